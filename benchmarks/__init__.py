@@ -1,0 +1,1 @@
+"""What a step costs, and how that grows with the number of agents."""

@@ -1,0 +1,1 @@
+"""How agents fuzzify, predict, decide and learn, and what that costs."""

@@ -1,0 +1,1 @@
+"""Where agents act: robots, boxes, sensors, failures and tasks."""

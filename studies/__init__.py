@@ -1,0 +1,1 @@
+"""What is measured: specs, trials, store, statistics and reports."""

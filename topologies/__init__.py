@@ -1,0 +1,1 @@
+"""Who is above whom: builders, specs, checks and pictures of hierarchies."""
