@@ -1,0 +1,176 @@
+"""The house rules: import direction, symlinks, what may be committed, what a wheel holds."""
+
+import ast
+import os
+import re
+import subprocess
+import sys
+import zipfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+ALLOWED = {
+    "core": {"core"},
+    "topologies": {"topologies", "core"},
+    "scenarios": {"scenarios", "core"},
+    "studies": {"studies", "core", "topologies", "scenarios"},
+}
+MAX_BYTES = 1_000_000
+
+
+def imported_modules(source: str, module: str, *, is_package: bool) -> Iterator[tuple[int, str]]:
+    """Line and absolute dotted name of everything that a module imports."""
+    package = module.split(".") if is_package else module.split(".")[:-1]
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield node.lineno, alias.name
+        elif isinstance(node, ast.ImportFrom):
+            start = package[: len(package) - node.level + 1] if node.level else []
+            stem = ".".join([*start, *filter(None, [node.module])])
+            # `from .. import core` imports a package, `from ..core import x` a name of one.
+            for alias in node.names:
+                yield node.lineno, f"{stem}.{alias.name}"
+
+
+def forbidden_imports(source: str, module: str, *, is_package: bool = False) -> list[str]:
+    """What a module of one of the four packages imports of ours and may not."""
+    package = module.split(".")[1]
+    found = []
+    for line, name in imported_modules(source, module, is_package=is_package):
+        first, _, rest = name.partition(".")
+        ours = rest.split(".")[0]
+        if first in ALLOWED:
+            found.append(f"{module}:{line} imports {name}; write nested_agents.{first} relatively")
+        elif first == "nested_agents" and ours not in ALLOWED[package]:
+            found.append(f"{module}:{line} imports {name}; {package} may not")
+    return found
+
+
+def modules_of(package: str) -> Iterator[tuple[Path, str]]:
+    for path in sorted((ROOT / package).rglob("*.py")):
+        parts = path.relative_to(ROOT).with_suffix("").parts
+        is_package = parts[-1] == "__init__"
+        yield path, ".".join(["nested_agents", *(parts[:-1] if is_package else parts)])
+
+
+@pytest.mark.parametrize("package", ALLOWED)
+def test_imports_point_one_way(package: str) -> None:
+    found = []
+    for path, module in modules_of(package):
+        source = path.read_text(encoding="utf-8")
+        found += forbidden_imports(source, module, is_package=path.name == "__init__.py")
+    assert not found, "\n".join(found)
+
+
+@pytest.mark.parametrize(
+    ("module", "source"),
+    [
+        ("nested_agents.core.team", "from ..scenarios import Box"),
+        ("nested_agents.core.team", "from .. import studies"),
+        ("nested_agents.core.team", "from .. import Team"),
+        ("nested_agents.core.team", "import nested_agents"),
+        ("nested_agents.core.team", "import nested_agents.topologies.chain as c"),
+        ("nested_agents.core.team", "import core"),
+        ("nested_agents.topologies.chain", "def f():\n    from ..scenarios.box import Box"),
+        ("nested_agents.scenarios.box", "from nested_agents.topologies import chain"),
+        ("nested_agents.scenarios.parts.box", "from ...studies import cli"),
+    ],
+)
+def test_a_forbidden_import_is_found(module: str, source: str) -> None:
+    assert len(forbidden_imports(source, module)) == 1
+
+
+@pytest.mark.parametrize(
+    ("module", "source"),
+    [
+        ("nested_agents.core.team", "import numpy as np\nfrom .rules import RuleBase"),
+        ("nested_agents.topologies.chain", "from ..core.hierarchy import Hierarchy"),
+        ("nested_agents.topologies.chain", "from ..core import Hierarchy\nfrom . import tree"),
+        ("nested_agents.studies.cli", "from ..scenarios import Box\nfrom ..topologies import tree"),
+    ],
+)
+def test_an_allowed_import_is_not(module: str, source: str) -> None:
+    assert forbidden_imports(source, module) == []
+
+
+@pytest.mark.parametrize("package", ALLOWED)
+def test_symlinks_are_relative_and_resolve(package: str) -> None:
+    link = ROOT / "nested_agents" / package
+    assert os.readlink(link) == f"../{package}"
+    assert link.resolve() == ROOT / package
+    assert (link / "__init__.py").is_file()
+
+
+@pytest.fixture(scope="module")
+def tracked() -> list[Path]:
+    git = subprocess.run(
+        ["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    if git.returncode:
+        pytest.skip("not a git checkout")
+    paths = [ROOT / name for name in git.stdout.split("\0") if name]
+    return [path for path in paths if path.is_file()]
+
+
+def test_tracked_files_are_small(tracked: list[Path]) -> None:
+    large = {str(p.relative_to(ROOT)): p.stat().st_size for p in tracked}
+    assert {name: size for name, size in large.items() if size > MAX_BYTES} == {}
+
+
+def test_tracked_files_name_no_place_of_the_machine(tracked: list[Path]) -> None:
+    # Written in pieces, so that this file passes its own test.
+    absolute = re.compile("|".join(re.escape("/" + top + "/") for top in ("work", "root")).encode())
+    found = [str(p.relative_to(ROOT)) for p in tracked if absolute.search(p.read_bytes())]
+    assert found == []
+
+
+def test_tracked_files_configure_no_index(tracked: list[Path]) -> None:
+    option = re.compile(r"(--|\[tool\.uv\.|^|\s)(extra-)?index(-url)?[ =\]]+\S*://", re.MULTILINE)
+    found = []
+    for path in tracked:
+        if path.suffix in {".toml", ".lock", ".txt", ".cfg", ".sh", ".yml", ""}:
+            text = path.read_text(encoding="utf-8", errors="ignore")
+            found += [str(path.relative_to(ROOT))] if option.search(text) else []
+    assert found == []
+
+
+def test_the_lock_has_hashes_and_no_host() -> None:
+    lock = (ROOT / "requirements.lock").read_text(encoding="utf-8")
+    assert "://" not in lock
+    pinned = re.findall(r"^[a-z0-9][\w.-]*==\S+.*(?:\n    --hash=.*)*", lock, re.MULTILINE)
+    assert pinned
+    assert [entry for entry in pinned if "--hash=sha256:" not in entry] == []
+
+
+def test_host_naming_locks_are_not_tracked(tracked: list[Path]) -> None:
+    assert [p.name for p in tracked if p.name == "uv.lock" or p.name.startswith("pylock")] == []
+
+
+@pytest.mark.slow
+def test_the_wheel_holds_the_four_packages(tmp_path: Path, tracked: list[Path]) -> None:
+    checkout = tmp_path / "checkout"
+    for path in tracked:  # a copy, so that the build leaves nothing in the checkout
+        copy = checkout / path.relative_to(ROOT)
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        copy.write_bytes(path.read_bytes())
+    (checkout / "nested_agents").mkdir(exist_ok=True)
+    for package in ALLOWED:
+        (checkout / "nested_agents" / package).symlink_to(f"../{package}")
+    command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-index"]
+    command += ["--no-build-isolation", "--wheel-dir", str(tmp_path), str(checkout)]
+    subprocess.run(command, check=True, stdin=subprocess.DEVNULL, timeout=120)
+    (wheel,) = tmp_path.glob("nested_agents-*.whl")
+    names = set(zipfile.ZipFile(wheel).namelist())
+    sources = {
+        f"nested_agents/{path.relative_to(ROOT).as_posix()}"
+        for path in tracked
+        if path.suffix == ".py" and path.relative_to(ROOT).parts[0] in ALLOWED
+    }
+    assert sources
+    assert sources <= names
+    assert {"nested_agents/__main__.py", "nested_agents/py.typed"} <= names
+    assert {name.split("/")[0] for name in names if ".dist-info" not in name} == {"nested_agents"}
