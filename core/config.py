@@ -1,0 +1,131 @@
+"""The settings of a learner, as they stand in the ``[learner]`` table of a spec.
+
+Each model refuses unknown keys and values outside the stated ranges when it is built.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Fraction = Annotated[float, Field(ge=0, le=1)]
+
+
+class Settings(BaseModel):
+    """A frozen model that refuses unknown keys."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class RuleBaseSettings(Settings):
+    """The fuzzy rule base that every agent holds (Section IV-B)."""
+
+    membership: Literal["triangular", "sigmoid"] = "triangular"
+    """Shape of the membership functions; the paper's are differences of sigmoids (Eq. 6)."""
+    memberships: Annotated[int, Field(ge=2, le=15)] | None = None
+    """Membership functions per variable, spread evenly; none: the state space's own centres."""
+    steepness: Positive = 8.0
+    """Sigmoid slope times the distance of neighbouring centres (c_j of Eq. 6, dimensionless)."""
+    order: Annotated[int, Field(ge=1, le=12)] = 1
+    """Variables per rule: 1 sums one-variable rule bases, d is the paper's full product."""
+    products: tuple[tuple[str, ...], ...] = ()
+    """Further products of variables by name, summed to those of `order`."""
+
+
+class PaperExploration(Settings):
+    """Epsilon-decreasing with a diminishing temperature (Section V).
+
+    The temperature is ``T(t) = 1 + T_max exp(-s t)``; with probability
+    ``epsilon (T(t) - 1) / (T_max - 1)``, cut off at 1, an agent explores.
+    """
+
+    kind: Literal["paper"] = "paper"
+    epsilon: Fraction = 1.0
+    """Exploration rate at the start; not printed in the paper."""
+    max_temperature: Annotated[float, Field(gt=1)] = 100.0
+    """T_max; not printed in the paper."""
+    decay: NonNegative = 0.005
+    """s per step, printed in Section IX."""
+    clock: Literal["episode", "run"] = "run"
+    """Whether t counts the steps of the episode or of the whole run; not stated in the paper."""
+    exploit: Literal["greatest", "sample"] = "greatest"
+    """Take the action of greatest probability (Section V), or sample Eq. 14."""
+    explore: Literal["uniform", "boltzmann"] = "uniform"
+    """How the "random action" of the other case is drawn; not stated in the paper."""
+
+
+class BurstExploration(Settings):
+    """Random actions that are held for a while, at a rate that falls from episode to episode.
+
+    The fraction of explorative decisions in episode ``k`` is ``max(floor, rate * decay ** k)``.
+    """
+
+    kind: Literal["burst"] = "burst"
+    rate: Fraction = 0.3
+    decay: Fraction = 0.75
+    floor: Fraction = 0.02
+    length: Annotated[float, Field(ge=1)] = 4.0
+    """Mean number of decisions for which a random action is repeated."""
+
+
+class Decision(Settings):
+    """How values become a joint action."""
+
+    rule: Literal["value", "reward", "reward-and-value", "random"] = "value"
+    """Decide by f of the predicted state, by predicted reward, by their discounted sum, or not."""
+    others: Literal["max", "mean", "observed"] = "max"
+    """What the agents below are expected to do: the best for this agent, anything with equal
+    chance, or what they were seen to do so far (the paper's "stochastically observing")."""
+    evaluator: Literal["auto", "exact", "sampling"] = "auto"
+    """Enumerate all joint actions, or a random sample of them; auto: exact up to `exact_up_to`."""
+    samples: Annotated[int, Field(ge=1)] = 64
+    """Joint actions of the agents below tried with each own action when sampling."""
+    exact_up_to: Annotated[int, Field(ge=1, le=10)] = 5
+    """Agents that may still be free when `evaluator` is auto and enumeration is exact."""
+
+
+class LearnerSettings(Settings):
+    """What all learners share."""
+
+    rule_base: RuleBaseSettings = RuleBaseSettings()
+    discount: Annotated[float, Field(ge=0, lt=1)] = 0.95
+    """gamma of Eq. 7."""
+    exploration: Annotated[PaperExploration | BurstExploration, Field(discriminator="kind")] = (
+        BurstExploration()
+    )
+    decision: Decision = Decision()
+
+
+class TDLambdaSettings(LearnerSettings):
+    """Online TD(lambda), Eq. 7-13."""
+
+    kind: Literal["td-lambda"] = "td-lambda"
+    step_size: Positive = 0.00012
+    """alpha of Eq. 13."""
+    trace_decay: Fraction = 0.4
+    """lambda of Eq. 8."""
+
+
+class BatchTDSettings(LearnerSettings):
+    """Batch TD(0) by ridge regression on all experience, after every episode."""
+
+    kind: Literal["batch-td"] = "batch-td"
+    ridge: Positive = 10.0
+    """Weight of the squared consequents against squared errors of rewards scaled by 100."""
+    sweeps: Annotated[int, Field(ge=1)] = 30
+    """Regressions on freshly discounted targets after every episode."""
+
+
+class FrozenSettings(LearnerSettings):
+    """No learning: the consequents stay zero. The control of every learning curve."""
+
+    kind: Literal["frozen"] = "frozen"
+
+
+Learner = Annotated[
+    TDLambdaSettings | BatchTDSettings | FrozenSettings, Field(discriminator="kind")
+]
+"""Any learner's settings, told apart by `kind`."""

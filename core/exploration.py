@@ -1,0 +1,151 @@
+"""From the values of an agent's actions to one action (Section V).
+
+An explorer serves all agents of a team. It is told when an episode begins and when a step has
+been decided; it is asked for one action at a time. Everything random comes from the generator that
+is passed in; exact ties are broken at random, since they are common (maintaining and zeroing a
+resting wheel lead to the same state).
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from .config import BurstExploration, PaperExploration
+from .protocols import FloatArray
+
+
+def boltzmann(values: FloatArray, temperature: float) -> FloatArray:
+    """Return the Boltzmann distribution over actions (Eq. 14).
+
+    >>> boltzmann(np.array([0.0, np.log(3.0)]), 1.0).round(2).tolist()
+    [0.25, 0.75]
+    """
+    weights = np.exp((values - values.max()) / temperature)
+    return weights / weights.sum()
+
+
+def greatest(values: FloatArray, rng: np.random.Generator) -> int:
+    """Return the index of the greatest value, ties (to 1e-12 of its size) broken at random."""
+    top = float(values.max())
+    best = np.flatnonzero(values >= top - 1e-12 * max(1.0, abs(top)))
+    return int(best[0] if len(best) == 1 else best[int(rng.integers(len(best)))])
+
+
+class Explorer(Protocol):
+    """Chooses actions; its whole memory is one array."""
+
+    memory: FloatArray
+
+    def begin_episode(self) -> None:
+        """Note that an episode begins."""
+
+    def choose(self, agent: int, values: FloatArray, rng: np.random.Generator) -> int:
+        """Return the action of `agent` given the values ``(A,)`` of its actions."""
+
+    def advance(self) -> None:
+        """Note that all agents have decided this step."""
+
+
+class Greedy:
+    """Always the action of greatest value."""
+
+    def __init__(self) -> None:
+        self.memory = np.zeros(0)
+
+    def begin_episode(self) -> None:
+        """Nothing depends on time."""
+
+    def advance(self) -> None:
+        """Nothing depends on time."""
+
+    def choose(self, agent: int, values: FloatArray, rng: np.random.Generator) -> int:
+        """Return the greatest action."""
+        return greatest(values, rng)
+
+
+class EpsilonDecreasingBoltzmann:
+    """The paper's epsilon-decreasing exploration with a diminishing temperature (Section V)."""
+
+    def __init__(self, settings: PaperExploration) -> None:
+        self.settings = settings
+        self.memory = np.zeros(1)  # t, the steps counted by the clock
+
+    @property
+    def temperature(self) -> float:
+        """T(t) = 1 + T_max exp(-s t)."""
+        s = self.settings
+        return 1.0 + s.max_temperature * float(np.exp(-s.decay * self.memory[0]))
+
+    @property
+    def rate(self) -> float:
+        """Exploration probability epsilon (T(t) - 1) / (T_max - 1), at most 1."""
+        s = self.settings
+        return min(1.0, s.epsilon * (self.temperature - 1.0) / (s.max_temperature - 1.0))
+
+    def begin_episode(self) -> None:
+        """Restart the clock if it counts the steps of the episode."""
+        if self.settings.clock == "episode":
+            self.memory[0] = 0.0
+
+    def advance(self) -> None:
+        """Let the clock tick."""
+        self.memory[0] += 1.0
+
+    def choose(self, agent: int, values: FloatArray, rng: np.random.Generator) -> int:
+        """Exploit with probability 1 - rate, else explore, each as the settings say."""
+        if rng.random() < self.rate:
+            if self.settings.explore == "uniform":
+                return int(rng.integers(len(values)))
+        elif self.settings.exploit == "greatest":
+            # Eq. 14 is increasing in the value: the greatest probability is the greatest value.
+            return greatest(values, rng)
+        return int(rng.choice(len(values), p=boltzmann(values, self.temperature)))
+
+
+class Bursts:
+    """Random actions held for a geometric number of decisions, less often in later episodes."""
+
+    def __init__(self, settings: BurstExploration, n_agents: int) -> None:
+        self.settings = settings
+        # The episode, then per agent: decisions left in its burst, the action held.
+        self.memory = np.zeros(1 + 2 * n_agents)
+        self.memory[0] = -1.0
+
+    @property
+    def rate(self) -> float:
+        """Fraction of decisions that are explorative in this episode."""
+        s = self.settings
+        return max(s.floor, s.rate * s.decay ** max(0.0, self.memory[0]))
+
+    def begin_episode(self) -> None:
+        """Count the episode and end every burst."""
+        self.memory[0] += 1.0
+        self.memory[1:] = 0.0
+
+    def advance(self) -> None:
+        """Bursts run down in `choose`."""
+
+    def choose(self, agent: int, values: FloatArray, rng: np.random.Generator) -> int:
+        """Return the held action, start a burst, or take the greatest."""
+        at = 1 + 2 * agent
+        if self.memory[at] > 0:
+            self.memory[at] -= 1.0
+            return int(self.memory[at + 1])
+        length, rate = self.settings.length, self.rate
+        # Starting with probability p a burst of mean length l makes l p / (1 - p + l p)
+        # of all decisions explorative; solved for p at the wanted rate.
+        if rng.random() < rate / (length - rate * (length - 1.0)):
+            action = int(rng.integers(len(values)))
+            self.memory[at] = rng.geometric(1.0 / length) - 1
+            self.memory[at + 1] = action
+            return action
+        return greatest(values, rng)
+
+
+def build_explorer(settings: PaperExploration | BurstExploration, n_agents: int) -> Explorer:
+    """Build the explorer that `settings` describe."""
+    if isinstance(settings, PaperExploration):
+        return EpsilonDecreasingBoltzmann(settings)
+    return Bursts(settings, n_agents)

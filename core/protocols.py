@@ -1,0 +1,127 @@
+"""What a learner may know of the world: the protocols that a scenario and its predictor fulfil.
+
+Conventions. ``n`` agents, ``d`` state variables, ``A`` actions. A joint action is an integer array
+``(n,)`` in agent order. Its *code* is that array read as a number in base ``A``, the first agent
+being the most significant digit; tables over all joint actions are indexed by code. Groups are
+blocks of consecutive agents that move one body (the wheels of a robot); the digits of one group
+read as a number are its *local code*.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .spaces import ActionSet, StateSpace
+
+FloatArray = NDArray[np.floating[Any]]
+IntArray = NDArray[np.integer[Any]]
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Next states of one agent for all joint actions, in their two blocks.
+
+    Attributes
+    ----------
+    own
+        ``(A ** w, n_own)`` own variables by the local code of the agent's group of ``w`` agents.
+    shared
+        ``(A ** n, d - n_own)`` shared variables by joint-action code.
+    divisor
+        The local code of joint-action code ``c`` is ``c // divisor % len(own)``.
+    """
+
+    own: FloatArray
+    shared: FloatArray
+    divisor: int
+
+
+class Prediction(Protocol):
+    """What joint actions taken now would lead to. Valid until the scenario's next step."""
+
+    def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
+        """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
+        ...
+
+    def rewards(self, joint_actions: IntArray) -> FloatArray:
+        """Return the predicted rewards ``(m,)`` of joint actions ``(m, n)``."""
+        ...
+
+    def blocks(self, agent: int) -> Blocks:
+        """Return the next states of `agent` for all ``A ** n`` joint actions."""
+        ...
+
+    def reward_table(self) -> FloatArray:
+        """Return the predicted rewards ``(A ** n,)`` of all joint actions by code."""
+        ...
+
+
+@dataclass(frozen=True)
+class Transition:
+    """What one step of a scenario returns.
+
+    Attributes
+    ----------
+    states
+        ``(n, d)`` states of the agents after the step.
+    reward
+        Reward received on entering these states, the same for every agent.
+    terminated
+        Whether the task is solved (or lost) for good.
+    truncated
+        Whether the episode ends for lack of time.
+    info
+        Measurements of the step by name, scalars or small arrays; for records, not for learners.
+    """
+
+    states: FloatArray
+    reward: float
+    terminated: bool
+    truncated: bool
+    info: Mapping[str, Any]
+
+
+@runtime_checkable
+class Scenario(Protocol):
+    """A world with a task. Everything a learner may know of it."""
+
+    @property
+    def agents(self) -> tuple[str, ...]:
+        """Names of the agents, in agent order."""
+        ...
+
+    @property
+    def groups(self) -> tuple[tuple[int, ...], ...]:
+        """Agents by body, consecutive; together all agents in order."""
+        ...
+
+    @property
+    def state_space(self) -> StateSpace:
+        """The state variables of every agent."""
+        ...
+
+    @property
+    def action_set(self) -> ActionSet:
+        """The actions of every agent."""
+        ...
+
+    def reset(self, seed: int | np.random.SeedSequence) -> FloatArray:
+        """Start an episode; everything random in it follows from `seed`. Return states (n, d)."""
+        ...
+
+    def step(self, joint_action: IntArray) -> Transition:
+        """Carry out a joint action ``(n,)`` for one decision period."""
+        ...
+
+    def predict(self) -> Prediction:
+        """Predict from the present state."""
+        ...
+
+    def measure(self) -> Mapping[str, Any]:
+        """Return the measurements of the present state, as in `Transition.info`."""
+        ...

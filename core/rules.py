@@ -1,0 +1,136 @@
+"""Fuzzy rule bases as linear value functions (Section IV-B, Eq. 9).
+
+A rule base is a sum of *terms*. A term is a set of state variables; it holds one rule for every
+combination of their membership functions, whose firing strength is the product of the membership
+degrees. Since each partition sums to one, so do the firing strengths of a term. Order d (one term
+over all variables, 5^7 rules) is the paper's rule base; order 1 (one term per variable, 35 rules)
+is a sum of one-variable functions.
+
+The consequent weights theta of one agent are a flat array ``(n_rules,)``: the terms one after the
+other, each in C order of its variables. The feature vector phi is the concatenation of the firing
+strengths; it is built explicitly by `RuleBase.features` only, for tests and tables.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+
+from . import kernels
+from .config import RuleBaseSettings
+from .fuzzy import Partition
+from .protocols import Blocks, FloatArray, IntArray
+from .spaces import StateSpace
+
+
+class RuleBase:
+    """A sum of fuzzy rule bases over subsets of the state variables.
+
+    Parameters
+    ----------
+    partitions
+        One partition per state variable, all of one membership shape.
+    terms
+        Index tuples into the variables, each increasing, all distinct.
+    n_own
+        How many leading variables form the own block (see `nested_agents.core.spaces`).
+
+    Examples
+    --------
+    The paper's example (Section IV-B): three variables with LOW and HIGH give eight rules.
+
+    >>> low_high = Partition((0.0, 1.0), "triangular")
+    >>> base = RuleBase([low_high] * 3, [(0, 1, 2)])
+    >>> base.n_rules, base.features(np.array([[0.0, 0.0, 0.25]])).round(2).tolist()
+    (8, [[0.75, 0.25, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]])
+    """
+
+    def __init__(
+        self, partitions: Sequence[Partition], terms: Sequence[tuple[int, ...]], n_own: int = 0
+    ) -> None:
+        d = len(partitions)
+        for term in terms:
+            if not term or list(term) != sorted(set(term)) or not 0 <= term[0] <= term[-1] < d:
+                raise ValueError(f"rule base: term {term} must increase within 0 to {d - 1}")
+        if not terms or len(set(terms)) != len(terms):
+            raise ValueError(f"rule base: terms {list(terms)} must be distinct and at least one")
+        self.partitions = tuple(partitions)
+        self.terms = tuple(terms)
+        self.n_own = n_own
+        self.sizes = tuple(
+            int(np.prod([self.partitions[j].size for j in term])) for term in self.terms
+        )
+        self.n_rules = sum(self.sizes)
+        self.layout = kernels.layout(self.partitions, self.terms, n_own)
+        self.compact = self.partitions[0].membership == "triangular"
+
+    @classmethod
+    def build(cls, space: StateSpace, settings: RuleBaseSettings) -> RuleBase:
+        """Build the rule base of `settings` over a state space.
+
+        Raises
+        ------
+        ValueError
+            If the order exceeds the number of variables or a product names an unknown variable.
+        """
+        names = [v.name for v in space.variables]
+        if settings.order > len(names):
+            raise ValueError(
+                f"learner.rule_base.order = {settings.order}, allowed 1 to {len(names)} in state "
+                f"space {space.name!r}"
+            )
+        terms = list(combinations(range(len(names)), settings.order))
+        for product in settings.products:
+            unknown = [name for name in product if name not in names]
+            if unknown:
+                raise ValueError(
+                    f"learner.rule_base.products: unknown variable {unknown[0]!r}, known: "
+                    f"{', '.join(names)}"
+                )
+            terms.append(tuple(sorted(names.index(name) for name in product)))
+        partitions = [
+            Partition.of(v, settings.membership, settings.memberships, settings.steepness)
+            for v in space.variables
+        ]
+        return cls(partitions, list(dict.fromkeys(terms)), space.n_own)
+
+    def features(self, states: FloatArray) -> FloatArray:
+        """Return phi ``(m, n_rules)`` of states ``(m, d)`` explicitly: the twin of every kernel."""
+        strengths = [p.strengths(states[:, j]) for j, p in enumerate(self.partitions)]
+        parts = []
+        for term in self.terms:
+            product = np.ones((len(states), 1))
+            for j in term:
+                product = (product[:, :, None] * strengths[j][:, None, :]).reshape(len(states), -1)
+            parts.append(product)
+        return np.concatenate(parts, axis=1)
+
+    def values(self, theta: FloatArray, states: FloatArray) -> FloatArray:
+        """Return f ``(m,)`` of states ``(m, d)`` for one agent's consequent weights (Eq. 9)."""
+        states = np.ascontiguousarray(states, dtype=float)
+        if self.compact:
+            return kernels.values_compact(theta, states, self.layout)
+        return kernels.values_dense(theta, states, self.layout)
+
+    def active(self, states: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Return rules ``(m, k)`` and their firing strengths ``(m, k)``; the others are zero.
+
+        For triangular partitions ``k`` is the sum of ``2 ** len(term)`` over the terms; for
+        sigmoid ones all rules are active.
+        """
+        states = np.ascontiguousarray(states, dtype=float)
+        if self.compact:
+            return kernels.active_compact(states, self.layout)
+        strengths = self.features(states)
+        return np.broadcast_to(np.arange(self.n_rules), strengths.shape), strengths
+
+    def block_values(self, theta: FloatArray, blocks: Blocks, codes: IntArray) -> FloatArray:
+        """Return f ``(len(codes),)`` of the next states that joint-action `codes` lead to.
+
+        The own part of theta is contracted once per distinct own block (sigmoid), or looked up
+        (triangular); the feature vector of a joint action is never built.
+        """
+        kernel = kernels.block_values_compact if self.compact else kernels.block_values_dense
+        return kernel(theta, blocks.own, blocks.shared, blocks.divisor, codes, self.layout)

@@ -1,0 +1,197 @@
+"""A team: a hierarchy of agents that decide together and learn each on its own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from .config import Decision
+from .config import Learner as LearnerSettings
+from .evaluators import Evaluator, ExactEnumeration, Sampling
+from .exploration import Explorer, Greedy, build_explorer
+from .hierarchy import Hierarchy
+from .learners import Learner, build_learner
+from .protocols import FloatArray, IntArray, Prediction, Scenario
+from .rules import RuleBase
+from .spaces import ActionSet
+
+
+class Team:
+    """Agents in a hierarchy, one rule base and one row of consequent weights each.
+
+    Use `Team.build` to make one from settings.
+
+    Parameters
+    ----------
+    hierarchy
+        Who decides before whom, and sees whom.
+    action_set
+        What each agent can do.
+    learner
+        Owns the consequent weights.
+    explorer
+        Chooses actions by value.
+    evaluator
+        Values actions; none: actions are drawn at random.
+    seed
+        Source of everything random in the team.
+    """
+
+    def __init__(
+        self,
+        hierarchy: Hierarchy,
+        action_set: ActionSet,
+        learner: Learner,
+        explorer: Explorer,
+        evaluator: ExactEnumeration | Sampling | None,
+        seed: np.random.SeedSequence,
+    ) -> None:
+        self.hierarchy, self.action_set = hierarchy, action_set
+        self.learner, self.explorer, self.evaluator = learner, explorer, evaluator
+        self.rng = np.random.Generator(np.random.PCG64(seed))
+        # How often each agent was seen to take each action; one of each to begin with.
+        self._seen: FloatArray = np.ones((len(hierarchy), len(action_set)))
+        self._greedy = Greedy()
+
+    @classmethod
+    def build(
+        cls,
+        settings: LearnerSettings,
+        scenario: Scenario,
+        hierarchy: Hierarchy,
+        seed: np.random.SeedSequence,
+    ) -> Team:
+        """Build the team of `settings` for the agents of a scenario.
+
+        Raises
+        ------
+        ValueError
+            If the hierarchy is over other agents than the scenario's, or the settings do not fit
+            its state space.
+        """
+        if hierarchy.agents != scenario.agents:
+            raise ValueError(
+                f"topology: agents {', '.join(hierarchy.agents)} are not the scenario's "
+                f"{', '.join(scenario.agents)}"
+            )
+        rules = RuleBase.build(scenario.state_space, settings.rule_base)
+        n = len(hierarchy)
+        return cls(
+            hierarchy,
+            scenario.action_set,
+            build_learner(settings, rules, n),
+            build_explorer(settings.exploration, n),
+            _build_evaluator(settings.decision, rules, hierarchy, scenario, settings.discount),
+            seed,
+        )
+
+    def begin_episode(self) -> None:
+        """Note that an episode begins."""
+        self.explorer.begin_episode()
+        self.learner.begin_episode()
+
+    def act(self, prediction: Prediction, *, explore: bool = True) -> IntArray:
+        """Decide a joint action ``(n,)``, from the top of the hierarchy down.
+
+        Without `explore` every agent takes its greatest action and the team's memory stays as it
+        is, apart from the random numbers that break ties.
+        """
+        n, n_actions = len(self.hierarchy), len(self.action_set)
+        if self.evaluator is None:
+            return self.rng.integers(n_actions, size=n)
+        explorer: Explorer = self.explorer if explore else self._greedy
+        frequencies = self._seen / self._seen.sum(axis=1, keepdims=True)
+        joint = np.full(n, self.action_set.neutral)
+        for i in self.hierarchy.order:
+            known = np.full(n, self.action_set.neutral)
+            above = list(self.hierarchy.above(i))
+            known[above] = joint[above]
+            values = self.evaluator.values(
+                i, known, self.learner.theta[i], prediction, frequencies, self.rng
+            )
+            joint[i] = explorer.choose(i, values, self.rng)
+        if explore:
+            explorer.advance()
+            self._seen[np.arange(n), joint] += 1.0
+        return joint
+
+    def learn(self, states: FloatArray, reward: float, terminated: bool) -> None:
+        """Take in the states ``(n, d)`` entered, with their reward."""
+        self._count(self.learner.observe(states, reward, terminated))
+
+    def end_episode(self) -> None:
+        """Learn what is learned after an episode."""
+        self._count(self.learner.end_episode())
+
+    def _count(self, updates: int) -> None:
+        if self.evaluator is not None:
+            self.evaluator.counts.weight_updates += updates
+
+    def save(self, path: Path | str) -> None:
+        """Write everything that the team remembers to an ``.npz`` file: arrays only."""
+        with open(path, "wb") as file:
+            np.savez(file, **self.arrays())
+
+    def load(self, path: Path | str) -> None:
+        """Continue from what `save` wrote; the team must be built from the same settings.
+
+        Raises
+        ------
+        ValueError
+            If the file is not of a team of this shape.
+        """
+        with np.load(path, allow_pickle=False) as arrays:
+            self.restore(dict(arrays))
+
+    def arrays(self) -> dict[str, FloatArray]:
+        """Return everything that the team remembers as named arrays."""
+        state = self.rng.bit_generator.state
+        words = [state["state"]["state"], state["state"]["inc"]]
+        generator = [word >> shift & (2**64 - 1) for word in words for shift in (64, 0)]
+        generator += [state["has_uint32"], state["uinteger"]]
+        learner = {f"learner.{name}": array for name, array in self.learner.arrays().items()}
+        return {
+            "generator": np.array(generator, dtype=np.uint64),
+            "explorer": self.explorer.memory,
+            "seen": self._seen,
+            **learner,
+        }
+
+    def restore(self, arrays: Mapping[str, FloatArray]) -> None:
+        """Continue from what `arrays` returned."""
+        theta = arrays.get("learner.theta")
+        if theta is None or theta.shape != self.learner.theta.shape:
+            found = None if theta is None else theta.shape
+            raise ValueError(
+                f"team: saved weights have shape {found}, this team's {self.learner.theta.shape}"
+            )
+        words = [int(word) for word in arrays["generator"]]
+        self.rng.bit_generator.state = {
+            "bit_generator": "PCG64",
+            "state": {"state": words[0] << 64 | words[1], "inc": words[2] << 64 | words[3]},
+            "has_uint32": words[4],
+            "uinteger": words[5],
+        }
+        self.explorer.memory[:] = arrays["explorer"]
+        self._seen = arrays["seen"].copy()
+        prefix = "learner."
+        self.learner.restore(
+            {k.removeprefix(prefix): v for k, v in arrays.items() if k.startswith(prefix)}
+        )
+
+
+def _build_evaluator(
+    decision: Decision, rules: RuleBase, hierarchy: Hierarchy, scenario: Scenario, discount: float
+) -> ExactEnumeration | Sampling | None:
+    if decision.rule == "random":
+        return None
+    common = (rules, hierarchy, len(scenario.action_set), decision.rule, decision.others, discount)
+    small = len(hierarchy) <= decision.exact_up_to
+    if decision.evaluator == "exact" or (decision.evaluator == "auto" and small):
+        return ExactEnumeration(*common)
+    return Sampling(decision.samples, *common)
+
+
+__all__ = ["Evaluator", "Team"]
