@@ -3,6 +3,7 @@
 import ast
 import os
 import re
+import shutil
 import subprocess
 import sys
 import zipfile
@@ -148,6 +149,38 @@ def test_the_lock_has_hashes_and_no_host() -> None:
 
 def test_host_naming_locks_are_not_tracked(tracked: list[Path]) -> None:
     assert [p.name for p in tracked if p.name == "uv.lock" or p.name.startswith("pylock")] == []
+
+
+@pytest.mark.parametrize(
+    ("environment", "complaint"),
+    [
+        ({"PYTHON": "no-such-python"}, "needs python3 >= 3.11, found none"),
+        ({"CXX": "no-such-compiler"}, "needs a C++ compiler (no-such-compiler)"),
+    ],
+)
+def test_dev_says_in_one_line_what_the_machine_lacks(
+    tmp_path: Path, environment: dict[str, str], complaint: str
+) -> None:
+    for name in ("dev", "pyproject.toml", "requirements.lock"):
+        shutil.copy(ROOT / name, tmp_path)
+    run = subprocess.run(
+        [tmp_path / "dev", "setup"],
+        env={**os.environ, **environment},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (run.returncode, run.stdout) == (2, "")
+    assert run.stderr.startswith(f"dev: {complaint}")
+    assert run.stderr.count("\n") == 1
+    assert not (tmp_path / ".venv").exists()
+
+
+def test_dev_refuses_an_unknown_command() -> None:
+    run = subprocess.run([ROOT / "dev", "tset"], capture_output=True, text=True, check=False)
+    assert run.returncode == 2
+    assert run.stderr.splitlines()[-1] == "dev: unknown command 'tset'"
 
 
 @pytest.mark.slow
