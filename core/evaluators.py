@@ -13,8 +13,9 @@ from typing import Literal, Protocol
 
 import numpy as np
 
+from .arrays import FloatArray, IntArray
 from .hierarchy import Hierarchy
-from .protocols import FloatArray, IntArray, Prediction
+from .protocols import Prediction
 from .rules import RuleBase
 
 Rule = Literal["value", "reward", "reward-and-value"]

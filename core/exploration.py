@@ -12,8 +12,8 @@ from typing import Protocol
 
 import numpy as np
 
+from .arrays import FloatArray
 from .config import BurstExploration, PaperExploration
-from .protocols import FloatArray
 
 
 def boltzmann(values: FloatArray, temperature: float) -> FloatArray:
@@ -52,7 +52,7 @@ class Greedy:
     """Always the action of greatest value."""
 
     def __init__(self) -> None:
-        self.memory = np.zeros(0)
+        self.memory: FloatArray = np.zeros(0)
 
     def begin_episode(self) -> None:
         """Nothing depends on time."""
@@ -70,7 +70,7 @@ class EpsilonDecreasingBoltzmann:
 
     def __init__(self, settings: PaperExploration) -> None:
         self.settings = settings
-        self.memory = np.zeros(1)  # t, the steps counted by the clock
+        self.memory: FloatArray = np.zeros(1)  # t, the steps counted by the clock
 
     @property
     def temperature(self) -> float:
@@ -110,7 +110,7 @@ class Bursts:
     def __init__(self, settings: BurstExploration, n_agents: int) -> None:
         self.settings = settings
         # The episode, then per agent: decisions left in its burst, the action held.
-        self.memory = np.zeros(1 + 2 * n_agents)
+        self.memory: FloatArray = np.zeros(1 + 2 * n_agents)
         self.memory[0] = -1.0
 
     @property

@@ -20,7 +20,7 @@ from typing import Literal
 
 import numpy as np
 
-from .protocols import FloatArray
+from .arrays import FloatArray
 from .spaces import Variable
 
 Membership = Literal["triangular", "sigmoid"]

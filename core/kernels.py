@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numba import njit
 
-from .protocols import FloatArray, IntArray
+from .arrays import FloatArray, IntArray
 
 if TYPE_CHECKING:
     from .fuzzy import Partition
@@ -44,9 +44,7 @@ class Layout(NamedTuple):
     n_own: int  # own variables
 
 
-def layout(
-    partitions: Sequence[Partition], terms: Sequence[tuple[int, ...]], n_own: int
-) -> Layout:
+def layout(partitions: Sequence[Partition], terms: Sequence[tuple[int, ...]], n_own: int) -> Layout:
     """Pack partitions and terms for the kernels."""
     d, t = len(partitions), len(terms)
     widest = max(len(p.knots) for p in partitions)
@@ -158,9 +156,7 @@ def _compact_value(theta, lay: Layout, lows, highs, shares) -> float:  # type: i
         if length == 1:
             j = lay.terms[t, 0]
             at = lay.offsets[t]
-            value += theta[at + lows[j]] + shares[j] * (
-                theta[at + highs[j]] - theta[at + lows[j]]
-            )
+            value += theta[at + lows[j]] + shares[j] * (theta[at + highs[j]] - theta[at + lows[j]])
             continue
         for corner in range(1 << length):
             weight, rule = 1.0, 0

@@ -15,7 +15,8 @@ from time import perf_counter
 
 import numpy as np
 
-from .protocols import FloatArray, IntArray, Scenario, Transition
+from .arrays import FloatArray, IntArray
+from .protocols import Scenario, Transition
 from .team import Team
 
 

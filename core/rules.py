@@ -19,9 +19,10 @@ from itertools import combinations
 import numpy as np
 
 from . import kernels
+from .arrays import FloatArray, IntArray
 from .config import RuleBaseSettings
 from .fuzzy import Partition
-from .protocols import Blocks, FloatArray, IntArray
+from .protocols import Blocks
 from .spaces import StateSpace
 
 

@@ -11,6 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from math import isfinite
 
+import numpy as np
+
+from .arrays import FloatArray, IntArray
+
 
 @dataclass(frozen=True)
 class Variable:
@@ -50,7 +54,7 @@ class Variable:
     def __post_init__(self) -> None:
         if not (isfinite(self.low) and isfinite(self.high) and self.low < self.high):
             raise ValueError(
-                f"variable {self.name!r}: range [{self.low}, {self.high}] must be finite, low < high"
+                f"variable {self.name!r}: range [{self.low}, {self.high}] must be finite and increase"
             )
         ordered = all(a < b for a, b in zip(self.centres, self.centres[1:], strict=False))
         inside = all(self.low <= c <= self.high for c in self.centres)
@@ -137,3 +141,26 @@ class ActionSet:
 
     def __len__(self) -> int:
         return len(self.names)
+
+    def apply(
+        self, speeds: FloatArray, actions: IntArray, unit: FloatArray, limit: FloatArray
+    ) -> FloatArray:
+        """Return the commanded speeds ``(..., n)`` after `actions` ``(..., n)``.
+
+        Parameters
+        ----------
+        speeds
+            ``(n,)`` commanded speeds before.
+        actions
+            Action indices.
+        unit, limit
+            ``(n,)`` what an increment changes, and the greatest speed.
+
+        Examples
+        --------
+        >>> ActionSet().apply(np.array([0.5, 0.1]), np.array([0, 3]), np.ones(2), np.ones(2))
+        array([1., 0.])
+        """
+        gains, increments = np.asarray(self.gains), np.asarray(self.increments)
+        wanted = gains[actions] * speeds + increments[actions] * unit
+        return np.clip(wanted, -limit, limit)

@@ -7,13 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
+from .arrays import FloatArray, IntArray
 from .config import Decision
 from .config import Learner as LearnerSettings
 from .evaluators import Evaluator, ExactEnumeration, Sampling
 from .exploration import Explorer, Greedy, build_explorer
 from .hierarchy import Hierarchy
 from .learners import Learner, build_learner
-from .protocols import FloatArray, IntArray, Prediction, Scenario
+from .protocols import Prediction, Scenario
 from .rules import RuleBase
 from .spaces import ActionSet
 
@@ -53,7 +54,7 @@ class Team:
         self.rng = np.random.Generator(np.random.PCG64(seed))
         # How often each agent was seen to take each action; one of each to begin with.
         self._seen: FloatArray = np.ones((len(hierarchy), len(action_set)))
-        self._greedy = Greedy()
+        self._greedy: Explorer = Greedy()
 
     @classmethod
     def build(
@@ -101,7 +102,7 @@ class Team:
         n, n_actions = len(self.hierarchy), len(self.action_set)
         if self.evaluator is None:
             return self.rng.integers(n_actions, size=n)
-        explorer: Explorer = self.explorer if explore else self._greedy
+        explorer = self.explorer if explore else self._greedy
         frequencies = self._seen / self._seen.sum(axis=1, keepdims=True)
         joint = np.full(n, self.action_set.neutral)
         for i in self.hierarchy.order:
@@ -132,7 +133,7 @@ class Team:
     def save(self, path: Path | str) -> None:
         """Write everything that the team remembers to an ``.npz`` file: arrays only."""
         with open(path, "wb") as file:
-            np.savez(file, **self.arrays())
+            np.savez(file, allow_pickle=False, **self.arrays())
 
     def load(self, path: Path | str) -> None:
         """Continue from what `save` wrote; the team must be built from the same settings.

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .protocols import Blocks, FloatArray, IntArray
+from .arrays import FloatArray, IntArray
+from .protocols import Blocks
 from .rules import RuleBase
 
 
@@ -17,9 +18,7 @@ def values(rules: RuleBase, theta: FloatArray, states: FloatArray) -> FloatArray
     return rules.features(states) @ theta
 
 
-def block_values(
-    rules: RuleBase, theta: FloatArray, blocks: Blocks, codes: IntArray
-) -> FloatArray:
+def block_values(rules: RuleBase, theta: FloatArray, blocks: Blocks, codes: IntArray) -> FloatArray:
     """Return f of joint-action codes, every next state written out."""
     own = blocks.own[codes // blocks.divisor % len(blocks.own)]
     return values(rules, theta, np.concatenate([own, blocks.shared[codes]], axis=1))

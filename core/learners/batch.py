@@ -14,8 +14,8 @@ import numpy as np
 from numba import njit
 from scipy.linalg import cho_factor, cho_solve
 
+from ..arrays import FloatArray, IntArray
 from ..config import BatchTDSettings
-from ..protocols import FloatArray, IntArray
 from ..rules import RuleBase
 
 REWARD_SCALE = 100.0
@@ -51,7 +51,7 @@ class BatchTD:
         self._rows: list[tuple[IntArray, FloatArray]] = []
 
     def begin_episode(self) -> None:
-        """The next after-state follows none."""
+        """Remember nothing more: the first after-state of an episode follows none."""
 
     def observe(self, states: FloatArray, reward: float, terminated: bool) -> int:
         """Remember an after-state."""
@@ -75,9 +75,7 @@ class BatchTD:
             factor = cho_factor(self._gram[i] + self.settings.ridge * np.eye(n_rules))
             theta = self.theta[i] * REWARD_SCALE
             for _ in range(self.settings.sweeps):
-                moment = _moment(
-                    theta, active, strengths, rewards, follower, gamma, low, high
-                )
+                moment = _moment(theta, active, strengths, rewards, follower, gamma, low, high)
                 theta = cho_solve(factor, moment, check_finite=False)
             self.theta[i] = theta / REWARD_SCALE
         return self.theta.size
@@ -117,7 +115,8 @@ class BatchTD:
         self._follower = [int(f) for f in arrays["follower"]]
         self._regressed = int(arrays["regressed"])
         past = arrays["states"][: self._regressed]
-        self._rows = [self.rules.active(past[:, i]) for i in range(len(self.theta))] if len(past) else []  # fmt: skip
+        agents = range(len(self.theta)) if len(past) else ()
+        self._rows = [self.rules.active(past[:, i]) for i in agents]
 
 
 @njit(cache=True)

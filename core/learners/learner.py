@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from ..protocols import FloatArray
+from ..arrays import FloatArray
 from ..rules import RuleBase
 
 

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from .. import kernels
+from ..arrays import FloatArray
 from ..config import TDLambdaSettings
-from ..protocols import FloatArray
 from ..rules import RuleBase
 
 

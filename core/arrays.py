@@ -1,0 +1,9 @@
+"""Array types: floating-point and integer NumPy arrays of any precision."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.floating[Any]]
+IntArray = NDArray[np.integer[Any]]

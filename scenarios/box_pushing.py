@@ -1,0 +1,190 @@
+"""Box pushing: wheels that learn to bring a box to a goal (Section IX-A).
+
+The scenario joins the world (robots, box, ground), the task (goal pose, reward, end of an
+episode), the sensing (states) and the servo layer, which turns actions into wheel speeds.
+"""
+
+from __future__ import annotations
+
+from math import pi
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from ..core.arrays import FloatArray, IntArray
+from ..core.protocols import Transition
+from ..core.spaces import ActionSet, StateSpace
+from .boxes import box_for
+from .config import ScenarioSettings
+from .geometry import surface
+from .infrared import strongest_reading
+from .prediction import BoxPrediction, Situation
+from .push import PushModel
+from .reward import reward
+from .robots import ROBOTS, compliance, nominal_effect
+from .starts import place
+from .state_spaces import STATE_SPACES, View
+from .world import CONTROL_PERIOD, World
+
+
+class BoxPushing:
+    """A box, a goal, and robots whose wheels are the agents.
+
+    Fulfils `nested_agents.core.protocols.Scenario`.
+
+    Parameters
+    ----------
+    settings
+        See `ScenarioSettings`.
+
+    Raises
+    ------
+    ValueError
+        If a robot, box or start is unknown, or the robots do not fit around the box.
+
+    Examples
+    --------
+    >>> scenario = BoxPushing(ScenarioSettings())
+    >>> scenario.agents
+    ('robot1.left', 'robot1.right', 'robot2.left', 'robot2.right')
+    >>> scenario.reset(0).shape
+    (4, 7)
+    """
+
+    def __init__(self, settings: ScenarioSettings) -> None:
+        self.settings = settings
+        self.robot = ROBOTS[settings.robot]
+        self.box = box_for(settings.box, settings.robots)
+        wheels = len(self.robot.wheels)
+        self.groups = tuple(
+            tuple(range(r * wheels, (r + 1) * wheels)) for r in range(settings.robots)
+        )
+        self.agents = tuple(
+            f"robot{r + 1}.{name}"
+            for r in range(settings.robots)
+            for name in self.robot.wheel_names
+        )
+        self.action_set = ActionSet()
+        self.world = World([self.robot] * settings.robots, self.box)
+        self._space = STATE_SPACES[settings.state_space]
+        self._limits: FloatArray = np.full(len(self.agents), self.robot.max_speed)
+        self._effects = (nominal_effect(self.robot),) * settings.robots
+        self._model = PushModel(
+            edges=self.box.outline.edges,
+            rounding=self.box.outline.rounding,
+            reach=self.box.reach,
+            radii=np.full(settings.robots, self.robot.radius),
+            compliance=np.stack([compliance(self.robot)] * settings.robots),
+            friction_force=self.box.friction_force,
+            friction_radius=self.box.friction_radius,
+            contact_friction=self.box.contact_friction,
+        )
+        self._goal: FloatArray = np.zeros(3)
+        self._speeds: FloatArray = np.zeros(len(self.agents))
+
+    @property
+    def state_space(self) -> StateSpace:
+        """The state variables of every agent."""
+        return self._space.space
+
+    def reset(self, seed: int | np.random.SeedSequence) -> FloatArray:
+        """Place robots, box and goal by the start distribution; return states ``(n, d)``."""
+        rng = np.random.default_rng(seed)
+        robots, box, self._goal = place(
+            self.settings.start, rng, [self.robot] * self.settings.robots, self.box
+        )
+        self.world.place(robots, box)
+        self._speeds = np.zeros(len(self.agents))
+        return self._observe()
+
+    def step(self, joint_action: IntArray) -> Transition:
+        """Command the wheels, let the world go on for one decision period, observe and reward."""
+        unit = self.settings.speed_increment * self._limits
+        self._speeds = self.action_set.apply(self._speeds, joint_action, unit, self._limits)
+        before = self._distance()
+        begin = perf_counter()
+        self.world.advance(self._speeds, self.settings.hold)
+        moved = perf_counter()
+        states = self._observe()
+        measured = self.measure()
+        readings = strongest_reading(self.world)
+        terminated = self._reached()
+        gained = reward(
+            self.settings.reward,
+            np.array([measured["distance_m"]]),
+            np.array([measured["distance_m"] - before]),
+            np.array([measured["orientation_rad"]]),
+            self.world.contact[None],
+            readings[None],
+        )
+        sensed = perf_counter()
+        if terminated:
+            measured["stopped_at_goal"] = self._stays()
+        measured["seconds"] = {"physics": moved - begin, "sensors": sensed - moved}
+        return Transition(states, float(gained[0]), terminated, False, measured)
+
+    def predict(self) -> BoxPrediction:
+        """Predict from the present state."""
+        return BoxPrediction(
+            Situation(
+                self.world.robot_poses.copy(), self.world.box_pose.copy(), self._goal,
+                self._speeds, self._effects, self.groups,
+            ),
+            self._model, self._space, self.action_set, self.settings.reward,
+            self.settings.hold * CONTROL_PERIOD, self.settings.speed_increment, self._limits,
+        )  # fmt: skip
+
+    def measure(self) -> dict[str, Any]:
+        """Return poses, speeds, contact and errors of the present state.
+
+        Keys: ``robot_poses`` (M, 3), ``box_pose``, ``goal_pose`` [m, m, rad], ``wheel_speeds``
+        (n,) as commanded [m/s], ``contact`` (M,) now, ``contact_time`` (M,) as a fraction of the
+        last decision period, ``distance_m``, ``orientation_rad`` of the box from the goal pose.
+        """
+        return {
+            "robot_poses": self.world.robot_poses.copy(),
+            "box_pose": self.world.box_pose.copy(),
+            "goal_pose": self._goal,
+            "wheel_speeds": self._speeds,
+            "contact": self.world.contact.copy(),
+            "contact_time": self.world.contact_time.copy(),
+            "distance_m": self._distance(),
+            "orientation_rad": self._orientation(),
+        }
+
+    def _distance(self) -> float:
+        ahead = self._goal[:2] - self.world.box_pose[:2]
+        return float(np.hypot(ahead[0], ahead[1]))
+
+    def _orientation(self) -> float:
+        return float((self.world.box_pose[2] - self._goal[2] + pi) % (2.0 * pi) - pi)
+
+    def _reached(self) -> bool:
+        allowed = self.settings.orientation_tolerance
+        turned = allowed is None or abs(self._orientation()) <= allowed
+        return self._distance() <= self.settings.tolerance and turned
+
+    def _stays(self) -> bool:
+        """Stop all wheels and tell whether the box comes to rest within the tolerance."""
+        self.world.advance(np.zeros(len(self.agents)), self.settings.hold)
+        return self._reached()
+
+    def _observe(self) -> FloatArray:
+        """Return the states ``(n, d)`` of all agents: the error observation layer."""
+        poses, box = self.world.robot_poses, self.world.box_pose
+        cos, sin = np.cos(box[2]), np.sin(box[2])
+        outline, gaps = self.box.outline, np.empty((1, len(poses)))
+        for r, (x, y, _) in enumerate(poses - np.array([box[0], box[1], 0.0])):
+            distance = surface(
+                outline.edges, outline.rounding, cos * x + sin * y, cos * y - sin * x
+            )[0]
+            gaps[0, r] = distance - self.robot.radius
+        view = View(poses[None], box[None], gaps, self._goal)
+        rows = []
+        for r, group in enumerate(self.groups):
+            shared = self._space.shared(view, r)[0]
+            for agent in group:
+                own = self._space.own(poses[r : r + 1], self._speeds[agent : agent + 1], self._goal)
+                rows.append(np.concatenate([own[0], shared]))
+        return np.array(rows)

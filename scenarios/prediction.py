@@ -1,0 +1,181 @@
+"""Predictions of box pushing: what any joint action would lead to, computed when asked for.
+
+The poses after a joint action come from the push predictor, at once for all robots. An agent's own
+block is predicted as if its robot pushed alone, so that it takes few values; in state spaces whose
+own block is the wheel speed that is exact.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..core.arrays import FloatArray, IntArray
+from ..core.protocols import Blocks
+from ..core.spaces import ActionSet
+from .config import RewardSettings
+from .infrared import expected_reading
+from .push import PushModel, push
+from .reward import reward
+from .state_spaces import BoxStateSpace, View, wrap
+
+
+@dataclass(frozen=True)
+class Situation:
+    """The present, as far as prediction needs it.
+
+    Attributes
+    ----------
+    robots, box, goal
+        Poses ``(M, 3)``, ``(3,)``, ``(3,)``.
+    speeds
+        ``(n,)`` commanded wheel speeds [m/s].
+    effects
+        Per robot ``(3, w + 1)``: twist in its frame = effect @ [wheel speeds, 1].
+    groups
+        Agents of each robot.
+    """
+
+    robots: FloatArray
+    box: FloatArray
+    goal: FloatArray
+    speeds: FloatArray
+    effects: tuple[FloatArray, ...]
+    groups: tuple[tuple[int, ...], ...]
+
+
+@dataclass(frozen=True)
+class BoxPrediction:
+    """Predicts from one situation; see `nested_agents.core.protocols.Prediction`."""
+
+    situation: Situation
+    model: PushModel
+    space: BoxStateSpace
+    action_set: ActionSet
+    rewards_of: RewardSettings
+    seconds: float
+    increment: float
+    limits: FloatArray
+
+    @cached_property
+    def _local_speeds(self) -> list[FloatArray]:
+        """Per robot ``(A ** w, w)``: the wheel speeds of every local code."""
+        a = len(self.action_set)
+        tables = []
+        for group in self.situation.groups:
+            digits = np.indices((a,) * len(group)).reshape(len(group), -1).T
+            tables.append(
+                self.action_set.apply(
+                    self.situation.speeds[list(group)],
+                    digits,
+                    self.increment * self.limits[list(group)],
+                    self.limits[list(group)],
+                )
+            )
+        return tables
+
+    @cached_property
+    def _twists(self) -> FloatArray:
+        """``(M, K, 3)`` twists of every local code, padded to the robot with most wheels."""
+        tables = self._local_speeds
+        twists = np.zeros((len(tables), max(len(t) for t in tables), 3))
+        for r, (speeds, effect) in enumerate(zip(tables, self.situation.effects, strict=True)):
+            twists[r, : len(speeds)] = speeds @ effect[:, :-1].T + effect[:, -1]
+        return twists
+
+    def _view(self, choices: IntArray) -> View:
+        robots, box, gaps = push(
+            self.situation.robots, self.situation.box, self._twists, choices, self.seconds,
+            self.model,
+        )  # fmt: skip
+        return View(robots, box, gaps, self.situation.goal)
+
+    def _choices(self, joint_actions: IntArray) -> IntArray:
+        """Return the local code ``(m, M)`` of each robot in joint actions ``(m, n)``."""
+        a = len(self.action_set)
+        codes = np.empty((len(joint_actions), len(self.situation.groups)), dtype=np.int64)
+        for r, group in enumerate(self.situation.groups):
+            places = a ** np.arange(len(group) - 1, -1, -1)
+            codes[:, r] = joint_actions[:, list(group)] @ places
+        return codes
+
+    @cached_property
+    def _all(self) -> View:
+        """All joint actions by code."""
+        a = len(self.action_set)
+        shape = tuple(a ** len(group) for group in self.situation.groups)
+        choices = np.indices(shape).reshape(len(shape), -1).T
+        return self._view(np.ascontiguousarray(choices, dtype=np.int64))
+
+    @cached_property
+    def _alone(self) -> list[FloatArray]:
+        """Per robot ``(A ** w, 3)``: its pose after every local code if it pushed alone."""
+        poses = []
+        for r, speeds in enumerate(self._local_speeds):
+            model = self.model._replace(
+                radii=self.model.radii[r : r + 1], compliance=self.model.compliance[r : r + 1]
+            )
+            robots, _, _ = push(
+                self.situation.robots[r : r + 1], self.situation.box,
+                self._twists[r : r + 1], np.arange(len(speeds))[:, None], self.seconds, model,
+            )  # fmt: skip
+            poses.append(robots[:, 0])
+        return poses
+
+    @cached_property
+    def _shared(self) -> dict[int, FloatArray]:
+        return {}
+
+    def _robot_of(self, agent: int) -> tuple[int, int]:
+        for r, group in enumerate(self.situation.groups):
+            if agent in group:
+                return r, group.index(agent)
+        raise IndexError(agent)
+
+    def blocks(self, agent: int) -> Blocks:
+        """Return the next states of `agent` for all joint actions, own block as if alone."""
+        r, wheel = self._robot_of(agent)
+        if r not in self._shared:
+            self._shared[r] = self.space.shared(self._all, r)
+        own = self.space.own(self._alone[r], self._local_speeds[r][:, wheel], self.situation.goal)
+        behind = sum(len(group) for group in self.situation.groups[r + 1 :])
+        return Blocks(own, self._shared[r], len(self.action_set) ** behind)
+
+    def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
+        """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
+        r, wheel = self._robot_of(agent)
+        choices = self._choices(joint_actions)
+        view = self._view(choices)
+        speeds = self._local_speeds[r][choices[:, r], wheel]
+        own = self.space.own(view.robots[:, r], speeds, self.situation.goal)
+        return np.concatenate([own, self.space.shared(view, r)], axis=1)
+
+    def poses(self, joint_actions: IntArray) -> View:
+        """Return the predicted situations of joint actions ``(m, n)``."""
+        return self._view(self._choices(joint_actions))
+
+    def rewards(self, joint_actions: IntArray) -> FloatArray:
+        """Return the predicted rewards ``(m,)`` of joint actions ``(m, n)``."""
+        return self._rewards(self._view(self._choices(joint_actions)))
+
+    def reward_table(self) -> FloatArray:
+        """Return the predicted rewards ``(A ** n,)`` of all joint actions."""
+        return self._rewards(self._all)
+
+    def _rewards(self, view: View) -> FloatArray:
+        goal, before = self.situation.goal, self.situation.box
+        distance = np.hypot(goal[0] - view.box[:, 0], goal[1] - view.box[:, 1])
+        return reward(
+            self.rewards_of,
+            distance,
+            distance - np.hypot(goal[0] - before[0], goal[1] - before[1]),
+            wrap(view.box[:, 2] - goal[2]),
+            view.gaps < CONTACT_GAP,
+            expected_reading(view.gaps),
+        )
+
+
+CONTACT_GAP = 0.002
+"""Predicted gap [m] below which a robot counts as touching."""
