@@ -1,1 +1,111 @@
 """Who is above whom: builders, specs, checks and pictures of hierarchies."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import networkx as nx
+
+from ..core.hierarchy import Hierarchy
+from . import builders, files
+from .builders import from_networkx
+from .checks import check_names
+from .config import KINDS, Topology, TopologySettings, parse
+
+Groups = Sequence[Sequence[str]]
+Build = Callable[[Any, Sequence[str], Groups], nx.DiGraph]
+
+
+def _chain(settings: Any, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
+    orders = {
+        "listed": tuple(agents),
+        "reversed": tuple(reversed(agents)),
+        "interleaved": builders.interleaved(groups),
+    }
+    order = orders[settings.order] if isinstance(settings.order, str) else settings.order
+    check_names(order, agents, "order")
+    return builders.chain(order)
+
+
+def _teams(settings: Any, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
+    members = groups if settings.members is None else settings.members
+    check_names(builders.names_of(members), agents, "members")
+    return builders.teams(members, settings.link)
+
+
+def _file(settings: Any, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
+    files.check_digest(settings.path, settings.digest)
+    return from_networkx(files.read_graph(settings.path), agents)
+
+
+def _python(settings: Any, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
+    files.check_digest(files.split_source(settings.source)[0], settings.digest)
+    function = files.from_python(settings.source)
+    return from_networkx(files.called(function, agents, groups), agents)
+
+
+def _package(settings: Any, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
+    function = files.from_package(settings.name)
+    return from_networkx(files.called(function, agents, groups), agents)
+
+
+# A topology: its settings in config.py, its builder in builders.py, and a line here.
+BUILDERS: dict[str, Build] = {
+    "chain": _chain,
+    "tree": lambda s, agents, groups: builders.tree(agents, s.branching),
+    "star": lambda s, agents, groups: builders.star(agents, s.leader),
+    "teams": _teams,
+    "independent": lambda s, agents, groups: builders.independent(agents),
+    "edges": lambda s, agents, groups: builders.from_edges(agents, s.edges, s.alone),
+    "random": lambda s, agents, groups: builders.random_hierarchy(agents, s.seed, s.density),
+    "file": _file,
+    "python": _python,
+    "package": _package,
+}
+"""What makes the graph of each kind of settings: ``(settings, agents, groups) -> graph``."""
+
+
+def build(
+    settings: TopologySettings,
+    agents: Sequence[str],
+    groups: Sequence[Sequence[int]] | None = None,
+) -> Hierarchy:
+    """Build the hierarchy of `settings` over named agents.
+
+    Parameters
+    ----------
+    settings
+        Any topology's settings but the single agent's.
+    agents
+        Distinct names, in agent order.
+    groups
+        Agent indices by body (robot); none: every agent is a body of its own.
+
+    Raises
+    ------
+    ValueError
+        If the settings do not fit the agents, or do not make a hierarchy. One line; it names the
+        culprit.
+
+    Examples
+    --------
+    >>> build(parse("chain:reversed"), ["a", "b", "c"])
+    Hierarchy(3 agents: b -> a, c -> b)
+    >>> build(parse("teams"), ["a1", "a2", "b1", "b2"], [(0, 1), (2, 3)])
+    Hierarchy(4 agents: a1 -> a2, a1 -> b1, b1 -> b2)
+    """
+    kind = str(getattr(settings, "kind", None))
+    if kind not in BUILDERS:
+        raise ValueError(f"topology {kind!r} is no hierarchy of {len(agents)} agents")
+    named = [(a,) for a in agents] if groups is None else [[agents[i] for i in g] for g in groups]
+    try:
+        return Hierarchy(agents, BUILDERS[kind](settings, agents, named).edges)
+    except ValueError as error:
+        raise ValueError(f"topology {kind!r}: {str(error).removeprefix('hierarchy: ')}") from None
+
+
+__all__ = [
+    "BUILDERS", "KINDS", "Hierarchy", "Topology", "TopologySettings", "build", "from_networkx",
+    "parse",
+]  # fmt: skip

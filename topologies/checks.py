@@ -1,0 +1,51 @@
+"""Checks that name the culprit: which agent is unknown, missing or named twice."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+
+
+def check_names(
+    names: Sequence[str], agents: Sequence[str], what: str, *, all_needed: bool = True
+) -> None:
+    """Refuse `names` that are not the agents, each once.
+
+    Parameters
+    ----------
+    names
+        The names to check.
+    agents
+        The agents there are.
+    what
+        The argument that `names` stands in, for the message.
+    all_needed
+        Whether every agent must be among the names.
+
+    Raises
+    ------
+    ValueError
+        If a name is unknown, occurs twice or is missing.
+    """
+    known = set(agents)
+    for name, times in Counter(names).items():
+        if name not in known:
+            raise ValueError(f"{what} names unknown agent {name!r}, known: {listed(agents)}")
+        if times > 1:
+            raise ValueError(f"{what} names agent {name!r} more than once")
+    missing = known.difference(names)
+    if all_needed and missing:
+        first = next(agent for agent in agents if agent in missing)
+        raise ValueError(f"{what} lacks agent {first!r}")
+
+
+def listed(names: Iterable[str], most: int = 12) -> str:
+    """Return names for a message, the first `most` of them.
+
+    Examples
+    --------
+    >>> listed("abcd", most=2)
+    'a, b, ... (4)'
+    """
+    names = list(names)
+    return ", ".join(names[:most]) + (f", ... ({len(names)})" if len(names) > most else "")
