@@ -9,13 +9,15 @@ Two shapes, on a line or on a circle, with any number of membership functions an
 - *triangular*: one at its own centre, falling linearly to zero at the neighbouring centres. At
   most two functions are active at a time.
 
-On a circle the partition repeats with the period. The NumPy code here is the readable definition;
+On a circle the partition repeats with the period; sigmoids reach as many periods to either side as
+their tails need to fall below 1e-11. The NumPy code here is the readable definition;
 `nested_agents.core.kernels` computes the same, fast.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import ceil
 from typing import Literal
 
 import numpy as np
@@ -24,6 +26,11 @@ from .arrays import FloatArray
 from .spaces import Variable
 
 Membership = Literal["triangular", "sigmoid"]
+
+TAIL = 26.0
+"""Sigmoids are cut off on a circle where their exponent passes this: exp(-26) = 5e-12."""
+MOST_COPIES = 32
+"""Copies of the circle on either side, at most; a steepness of 1 never needs as many."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +69,10 @@ class Partition:
             raise ValueError(
                 f"partition: centres {self.centres} must lie within one period of {self.period}"
             )
+        if self.copies > MOST_COPIES:
+            raise ValueError(
+                f"partition: steepness = {self.steepness} is too flat for a circle, 1 is not"
+            )
 
     @classmethod
     def of(
@@ -93,12 +104,20 @@ class Partition:
         return len(self.centres)
 
     @property
-    def knots(self) -> FloatArray:
-        """The centres; on a circle with a copy of the whole circle on either side, ``(3 m,)``."""
-        centres = np.asarray(self.centres)
+    def copies(self) -> int:
+        """Copies of the whole circle laid on either side of it, 0 on a line."""
         if not self.period:
-            return centres
-        return np.concatenate([centres - self.period, centres, centres + self.period])
+            return 0
+        if self.membership == "triangular":
+            return 1
+        widest = max(np.diff([*self.centres, self.centres[0] + self.period]))
+        return ceil(TAIL * widest / (self.steepness * self.period))
+
+    @property
+    def knots(self) -> FloatArray:
+        """The centres; on a circle with its copies on either side, ``((1 + 2 copies) m,)``."""
+        turns = np.arange(-self.copies, self.copies + 1)
+        return (turns[:, None] * self.period + np.asarray(self.centres)).ravel()
 
     def wrap(self, x: FloatArray) -> FloatArray:
         """Map values of a circular variable to the period that is centred on the centres."""
@@ -125,5 +144,5 @@ class Partition:
         levels = np.concatenate([edge, rising, 0.0 * edge], axis=-1)
         strengths = levels[..., :-1] - levels[..., 1:]
         if self.period:
-            strengths = strengths.reshape(*strengths.shape[:-1], 3, self.size).sum(axis=-2)
+            strengths = strengths.reshape(*strengths.shape[:-1], -1, self.size).sum(axis=-2)
         return strengths

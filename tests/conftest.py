@@ -1,0 +1,109 @@
+"""A world small enough to reason about, for tests that need a scenario but no physics."""
+
+from math import pi
+
+import numpy as np
+import pytest
+
+from nested_agents.core.protocols import Blocks, Transition
+from nested_agents.core.spaces import ActionSet, StateSpace, Variable
+
+
+def decode(codes: np.ndarray, n_agents: int, n_actions: int) -> np.ndarray:
+    """Joint actions ``(m, n)`` of codes ``(m,)``."""
+    return np.stack(np.unravel_index(codes, (n_actions,) * n_agents), axis=-1)
+
+
+class LineWorld:
+    """Carts on a line that together push a load towards a goal.
+
+    Agents are wheels, ``wheels`` to a cart. An agent's own variables are the speed of its wheel
+    and the angle to which its cart has rolled (periodic); all share the gap between load and goal.
+    A cart moves at the mean speed of its wheels, the load at a tenth of the carts' mean.
+    """
+
+    def __init__(self, carts: int = 2, wheels: int = 2, *, closed: float = 0.02) -> None:
+        n = carts * wheels
+        self.agents = tuple(f"cart{i // wheels}.wheel{i % wheels}" for i in range(n))
+        self.groups = tuple(tuple(range(c * wheels, (c + 1) * wheels)) for c in range(carts))
+        self.action_set = ActionSet()
+        self.state_space = StateSpace(
+            "line",
+            (
+                Variable("speed", "m/s", -1.0, 1.0),
+                Variable("phase", "rad", -pi, pi, periodic=True),
+                Variable("gap", "m", 0.0, 2.0),
+            ),
+            n_own=2,
+        )
+        self.closed = closed
+        self.shape = (carts, wheels)
+
+    def reset(self, seed: int | np.random.SeedSequence) -> np.ndarray:
+        rng = np.random.default_rng(seed)
+        self.speeds = np.zeros(len(self.agents))
+        self.phases = rng.uniform(-pi, pi, self.shape[0])
+        self.gap = rng.uniform(0.2, 1.5)
+        return self._states(self.speeds[None], self.phases[None], np.array([self.gap]))[0]
+
+    def step(self, joint_action: np.ndarray) -> Transition:
+        speeds, phases, gaps = self.after(np.asarray(joint_action)[None])
+        self.speeds, self.phases, self.gap = speeds[0], phases[0], float(gaps[0])
+        return Transition(
+            states=self._states(speeds, phases, gaps)[0],
+            reward=float(self.reward(gaps)[0]),
+            terminated=abs(self.gap) < self.closed,
+            truncated=False,
+            info=self.measure(),
+        )
+
+    def predict(self) -> "LinePrediction":
+        return LinePrediction(self)
+
+    def measure(self) -> dict[str, float]:
+        return {"distance_m": abs(self.gap)}
+
+    def after(self, joint: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Speeds ``(m, n)``, phases ``(m, carts)`` and gaps ``(m,)`` after joint actions."""
+        n = len(self.agents)
+        speeds = self.action_set.apply(self.speeds, joint, np.full(n, 0.3), np.ones(n))
+        carts = speeds.reshape(-1, *self.shape).mean(axis=2)
+        phases = (self.phases + carts + pi) % (2 * pi) - pi
+        return speeds, phases, self.gap - 0.1 * carts.mean(axis=1)
+
+    def reward(self, gaps: np.ndarray) -> np.ndarray:
+        return -0.01 * np.abs(gaps)
+
+    def _states(self, speeds: np.ndarray, phases: np.ndarray, gaps: np.ndarray) -> np.ndarray:
+        rolled = np.repeat(phases, self.shape[1], axis=1)
+        return np.stack([speeds, rolled, np.broadcast_to(gaps[:, None], speeds.shape)], axis=2)
+
+
+class LinePrediction:
+    """Exact predictions of a line world's next step."""
+
+    def __init__(self, world: LineWorld) -> None:
+        self.world = world
+        self.n, self.n_actions = len(world.agents), len(world.action_set)
+
+    def states(self, agent: int, joint_actions: np.ndarray) -> np.ndarray:
+        return self.world._states(*self.world.after(joint_actions))[:, agent]
+
+    def rewards(self, joint_actions: np.ndarray) -> np.ndarray:
+        return self.world.reward(self.world.after(joint_actions)[2])
+
+    def blocks(self, agent: int) -> Blocks:
+        w, a = self.world.shape[1], self.n_actions
+        divisor = a ** (self.n - w * (agent // w + 1))
+        everything = self.states(agent, decode(np.arange(a**self.n), self.n, a))
+        local = self.states(agent, decode(np.arange(a**w) * divisor, self.n, a))
+        return Blocks(local[:, :2].copy(), everything[:, 2:].copy(), divisor)
+
+    def reward_table(self) -> np.ndarray:
+        return self.rewards(decode(np.arange(self.n_actions**self.n), self.n, self.n_actions))
+
+
+@pytest.fixture(scope="session")
+def line_world() -> type[LineWorld]:
+    """The class: ``line_world(carts=2, wheels=2)`` is a scenario without physics."""
+    return LineWorld
