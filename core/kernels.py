@@ -27,7 +27,7 @@ class Layout(NamedTuple):
 
     sigmoid: bool
     counts: IntArray  # (d,) membership functions
-    knots: FloatArray  # (d, k) centres, on a circle with a copy on either side
+    knots: FloatArray  # (d, k) centres, on a circle with copies on either side
     n_knots: IntArray  # (d,)
     bounds: FloatArray  # (d, k - 1) midpoints between knots
     slopes: FloatArray  # (d, k - 1) sigmoid slopes
