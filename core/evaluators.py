@@ -20,6 +20,9 @@ from .rules import RuleBase
 
 Rule = Literal["value", "reward", "reward-and-value"]
 
+MOST_JOINT_ACTIONS = 4**12
+"""The most that one agent enumerates: beyond, the tables do not fit into memory."""
+
 
 @dataclass
 class Counts:
@@ -102,6 +105,27 @@ class _Gathering:
         if self.rule != "reward":
             self.counts.rule_evaluations += joint_actions * self.rules.n_rules
 
+    def _by_states(
+        self,
+        agent: int,
+        joint_action: IntArray,
+        tried: IntArray,
+        theta: FloatArray,
+        prediction: Prediction,
+    ) -> FloatArray:
+        """Value ``(A, m)`` each own action with each of the joint actions `tried` ``(m, k)``."""
+        a = self.n_actions
+        joint = np.tile(joint_action, (a * len(tried), 1))
+        joint[:, agent] = np.repeat(np.arange(a), len(tried))
+        joint[:, list(self.hierarchy.below(agent))] = np.tile(tried, (a, 1))
+        self._count(len(joint))
+        rewards = values = None
+        if self.rule != "value":
+            rewards = prediction.rewards(joint)
+        if self.rule != "reward":
+            values = self.rules.values(theta, prediction.states(agent, joint))
+        return self._combine(rewards, values).reshape(a, -1)
+
     def _combine(self, rewards: FloatArray | None, values: FloatArray | None) -> FloatArray:
         if rewards is None or values is None:
             combined = values if rewards is None else rewards
@@ -116,13 +140,32 @@ class _Gathering:
 
 
 class ExactEnumeration(_Gathering):
-    """Tries every joint action of the agents below: ``A ** (1 + len(below))`` per agent."""
+    """Tries every joint action of the agents below: ``A ** (1 + len(below))`` per agent.
+
+    If all agents together try at least as many joint actions as there are, next states are taken
+    from a table of all, else they are predicted for the joint actions that are tried.
+
+    Raises
+    ------
+    ValueError
+        If an agent would have to try more than `MOST_JOINT_ACTIONS`.
+    """
 
     def __init__(self, *args: object) -> None:
         super().__init__(*args)  # type: ignore[arg-type]
         n, a = len(self.hierarchy), self.n_actions
-        self._places = a ** np.arange(n - 1, -1, -1, dtype=np.int64)
+        for i, name in enumerate(self.hierarchy.agents):
+            free = 1 + len(self.hierarchy.below(i))
+            if a**free > MOST_JOINT_ACTIONS:
+                raise ValueError(
+                    f"decision.evaluator: agent {name!r} would try {a} ** {free} joint actions, "
+                    f"exact enumeration allows {MOST_JOINT_ACTIONS}; use sampling"
+                )
         self._tried = [_combinations(self.hierarchy.below(i), a) for i in range(n)]
+        self._tabulated = self.hierarchy.joint_actions(a) >= a**n
+        if not self._tabulated:
+            return
+        self._places = a ** np.arange(n - 1, -1, -1, dtype=np.int64)
         # Code offsets (A, A ** k): own action by joint action of the agents below.
         self._offsets = [
             np.arange(a)[:, None] * self._places[i]
@@ -140,10 +183,19 @@ class ExactEnumeration(_Gathering):
         rng: np.random.Generator,
     ) -> FloatArray:
         """Return the value ``(A,)`` of each action of `agent`, see `Evaluator.values`."""
-        below = self.hierarchy.below(agent)
+        below, tried = self.hierarchy.below(agent), self._tried[agent]
+        weights = _weights(frequencies, below, tried) if self.others == "observed" else None
+        if self._tabulated:
+            table = self._by_codes(agent, joint_action, theta, prediction)
+        else:
+            table = self._by_states(agent, joint_action, tried, theta, prediction)
+        return self._gather(table, weights)
+
+    def _by_codes(
+        self, agent: int, joint_action: IntArray, theta: FloatArray, prediction: Prediction
+    ) -> FloatArray:
         fixed = joint_action.copy()
-        fixed[agent] = 0
-        fixed[list(below)] = 0
+        fixed[[agent, *self.hierarchy.below(agent)]] = 0
         codes = (self._offsets[agent] + int(fixed @ self._places)).ravel()
         self._count(len(codes))
         rewards = values = None
@@ -151,11 +203,7 @@ class ExactEnumeration(_Gathering):
             rewards = prediction.reward_table()[codes]
         if self.rule != "reward":
             values = self.rules.block_values(theta, prediction.blocks(agent), codes)
-        weights = None
-        if self.others == "observed":
-            weights = _weights(frequencies, below, self._tried[agent])
-        table = self._combine(rewards, values).reshape(self.n_actions, -1)
-        return self._gather(table, weights)
+        return self._combine(rewards, values).reshape(self.n_actions, -1)
 
 
 class Sampling(_Gathering):
@@ -191,13 +239,5 @@ class Sampling(_Gathering):
             tried = (draws >= ladder).sum(axis=2)
         else:
             tried = rng.integers(a, size=(self.samples, len(below)))
-        joint = np.tile(joint_action, (a * len(tried), 1))
-        joint[:, agent] = np.repeat(np.arange(a), len(tried))
-        joint[:, list(below)] = np.tile(tried, (a, 1))
-        self._count(len(joint))
-        rewards = values = None
-        if self.rule != "value":
-            rewards = prediction.rewards(joint)
-        if self.rule != "reward":
-            values = self.rules.values(theta, prediction.states(agent, joint))
-        return self._gather(self._combine(rewards, values).reshape(a, -1), weights)
+        table = self._by_states(agent, joint_action, tried, theta, prediction)
+        return self._gather(table, weights)

@@ -14,7 +14,7 @@ from .evaluators import Evaluator, ExactEnumeration, Sampling
 from .exploration import Explorer, Greedy, build_explorer
 from .hierarchy import Hierarchy
 from .learners import Learner, build_learner
-from .protocols import Prediction, Scenario
+from .protocols import Prediction, Scenario, Transition
 from .rules import RuleBase
 from .spaces import ActionSet
 
@@ -118,9 +118,18 @@ class Team:
             self._seen[np.arange(n), joint] += 1.0
         return joint
 
-    def learn(self, states: FloatArray, reward: float, terminated: bool) -> None:
-        """Take in the states ``(n, d)`` entered, with their reward."""
-        self._count(self.learner.observe(states, reward, terminated))
+    def learn(self, transition: Transition, prediction: Prediction) -> None:
+        """Take in what a step led to, and the prediction from there."""
+        candidates = None
+        if self.learner.candidates:
+            n, n_actions = len(self.hierarchy), len(self.action_set)
+            joint = self.rng.integers(n_actions, size=(self.learner.candidates, n))
+            candidates = np.array([prediction.states(i, joint) for i in range(n)])
+        self._count(
+            self.learner.observe(
+                transition.states, transition.reward, transition.terminated, candidates
+            )
+        )
 
     def end_episode(self) -> None:
         """Learn what is learned after an episode."""
@@ -189,7 +198,8 @@ def _build_evaluator(
     if decision.rule == "random":
         return None
     common = (rules, hierarchy, len(scenario.action_set), decision.rule, decision.others, discount)
-    small = len(hierarchy) <= decision.exact_up_to
+    free = max(1 + len(hierarchy.below(i)) for i in range(len(hierarchy)))
+    small = free <= decision.exact_up_to
     if decision.evaluator == "exact" or (decision.evaluator == "auto" and small):
         return ExactEnumeration(*common)
     return Sampling(decision.samples, *common)

@@ -8,10 +8,12 @@ from typing import Any
 import networkx as nx
 
 from ..core.hierarchy import Hierarchy
+from ..core.protocols import Scenario
+from ..core.single_agent import SingleAgent
 from . import builders, files
 from .builders import from_networkx
 from .checks import check_names
-from .config import KINDS, Topology, TopologySettings, parse
+from .config import KINDS, SingleAgentSettings, Topology, TopologySettings, parse
 
 Groups = Sequence[Sequence[str]]
 Build = Callable[[Any, Sequence[str], Groups], nx.DiGraph]
@@ -97,7 +99,8 @@ def build(
     """
     kind = str(getattr(settings, "kind", None))
     if kind not in BUILDERS:
-        raise ValueError(f"topology {kind!r} is no hierarchy of {len(agents)} agents")
+        hint = "; use topologies.arrange" if isinstance(settings, SingleAgentSettings) else ""
+        raise ValueError(f"topology {kind!r} is no hierarchy of {len(agents)} agents{hint}")
     named = [(a,) for a in agents] if groups is None else [[agents[i] for i in g] for g in groups]
     try:
         return Hierarchy(agents, BUILDERS[kind](settings, agents, named).edges)
@@ -105,7 +108,24 @@ def build(
         raise ValueError(f"topology {kind!r}: {str(error).removeprefix('hierarchy: ')}") from None
 
 
+def arrange(settings: TopologySettings, scenario: Scenario) -> tuple[Scenario, Hierarchy]:
+    """Return a scenario and the hierarchy of its agents, as `settings` want them.
+
+    The scenario is the given one, except for the single agent, which sees it as a scenario of its
+    own.
+
+    Raises
+    ------
+    ValueError
+        As `build` does, or if there are too many joint actions for a single agent.
+    """
+    if isinstance(settings, SingleAgentSettings):
+        scenario = SingleAgent(scenario)
+        return scenario, Hierarchy(scenario.agents, [])
+    return scenario, build(settings, scenario.agents, scenario.groups)
+
+
 __all__ = [
-    "BUILDERS", "KINDS", "Hierarchy", "Topology", "TopologySettings", "build", "from_networkx",
-    "parse",
+    "BUILDERS", "KINDS", "Hierarchy", "Topology", "TopologySettings", "arrange", "build",
+    "from_networkx", "parse",
 ]  # fmt: skip

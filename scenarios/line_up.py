@@ -1,0 +1,164 @@
+"""Line-up: carts on parallel rails meet side by side on a goal line.
+
+The smallest task with physics in which agents must coordinate: each agent drives one cart, and the
+team is rewarded for being near the line and for staying level, as if the carts carried a beam. Its
+two state variables keep even the joint state of three agents small enough for a single agent
+(Section VII), and its prediction is exact and cheap, so that it serves to measure costs.
+
+Physics: a cart of mass m is pulled by a servo of stiffness k [N/(m/s)] towards its commanded speed
+u, ``m dv/dt = k (u - v)``. With ``tau = m / k`` and u held for a period T this is solved exactly::
+
+    v' = u + (v - u) exp(-T / tau)
+    x' = x + u T + (v - u) tau (1 - exp(-T / tau))
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..core.arrays import FloatArray, IntArray
+from ..core.protocols import Blocks, Transition
+from ..core.spaces import ActionSet, StateSpace, Variable
+
+PERIOD = 0.25
+"""One decision [s]."""
+TAU = 0.1
+"""Mass over servo stiffness [s]: 1 kg and 10 N/(m/s)."""
+MAX_SPEED = 0.4
+"""Greatest commanded speed [m/s]."""
+INCREMENT = 0.2
+"""What increase and decrease change [m/s]."""
+TOLERANCE = 0.08
+"""Distance from the line within which every cart must be [m]."""
+
+DISTANCE = Variable("distance", "m", -1.0, 1.0, centres=(-1.0, -0.3, 0.0, 0.3, 1.0))
+LEAD = Variable("lead", "m", -0.8, 0.8, centres=(-0.8, -0.2, 0.0, 0.2, 0.8))
+
+
+class LineUp:
+    """The line-up scenario; a `nested_agents.core.protocols.Scenario`.
+
+    Parameters
+    ----------
+    n_agents
+        Number of carts, at least 1.
+
+    Examples
+    --------
+    >>> scenario = LineUp(2)
+    >>> scenario.agents, scenario.reset(0).shape
+    (('cart1', 'cart2'), (2, 2))
+    """
+
+    def __init__(self, n_agents: int) -> None:
+        if n_agents < 1:
+            raise ValueError(f"line-up: n_agents = {n_agents}, allowed: 1 or more")
+        self.agents = tuple(f"cart{i + 1}" for i in range(n_agents))
+        self.groups = tuple((i,) for i in range(n_agents))
+        self.action_set = ActionSet()
+        self.state_space = StateSpace("line-up", (DISTANCE, LEAD), n_own=1)
+        self._places: FloatArray = np.zeros(n_agents)
+        self._speeds: FloatArray = np.zeros(n_agents)
+        self._commands: FloatArray = np.zeros(n_agents)
+
+    def reset(self, seed: int | np.random.SeedSequence) -> FloatArray:
+        """Put the carts at rest, each 0.2 to 1 m from the line on the same side."""
+        rng = np.random.default_rng(seed)
+        n = len(self.agents)
+        self._places = rng.choice([-1.0, 1.0]) * rng.uniform(0.2, 1.0, size=n)
+        self._speeds, self._commands = np.zeros(n), np.zeros(n)
+        return self._states()
+
+    def step(self, joint_action: IntArray) -> Transition:
+        """Carry out a joint action ``(n,)`` for one period."""
+        self._commands = self._commanded(joint_action)
+        self._places, self._speeds = advance(self._places, self._speeds, self._commands)
+        arrived = bool((np.abs(self._places) < TOLERANCE).all())
+        return Transition(
+            self._states(), float(reward(self._places)), arrived, False, self.measure()
+        )
+
+    def predict(self) -> LineUpPrediction:
+        """Predict from the present state."""
+        n, n_actions = len(self.agents), len(self.action_set)
+        every = np.tile(np.arange(n_actions)[:, None], n)
+        commands = self._commanded(every)
+        places, _ = advance(self._places, self._speeds, commands)
+        return LineUpPrediction(places.T.copy())
+
+    def measure(self) -> Mapping[str, Any]:
+        """Return the mean distance from the line and the spread of the carts [m]."""
+        return {
+            "distance_m": float(np.abs(self._places).mean()),
+            "spread_m": float(np.ptp(self._places)),
+            "seconds": {"physics": 0.0, "sensors": 0.0},
+        }
+
+    def _commanded(self, joint_actions: IntArray) -> FloatArray:
+        n = len(self.agents)
+        unit, limit = np.full(n, INCREMENT), np.full(n, MAX_SPEED)
+        return self.action_set.apply(self._commands, joint_actions, unit, limit)
+
+    def _states(self) -> FloatArray:
+        lead = self._places - self._places.mean()
+        return np.stack([self._places, lead], axis=1)
+
+
+class LineUpPrediction:
+    """Exact prediction; a `nested_agents.core.protocols.Prediction`.
+
+    Parameters
+    ----------
+    places
+        ``(n, A)`` next place [m] of every cart by its own action.
+    """
+
+    def __init__(self, places: FloatArray) -> None:
+        self._places = places
+        self._sums: FloatArray | None = None
+
+    def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
+        """Return the next states ``(m, 2)`` of `agent` for joint actions ``(m, n)``."""
+        places = self._places[np.arange(len(self._places)), joint_actions]
+        own = places[:, agent]
+        return np.stack([own, own - places.mean(axis=1)], axis=1)
+
+    def rewards(self, joint_actions: IntArray) -> FloatArray:
+        """Return the rewards ``(m,)`` of joint actions ``(m, n)``."""
+        return reward(self._places[np.arange(len(self._places)), joint_actions])
+
+    def blocks(self, agent: int) -> Blocks:
+        """Return the next states of `agent` for all joint actions."""
+        n, n_actions = self._places.shape
+        if self._sums is None:
+            self._sums = self._places[0]
+            for places in self._places[1:]:
+                self._sums = np.add.outer(self._sums, places).ravel()
+        divisor = n_actions ** (n - 1 - agent)
+        own = self._places[agent][:, None]
+        lead = own - self._sums.reshape(-1, n_actions, divisor) / n
+        return Blocks(own.copy(), lead.reshape(-1, 1), divisor)
+
+    def reward_table(self) -> FloatArray:
+        """Return the rewards ``(A ** n,)`` of all joint actions by code."""
+        n, n_actions = self._places.shape
+        codes = np.arange(n_actions**n)
+        digits = codes[:, None] // n_actions ** np.arange(n - 1, -1, -1) % n_actions
+        return self.rewards(digits)
+
+
+def advance(
+    places: FloatArray, speeds: FloatArray, commands: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return places [m] and speeds [m/s] one period on, commands [m/s] being held."""
+    slip, decay = speeds - commands, np.exp(-PERIOD / TAU)
+    return places + commands * PERIOD + slip * TAU * (1.0 - decay), commands + slip * decay
+
+
+def reward(places: FloatArray) -> FloatArray:
+    """Return the reward ``(...,)`` of places ``(..., n)`` [m]: near the line, and level."""
+    near = np.exp(-2.0 * np.abs(places).mean(axis=-1))
+    return 0.01 * near - 0.005 * np.ptp(places, axis=-1)
