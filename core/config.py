@@ -107,16 +107,45 @@ class TDLambdaSettings(LearnerSettings):
     """alpha of Eq. 13."""
     trace_decay: Fraction = 0.4
     """lambda of Eq. 8."""
+    normalised: bool = False
+    """Divide the step size by the squared length of the feature vector."""
 
 
-class BatchTDSettings(LearnerSettings):
-    """Batch TD(0) by ridge regression on all experience, after every episode."""
+class GradientTDSettings(LearnerSettings):
+    """Gradient TD(lambda), the convergent method cited as [26]."""
 
-    kind: Literal["batch-td"] = "batch-td"
+    kind: Literal["gradient-td"] = "gradient-td"
+    correction: Literal["tdc", "gtd2"] = "tdc"
+    """TD with gradient correction, or GTD2."""
+    step_size: Positive = 0.01
+    """alpha, of the consequent weights."""
+    second_step_size: Positive = 0.005
+    """beta, of the second weights."""
+    trace_decay: Fraction = 0.4
+    """lambda."""
+
+
+class ReplaySettings(LearnerSettings):
+    """What learners share that regress on all experience after every episode."""
+
     ridge: Positive = 10.0
     """Weight of the squared consequents against squared errors of rewards scaled by 100."""
     sweeps: Annotated[int, Field(ge=1)] = 30
     """Regressions on freshly discounted targets after every episode."""
+
+
+class BatchTDSettings(ReplaySettings):
+    """Batch TD(0): towards the state that followed."""
+
+    kind: Literal["batch-td"] = "batch-td"
+
+
+class FittedValueSettings(ReplaySettings):
+    """Fitted value iteration: towards the best of the predicted next states."""
+
+    kind: Literal["fitted-value"] = "fitted-value"
+    candidates: Annotated[int, Field(ge=1)] = 64
+    """Joint actions tried from every state in memory, drawn anew at every step."""
 
 
 class FrozenSettings(LearnerSettings):
@@ -126,6 +155,7 @@ class FrozenSettings(LearnerSettings):
 
 
 Learner = Annotated[
-    TDLambdaSettings | BatchTDSettings | FrozenSettings, Field(discriminator="kind")
+    TDLambdaSettings | GradientTDSettings | BatchTDSettings | FittedValueSettings | FrozenSettings,
+    Field(discriminator="kind"),
 ]
 """Any learner's settings, told apart by `kind`."""

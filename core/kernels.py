@@ -332,3 +332,25 @@ def td_update(  # type: ignore[no-untyped-def]
                     e = decay * trace[i, at + c] + own[r] * shared[c]
                     trace[i, at + c] = e
                     theta[i, at + c] += steps[i] * e
+
+
+@njit(cache=True)
+def add_features(  # type: ignore[no-untyped-def]
+    target, states: FloatArray, weights: FloatArray, lay: Layout
+) -> None:
+    """Add ``weights[i] * phi(states[i])`` to row i of ``target (n, n_rules)``, in place."""
+    d = len(lay.counts)
+    strengths = np.empty((d, lay.counts.max()))
+    own = np.empty(lay.own_sizes.max())
+    shared = np.empty(lay.shared_sizes.max())
+    for i in range(len(states)):
+        for j in range(d):
+            _strengths(j, states[i, j], lay, strengths[j])
+        for t in range(len(lay.lengths)):
+            _product(t, 0, lay.own_lengths[t], lay, strengths, own, 0)
+            _product(t, lay.own_lengths[t], lay.lengths[t], lay, strengths, shared, 0)
+            columns = lay.shared_sizes[t]
+            for r in range(lay.own_sizes[t]):
+                at = lay.offsets[t] + r * columns
+                for c in range(columns):
+                    target[i, at + c] += weights[i] * own[r] * shared[c]

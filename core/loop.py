@@ -89,15 +89,17 @@ def control_loop(
         states = scenario.reset(world_seed(seed, episode))
         if learn:
             team.begin_episode()
+        prediction = scenario.predict()
         for step in range(steps):
             begin = perf_counter()
-            joint_action = team.act(scenario.predict(), explore=learn)
+            joint_action = team.act(prediction, explore=learn)
             decided = perf_counter()
             transition = scenario.step(joint_action)
             last = transition.terminated or transition.truncated or step == steps - 1
             moved = perf_counter()
+            prediction = scenario.predict()
             if learn:
-                team.learn(transition.states, transition.reward, transition.terminated)
+                team.learn(transition, prediction)
                 if last:
                     team.end_episode()
             yield StepRecord(

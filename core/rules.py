@@ -115,6 +115,20 @@ class RuleBase:
             return kernels.values_compact(theta, states, self.layout)
         return kernels.values_dense(theta, states, self.layout)
 
+    def each(self, theta: FloatArray, states: FloatArray) -> FloatArray:
+        """Return f ``(n,)`` of states ``(n, d)``, each by its own row of theta ``(n, n_rules)``."""
+        return np.array([self.values(theta[i], states[i : i + 1])[0] for i in range(len(states))])
+
+    def squared_lengths(self, states: FloatArray) -> FloatArray:
+        """Return the squared length ``(m,)`` of phi of states ``(m, d)``.
+
+        A product's is the product of its variables' squared lengths.
+        """
+        squares = [
+            (p.strengths(states[:, j]) ** 2).sum(axis=1) for j, p in enumerate(self.partitions)
+        ]
+        return np.sum([np.prod([squares[j] for j in term], axis=0) for term in self.terms], axis=0)
+
     def active(self, states: FloatArray) -> tuple[IntArray, FloatArray]:
         """Return rules ``(m, k)`` and their firing strengths ``(m, k)``; the others are zero.
 

@@ -8,21 +8,40 @@ R(s) / (1 - discount). Siblings differ where their mathematics differs.
 
 from __future__ import annotations
 
-from ..config import BatchTDSettings, FrozenSettings, TDLambdaSettings
+from ..config import (
+    BatchTDSettings,
+    FittedValueSettings,
+    FrozenSettings,
+    GradientTDSettings,
+    TDLambdaSettings,
+)
 from ..config import Learner as LearnerSettings
 from ..rules import RuleBase
-from .batch import BatchTD
+from .batch import BatchTD, FittedValue
+from .gradient import GradientTD
 from .learner import Frozen, Learner
 from .td import TDLambda
 
-__all__ = ["BatchTD", "Frozen", "Learner", "TDLambda", "build_learner"]
+__all__ = [
+    "BatchTD",
+    "FittedValue",
+    "Frozen",
+    "GradientTD",
+    "Learner",
+    "TDLambda",
+    "build_learner",
+]
 
 
 def build_learner(settings: LearnerSettings, rules: RuleBase, n_agents: int) -> Learner:
     """Build the learner that `settings` describe, with all consequent weights zero."""
     if isinstance(settings, TDLambdaSettings):
         return TDLambda(settings, rules, n_agents)
+    if isinstance(settings, GradientTDSettings):
+        return GradientTD(settings, rules, n_agents)
     if isinstance(settings, BatchTDSettings):
         return BatchTD(settings, rules, n_agents)
+    if isinstance(settings, FittedValueSettings):
+        return FittedValue(settings, rules, n_agents)
     assert isinstance(settings, FrozenSettings)
     return Frozen(rules, n_agents)

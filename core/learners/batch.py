@@ -1,9 +1,11 @@
-"""Batch TD(0) by ridge regression on all experience (fitted policy evaluation, Ernst et al. 2005).
+"""Learning by ridge regression on all experience (Ernst, Geurts and Wehenkel 2005).
 
-After every episode, several times over: give every after-state s in memory the target
-``R(s) + gamma f(s')``, and find the weights that minimise the squared errors of f plus ``ridge``
-times the squared weights. Targets are clipped to the range that discounted sums of the rewards
-seen so far can reach, so that no extrapolation can run away.
+After every episode, several times over: give every after-state s in memory a target, and find the
+weights that minimise the squared errors of f plus ``ridge`` times the squared weights. Batch TD(0)
+aims at ``R(s) + gamma f(s')`` with the state s' that followed; fitted value iteration (the value
+iteration of Section VII) at ``R(s) + gamma max_a f(s_a)`` over predicted next states s_a, so that
+experience under exploration teaches the value of acting well. Targets are clipped to the range
+that discounted sums of the rewards seen so far can reach: no extrapolation can run away.
 """
 
 from __future__ import annotations
@@ -15,15 +17,18 @@ from numba import njit
 from scipy.linalg import cho_factor, cho_solve
 
 from ..arrays import FloatArray, IntArray
-from ..config import BatchTDSettings
+from ..config import FittedValueSettings, ReplaySettings
 from ..rules import RuleBase
 
 REWARD_SCALE = 100.0
 """Rewards are of the order of 0.01; the ridge weighs against rewards times this."""
 
+TERMINAL, CUT_OFF = -1, -2
+"""In place of the index of the next after-state: it is entered for ever; it is not known."""
+
 
 class BatchTD:
-    """Replays all experience after every episode.
+    """Batch TD(0).
 
     Raises
     ------
@@ -31,19 +36,18 @@ class BatchTD:
         If the rule base is too large for its normal equations to be solved densely.
     """
 
+    candidates = 0
     largest = 4096
 
-    def __init__(self, settings: BatchTDSettings, rules: RuleBase, n_agents: int) -> None:
+    def __init__(self, settings: ReplaySettings, rules: RuleBase, n_agents: int) -> None:
         if rules.n_rules > self.largest:
             raise ValueError(
-                f"learner.kind = 'batch-td' solves for all rules at once: {rules.n_rules} rules, "
+                f"learner.kind: batch learners solve for all rules at once: {rules.n_rules} rules, "
                 f"allowed up to {self.largest}; lower learner.rule_base.order"
             )
         self.settings, self.rules = settings, rules
         self.theta: FloatArray = np.zeros((n_agents, rules.n_rules))
         self._gram: FloatArray = np.zeros((n_agents, rules.n_rules, rules.n_rules))
-        # Experience of finished episodes; `follower` is the index of the next after-state, -1
-        # behind a terminal one, -2 where the episode was cut off.
         self._states: list[FloatArray] = []
         self._rewards: list[float] = []
         self._follower: list[int] = []
@@ -53,11 +57,17 @@ class BatchTD:
     def begin_episode(self) -> None:
         """Remember nothing more: the first after-state of an episode follows none."""
 
-    def observe(self, states: FloatArray, reward: float, terminated: bool) -> int:
+    def observe(
+        self,
+        states: FloatArray,
+        reward: float,
+        terminated: bool,
+        candidates: FloatArray | None = None,
+    ) -> int:
         """Remember an after-state."""
         self._states.append(states.copy())
         self._rewards.append(reward)
-        self._follower.append(-1 if terminated else len(self._states))
+        self._follower.append(TERMINAL if terminated else len(self._states))
         return 0
 
     def end_episode(self) -> int:
@@ -65,25 +75,38 @@ class BatchTD:
         if not self._states:
             return 0
         if self._follower[-1] == len(self._states):
-            self._follower[-1] = -2
+            self._follower[-1] = CUT_OFF
         self._extend()
         rewards = REWARD_SCALE * np.array(self._rewards)
         follower = np.array(self._follower)
-        gamma, n_rules = self.settings.discount, self.rules.n_rules
+        gamma = self.settings.discount
         low, high = rewards.min() / (1.0 - gamma), rewards.max() / (1.0 - gamma)
+        ridge = self.settings.ridge * np.eye(self.rules.n_rules)
         for i, (active, strengths) in enumerate(self._rows):
-            factor = cho_factor(self._gram[i] + self.settings.ridge * np.eye(n_rules))
+            factor = cho_factor(self._gram[i] + ridge, check_finite=False)
             theta = self.theta[i] * REWARD_SCALE
             for _ in range(self.settings.sweeps):
-                moment = _moment(theta, active, strengths, rewards, follower, gamma, low, high)
+                targets = np.where(
+                    follower == TERMINAL,
+                    rewards / (1.0 - gamma),
+                    rewards + gamma * self._continuation(i, theta, follower),
+                )
+                moment = _moment(
+                    active, strengths, np.clip(targets, low, high), follower, self.rules.n_rules
+                )
                 theta = cho_solve(factor, moment, check_finite=False)
             self.theta[i] = theta / REWARD_SCALE
         return self.theta.size
 
+    def _continuation(self, agent: int, theta: FloatArray, follower: IntArray) -> FloatArray:
+        """Return f ``(N,)`` of what comes after every after-state; arbitrary where unknown."""
+        values = _row_values(theta, *self._rows[agent])
+        return values[np.maximum(follower, 0)]
+
     def _extend(self) -> None:
         """Take the newest episode into active rules and Gram matrices."""
         new = np.array(self._states[self._regressed :])
-        usable = np.array(self._follower[self._regressed :]) != -2
+        usable = np.array(self._follower[self._regressed :]) != CUT_OFF
         for i in range(len(self.theta)):
             active, strengths = self.rules.active(new[:, i])
             _add_gram(self._gram[i], active[usable], strengths[usable])
@@ -119,6 +142,42 @@ class BatchTD:
         self._rows = [self.rules.active(past[:, i]) for i in agents]
 
 
+class FittedValue(BatchTD):
+    """Fitted value iteration over predicted next states."""
+
+    def __init__(self, settings: FittedValueSettings, rules: RuleBase, n_agents: int) -> None:
+        super().__init__(settings, rules, n_agents)
+        self.candidates = settings.candidates
+        self._candidates: list[FloatArray] = []
+
+    def observe(
+        self,
+        states: FloatArray,
+        reward: float,
+        terminated: bool,
+        candidates: FloatArray | None = None,
+    ) -> int:
+        """Remember an after-state and the predicted next states ``(n, m, d)``."""
+        if candidates is None:
+            raise ValueError("fitted value iteration needs predicted next states")
+        self._candidates.append(candidates.astype(np.float32))
+        return super().observe(states, reward, terminated)
+
+    def _continuation(self, agent: int, theta: FloatArray, follower: IntArray) -> FloatArray:
+        nexts = np.array([c[agent] for c in self._candidates], dtype=float)
+        values = self.rules.values(theta, nexts.reshape(-1, nexts.shape[2]))
+        return values.reshape(nexts.shape[:2]).max(axis=1)
+
+    def arrays(self) -> dict[str, FloatArray]:
+        """Return what batch TD returns, and the predicted next states."""
+        return {**super().arrays(), "candidates": np.array(self._candidates)}
+
+    def restore(self, arrays: Mapping[str, FloatArray]) -> None:
+        """Continue from `arrays`."""
+        super().restore(arrays)
+        self._candidates = list(arrays["candidates"])
+
+
 @njit(cache=True)
 def _add_gram(gram: FloatArray, active: IntArray, strengths: FloatArray) -> None:
     """Add phi phi' of every row to `gram`."""
@@ -129,24 +188,23 @@ def _add_gram(gram: FloatArray, active: IntArray, strengths: FloatArray) -> None
 
 
 @njit(cache=True)
-def _moment(  # type: ignore[no-untyped-def]
-    theta, active, strengths, rewards, follower, gamma: float, low: float, high: float
-) -> FloatArray:
-    """Return the sum of phi times target over all rows that have one."""
-    n, k = active.shape
-    values = np.zeros(n)
-    for s in range(n):
-        for a in range(k):
+def _row_values(theta: FloatArray, active: IntArray, strengths: FloatArray) -> FloatArray:
+    """Return f ``(N,)`` of all rows."""
+    values = np.zeros(len(active))
+    for s in range(len(active)):
+        for a in range(active.shape[1]):
             values[s] += strengths[s, a] * theta[active[s, a]]
-    moment = np.zeros(len(theta))
-    for s in range(n):
-        if follower[s] == -2:
-            continue
-        if follower[s] == -1:
-            target = rewards[s] / (1.0 - gamma)
-        else:
-            target = rewards[s] + gamma * values[follower[s]]
-        target = min(max(target, low), high)
-        for a in range(k):
-            moment[active[s, a]] += strengths[s, a] * target
+    return values
+
+
+@njit(cache=True)
+def _moment(
+    active: IntArray, strengths: FloatArray, targets: FloatArray, follower: IntArray, n_rules: int
+) -> FloatArray:
+    """Return the sum of phi times target over all rows whose follower is known."""
+    moment = np.zeros(n_rules)
+    for s in range(len(active)):
+        if follower[s] != -2:  # CUT_OFF
+            for a in range(active.shape[1]):
+                moment[active[s, a]] += strengths[s, a] * targets[s]
     return moment

@@ -17,14 +17,32 @@ class Learner(Protocol):
     theta: FloatArray
     """``(n_agents, n_rules)`` consequent weights, one row per agent."""
 
+    candidates: int
+    """How many predicted next states per agent `observe` is to be given; 0: none."""
+
     def begin_episode(self) -> None:
         """Forget what reached into the past: an episode begins."""
         ...
 
-    def observe(self, states: FloatArray, reward: float, terminated: bool) -> int:
-        """Take in the states ``(n, d)`` entered and their reward.
+    def observe(
+        self,
+        states: FloatArray,
+        reward: float,
+        terminated: bool,
+        candidates: FloatArray | None = None,
+    ) -> int:
+        """Take in the states entered; return the number of consequent weights changed.
 
-        Returns the number of consequent weights changed.
+        Parameters
+        ----------
+        states
+            ``(n, d)`` states that the agents entered.
+        reward
+            Received on entering them.
+        terminated
+            Whether they are terminal.
+        candidates
+            ``(n, candidates, d)`` predicted next states of each agent under random joint actions.
         """
         ...
 
@@ -44,13 +62,21 @@ class Learner(Protocol):
 class Frozen:
     """Never learns: the consequent weights stay as they are, zero from the start."""
 
+    candidates = 0
+
     def __init__(self, rules: RuleBase, n_agents: int) -> None:
         self.theta: FloatArray = np.zeros((n_agents, rules.n_rules))
 
     def begin_episode(self) -> None:
         """Nothing to forget."""
 
-    def observe(self, states: FloatArray, reward: float, terminated: bool) -> int:
+    def observe(
+        self,
+        states: FloatArray,
+        reward: float,
+        terminated: bool,
+        candidates: FloatArray | None = None,
+    ) -> int:
         """Change nothing."""
         return 0
 

@@ -21,9 +21,14 @@ class TDLambda:
         e     = gamma lambda e + phi(s)            (Eq. 8, 12)
         theta = theta + alpha delta e              (Eq. 13)
 
+    With a normalised step size alpha is divided by the squared length of phi(s), so that
+    ``step_size = 1`` would remove the TD error of s at once.
+
     A terminal state s' is followed by itself for ever, which adds one update with
     ``delta = R(s') / (1 - gamma) - f(s')``.
     """
+
+    candidates = 0
 
     def __init__(self, settings: TDLambdaSettings, rules: RuleBase, n_agents: int) -> None:
         self.settings, self.rules = settings, rules
@@ -37,11 +42,19 @@ class TDLambda:
         self.trace[:] = 0.0
         self._previous = None
 
-    def observe(self, states: FloatArray, reward: float, terminated: bool) -> int:
+    def observe(
+        self,
+        states: FloatArray,
+        reward: float,
+        terminated: bool,
+        candidates: FloatArray | None = None,
+    ) -> int:
         """Update by Eq. 7-13 for the step from the previous states to these."""
         gamma, changed = self.settings.discount, 0
         if self._previous is not None:
-            changed += self._update(self._previous, self._reward + gamma * self._values(states))
+            changed += self._update(
+                self._previous, self._reward + gamma * self.rules.each(self.theta, states)
+            )
         self._previous, self._reward = states.copy(), reward
         if terminated:
             changed += self._update(states, np.full(len(states), reward / (1.0 - gamma)))
@@ -51,21 +64,13 @@ class TDLambda:
         """Nothing is left to learn."""
         return 0
 
-    def _values(self, states: FloatArray) -> FloatArray:
-        return np.array(
-            [self.rules.values(self.theta[i], states[i : i + 1])[0] for i in range(len(states))]
-        )
-
     def _update(self, states: FloatArray, targets: FloatArray) -> int:
-        delta = targets - self._values(states)
-        kernels.td_update(
-            self.theta,
-            self.trace,
-            np.ascontiguousarray(states, dtype=float),
-            self.settings.step_size * delta,
-            self.settings.discount * self.settings.trace_decay,
-            self.rules.layout,
-        )
+        delta = targets - self.rules.each(self.theta, states)
+        steps = self.settings.step_size * delta
+        if self.settings.normalised:
+            steps = steps / self.rules.squared_lengths(states)
+        decay = self.settings.discount * self.settings.trace_decay
+        kernels.td_update(self.theta, self.trace, states, steps, decay, self.rules.layout)
         return self.theta.size
 
     def arrays(self) -> dict[str, FloatArray]:
