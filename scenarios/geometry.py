@@ -16,9 +16,8 @@ from math import hypot, inf, sqrt
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from ..core.arrays import FloatArray
 
 ON_SURFACE = 1e-12
 """Distance below which the direction to the nearest point is meaningless [m]."""
@@ -43,7 +42,7 @@ class Outline:
     (0.2, 1.0, 0.0, 0.1, 0.0)
     """
 
-    edges: Array
+    edges: FloatArray
     rounding: float = 0.0
 
     def __post_init__(self) -> None:
@@ -59,14 +58,14 @@ class Outline:
         return float(np.hypot(ends[:, 0], ends[:, 1]).max()) + self.rounding
 
 
-def ring_edges(vertices: Array) -> Array:
+def ring_edges(vertices: FloatArray) -> FloatArray:
     """Return the edges ``(n, 4)`` of a closed ring of vertices ``(n, 2)``."""
     return np.hstack([vertices, np.roll(vertices, -1, axis=0)])
 
 
 @njit(cache=True)
 def surface(
-    edges: Array, rounding: float, x: float, y: float
+    edges: FloatArray, rounding: float, x: float, y: float
 ) -> tuple[float, float, float, float, float]:
     """Return where a point stands relative to an outline.
 
@@ -117,7 +116,7 @@ def surface(
 
 
 def surface_numpy(
-    edges: Array, rounding: float, x: float, y: float
+    edges: FloatArray, rounding: float, x: float, y: float
 ) -> tuple[float, float, float, float, float]:
     """Return what `surface` returns, by array operations on all edges at once."""
     point = np.array([x, y])
@@ -181,7 +180,7 @@ def _ray_edge(
 
 @njit(cache=True)
 def ray(
-    edges: Array, rounding: float, x: float, y: float, dx: float, dy: float, reach: float
+    edges: FloatArray, rounding: float, x: float, y: float, dx: float, dy: float, reach: float
 ) -> float:
     """Return how far a ray travels before it meets an outline.
 
@@ -218,7 +217,7 @@ def ray(
 
 
 def ray_numpy(
-    edges: Array, rounding: float, x: float, y: float, dx: float, dy: float, reach: float
+    edges: FloatArray, rounding: float, x: float, y: float, dx: float, dy: float, reach: float
 ) -> float:
     """Return what `ray` returns, by marching the signed distance of `surface_numpy`.
 
