@@ -57,6 +57,10 @@ class RuleBase:
                 raise ValueError(f"rule base: term {term} must increase within 0 to {d - 1}")
         if not terms or len(set(terms)) != len(terms):
             raise ValueError(f"rule base: terms {list(terms)} must be distinct and at least one")
+        if len({p.membership for p in partitions}) > 1:
+            raise ValueError("rule base: all partitions must have one membership shape")
+        if not 0 <= n_own <= d:
+            raise ValueError(f"rule base: n_own = {n_own}, allowed 0 to {d}")
         self.partitions = tuple(partitions)
         self.terms = tuple(terms)
         self.n_own = n_own

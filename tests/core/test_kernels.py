@@ -1,0 +1,134 @@
+"""Every kernel against its plain-NumPy twin, over many shapes of rule base."""
+
+from itertools import combinations
+from math import pi
+
+import numpy as np
+import pytest
+
+from nested_agents.core import kernels, twins
+from nested_agents.core.fuzzy import Partition
+from nested_agents.core.protocols import Blocks
+from nested_agents.core.rules import RuleBase
+
+N_ACTIONS, N_AGENTS, GROUP = 4, 4, 2
+TERMS = {
+    "order 1": [(0,), (1,), (2,), (3,)],
+    "order 2": list(combinations(range(4), 2)),
+    "order 4": [(0, 1, 2, 3)],
+    "mixed": [(0,), (2,), (1, 3), (0, 2, 3)],
+    "one variable unused": [(1, 2)],
+}
+
+
+def partitions_of(membership: str) -> list[Partition]:
+    return [
+        Partition((-1.0, 0.0, 0.5, 2.0), membership),
+        Partition((-2.2, -0.5, 0.0, 0.5, 2.2), membership, 2 * pi),
+        Partition((0.0, 1.0), membership, steepness=3.0),
+        Partition((-1.0, 1.0, 1.5), membership, 4.0, 5.0),
+    ]
+
+
+def states_of(rng: np.random.Generator, m: int, d: int = 4) -> np.ndarray:
+    """States inside and outside the ranges, some of them exactly on centres."""
+    states = rng.uniform(-4.0, 4.0, (m, d))
+    states[: m // 3] = rng.choice([-2.2, -1.0, 0.0, 0.5, 1.0, 2.0], (m // 3, d))
+    return states
+
+
+def blocks_of(rng: np.random.Generator, n_own: int, d: int = 4) -> Blocks:
+    own = states_of(rng, N_ACTIONS**GROUP, d)[:, :n_own]
+    shared = states_of(rng, N_ACTIONS**N_AGENTS, d)[:, n_own:]
+    divisor = int(rng.choice([1, N_ACTIONS, N_ACTIONS**GROUP]))
+    return Blocks(np.ascontiguousarray(own), np.ascontiguousarray(shared), divisor)
+
+
+@pytest.fixture(params=[0, 2, 4], ids=lambda n: f"{n} own")
+def n_own(request: pytest.FixtureRequest) -> int:
+    return request.param
+
+
+@pytest.fixture(params=TERMS)
+def terms(request: pytest.FixtureRequest) -> list:
+    return TERMS[request.param]
+
+
+@pytest.fixture(params=["triangular", "sigmoid"])
+def base(request: pytest.FixtureRequest, terms: list, n_own: int) -> RuleBase:
+    return RuleBase(partitions_of(request.param), terms, n_own)
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(20100)
+
+
+def test_values(base: RuleBase, rng: np.random.Generator) -> None:
+    theta, states = rng.normal(size=base.n_rules), states_of(rng, 60)
+    expected = twins.values(base, theta, states)
+    assert base.values(theta, states) == pytest.approx(expected, rel=0, abs=1e-12)
+    # The dense kernel serves any shape; the compact one is a shortcut for triangles.
+    dense = kernels.values_dense(theta, states, base.layout)
+    assert dense == pytest.approx(expected, rel=0, abs=1e-12)
+
+
+def test_block_values(base: RuleBase, rng: np.random.Generator) -> None:
+    theta, blocks = rng.normal(size=base.n_rules), blocks_of(rng, base.n_own)
+    codes = rng.integers(N_ACTIONS**N_AGENTS, size=90)
+    expected = twins.block_values(base, theta, blocks, codes)
+    assert base.block_values(theta, blocks, codes) == pytest.approx(expected, rel=0, abs=1e-12)
+    dense = kernels.block_values_dense(
+        theta, blocks.own, blocks.shared, blocks.divisor, codes, base.layout
+    )
+    assert dense == pytest.approx(expected, rel=0, abs=1e-12)
+
+
+def test_td_update(base: RuleBase, rng: np.random.Generator) -> None:
+    theta, trace = rng.normal(size=(2, 3, base.n_rules))
+    theta_twin, trace_twin = theta.copy(), trace.copy()
+    for _ in range(3):
+        states, steps = states_of(rng, 3), 0.1 * rng.normal(size=3)
+        kernels.td_update(theta, trace, states, steps, 0.38, base.layout)
+        twins.td_update(base, theta_twin, trace_twin, states, steps, 0.38)
+    assert trace == pytest.approx(trace_twin, rel=0, abs=1e-12)
+    assert theta == pytest.approx(theta_twin, rel=0, abs=1e-12)
+
+
+def test_block_values_agree_with_values_of_the_states(
+    base: RuleBase, rng: np.random.Generator
+) -> None:
+    theta, blocks = rng.normal(size=base.n_rules), blocks_of(rng, base.n_own)
+    codes = np.arange(N_ACTIONS**N_AGENTS)
+    own = blocks.own[codes // blocks.divisor % len(blocks.own)]
+    expected = base.values(theta, np.concatenate([own, blocks.shared], axis=1))
+    assert base.block_values(theta, blocks, codes) == pytest.approx(expected, rel=0, abs=1e-12)
+
+
+def test_a_states_array_in_any_memory_order(base: RuleBase, rng: np.random.Generator) -> None:
+    theta, states = rng.normal(size=base.n_rules), states_of(rng, 12)
+    assert (base.values(theta, np.asfortranarray(states)) == base.values(theta, states)).all()
+    assert (base.values(theta, states[::2]) == base.values(theta, states)[::2]).all()
+
+
+@pytest.mark.parametrize("membership", ["triangular", "sigmoid"])
+def test_the_papers_78125_rules(membership: str, rng: np.random.Generator) -> None:
+    angle = tuple(float(c) for c in np.linspace(-pi, pi, 5, endpoint=False))
+    circle = Partition(angle, membership, 2 * pi)
+    line = Partition((0.0, 0.25, 0.5, 0.75, 1.0), membership)
+    base = RuleBase([circle, circle, line, line, circle, circle, line], [tuple(range(7))], n_own=4)
+    assert base.n_rules == 5**7
+    theta, states = rng.normal(size=base.n_rules), rng.uniform(-4, 4, (4, 7))
+    expected = twins.values(base, theta, states)
+    assert base.values(theta, states) == pytest.approx(expected, rel=0, abs=1e-12)
+    blocks, codes = blocks_of(rng, 4, 7), rng.integers(N_ACTIONS**N_AGENTS, size=6)
+    expected = twins.block_values(base, theta, blocks, codes)
+    assert base.block_values(theta, blocks, codes) == pytest.approx(expected, rel=0, abs=1e-12)
+
+    theta, trace = rng.normal(size=(2, 2, base.n_rules))
+    theta_twin, trace_twin = theta.copy(), trace.copy()
+    steps = np.array([0.01, -0.02])
+    kernels.td_update(theta, trace, states[:2], steps, 0.3996, base.layout)
+    twins.td_update(base, theta_twin, trace_twin, states[:2], steps, 0.3996)
+    assert np.abs(trace - trace_twin).max() <= 1e-12
+    assert np.abs(theta - theta_twin).max() <= 1e-12
