@@ -1,1 +1,6 @@
 """What is measured: specs, trials, store, statistics and reports."""
+
+STUDIES: dict[str, str] = {
+    "learning-curve": "learning_curve",
+}
+"""The module of every study by name; see `nested_agents.studies.study`."""

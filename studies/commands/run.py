@@ -1,0 +1,36 @@
+"""``nested-agents run``: run the study of a spec."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from .options import CORES, Changes, Jobs
+
+
+def command(
+    spec: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="SPEC.toml")],
+    out: Annotated[Path, tyro.conf.arg(metavar="DIR")],
+    jobs: Jobs = CORES,
+    set: Changes = (),
+) -> int:
+    """Run the study of a spec; the same command again continues it.
+
+    Parameters
+    ----------
+    spec
+        What to run; `nested-agents demo --print-spec` prints an example.
+    out
+        Where to keep the study; made if it does not exist. Every trial is kept the moment it
+        finishes, so interrupting costs only those that are running.
+    jobs
+        Worker processes; one for every core unless said otherwise.
+    set
+        Lay a value over the spec: --set learner.ridge=1 --set "seeds=[3, 5]". May be repeated.
+    """
+    from ..conduct import conduct
+    from ..spec import Spec
+
+    return conduct(Spec.load(spec, set), out, jobs)

@@ -1,0 +1,90 @@
+"""Conducts a study from its spec to its figures, and tells the user how it goes.
+
+The one place where running, analysis and drawing meet; each of them knows nothing of the others.
+"""
+
+from __future__ import annotations
+
+from contextlib import closing
+from pathlib import Path
+
+from . import display
+from .results import read
+from .runner import run_trials
+from .spec import Spec
+from .spec_errors import SpecError
+from .store import Store
+from .study import load_study
+from .trial import Trial, check, trials_of
+
+
+def conduct(
+    spec: Spec,
+    directory: Path,
+    jobs: int,
+    *,
+    replay: bool = False,
+    retry_failed: bool = False,
+) -> int:
+    """Run what is left of a study, print its table, draw its figures.
+
+    Parameters
+    ----------
+    spec
+        The study.
+    directory
+        Where it is kept.
+    jobs
+        Worker processes.
+    replay
+        Whether to draw a replay of the first condition's first seed.
+    retry_failed
+        Whether failed trials are run again.
+
+    Returns
+    -------
+    int
+        1 if any trial failed, else 0.
+    """
+    if jobs < 1:
+        raise SpecError(f"--jobs {jobs}: must be at least 1")
+    check(spec)
+    study, trials = load_study(spec.study), trials_of(spec)
+    with Store.create(directory, spec) as store:
+        if retry_failed:
+            store.forget_failed()
+        pending = store.pending(trials)
+        try:
+            with closing(run_trials(pending, store, study.measure, jobs)) as outcomes:
+                display.follow(outcomes, len(trials), len(trials) - len(pending))
+        except KeyboardInterrupt:
+            display.say(
+                f"interrupted: {store.counts()['done']} of {len(trials)} trials are kept in "
+                f"{directory}; the same command continues"
+            )
+            raise
+        failed, results = store.failed(), read(store)
+        replays = _replay(store, trials[0]) if replay and not failed else []
+    analysis = study.analyse(results)
+    display.print_table(analysis.table)
+    figures = directory / "figures"
+    figures.mkdir(exist_ok=True)
+    paths = study.draw(analysis, figures) if analysis.table else []
+    display.print_places(directory, [*paths, *replays])
+    if failed:
+        display.say(f"{len(failed)} trials failed: nested-agents status {directory}")
+    return 1 if failed else 0
+
+
+def _replay(store: Store, trial: Trial) -> list[Path]:
+    from ..scenarios.rendering import animate
+
+    folder = store.directory / "replay"
+    folder.mkdir(exist_ok=True)
+    paths = []
+    for name in ("first", "last"):
+        path = folder / f"{name}-episode.gif"
+        if not path.exists():
+            animate(store.recording(trial, name), path)
+        paths.append(path)
+    return paths

@@ -1,0 +1,104 @@
+"""What the user sees of a study on the terminal: progress, table, and where things are."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+from rich.table import Table
+
+from .runner import Outcome
+from .store import DATABASE
+from .summary import Summary, interval, number
+
+PLAIN_SECONDS = 10.0
+"""How often a line tells of the progress when there is no terminal."""
+
+
+def say(line: str) -> None:
+    """Print a line on standard error."""
+    print(line, file=sys.stderr, flush=True)
+
+
+def follow(outcomes: Iterable[Outcome], total: int, done: int) -> None:
+    """Consume outcomes while showing how many of `total` trials are done and how long is left."""
+    if done:
+        say(f"{done} of {total} trials were run before")
+    if done == total:
+        return
+    if sys.stderr.isatty():
+        _follow_bar(outcomes, total, done)
+    else:
+        _follow_lines(outcomes, total, done)
+
+
+def _follow_bar(outcomes: Iterable[Outcome], total: int, done: int) -> None:
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(bar_width=None),
+        MofNCompleteColumn(),
+        TextColumn("trials"),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(compact=True),
+    )
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, speed_estimate_period=600.0) as progress:
+        task = progress.add_task("running", total=total, completed=done)
+        for outcome in outcomes:
+            progress.advance(task)
+            if outcome.error is not None:
+                progress.console.print(_failure(outcome), markup=False, highlight=False)
+
+
+def _follow_lines(outcomes: Iterable[Outcome], total: int, done: int) -> None:
+    begin = said = time.monotonic()
+    for here, outcome in enumerate(outcomes, 1):
+        if outcome.error is not None:
+            say(_failure(outcome))
+        now = time.monotonic()
+        if now - said >= PLAIN_SECONDS or done + here == total:
+            said = now
+            left = (now - begin) / here * (total - done - here)
+            say(f"{done + here} of {total} trials, {now - begin:.0f} s, about {left:.0f} s left")
+
+
+def _failure(outcome: Outcome) -> str:
+    last = (outcome.error or "").strip().splitlines()[-1]
+    return f"failed: {outcome.trial.condition}, seed {outcome.trial.seed}: {last}"
+
+
+def print_table(lines: Sequence[Summary]) -> None:
+    """Print estimates by condition, each over its 95 % interval."""
+    if not lines:
+        print("no trial has finished")
+        return
+    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, header_style="bold")
+    table.add_column("", no_wrap=False)
+    for title in lines[0].estimates:
+        table.add_column(title, justify="right", vertical="top")
+    for line in lines:
+        estimates = line.estimates.values()
+        cells = [f"{number(float(e.value))}\n[dim]{interval(e)}[/]" for e in estimates]
+        table.add_row(f"{escape(line.condition)}\n[dim]{line.seeds} seeds[/]", *cells)
+    Console().print(table)
+
+
+def print_places(directory: Path, paths: Sequence[Path]) -> None:
+    """Say where results and pictures are."""
+    print()
+    for path in paths:
+        print(path)
+    print(f"{directory / DATABASE}: nested-agents results {directory} --format csv")

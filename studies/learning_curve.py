@@ -1,0 +1,114 @@
+"""The learning-curve study: how the agents fare from episode to episode (Fig. 5 and 6).
+
+Every claim of learning needs its controls beside it, above all the one whose weights stay frozen:
+it tells learning from what the predictor alone achieves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from .results import Results
+from .statistics import Estimate, bootstrap, rate, rates
+from .summary import Summary
+from .trial import run_trial as measure
+
+BLOCK = 5
+"""Episodes at each end of training that the table averages over."""
+
+
+@dataclass(frozen=True)
+class Metric:
+    """A column of the table.
+
+    Attributes
+    ----------
+    title
+        Its heading.
+    measure
+        Which measurement, see `nested_agents.studies.results.MEASURES`.
+    block
+        Which episodes: the first or the last `BLOCK` of training, or those of the evaluation.
+    is_rate
+        Whether each episode is a success or not.
+    """
+
+    title: str
+    measure: str
+    block: Literal["first", "last", "greedy"]
+    is_rate: bool = False
+
+
+METRICS = (
+    Metric(f"success first {BLOCK}", "success", "first", is_rate=True),
+    Metric(f"success last {BLOCK}", "success", "last", is_rate=True),
+    Metric("success greedy", "success", "greedy", is_rate=True),
+    Metric("stopped greedy", "stopped_at_goal", "greedy", is_rate=True),
+    Metric("distance [m]", "final_distance_m", "last"),
+    Metric("turned [rad]", "final_orientation_rad", "last"),
+    Metric("contact", "contact_fraction", "last"),
+    Metric("return", "return", "last"),
+)
+
+CURVES = ("success", "final_distance_m", "final_orientation_rad", "contact_fraction")
+"""The measures that are followed from episode to episode."""
+
+
+@dataclass(frozen=True)
+class LearningCurves:
+    """The analysis.
+
+    Attributes
+    ----------
+    table
+        One line per condition.
+    curves
+        By condition and measure, estimates ``(n_episodes,)`` over seeds.
+    """
+
+    table: tuple[Summary, ...]
+    curves: dict[str, dict[str, Estimate]]
+
+
+def analyse(results: Results) -> LearningCurves:
+    """Estimate the table and the curves; 95 % intervals, seeds as the unit of sampling."""
+    table = []
+    for condition, training in results.training.items():
+        evaluation = results.evaluation.get(condition)
+        estimates = {}
+        for metric in METRICS:
+            arrays = evaluation if metric.block == "greedy" else training
+            if arrays is None:
+                continue
+            block = slice(None, BLOCK) if metric.block == "first" else slice(-BLOCK, None)
+            values = arrays[metric.measure]
+            values = values if metric.block == "greedy" else values[:, block]
+            estimates[metric.title] = rate(values) if metric.is_rate else bootstrap(_runs(values))
+        table.append(Summary(condition, len(training["success"]), estimates))
+    curves = {
+        condition: {
+            name: rates(training[name]) if name == "success" else bootstrap(training[name])
+            for name in CURVES
+        }
+        for condition, training in results.training.items()
+    }
+    return LearningCurves(tuple(table), curves)
+
+
+def draw(analysis: LearningCurves, directory: Path) -> list[Path]:
+    """Write the figures into an existing directory; return their paths."""
+    from . import figures  # workers import this module, and matplotlib takes its time
+
+    return figures.draw(analysis, directory)
+
+
+def _runs(values: np.ndarray) -> np.ndarray:
+    """Return the mean of each run over its episodes."""
+    return np.asarray(values.mean(axis=1))
+
+
+__all__ = ["METRICS", "LearningCurves", "analyse", "draw", "measure"]

@@ -1,0 +1,132 @@
+"""Tables of settings laid over each other, and dotted keys into them.
+
+A *table* is a nested dictionary as TOML reads it. Laying one over another replaces values and
+descends into tables. Where the two name a different `kind`, the lower one keeps only what both
+kinds inherit in common: a trace decay says nothing to a learner that has no trace.
+"""
+
+from __future__ import annotations
+
+import tomllib
+import typing
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from pydantic import BaseModel
+
+Table = dict[str, Any]
+
+
+def models_of(annotation: Any) -> list[type[BaseModel]]:
+    """Return the settings models that a field's annotation allows, in order."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [model for part in typing.get_args(annotation) for model in models_of(part)]
+
+
+def kind_of(model: type[BaseModel]) -> str | None:
+    """Return the `kind` by which a table names this model, if it has one."""
+    field = model.model_fields.get("kind")
+    return None if field is None else field.default
+
+
+def model_at(annotation: Any, table: object) -> type[BaseModel] | None:
+    """Return the model that `table` is meant for; none if its kind is unknown or missing."""
+    models = models_of(annotation)
+    if len(models) == 1:
+        return models[0]
+    kind = table.get("kind") if isinstance(table, Mapping) else None
+    return next((m for m in models if kind is not None and kind_of(m) == kind), None)
+
+
+def overlay(base: Mapping[str, Any], table: Mapping[str, Any], annotation: Any = None) -> Table:
+    """Return `base` with `table` laid over it; neither is modified.
+
+    Parameters
+    ----------
+    base, table
+        The lower and the upper table.
+    annotation
+        Model, or union of models told apart by `kind`, that the result is meant for. None: plain
+        tables without kinds.
+
+    Examples
+    --------
+    >>> overlay({"a": 1, "b": {"c": 2, "d": 3}}, {"b": {"c": 4}})
+    {'a': 1, 'b': {'c': 4, 'd': 3}}
+    """
+    result = dict(base)
+    if "kind" in base and "kind" in table and base["kind"] != table["kind"]:
+        kept = _common_fields(model_at(annotation, base), model_at(annotation, table))
+        result = {key: value for key, value in base.items() if key in kept}
+    model = model_at(annotation, {**result, **table})
+    for key, value in table.items():
+        below = result.get(key)
+        if isinstance(value, Mapping) and isinstance(below, Mapping):
+            field = model.model_fields.get(key) if model is not None else None
+            result[key] = overlay(below, value, None if field is None else field.annotation)
+        else:
+            result[key] = value
+    return result
+
+
+def _common_fields(first: type[BaseModel] | None, second: type[BaseModel] | None) -> set[str]:
+    if first is None or second is None:
+        return set()
+    shared = next(c for c in first.__mro__ if issubclass(second, c) and issubclass(c, BaseModel))
+    return set(shared.model_fields)
+
+
+def nested(key: str, value: object) -> Table:
+    """Return the table that holds `value` at a dotted key.
+
+    Examples
+    --------
+    >>> nested("learner.rule_base.order", 2)
+    {'learner': {'rule_base': {'order': 2}}}
+    """
+    for part in reversed(key.split(".")):
+        value = {part: value}
+    return typing.cast(Table, value)
+
+
+def flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the dotted key and the value of every entry; tables are descended into, lists not.
+
+    Examples
+    --------
+    >>> list(flat({"a": {"b": 1}, "c": [2]}))
+    [('a.b', 1), ('c', [2])]
+    """
+    for key, value in table.items():
+        if isinstance(value, Mapping) and value:
+            yield from flat(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", value
+
+
+def assignment(text: str) -> Table:
+    """Read ``key=value`` as TOML would; a bare word as value is a string.
+
+    Raises
+    ------
+    ValueError
+        If `text` is not one assignment.
+
+    Examples
+    --------
+    >>> assignment("scenario.box = circle"), assignment("seeds=[1, 2]")
+    ({'scenario': {'box': 'circle'}}, {'seeds': [1, 2]})
+    """
+    key, equals, value = (part.strip() for part in text.partition("="))
+    if not (key and equals and value) or "\n" in text:
+        raise ValueError("expected key=value")
+    try:
+        return tomllib.loads(f"{key} = {value}")
+    except tomllib.TOMLDecodeError:
+        if any(character in value for character in "\"'[]{}#=, "):
+            raise ValueError("the value is not valid TOML") from None
+    try:
+        return tomllib.loads(f"{key} = '{value}'")
+    except tomllib.TOMLDecodeError:
+        raise ValueError("the key is not valid TOML") from None

@@ -1,0 +1,56 @@
+"""Named starting points of a spec: a scenario, a topology and a learner.
+
+A preset states where it departs from the defaults of the settings models; a spec's own tables are
+laid over it. `frozen`, `random` and `greedy` are the controls of a learning curve.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+
+class Preset(NamedTuple):
+    """A named fragment of a spec."""
+
+    summary: str
+    """What it is, in one line."""
+    table: Mapping[str, Any]
+    """The `scenario`, `topology` and `learner` tables as they would stand in a spec."""
+
+
+PRESETS: dict[str, Preset] = {
+    "default": Preset(
+        "the best learner known: batch TD on a first-order rule base over relational variables",
+        {"learner": {"kind": "batch-td"}},
+    ),
+    "paper": Preset(
+        "constants as printed in the paper; what it does not print is in docs/fidelity.md",
+        {
+            "scenario": {"state_space": "paper", "hold": 1, "speed_increment": 0.25},
+            "topology": {"kind": "chain"},
+            "learner": {
+                "kind": "td-lambda",
+                "step_size": 0.00012,
+                "discount": 0.999,
+                "trace_decay": 0.4,
+                "rule_base": {"membership": "sigmoid", "memberships": 5, "order": 7},
+                "exploration": {"kind": "paper", "decay": 0.005},
+                "decision": {"rule": "value", "others": "observed"},
+            },
+        },
+    ),
+    "frozen": Preset(
+        "control: as default, but the consequent weights stay zero",
+        {"learner": {"kind": "frozen"}},
+    ),
+    "random": Preset(
+        "control: every action is drawn at random",
+        {"learner": {"kind": "frozen", "decision": {"rule": "random"}}},
+    ),
+    "greedy": Preset(
+        "control: one-step lookahead on the predicted reward, nothing learned",
+        {"learner": {"kind": "frozen", "decision": {"rule": "reward"}}},
+    ),
+}
+"""Every preset by name."""

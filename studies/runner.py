@@ -1,0 +1,163 @@
+"""Runs trials in worker processes and keeps every result the moment it arrives.
+
+Workers are separate processes even for one job: a crash in native code costs one trial, and the
+number of threads that linear algebra uses, on which last bits depend, is always one. A trial whose
+worker is killed is run again, alone, up to `ATTEMPTS` times.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+import traceback
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import joblib
+from joblib.externals.loky import get_reusable_executor
+from joblib.externals.loky.process_executor import TerminatedWorkerError
+
+from .store import Store
+from .trial import Trial, TrialResult
+
+ATTEMPTS = 3
+"""How often a trial is run whose worker dies while nothing else runs."""
+
+Measure = Callable[[Trial], TrialResult]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a trial: its result is in the store already.
+
+    Attributes
+    ----------
+    trial
+        The trial.
+    error
+        The traceback, if it failed.
+    seconds
+        How long it took.
+    """
+
+    trial: Trial
+    error: str | None
+    seconds: float
+
+
+def run_trials(
+    trials: Sequence[Trial], store: Store, measure: Measure, jobs: int
+) -> Generator[Outcome]:
+    """Run trials in parallel; store, then yield each as it finishes.
+
+    Closing the generator, or an exception in its consumer, stops the workers at once.
+
+    Parameters
+    ----------
+    trials
+        The trials to run, for instance `Store.pending`.
+    store
+        Where results and tracebacks are kept.
+    measure
+        Runs one trial; a module-level function, since workers import it by name.
+    jobs
+        Number of worker processes that are busy at a time, at least 1.
+
+    Raises
+    ------
+    ValueError
+        If `jobs` is less than 1.
+    """
+    if jobs < 1:
+        raise ValueError(f"jobs = {jobs}: must be at least 1")
+    queue = list(trials)
+    while queue:
+        started: list[Trial] = []
+        finished: set[str] = set()
+        try:
+            with closing(_parallel(queue, measure, jobs, started)) as arriving:
+                for trial, result, error, seconds in arriving:
+                    finished.add(trial.identity)
+                    yield _keep(store, trial, result, error, seconds)
+        except TerminatedWorkerError:
+            for suspect in [t for t in started if t.identity not in finished]:
+                finished.add(suspect.identity)
+                yield _alone(suspect, store, measure)
+        queue = [trial for trial in queue if trial.identity not in finished]
+
+
+Arrival = tuple[Trial, TrialResult | None, str | None, float]
+
+
+def _parallel(
+    trials: Sequence[Trial], measure: Measure, jobs: int, started: list[Trial]
+) -> Generator[Arrival]:
+    """Yield results in order of arrival; `started` receives each trial as it is handed out."""
+
+    def tasks() -> Iterator[Any]:
+        for trial in trials:
+            started.append(trial)
+            yield joblib.delayed(_attempt)(measure, trial)
+
+    with joblib.parallel_config(backend="loky", inner_max_num_threads=1):
+        # joblib runs a single job in this process: ask for two workers and feed them singly.
+        parallel = joblib.Parallel(
+            n_jobs=max(jobs, 2), pre_dispatch=jobs, batch_size=1, return_as="generator_unordered"
+        )
+        arriving = parallel(tasks())
+    try:
+        yield from arriving
+    except (GeneratorExit, KeyboardInterrupt):
+        get_reusable_executor().shutdown(wait=True, kill_workers=True)
+        raise
+
+
+def _alone(trial: Trial, store: Store, measure: Measure) -> Outcome:
+    for _ in range(ATTEMPTS):
+        try:
+            ((_, result, error, seconds),) = _parallel([trial], measure, 1, [])
+        except TerminatedWorkerError as death:
+            reason = str(death)
+        else:
+            return _keep(store, trial, result, error, seconds)
+    return _keep(store, trial, None, f"its worker died {ATTEMPTS} times: {reason}", 0.0)
+
+
+def _keep(
+    store: Store, trial: Trial, result: TrialResult | None, error: str | None, seconds: float
+) -> Outcome:
+    if result is None:
+        store.fail(trial, error or "")
+    else:
+        store.save(trial, result, seconds)
+    return Outcome(trial, error, seconds)
+
+
+def _attempt(measure: Measure, trial: Trial) -> Arrival:
+    """Run one trial in a worker; what goes wrong is returned as text."""
+    _become_worker()
+    begin = time.perf_counter()
+    try:
+        result = measure(trial)
+    except Exception:
+        return trial, None, traceback.format_exc(), time.perf_counter() - begin
+    return trial, result, None, time.perf_counter() - begin
+
+
+@cache
+def _become_worker() -> None:
+    """Leave Ctrl-C to the parent, and do not outlive it when it is killed."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = os.getppid()
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(0.5)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()

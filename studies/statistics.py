@@ -1,0 +1,131 @@
+"""Point estimates with intervals: percentile bootstrap over seeds, and rates over episodes.
+
+The seed is the unit of sampling: episodes of one run depend on each other, runs do not. Intervals
+of fewer than two seeds are not a number rather than of no width.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import stats
+
+Array = NDArray[np.float64]
+
+STATISTICS: dict[str, Callable[[Array], Array]] = {
+    "mean": lambda x: np.mean(x, axis=-1),
+    "iqm": lambda x: stats.trim_mean(x, 0.25, axis=-1),
+    "median": lambda x: np.median(x, axis=-1),
+}
+"""Statistics of the last axis by name; the interquartile mean leaves out a quarter at each end."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A value with the ends of its interval; arrays of equal shape, or of no dimension."""
+
+    value: Array
+    low: Array
+    high: Array
+
+
+def bootstrap(
+    *strata: ArrayLike,
+    statistic: str = "mean",
+    level: float = 0.95,
+    resamples: int = 4000,
+    seed: int = 0,
+) -> Estimate:
+    """Return a statistic of values pooled over strata, with its stratified bootstrap interval.
+
+    Each stratum is resampled on its own, whole runs at a time, so that every stratum keeps its
+    weight (Agarwal et al. 2021, Section 4.1).
+
+    Parameters
+    ----------
+    *strata
+        Values ``(n_runs,)`` or ``(n_runs, n_points)``; the number of runs may differ. Points are
+        estimated apart, on the same resamples.
+    statistic
+        Name in `STATISTICS`.
+    level
+        Coverage of the interval.
+    resamples, seed
+        Number of resamples, and the seed that draws them.
+
+    Raises
+    ------
+    ValueError
+        If the statistic is unknown, or a stratum is empty.
+
+    Examples
+    --------
+    >>> e = bootstrap([1.0, 2.0, 3.0, 4.0])
+    >>> float(e.value), bool(1.0 <= e.low < 2.5 < e.high <= 4.0)
+    (2.5, True)
+    """
+    if statistic not in STATISTICS:
+        raise ValueError(f"statistic = {statistic!r}: known: {', '.join(STATISTICS)}")
+    arrays = [np.asarray(stratum, dtype=float) for stratum in strata]
+    if not arrays or any(array.ndim not in (1, 2) or len(array) == 0 for array in arrays):
+        raise ValueError("bootstrap: every stratum needs values (n_runs,) or (n_runs, n_points)")
+    compute = STATISTICS[statistic]
+    value = compute(np.concatenate(arrays).T)
+    if any(len(array) < 2 for array in arrays):
+        return Estimate(value, np.full_like(value, np.nan), np.full_like(value, np.nan))
+    rng = np.random.default_rng(seed)
+    drawn = [array[rng.integers(len(array), size=(resamples, len(array)))] for array in arrays]
+    # (resamples, n_runs) or (resamples, n_runs, n_points): runs last for the statistic.
+    samples = np.moveaxis(np.concatenate(drawn, axis=1), 1, -1)
+    tail = (1.0 - level) / 2.0
+    low, high = np.quantile(compute(samples), [tail, 1.0 - tail], axis=0)
+    return Estimate(value, low, high)
+
+
+def rate(outcomes: ArrayLike, level: float = 0.95) -> Estimate:
+    """Return a success rate with its Wilson interval, runs as clusters.
+
+    With one episode a run this is Wilson's score interval (Wilson 1927). With several, the number
+    of episodes is divided by the design effect (Kish 1965): how much more the rates of the runs
+    vary than those of independent episodes would. It lies between 1 (episodes independent) and
+    the number of episodes a run (all alike), and is taken as the latter if every episode of every
+    run ended the same way, for then nothing can be said of it.
+
+    Parameters
+    ----------
+    outcomes
+        Zeros and ones ``(n_runs, n_episodes)``.
+    level
+        Coverage of the interval.
+
+    Examples
+    --------
+    >>> e = rate([[1], [1], [1], [0]])
+    >>> f"{e.value:.2f} [{e.low:.2f}, {e.high:.2f}]"
+    '0.75 [0.30, 0.95]'
+    """
+    array = np.asarray(outcomes, dtype=float)
+    n_runs, n_episodes = array.shape
+    p = array.mean()
+    if n_runs < 2:
+        return Estimate(p, np.full_like(p, np.nan), np.full_like(p, np.nan))
+    independent = p * (1.0 - p) / (n_runs * n_episodes)
+    observed = array.mean(axis=1).var(ddof=1) / n_runs
+    effect = observed / independent if independent > 0.0 else float(n_episodes)
+    n = n_runs * n_episodes / np.clip(effect, 1.0, n_episodes)
+    z = stats.norm.ppf(0.5 + level / 2.0)
+    centre = (p + z**2 / (2.0 * n)) / (1.0 + z**2 / n)
+    half = z / (1.0 + z**2 / n) * np.sqrt(p * (1.0 - p) / n + z**2 / (4.0 * n**2))
+    low, high = np.clip([centre - half, centre + half], 0.0, 1.0)
+    # At a rate of 0 or 1 one end is the rate itself, but for rounding.
+    return Estimate(p, np.minimum(low, p), np.maximum(high, p))
+
+
+def rates(outcomes: ArrayLike, level: float = 0.95) -> Estimate:
+    """Return `rate` of each column of ``(n_runs, n_points)`` outcomes on its own."""
+    found = [rate(column[:, None], level) for column in np.asarray(outcomes).T]
+    value, low, high = np.array([(e.value, e.low, e.high) for e in found]).T
+    return Estimate(value, low, high)

@@ -1,0 +1,35 @@
+"""What a study is: a measure of one trial, an analysis of all, and figures of the analysis.
+
+A study is one module that offers these, and one line in `nested_agents.studies.STUDIES`.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Protocol, cast
+
+from . import STUDIES
+from .results import Results
+from .trial import Trial, TrialResult
+
+
+class Study(Protocol):
+    """The functions of a study's module."""
+
+    def measure(self, trial: Trial) -> TrialResult:
+        """Run one trial; imported by name in worker processes."""
+        ...
+
+    def analyse(self, results: Results) -> Any:
+        """Turn results into estimates; its attribute `table` holds the `Summary` lines."""
+        ...
+
+    def draw(self, analysis: Any, directory: Path) -> list[Path]:
+        """Write figures of an analysis into an existing directory; return their paths."""
+        ...
+
+
+def load_study(name: str) -> Study:
+    """Return the study of a name in `nested_agents.studies.STUDIES`."""
+    return cast(Study, import_module(f".{STUDIES[name]}", __package__))
