@@ -25,6 +25,7 @@ COMMANDS: dict[str, str] = {
     "status": "status",
     "retry": "retry",
     "presets": "presets",
+    "topology": "topology",
 }
 """The module of every command by name, in the order of the help."""
 

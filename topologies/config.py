@@ -38,7 +38,7 @@ class ChainSettings(TopologySettings):
     order: Literal["listed", "reversed", "interleaved"] | Names = "listed"
     """The agents' own order, its reverse, wheel by wheel across robots, or all names in order."""
 
-    argument: ClassVar[str] = "reversed | interleaved | NAME,NAME,..."
+    argument: ClassVar[str] = "reversed|interleaved|NAME,NAME,..."
 
     @classmethod
     def parsed(cls, argument: str) -> Self:
@@ -107,7 +107,7 @@ class EdgesSettings(TopologySettings):
     """Any hierarchy, edge by edge."""
 
     kind: Literal["edges"] = "edges"
-    edges: tuple[tuple[str, str], ...] = ()
+    edges: tuple[tuple[str, str], ...]
     """Pairs (superior, subordinate)."""
     alone: Names = ()
     """Agents in no edge."""
@@ -149,7 +149,7 @@ class FileSettings(TopologySettings):
     digest: str = ""
     """Hash of the file's content, filled in when missing: results belong to that content."""
 
-    argument: ClassVar[str] = "PATH.graphml | PATH.json"
+    argument: ClassVar[str] = "PATH.graphml|PATH.json"
 
     @model_validator(mode="before")
     @classmethod

@@ -1,0 +1,57 @@
+"""``nested-agents topology``: which hierarchies there are, and what one of them looks like."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+
+def command(
+    action: Annotated[Literal["list", "show"], tyro.conf.Positional],
+    topology: Annotated[str | None, tyro.conf.Positional, tyro.conf.arg(metavar="[SPEC]")] = None,
+    agents: int | None = None,
+    robots: int | None = None,
+    wheels: int | None = None,
+    actions: int = 4,
+    format: Literal["table", "json"] = "table",
+    plot: Path | None = None,
+) -> int:
+    """List the topologies, or show one of them: edges, order of decision, who sees whom, cost.
+
+    Parameters
+    ----------
+    action
+        What to do.
+    topology
+        A topology as in a spec: chain:reversed, tree:2, file.py:function, graph.json, ...
+    agents
+        Number of agents; default: those that the topology names, else robots times wheels, else 4.
+    robots
+        Number of robots, whose agents are consecutive.
+    wheels
+        Wheels (agents) of a robot; default: 2 if the number of agents is even, else 1.
+    actions
+        Actions of each agent.
+    format
+        How to print it.
+    plot
+        A picture to write: SVG, PNG or PDF by suffix.
+    """
+    from ..spec_errors import SpecError
+    from ..topology_view import kinds, printed, view
+
+    try:
+        if action == "list":
+            print(kinds(format))
+        elif topology is None:
+            raise SpecError("topology show: SPEC is missing; see nested-agents topology list")
+        else:
+            shown = view(topology, agents, robots, wheels, actions)
+            if plot is not None:
+                shown.draw(plot)
+            print(printed(shown, format))
+    except ValueError as error:
+        raise SpecError(str(error)) from None
+    return 0
