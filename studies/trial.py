@@ -110,8 +110,8 @@ def build(settings: ConditionSettings, seed: int) -> tuple[Opened, Team]:
     ValueError
         If the settings do not fit together; one line.
     """
-    scenario = Opened(scenarios.build(settings.scenario))
-    hierarchy = topologies.build(settings.topology, scenario.agents, scenario.groups)
+    arranged, hierarchy = topologies.arrange(settings.topology, scenarios.build(settings.scenario))
+    scenario = Opened(arranged)
     return scenario, Team.build(settings.learner, scenario, hierarchy, policy_seed(seed))
 
 

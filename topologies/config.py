@@ -6,6 +6,7 @@ argument may be.
 
 from __future__ import annotations
 
+from difflib import get_close_matches
 from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
@@ -251,8 +252,10 @@ def parse(text: str) -> TopologySettings:
         raise ValueError(f"topology {text!r}: {_one_line(error)}") from None
     except ValueError as error:
         raise ValueError(f"topology {text!r}: {error}") from None
-    known = ", ".join([*KINDS, *files.installed()])
-    raise ValueError(f"topology {text!r}: unknown kind, known: {known}, or a file")
+    known = [*KINDS, *files.installed()]
+    near = get_close_matches(kind, known, n=1)
+    hint = f"did you mean {near[0]!r}? " if near else ""
+    raise ValueError(f"topology {text!r}: {hint}known: {', '.join(known)}, or a file")
 
 
 def _from_text(value: object) -> object:
