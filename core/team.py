@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
@@ -14,8 +15,9 @@ from .evaluators import Evaluator, ExactEnumeration, Sampling
 from .exploration import Explorer, Greedy, build_explorer
 from .hierarchy import Hierarchy
 from .learners import Learner, build_learner
-from .protocols import Prediction, Scenario, Transition
+from .protocols import EmbodiedPrediction, EmbodiedScenario, Prediction, Scenario, Transition
 from .rules import RuleBase
+from .self_model import SelfModel
 from .spaces import ActionSet
 
 
@@ -38,6 +40,8 @@ class Team:
         Values actions; none: actions are drawn at random.
     seed
         Source of everything random in the team.
+    self_model
+        What the wheels do, as learned; none: prediction takes every robot as nominal.
     """
 
     def __init__(
@@ -48,9 +52,11 @@ class Team:
         explorer: Explorer,
         evaluator: ExactEnumeration | Sampling | None,
         seed: np.random.SeedSequence,
+        self_model: SelfModel | None = None,
     ) -> None:
         self.hierarchy, self.action_set = hierarchy, action_set
         self.learner, self.explorer, self.evaluator = learner, explorer, evaluator
+        self.self_model = self_model
         self.rng = np.random.Generator(np.random.PCG64(seed))
         # How often each agent was seen to take each action; one of each to begin with.
         self._seen: FloatArray = np.ones((len(hierarchy), len(action_set)))
@@ -77,6 +83,11 @@ class Team:
                 f"topology: agents {', '.join(hierarchy.agents)} are not the scenario's "
                 f"{', '.join(scenario.agents)}"
             )
+        self_model = None
+        if settings.self_model.enabled:
+            if not isinstance(scenario, EmbodiedScenario):
+                raise ValueError("learner.self_model.enabled: the scenario has no bodies on wheels")
+            self_model = SelfModel(settings.self_model, scenario.nominal_effects)
         rules = RuleBase.build(scenario.state_space, settings.rule_base)
         n = len(hierarchy)
         return cls(
@@ -86,12 +97,20 @@ class Team:
             build_explorer(settings.exploration, n),
             _build_evaluator(settings.decision, rules, hierarchy, scenario, settings.discount),
             seed,
+            self_model,
         )
 
     def begin_episode(self) -> None:
         """Note that an episode begins."""
         self.explorer.begin_episode()
         self.learner.begin_episode()
+
+    def predict(self, scenario: Scenario) -> Prediction:
+        """Predict from the scenario's present state, by the self-model if there is one."""
+        if self.self_model is None:
+            return scenario.predict()
+        assert isinstance(scenario, EmbodiedScenario)
+        return scenario.predict_with(self.self_model.effects)
 
     def act(self, prediction: Prediction, *, explore: bool = True) -> IntArray:
         """Decide a joint action ``(n,)``, from the top of the hierarchy down.
@@ -117,6 +136,20 @@ class Team:
             explorer.advance()
             self._seen[np.arange(n), joint] += 1.0
         return joint
+
+    def adapt(self, prediction: Prediction, joint_action: IntArray, transition: Transition) -> None:
+        """Revise the self-model by what `joint_action` did, against what was predicted of it.
+
+        What contact is predicted to take from the motion is given back first: a robot that pushes
+        a box is slow, not broken.
+        """
+        if self.self_model is None or transition.motions is None:
+            return
+        embodied = cast(EmbodiedPrediction, prediction)
+        speeds = embodied.commands(joint_action)
+        free = transition.motions - embodied.slips(joint_action)
+        for body, group in enumerate(embodied.groups):
+            self.self_model.observe(body, speeds[list(group)], free[body])
 
     def learn(self, transition: Transition, prediction: Prediction) -> None:
         """Take in what a step led to, and the prediction from there."""
@@ -162,6 +195,8 @@ class Team:
         generator = [word >> shift & (2**64 - 1) for word in words for shift in (64, 0)]
         generator += [state["has_uint32"], state["uinteger"]]
         learner = {f"learner.{name}": array for name, array in self.learner.arrays().items()}
+        if self.self_model is not None:
+            learner |= {f"self_model.{k}": v for k, v in self.self_model.arrays().items()}
         return {
             "generator": np.array(generator, dtype=np.uint64),
             "explorer": self.explorer.memory,
@@ -171,12 +206,18 @@ class Team:
 
     def restore(self, arrays: Mapping[str, FloatArray]) -> None:
         """Continue from what `arrays` returned."""
-        theta = arrays.get("learner.theta")
-        if theta is None or theta.shape != self.learner.theta.shape:
-            found = None if theta is None else theta.shape
+        own = self.arrays()
+        if arrays.keys() != own.keys():
             raise ValueError(
-                f"team: saved weights have shape {found}, this team's {self.learner.theta.shape}"
+                f"team: saved arrays {', '.join(sorted(arrays))} are not this team's "
+                f"{', '.join(sorted(own))}"
             )
+        for name in ("learner.theta", "seen", "explorer", "generator"):
+            if arrays[name].shape != own[name].shape:
+                raise ValueError(
+                    f"team: saved {name} has shape {arrays[name].shape}, this team's "
+                    f"{own[name].shape}"
+                )
         words = [int(word) for word in arrays["generator"]]
         self.rng.bit_generator.state = {
             "bit_generator": "PCG64",
@@ -186,10 +227,14 @@ class Team:
         }
         self.explorer.memory[:] = arrays["explorer"]
         self._seen = arrays["seen"].copy()
-        prefix = "learner."
-        self.learner.restore(
-            {k.removeprefix(prefix): v for k, v in arrays.items() if k.startswith(prefix)}
-        )
+        self.learner.restore(_part(arrays, "learner."))
+        if self.self_model is not None:
+            self.self_model.restore(_part(arrays, "self_model."))
+
+
+def _part(arrays: Mapping[str, FloatArray], prefix: str) -> dict[str, FloatArray]:
+    """Return the arrays whose names begin with `prefix`, without it."""
+    return {k.removeprefix(prefix): v for k, v in arrays.items() if k.startswith(prefix)}
 
 
 def _build_evaluator(

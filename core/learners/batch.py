@@ -55,7 +55,8 @@ class BatchTD:
         self._rows: list[tuple[IntArray, FloatArray]] = []
 
     def begin_episode(self) -> None:
-        """Remember nothing more: the first after-state of an episode follows none."""
+        """Note that the first after-state follows none, even if the last episode was given up."""
+        self._cut_off()
 
     def observe(
         self,
@@ -74,8 +75,7 @@ class BatchTD:
         """Regress on all experience."""
         if not self._states:
             return 0
-        if self._follower[-1] == len(self._states):
-            self._follower[-1] = CUT_OFF
+        self._cut_off()
         self._extend()
         rewards = REWARD_SCALE * np.array(self._rewards)
         follower = np.array(self._follower)
@@ -97,6 +97,10 @@ class BatchTD:
                 theta = cho_solve(factor, moment, check_finite=False)
             self.theta[i] = theta / REWARD_SCALE
         return self.theta.size
+
+    def _cut_off(self) -> None:
+        if self._follower and self._follower[-1] == len(self._states):
+            self._follower[-1] = CUT_OFF
 
     def _continuation(self, agent: int, theta: FloatArray, follower: IntArray) -> FloatArray:
         """Return f ``(N,)`` of what comes after every after-state; arbitrary where unknown."""

@@ -132,3 +132,11 @@ def test_the_papers_78125_rules(membership: str, rng: np.random.Generator) -> No
     twins.td_update(base, theta_twin, trace_twin, states[:2], steps, 0.3996)
     assert np.abs(trace - trace_twin).max() <= 1e-12
     assert np.abs(theta - theta_twin).max() <= 1e-12
+
+
+def test_add_features(base: RuleBase, rng: np.random.Generator) -> None:
+    target, states = rng.normal(size=(3, base.n_rules)), states_of(rng, 3)
+    weights = rng.normal(size=3)
+    expected = target + weights[:, None] * base.features(states)
+    kernels.add_features(target, states, weights, base.layout)
+    assert target == pytest.approx(expected, rel=0, abs=1e-12)

@@ -142,3 +142,14 @@ def test_settings_that_do_not_fit_the_state_space(
 ) -> None:
     with pytest.raises(ValueError, match=complaint):
         RuleBase.build(space_of(3), settings)
+
+
+@pytest.mark.parametrize("membership", ["triangular", "sigmoid"])
+def test_squared_lengths_and_values_by_row(membership: str) -> None:
+    settings = RuleBaseSettings(membership=membership, memberships=4, products=(("x0", "x2"),))
+    base = RuleBase.build(space_of(3), settings)
+    rng = np.random.default_rng(3)
+    states, theta = rng.uniform(-0.2, 1.2, (6, 3)), rng.normal(size=(6, base.n_rules))
+    features = base.features(states)
+    assert base.squared_lengths(states) == pytest.approx((features**2).sum(axis=1), abs=1e-14)
+    assert base.each(theta, states) == pytest.approx((features * theta).sum(axis=1), abs=1e-12)

@@ -1,0 +1,161 @@
+"""Batch learners against ridge regression written out in NumPy, and known solutions."""
+
+import numpy as np
+import pytest
+
+from nested_agents.core.config import BatchTDSettings, FittedValueSettings
+from nested_agents.core.fuzzy import Partition
+from nested_agents.core.learners.batch import REWARD_SCALE, BatchTD, FittedValue
+from nested_agents.core.rules import RuleBase
+
+TABLE = RuleBase([Partition((0.0, 1.0, 2.0, 3.0, 4.0), "triangular")], [(0,)])
+
+
+def fuzzy(membership: str) -> RuleBase:
+    partitions = [Partition((0.0, 0.4, 1.0), membership), Partition((-1.0, 1.0), membership, 4.0)]
+    return RuleBase(partitions, [(0,), (0, 1)], 1)
+
+
+def episodes_of(rng: np.random.Generator, n_agents: int) -> list[tuple]:
+    """Episodes (states (T, n, 2), rewards (T,), terminal, candidates (T, n, 6, 2))."""
+    made = []
+    for length, terminal in ((7, True), (1, False), (5, False), (1, True)):
+        states = rng.uniform(-1, 1, (length, n_agents, 2))
+        # Single precision, as they are stored.
+        nexts = rng.uniform(-1, 1, (length, n_agents, 6, 2)).astype(np.float32).astype(float)
+        made.append((states, 0.01 * rng.normal(size=length), terminal, nexts))
+    return made
+
+
+def feed(learner: BatchTD, episode: tuple) -> int:
+    states, rewards, terminal, nexts = episode
+    learner.begin_episode()
+    for t in range(len(states)):
+        last = t == len(states) - 1
+        learner.observe(states[t], float(rewards[t]), terminal and last, nexts[t])
+    return learner.end_episode()
+
+
+def ridge_by_hand(
+    rules: RuleBase, episodes: list[tuple], settings: BatchTDSettings | FittedValueSettings
+) -> np.ndarray:
+    """Consequent weights of all agents after `episodes`, regressing after each of them."""
+    n_agents, gamma = episodes[0][0].shape[1], settings.discount
+    fitted = isinstance(settings, FittedValueSettings)
+    theta = np.zeros((n_agents, rules.n_rules))
+    for k in range(1, len(episodes) + 1):
+        seen = REWARD_SCALE * np.concatenate([episode[1] for episode in episodes[:k]])
+        low, high = seen.min() / (1 - gamma), seen.max() / (1 - gamma)
+        for i in range(n_agents):
+            w = REWARD_SCALE * theta[i]
+            for _ in range(settings.sweeps):
+                rows, targets = [], []
+                for states, rewards, terminal, nexts in episodes[:k]:
+                    phi = rules.features(states[:, i])
+                    for t in range(len(states)):
+                        reward = REWARD_SCALE * rewards[t]
+                        if t == len(states) - 1:
+                            if not terminal:
+                                continue
+                            target = reward / (1 - gamma)
+                        elif fitted:
+                            target = reward + gamma * (rules.features(nexts[t, i]) @ w).max()
+                        else:
+                            target = reward + gamma * phi[t + 1] @ w
+                        rows.append(phi[t])
+                        targets.append(min(max(target, low), high))
+                x = np.array(rows).reshape(-1, rules.n_rules)
+                gram = x.T @ x + settings.ridge * np.eye(rules.n_rules)
+                w = np.linalg.solve(gram, x.T @ np.array(targets))
+            theta[i] = w / REWARD_SCALE
+    return theta
+
+
+@pytest.mark.parametrize("membership", ["triangular", "sigmoid"])
+@pytest.mark.parametrize("ridge", [0.01, 10.0])
+def test_batch_td_is_the_ridge_regression_written_out(membership: str, ridge: float) -> None:
+    rules, settings = fuzzy(membership), BatchTDSettings(ridge=ridge, sweeps=4, discount=0.8)
+    episodes = episodes_of(np.random.default_rng(1), 2)
+    learner = BatchTD(settings, rules, 2)
+    for episode in episodes:
+        assert feed(learner, episode) == 2 * rules.n_rules
+    expected = ridge_by_hand(rules, episodes, settings)
+    assert learner.theta == pytest.approx(expected, rel=0, abs=1e-12)
+
+
+@pytest.mark.parametrize("membership", ["triangular", "sigmoid"])
+def test_fitted_value_is_the_ridge_regression_written_out(membership: str) -> None:
+    rules = fuzzy(membership)
+    settings = FittedValueSettings(ridge=0.1, sweeps=4, discount=0.8, candidates=6)
+    episodes = episodes_of(np.random.default_rng(2), 2)
+    learner = FittedValue(settings, rules, 2)
+    for episode in episodes:
+        feed(learner, episode)
+    expected = ridge_by_hand(rules, episodes, settings)
+    assert learner.theta == pytest.approx(expected, rel=0, abs=1e-12)
+
+
+def test_batch_td_solves_a_known_chain() -> None:
+    # The chain of test_td: V(4) = 0.3 / 0.1 = 3, 2.7, -2 + 2.43 = 0.43, 0.387, 1 + 0.3483. The
+    # targets stay within the range -2 / 0.1 to 1 / 0.1 of discounted sums.
+    settings = BatchTDSettings(ridge=1e-13, sweeps=300, discount=0.9)
+    learner = BatchTD(settings, TABLE, 1)
+    states = np.arange(5.0).reshape(5, 1, 1)
+    feed(learner, (states, np.array([1.0, 0.0, -2.0, 0.0, 0.3]), True, [None] * 5))
+    assert learner.theta[0] == pytest.approx([1.3483, 0.387, 0.43, 2.7, 3.0], rel=0, abs=1e-10)
+
+
+def test_fitted_value_solves_a_known_decision() -> None:
+    # In state 0 one may stay (reward 0.1 for ever: worth 1) or enter 1, terminal, reward 0.3,
+    # worth 3. Experience only ever stays; V(0) = 0.1 + 0.9 * max(V(0), 3) = 2.8.
+    settings = FittedValueSettings(ridge=1e-13, sweeps=300, discount=0.9, candidates=2)
+    learner = FittedValue(settings, TABLE, 1)
+    both = np.array([[[0.0], [1.0]]])
+    feed(learner, (np.ones((1, 1, 1)), np.array([0.3]), True, [both]))
+    feed(learner, (np.zeros((4, 1, 1)), np.full(4, 0.1), False, [both] * 4))
+    assert learner.theta[0, :2] == pytest.approx([2.8, 3.0], rel=0, abs=1e-10)
+
+
+def test_targets_stay_within_what_rewards_can_sum_to() -> None:
+    # theta far too large: the first target R + 0.9 * 1e6 is cut to 1 / (1 - 0.9) = 10.
+    learner = BatchTD(BatchTDSettings(ridge=1e-13, sweeps=1, discount=0.9), TABLE, 1)
+    learner.theta[:] = 1e6
+    feed(learner, (np.array([[[0.0]], [[1.0]]]), np.array([1.0, -1.0]), False, [None] * 2))
+    assert learner.theta[0, :2] == pytest.approx([10.0, 0.0], rel=0, abs=1e-10)
+
+
+def test_an_episode_given_up_is_not_linked_to_the_next() -> None:
+    episodes = episodes_of(np.random.default_rng(3), 1)
+    given_up, next_one = episodes[2], episodes[0]
+    rules = fuzzy("triangular")
+    learner = BatchTD(BatchTDSettings(sweeps=3, ridge=0.1), rules, 1)
+    learner.begin_episode()
+    for state, reward in zip(given_up[0], given_up[1], strict=True):
+        learner.observe(state, float(reward), False)
+    feed(learner, next_one)
+    expected = BatchTD(BatchTDSettings(sweeps=3, ridge=0.1), rules, 1)
+    expected.theta[:] = 0.0
+    feed(expected, given_up)
+    expected.theta[:] = 0.0
+    feed(expected, next_one)
+    assert (learner.theta == expected.theta).all()
+
+
+def test_no_experience_teaches_nothing() -> None:
+    learner = BatchTD(BatchTDSettings(), TABLE, 2)
+    learner.begin_episode()
+    assert learner.end_episode() == 0
+    assert not learner.theta.any()
+
+
+def test_too_many_rules_are_refused() -> None:
+    rules = RuleBase([Partition((0.0, 1.0), "triangular")] * 13, [tuple(range(13))])
+    with pytest.raises(ValueError, match="8192 rules, allowed up to 4096") as caught:
+        BatchTD(BatchTDSettings(), rules, 1)
+    assert "\n" not in str(caught.value)
+
+
+def test_fitted_value_needs_predictions() -> None:
+    learner = FittedValue(FittedValueSettings(), TABLE, 1)
+    with pytest.raises(ValueError, match="needs predicted next states"):
+        learner.observe(np.zeros((1, 1)), 0.0, False)
