@@ -27,8 +27,8 @@ def feed(
 @pytest.mark.parametrize("correction", CORRECTIONS)
 @pytest.mark.parametrize("trace_decay", [0.0, 0.4, 1.0])
 def test_the_equations_written_out(correction: str, trace_decay: float) -> None:
-    # w aims at E[phi phi'] w = E[delta e]. With A = E[e (phi - gamma phi')'], GTD2 moves theta along
-    # A'w and TDC along E[delta e] less the part of A'w that bootstraps.
+    # w aims at E[phi phi'] w = E[delta e]. With A = E[e (phi - gamma phi')'], GTD2 moves theta
+    # along A'w and TDC along E[delta e] less the part of A'w that bootstraps.
     rng = np.random.default_rng(1)
     states, rewards = rng.uniform(-1, 1, (25, 2)), rng.normal(size=25)
     alpha, beta, gamma = 0.1, 0.2, 0.9
