@@ -12,6 +12,7 @@ import signal
 import threading
 import time
 import traceback
+import warnings
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
@@ -25,7 +26,7 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 from .store import Store
 from .trial import Trial, TrialResult
 
-ATTEMPTS = 3
+ATTEMPTS = 2
 """How often a trial is run whose worker dies while nothing else runs."""
 
 Measure = Callable[[Trial], TrialResult]
@@ -111,8 +112,13 @@ def _parallel(
         )
         arriving = parallel(tasks())
     try:
-        yield from arriving
+        for arrival in arriving:  # not `yield from`, which would close it before we can
+            yield arrival
     except (GeneratorExit, KeyboardInterrupt):
+        with warnings.catch_warnings():
+            # That tasks are left undone is what closing means.
+            warnings.simplefilter("ignore", UserWarning)
+            arriving.close()
         get_reusable_executor().shutdown(wait=True, kill_workers=True)
         raise
 

@@ -100,7 +100,9 @@ class Store:
         """
         if not (directory / DATABASE).is_file():
             raise SpecError(f"{directory}: holds no study (no {DATABASE})")
-        with _connected(directory / DATABASE, "?mode=ro") as connection:
+        # Not mode=ro: such a connection leaves SQLite's -wal and -shm files behind.
+        with _connected(directory / DATABASE, "?mode=rw") as connection:
+            connection.execute("PRAGMA query_only = ON")
             yield cls(directory, connection)
 
     def spec(self) -> Spec:
