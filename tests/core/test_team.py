@@ -1,0 +1,297 @@
+"""A team passes actions down, saves and continues bit for bit, and refuses foreign files."""
+
+import copy
+import zipfile
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydantic import TypeAdapter
+
+from nested_agents.core.config import Learner as LearnerSettings
+from nested_agents.core.evaluators import ExactEnumeration, Sampling
+from nested_agents.core.hierarchy import Hierarchy
+from nested_agents.core.team import Team
+
+PAPER = {"kind": "paper", "decay": 0.05, "clock": "episode"}
+BURST = {"kind": "burst", "rate": 0.4}
+TEAMS = {
+    "td-lambda, paper": {"kind": "td-lambda", "step_size": 0.1, "exploration": PAPER},
+    "td-lambda, burst": {"kind": "td-lambda", "step_size": 0.1, "exploration": BURST},
+    "td-lambda, 75 rules": {
+        "kind": "td-lambda",
+        "rule_base": {"membership": "sigmoid", "memberships": 5, "order": 2},
+        "decision": {"others": "observed"},
+    },
+    "gradient-td": {"kind": "gradient-td", "exploration": PAPER},
+    "batch-td": {"kind": "batch-td", "ridge": 0.1, "exploration": BURST},
+    "batch-td, sigmoid": {"kind": "batch-td", "rule_base": {"membership": "sigmoid"}},
+    "fitted-value": {"kind": "fitted-value", "candidates": 5, "sweeps": 3},
+    "sampling": {
+        "kind": "batch-td",
+        "decision": {"evaluator": "sampling", "samples": 7, "others": "observed"},
+    },
+    "frozen": {"kind": "frozen", "decision": {"rule": "reward-and-value"}},
+    "random": {"kind": "td-lambda", "decision": {"rule": "random"}},
+}
+
+
+def settings_of(name: str):
+    return TypeAdapter(LearnerSettings).validate_python(TEAMS[name])
+
+
+def chain_of(agents: tuple[str, ...]) -> Hierarchy:
+    return Hierarchy(agents, list(pairwise(agents)))
+
+
+@pytest.fixture
+def world(line_world):
+    return line_world(carts=2, wheels=2, closed=0.05)
+
+
+def team_of(name: str, world, seed: int = 1, hierarchy: Hierarchy | None = None) -> Team:
+    hierarchy = hierarchy or chain_of(world.agents)
+    return Team.build(settings_of(name), world, hierarchy, np.random.SeedSequence(seed))
+
+
+def run_steps(team: Team, world, steps: int) -> list[list[int]]:
+    actions = []
+    for _ in range(steps):
+        joint = team.act(world.predict())
+        transition = world.step(joint)
+        team.learn(transition, world.predict())
+        actions.append(joint.tolist())
+    return actions
+
+
+def run_episode(team: Team, world, seed: int, steps: int = 12) -> list[list[int]]:
+    world.reset(seed)
+    team.begin_episode()
+    actions = run_steps(team, world, steps)
+    team.end_episode()
+    return actions
+
+
+def same(one: Team, two: Team) -> bool:
+    a, b = one.arrays(), two.arrays()
+    return a.keys() == b.keys() and all((a[k] == b[k]).all() for k in a)
+
+
+@pytest.mark.parametrize("name", TEAMS)
+def test_a_saved_team_continues_bit_for_bit_within_an_episode(
+    name: str, world, tmp_path: Path
+) -> None:
+    team = team_of(name, world)
+    for episode in range(2):
+        run_episode(team, world, episode)
+    world.reset(2)
+    team.begin_episode()
+    run_steps(team, world, 5)
+    team.save(tmp_path / "team.npz")
+    elsewhere, restored = copy.deepcopy(world), team_of(name, world, seed=99)
+    restored.load(tmp_path / "team.npz")
+    assert same(team, restored)
+
+    def carry_on(team: Team, world) -> list:
+        actions = run_steps(team, world, 6)
+        team.end_episode()
+        return actions + run_episode(team, world, 3)
+
+    assert carry_on(team, world) == carry_on(restored, elsewhere)
+    assert same(team, restored)
+
+
+@pytest.mark.parametrize("name", TEAMS)
+def test_a_fresh_team_can_be_saved(name: str, world, tmp_path: Path) -> None:
+    team, restored = team_of(name, world), team_of(name, world, seed=99)
+    team.save(tmp_path / "team.npz")
+    restored.load(tmp_path / "team.npz")
+    assert run_episode(team, world, 0) == run_episode(restored, world, 0)
+    assert same(team, restored)
+
+
+@pytest.mark.parametrize("name", TEAMS)
+def test_same_seed_same_bits_other_seed_other_actions(name: str, world) -> None:
+    one, two, three = team_of(name, world), team_of(name, world), team_of(name, world, seed=2)
+    actions = [[run_episode(t, world, e) for e in range(2)] for t in (one, two, three)]
+    assert actions[0] == actions[1]
+    assert same(one, two)
+    assert actions[0] != actions[2]
+
+
+def test_a_file_holds_arrays_only(world, tmp_path: Path) -> None:
+    team = team_of("fitted-value", world)
+    run_episode(team, world, 0)
+    team.save(tmp_path / "team.npz")
+    with np.load(tmp_path / "team.npz", allow_pickle=False) as arrays:
+        assert {arrays[name].dtype.kind for name in arrays.files} <= set("fiu")
+    assert all(n.endswith(".npy") for n in zipfile.ZipFile(tmp_path / "team.npz").namelist())
+
+
+def test_pickles_are_refused(world, tmp_path: Path) -> None:
+    team = team_of("frozen", world)
+    arrays = {**team.arrays(), "seen": np.array([{"a": 1}], dtype=object)}
+    np.savez(tmp_path / "team.npz", **arrays)
+    with pytest.raises(ValueError, match="allow_pickle=False"):
+        team.load(tmp_path / "team.npz")
+
+
+@pytest.mark.parametrize(
+    ("saved", "loading", "complaint"),
+    [
+        ("td-lambda, paper", "td-lambda, 75 rules", r"learner.theta has shape \(4, 15\)"),
+        ("td-lambda, paper", "td-lambda, burst", r"explorer has shape \(1,\), this team's \(9,\)"),
+        ("td-lambda, paper", "batch-td", "saved arrays .* are not this team's"),
+        ("batch-td", "td-lambda, paper", "saved arrays .* are not this team's"),
+        ("frozen", "gradient-td", "saved arrays .* are not this team's"),
+    ],
+)
+def test_what_another_team_saved_is_refused(
+    saved: str, loading: str, complaint: str, world, tmp_path: Path
+) -> None:
+    team_of(saved, world).save(tmp_path / "team.npz")
+    team, untouched = team_of(loading, world, 5), team_of(loading, world, 5)
+    with pytest.raises(ValueError, match=complaint) as caught:
+        team.load(tmp_path / "team.npz")
+    assert "\n" not in str(caught.value)
+    assert same(team, untouched)
+
+
+def test_a_team_of_other_size_is_refused(world, line_world, tmp_path: Path) -> None:
+    team_of("frozen", line_world(carts=3, wheels=2)).save(tmp_path / "team.npz")
+    with pytest.raises(ValueError, match=r"learner.theta has shape \(6, 15\)"):
+        team_of("frozen", world).load(tmp_path / "team.npz")
+
+
+class Witness:
+    """Notes what each agent is told, and values its actions by a script."""
+
+    def __init__(self, best: list[int]) -> None:
+        self.best, self.told = best, {}
+
+    def values(self, agent, joint_action, theta, prediction, frequencies, rng) -> np.ndarray:
+        self.told[agent] = joint_action.tolist()
+        return np.eye(4)[self.best[agent]]
+
+
+@pytest.mark.parametrize(
+    ("edges", "told"),
+    [
+        # Agents choose 0, 1, 3, 0; those above are told, all others count as maintaining (2).
+        ([(0, 1), (1, 2), (2, 3)], [[2, 2, 2, 2], [0, 2, 2, 2], [0, 1, 2, 2], [0, 1, 3, 2]]),
+        ([(3, 2), (2, 1), (1, 0)], [[2, 1, 3, 0], [2, 2, 3, 0], [2, 2, 2, 0], [2, 2, 2, 2]]),
+        ([(0, 1), (0, 2), (1, 3)], [[2, 2, 2, 2], [0, 2, 2, 2], [0, 2, 2, 2], [0, 1, 2, 2]]),
+        ([(0, 1), (2, 3)], [[2, 2, 2, 2], [0, 2, 2, 2], [2, 2, 2, 2], [2, 2, 3, 2]]),
+        ([], [[2, 2, 2, 2]] * 4),
+    ],
+)
+def test_actions_are_passed_down_and_the_unseen_maintain(edges, told, world) -> None:
+    names = world.agents
+    hierarchy = Hierarchy(names, [(names[a], names[b]) for a, b in edges])
+    team = team_of("frozen", world, hierarchy=hierarchy)
+    witness = team.evaluator = Witness([0, 1, 3, 0])  # type: ignore[assignment]
+    world.reset(0)
+    assert team.act(world.predict(), explore=False).tolist() == [0, 1, 3, 0]
+    assert [witness.told[i] for i in range(4)] == told
+    assert tuple(witness.told) == hierarchy.order
+
+
+def test_frequencies_are_what_was_seen(world) -> None:
+    team = team_of("random", world)
+    team.evaluator = Witness([0, 1, 3, 0])  # type: ignore[assignment]
+    team.explorer = team._greedy
+    world.reset(0)
+    for _ in range(6):
+        team.act(world.predict())
+    # One of each to begin with, then six times the same: 7 in 10.
+    assert team.arrays()["seen"].tolist() == [
+        [7, 1, 1, 1],
+        [1, 7, 1, 1],
+        [1, 1, 1, 7],
+        [7, 1, 1, 1],
+    ]
+
+
+@pytest.mark.parametrize("name", ["td-lambda, paper", "batch-td", "sampling"])
+def test_acting_without_exploring_leaves_the_memory_alone(name: str, world) -> None:
+    team = team_of(name, world)
+    run_episode(team, world, 0)
+    before = {k: v.copy() for k, v in team.arrays().items() if k != "generator"}
+    world.reset(1)
+    for _ in range(5):
+        world.step(team.act(world.predict(), explore=False))
+    after = team.arrays()
+    assert all((after[k] == v).all() for k, v in before.items())
+
+
+def test_a_random_team_draws_all_actions_alike(world) -> None:
+    team = team_of("random", world)
+    world.reset(0)
+    drawn = np.array([team.act(world.predict()) for _ in range(4000)])
+    shares = np.stack([(drawn == action).mean(axis=0) for action in range(4)])
+    assert shares == pytest.approx(np.full((4, 4), 0.25), abs=0.035)
+
+
+def test_counts_of_an_episode(world) -> None:
+    team = team_of("td-lambda, paper", world)
+    run_episode(team, world, 0, steps=12)
+    # Twelve decisions; eleven updates, as the first after-state has none before it.
+    assert isinstance(team.evaluator, ExactEnumeration)
+    counts = team.evaluator.counts
+    assert counts.joint_actions == 12 * (256 + 64 + 16 + 4)
+    assert counts.rule_evaluations == counts.joint_actions * 15
+    assert counts.weight_updates == 11 * 4 * 15
+
+
+@pytest.mark.parametrize(
+    ("decision", "kind"),
+    [
+        ({}, ExactEnumeration),
+        ({"exact_up_to": 3}, Sampling),
+        ({"evaluator": "sampling"}, Sampling),
+        ({"exact_up_to": 3, "evaluator": "exact"}, ExactEnumeration),
+    ],
+)
+def test_the_evaluator_follows_the_settings(decision: dict, kind: type, world) -> None:
+    settings = TypeAdapter(LearnerSettings).validate_python(
+        {"kind": "frozen", "decision": decision}
+    )
+    team = Team.build(settings, world, chain_of(world.agents), np.random.SeedSequence(1))
+    assert isinstance(team.evaluator, kind)
+
+
+def test_a_hierarchy_over_other_agents_is_refused(world) -> None:
+    with pytest.raises(ValueError, match=r"topology: agents a, b are not the scenario's") as caught:
+        team_of("frozen", world, hierarchy=Hierarchy("ab", []))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["td-lambda, burst", "batch-td", "gradient-td"])
+def test_permuting_agents_permutes_what_is_learned(name: str, line_world) -> None:
+    # Every agent's cart has one wheel. Both worlds are stepped with the same actions; what agents
+    # learn from them does not depend on the order in which they are listed.
+    class Permuted(line_world):
+        order = np.array([2, 0, 1])
+
+        def step(self, joint_action):
+            inverse = np.argsort(self.order)
+            transition = super().step(np.asarray(joint_action)[inverse])
+            return replace(transition, states=transition.states[self.order])
+
+    here, there = line_world(3, 1), Permuted(3, 1)
+    one, two = team_of(name, here), team_of(name, there)
+    rng = np.random.default_rng(4)
+    for episode in range(2):
+        for team, world in ((one, here), (two, there)):
+            world.reset(episode)
+            team.begin_episode()
+        for _ in range(10):
+            joint = rng.integers(4, size=3)
+            one.learn(here.step(joint), here.predict())
+            two.learn(there.step(joint[there.order]), there.predict())
+        one.end_episode()
+        two.end_episode()
+    assert np.abs(one.learner.theta).max() > 0
+    assert (two.learner.theta == one.learner.theta[there.order]).all()
