@@ -143,17 +143,19 @@ def surface_numpy(
 
 
 @njit(cache=True)
-def _ray_disc(
-    cx: float, cy: float, radius: float, x: float, y: float, dx: float, dy: float, reach: float
-) -> float:
-    """Return the distance at which a ray from outside enters a disc, or `reach`."""
-    bx, by = cx - x, cy - y
-    along = bx * dx + by * dy
-    root = radius * radius - (bx * bx + by * by - along * along)
-    if root < 0.0:
+def disc_hit(cx: float, cy: float, radius: float, dx: float, dy: float, reach: float) -> float:
+    """Return the distance at which a ray from the origin enters a disc, or `reach`.
+
+    A ray from inside enters at once, at distance 0.
+    """
+    square = cx * cx + cy * cy - radius * radius
+    if square <= 0.0:
+        return 0.0
+    along = cx * dx + cy * dy
+    root = along * along - square
+    if along < 0.0 or root < 0.0:
         return reach
-    hit = along - sqrt(root)
-    return hit if 0.0 <= hit < reach else reach
+    return min(reach, along - sqrt(root))
 
 
 @njit(cache=True)
@@ -206,7 +208,7 @@ def ray(
     for i in range(edges.shape[0]):
         x0, y0, x1, y1 = edges[i, 0], edges[i, 1], edges[i, 2], edges[i, 3]
         if rounding > 0.0:
-            best = _ray_disc(x0, y0, rounding, x, y, dx, dy, best)
+            best = disc_hit(x0 - x, y0 - y, rounding, dx, dy, best)
             length = hypot(x1 - x0, y1 - y0)
             if length > 0.0:  # the ring closes, so the other end is some edge's start
                 ox, oy = rounding * (y1 - y0) / length, -rounding * (x1 - x0) / length
