@@ -87,6 +87,23 @@ class Decision(Settings):
     """Agents that may still be free when `evaluator` is auto and enumeration is exact."""
 
 
+class SelfModelSettings(Settings):
+    """Whether and how fast a robot revises what it believes its wheels to do."""
+
+    enabled: bool = False
+    """Otherwise prediction takes every robot as nominal."""
+    prior_effect: Positive = 0.3
+    """Standard deviation of a wheel's effect around the nominal one [m/s per m/s]."""
+    prior_constant: Positive = 0.003
+    """Standard deviation of the constant part of the motion [m/s]."""
+    noise: Positive = 0.004
+    """Standard deviation of a measured speed around the model's [m/s]."""
+    surprise: Positive = 9.0
+    """Squared innovation, in units of its expected square, from which on a change is assumed."""
+    inflation: Positive = 1.0
+    """Share of the prior covariance that is added then."""
+
+
 class LearnerSettings(Settings):
     """What all learners share."""
 
@@ -97,6 +114,7 @@ class LearnerSettings(Settings):
         BurstExploration()
     )
     decision: Decision = Decision()
+    self_model: SelfModelSettings = SelfModelSettings()
 
 
 class TDLambdaSettings(LearnerSettings):

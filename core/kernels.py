@@ -83,11 +83,11 @@ def layout(partitions: Sequence[Partition], terms: Sequence[tuple[int, ...]], n_
     )
 
 
-@njit(cache=True, inline="always")
+@njit(cache=True)
 def _wrapped(j: int, x: float, lay: Layout) -> float:
-    period = lay.periods[j]
-    if period > 0.0:
-        x -= period * np.floor((x - lay.lows[j]) / period)
+    period, low = lay.periods[j], lay.lows[j]
+    if period > 0.0 and not low <= x < low + period:
+        x -= period * np.floor((x - low) / period)
     return x
 
 
@@ -95,14 +95,22 @@ def _wrapped(j: int, x: float, lay: Layout) -> float:
 def _pair(j: int, x: float, lay: Layout) -> tuple[int, int, float]:
     """Return the two neighbouring triangular functions (lower, upper) and the upper's strength."""
     x = _wrapped(j, x, lay)
-    last = lay.n_knots[j] - 1
-    k = 0
-    while k < last - 1 and x >= lay.knots[j, k + 1]:
-        k += 1
-    low, high = lay.knots[j, k], lay.knots[j, k + 1]
-    share = min(max((x - low) / (high - low), 0.0), 1.0)
     m = lay.counts[j]
-    return k % m, (k + 1) % m, share
+    knots = lay.knots[j]
+    # On a circle x lies between the last centre of the left copy and the first of the right one.
+    first, last = (m - 1, 2 * m - 1) if lay.periods[j] > 0.0 else (0, m - 2)
+    k = first
+    while k < last and x >= knots[k + 1]:
+        k += 1
+    share = min(max((x - knots[k]) / (knots[k + 1] - knots[k]), 0.0), 1.0)
+    lower, upper = k, k + 1
+    if lower >= m:
+        lower -= m
+    if upper >= m:
+        upper -= m
+    if upper >= m:
+        upper -= m
+    return lower, upper, share
 
 
 @njit(cache=True)

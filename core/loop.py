@@ -89,7 +89,7 @@ def control_loop(
         states = scenario.reset(world_seed(seed, episode))
         if learn:
             team.begin_episode()
-        prediction = scenario.predict()
+        prediction = team.predict(scenario)
         for step in range(steps):
             begin = perf_counter()
             joint_action = team.act(prediction, explore=learn)
@@ -97,7 +97,9 @@ def control_loop(
             transition = scenario.step(joint_action)
             last = transition.terminated or transition.truncated or step == steps - 1
             moved = perf_counter()
-            prediction = scenario.predict()
+            if learn:
+                team.adapt(prediction, joint_action, transition)
+            prediction = team.predict(scenario)
             if learn:
                 team.learn(transition, prediction)
                 if last:

@@ -9,7 +9,7 @@ read as a number are its *local code*.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
@@ -74,6 +74,9 @@ class Transition:
         Whether the episode ends for lack of time.
     info
         Measurements of the step by name, scalars or small arrays; for records, not for learners.
+    motions
+        ``(M, 3)`` mean twist of every group's body in its own frame [m/s, m/s, rad/s], if bodies
+        measure it.
     """
 
     states: FloatArray
@@ -81,6 +84,7 @@ class Transition:
     terminated: bool
     truncated: bool
     info: Mapping[str, Any]
+    motions: FloatArray | None = None
 
 
 @runtime_checkable
@@ -121,4 +125,35 @@ class Scenario(Protocol):
 
     def measure(self) -> Mapping[str, Any]:
         """Return the measurements of the present state, as in `Transition.info`."""
+        ...
+
+
+class EmbodiedPrediction(Prediction, Protocol):
+    """A prediction for bodies that are moved by wheels."""
+
+    @property
+    def groups(self) -> tuple[tuple[int, ...], ...]:
+        """Agents by body."""
+        ...
+
+    def commands(self, joint_action: IntArray) -> FloatArray:
+        """Return the wheel speeds ``(n,)`` that a joint action ``(n,)`` would command."""
+        ...
+
+    def slips(self, joint_action: IntArray) -> FloatArray:
+        """Return by how much contact is predicted to change the bodies' twists, ``(M, 3)``."""
+        ...
+
+
+@runtime_checkable
+class EmbodiedScenario(Scenario, Protocol):
+    """A scenario whose groups are bodies on wheels, open to self-models."""
+
+    @property
+    def nominal_effects(self) -> tuple[FloatArray, ...]:
+        """Per body the ``(3, w + 1)`` effect of its wheel speeds on its twist."""
+        ...
+
+    def predict_with(self, effects: Sequence[FloatArray]) -> EmbodiedPrediction:
+        """Predict from the present state, believing in these effects."""
         ...

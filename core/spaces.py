@@ -54,7 +54,7 @@ class Variable:
     def __post_init__(self) -> None:
         if not (isfinite(self.low) and isfinite(self.high) and self.low < self.high):
             raise ValueError(
-                f"variable {self.name!r}: range [{self.low}, {self.high}] must be finite and increase"
+                f"variable {self.name!r}: range [{self.low}, {self.high}] must be finite, low first"
             )
         ordered = all(a < b for a, b in zip(self.centres, self.centres[1:], strict=False))
         inside = all(self.low <= c <= self.high for c in self.centres)

@@ -6,6 +6,7 @@ episode), the sensing (states) and the servo layer, which turns actions into whe
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import pi
 from time import perf_counter
 from typing import Any
@@ -17,9 +18,8 @@ from ..core.protocols import Transition
 from ..core.spaces import ActionSet, StateSpace
 from .boxes import box_for
 from .config import ScenarioSettings
-from .geometry import surface
 from .infrared import strongest_reading
-from .prediction import BoxPrediction, Situation
+from .prediction import BoxPrediction, Situation, mean_twists
 from .push import PushModel
 from .reward import reward
 from .robots import ROBOTS, compliance, nominal_effect
@@ -69,7 +69,7 @@ class BoxPushing:
         self.world = World([self.robot] * settings.robots, self.box)
         self._space = STATE_SPACES[settings.state_space]
         self._limits: FloatArray = np.full(len(self.agents), self.robot.max_speed)
-        self._effects = (nominal_effect(self.robot),) * settings.robots
+        self._effects = self.nominal_effects
         self._model = PushModel(
             edges=self.box.outline.edges,
             rounding=self.box.outline.rounding,
@@ -102,11 +102,13 @@ class BoxPushing:
         """Command the wheels, let the world go on for one decision period, observe and reward."""
         unit = self.settings.speed_increment * self._limits
         self._speeds = self.action_set.apply(self._speeds, joint_action, unit, self._limits)
-        before = self._distance()
+        before, poses = self._distance(), self.world.robot_poses.copy()
         begin = perf_counter()
         self.world.advance(self._speeds, self.settings.hold)
         moved = perf_counter()
         states = self._observe()
+        period = self.settings.hold * CONTROL_PERIOD
+        motions = mean_twists(poses, self.world.robot_poses, period)
         measured = self.measure()
         readings = strongest_reading(self.world)
         terminated = self._reached()
@@ -122,14 +124,23 @@ class BoxPushing:
         if terminated:
             measured["stopped_at_goal"] = self._stays()
         measured["seconds"] = {"physics": moved - begin, "sensors": sensed - moved}
-        return Transition(states, float(gained[0]), terminated, False, measured)
+        return Transition(states, float(gained[0]), terminated, False, measured, motions)
+
+    @property
+    def nominal_effects(self) -> tuple[FloatArray, ...]:
+        """Per robot the ``(3, w + 1)`` effect of its wheel speeds on its twist."""
+        return (nominal_effect(self.robot),) * self.settings.robots
 
     def predict(self) -> BoxPrediction:
-        """Predict from the present state."""
+        """Predict from the present state, every robot taken as nominal."""
+        return self.predict_with(self._effects)
+
+    def predict_with(self, effects: Sequence[FloatArray]) -> BoxPrediction:
+        """Predict from the present state, believing in these effects of the wheels."""
         return BoxPrediction(
             Situation(
                 self.world.robot_poses.copy(), self.world.box_pose.copy(), self._goal,
-                self._speeds, self._effects, self.groups,
+                self._speeds, tuple(effects), self.groups,
             ),
             self._model, self._space, self.action_set, self.settings.reward,
             self.settings.hold * CONTROL_PERIOD, self.settings.speed_increment, self._limits,
@@ -172,15 +183,8 @@ class BoxPushing:
 
     def _observe(self) -> FloatArray:
         """Return the states ``(n, d)`` of all agents: the error observation layer."""
-        poses, box = self.world.robot_poses, self.world.box_pose
-        cos, sin = np.cos(box[2]), np.sin(box[2])
-        outline, gaps = self.box.outline, np.empty((1, len(poses)))
-        for r, (x, y, _) in enumerate(poses - np.array([box[0], box[1], 0.0])):
-            distance = surface(
-                outline.edges, outline.rounding, cos * x + sin * y, cos * y - sin * x
-            )[0]
-            gaps[0, r] = distance - self.robot.radius
-        view = View(poses[None], box[None], gaps, self._goal)
+        poses = self.world.robot_poses
+        view = View(poses[None], self.world.box_pose[None], self.world.gaps[None], self._goal)
         rows = []
         for r, group in enumerate(self.groups):
             shared = self._space.shared(view, r)[0]

@@ -139,7 +139,9 @@ class BoxPrediction:
         r, wheel = self._robot_of(agent)
         if r not in self._shared:
             self._shared[r] = self.space.shared(self._all, r)
-        own = self.space.own(self._alone[r], self._local_speeds[r][:, wheel], self.situation.goal)
+        speeds = self._local_speeds[r][:, wheel]
+        poses = self._alone[r] if self.space.own_needs_pose else np.zeros((len(speeds), 3))
+        own = self.space.own(poses, speeds, self.situation.goal)
         behind = sum(len(group) for group in self.situation.groups[r + 1 :])
         return Blocks(own, self._shared[r], len(self.action_set) ** behind)
 
@@ -155,6 +157,23 @@ class BoxPrediction:
     def poses(self, joint_actions: IntArray) -> View:
         """Return the predicted situations of joint actions ``(m, n)``."""
         return self._view(self._choices(joint_actions))
+
+    @property
+    def groups(self) -> tuple[tuple[int, ...], ...]:
+        """Agents by robot."""
+        return self.situation.groups
+
+    def commands(self, joint_action: IntArray) -> FloatArray:
+        """Return the wheel speeds ``(n,)`` that a joint action ``(n,)`` would command [m/s]."""
+        choices = self._choices(joint_action[None])[0]
+        return np.concatenate([t[c] for t, c in zip(self._local_speeds, choices, strict=True)])
+
+    def slips(self, joint_action: IntArray) -> FloatArray:
+        """Return by how much contact is predicted to change the robots' twists, ``(M, 3)``."""
+        choices = self._choices(joint_action[None])
+        after = self._view(choices).robots[0]
+        free = self._twists[np.arange(len(after)), choices[0]]
+        return mean_twists(self.situation.robots, after, self.seconds) - free
 
     def rewards(self, joint_actions: IntArray) -> FloatArray:
         """Return the predicted rewards ``(m,)`` of joint actions ``(m, n)``."""
@@ -175,6 +194,18 @@ class BoxPrediction:
             view.gaps < CONTACT_GAP,
             expected_reading(view.gaps),
         )
+
+
+def mean_twists(before: FloatArray, after: FloatArray, seconds: float) -> FloatArray:
+    """Return the constant twists ``(M, 3)``, own frame, between poses ``(M, 3)``."""
+    turn = wrap(after[:, 2] - before[:, 2])
+    heading = before[:, 2] + 0.5 * turn
+    # The chord of an arc is shorter than the arc by the sinc of half its angle.
+    chord = (after[:, :2] - before[:, :2]) / np.sinc(0.5 * turn / np.pi)[:, None]
+    cos, sin = np.cos(heading), np.sin(heading)
+    ahead = cos * chord[:, 0] + sin * chord[:, 1]
+    left = cos * chord[:, 1] - sin * chord[:, 0]
+    return np.stack([ahead, left, turn], axis=1) / seconds
 
 
 CONTACT_GAP = 0.002

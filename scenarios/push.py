@@ -24,7 +24,11 @@ from .geometry import surface
 SUBSTEPS = 4
 SWEEPS = 4
 CREEP = 0.002
-"""Speed [m/s] below which ground friction is taken as viscous."""
+"""Speed of the box [m/s] below which ground friction is taken as viscous."""
+START_SPEED = 0.05
+"""Speed of the box [m/s] from which the sweeps start."""
+MARGIN = 0.01
+"""How far [m] a moving box may carry its surface towards a robot within a substep."""
 
 
 class PushModel(NamedTuple):
@@ -58,7 +62,7 @@ class PushModel(NamedTuple):
     contact_friction: float
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
 def push(  # type: ignore[no-untyped-def]
     robots: FloatArray,
     box: FloatArray,
@@ -94,166 +98,155 @@ def push(  # type: ignore[no-untyped-def]
     out_box = np.empty((m, 3))
     out_gaps = np.empty((m, n))
     dt = seconds / SUBSTEPS
-    force_n, force_t = np.zeros(n), np.zeros(n)
-    arms, gaps = np.empty((n, 6)), np.empty(n)
-    inward = np.empty((n, 2))
-    rho2 = model.friction_radius**2
+    contacts = np.zeros((n, N_FIELDS))
+    now = np.empty((n, 3))
     for c in range(m):
-        now = robots.copy()
-        bx, by, bpsi = box
+        now[:] = robots
+        bx, by, bpsi = box[0], box[1], box[2]
         for _ in range(SUBSTEPS):
-            active = _contacts(now, bx, by, bpsi, twists, choices[c], dt, model, gaps, inward, arms)
             ux, uy, uw = 0.0, 0.0, 0.0
-            if active:
-                ux, uy, uw = _solve(
-                    now, twists, choices[c], dt, model, gaps, inward, arms, force_n, force_t, rho2
-                )
-            else:
-                force_n[:] = 0.0
-                force_t[:] = 0.0
+            if _find_contacts(now, bx, by, bpsi, twists, choices[c], dt, model, contacts):
+                ux, uy, uw = _solve(contacts, dt, model)
             for r in range(n):
-                vx, vy, w = _robot_velocity(
-                    now[r, 2], twists[r, choices[c, r]], model.compliance[r], arms[r],
-                    inward[r], force_n[r], force_t[r],
-                )  # fmt: skip
-                now[r, 0] += vx * dt
-                now[r, 1] += vy * dt
-                now[r, 2] += w * dt
+                _move(now[r], twists[r, choices[c, r]], contacts[r], model.compliance[r], dt)
             bx += ux * dt
             by += uy * dt
             bpsi += uw * dt
+        cos, sin = np.cos(bpsi), np.sin(bpsi)
         for r in range(n):
             out_robots[c, r] = now[r]
-            out_gaps[c, r] = _gap(now[r, 0], now[r, 1], bx, by, bpsi, model, r, inward[r], arms[r])
+            dx, dy = now[r, 0] - bx, now[r, 1] - by
+            lx, ly = cos * dx + sin * dy, cos * dy - sin * dx
+            near = surface(model.edges, model.rounding, lx, ly)
+            out_gaps[c, r] = near[0] - model.radii[r]
         out_box[c, 0], out_box[c, 1], out_box[c, 2] = bx, by, bpsi
     return out_robots, out_box, out_gaps
 
 
-@njit(cache=True)
-def _gap(x, y, bx, by, bpsi, model, r, inward, arms):  # type: ignore[no-untyped-def]
-    """Return the gap of robot r; write the inward normal and the contact arms (world frame)."""
+# A contact as one row of numbers; in the frame of the contact, n is into the box, t to its left.
+_NX, _NY = 0, 1  # the direction n, world frame
+_LEVER_N, _LEVER_T = 2, 3  # torque on the box per force along n and t
+_ARM_X, _ARM_Y = 4, 5  # from the robot's centre to the contact, world frame
+_YIELD_NN, _YIELD_NT, _YIELD_TT = 6, 7, 8  # how the robot yields there to force
+_WANT_N, _WANT_T = 9, 10  # velocity there of the robot if free, less what closes the gap
+_FORCE_N, _FORCE_T = 11, 12  # on the box
+_COS, _SIN = 13, 14  # heading of the robot
+_ACTIVE = 15
+N_FIELDS = 16
+
+
+@njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
+def _find_contacts(now, bx, by, bpsi, twists, choice, dt, model, contacts):  # type: ignore[no-untyped-def]
+    """Fill the contact rows of the robots that may touch the box within the substep."""
+    found = False
     cos, sin = np.cos(bpsi), np.sin(bpsi)
-    dx, dy = x - bx, y - by
-    distance, nx, ny, px, py = surface(
-        model.edges, model.rounding, cos * dx + sin * dy, cos * dy - sin * dx
-    )
-    wx, wy = cos * nx - sin * ny, sin * nx + cos * ny
-    inward[0], inward[1] = -wx, -wy
-    arms[0], arms[1] = -model.radii[r] * wx, -model.radii[r] * wy
-    arms[2], arms[3] = cos * px - sin * py, sin * px + cos * py
-    return distance - model.radii[r]
-
-
-@njit(cache=True)
-def _contacts(now, bx, by, bpsi, twists, choice, dt, model, gaps, inward, arms):  # type: ignore[no-untyped-def]
-    """Find which robots may touch the box within the substep; return how many."""
-    active = 0
     for r in range(len(now)):
+        row, twist = contacts[r], twists[r, choice[r]]
+        ch, sh = np.cos(now[r, 2]), np.sin(now[r, 2])
+        row[_COS], row[_SIN] = ch, sh
+        row[_ACTIVE] = row[_FORCE_N] = row[_FORCE_T] = 0.0
         dx, dy = now[r, 0] - bx, now[r, 1] - by
-        clearance = np.sqrt(dx * dx + dy * dy) - model.reach - model.radii[r]
-        twist = twists[r, choice[r]]
+        radius = model.radii[r]
         travel = dt * np.sqrt(twist[0] ** 2 + twist[1] ** 2)
-        if clearance > travel:
-            gaps[r] = np.inf
+        if np.sqrt(dx * dx + dy * dy) - model.reach - radius > 2.0 * travel + MARGIN:
             continue
-        gaps[r] = _gap(now[r, 0], now[r, 1], bx, by, bpsi, model, r, inward[r], arms[r])
-        # A moving box may carry its surface towards a robot, hence the margin.
-        if gaps[r] > 2.0 * travel + 0.01:
-            gaps[r] = np.inf
-        else:
-            active += 1
-    return active
+        lx, ly = cos * dx + sin * dy, cos * dy - sin * dx
+        distance, nx, ny, px, py = surface(model.edges, model.rounding, lx, ly)
+        gap = distance - radius
+        if gap > 2.0 * travel + MARGIN:
+            continue
+        found = True
+        ix, iy = sin * ny - cos * nx, -sin * nx - cos * ny
+        tx, ty = -iy, ix
+        wx, wy = cos * px - sin * py, sin * px + cos * py
+        ax, ay = radius * ix, radius * iy
+        row[_ACTIVE] = 1.0
+        row[_NX], row[_NY], row[_ARM_X], row[_ARM_Y] = ix, iy, ax, ay
+        row[_LEVER_N], row[_LEVER_T] = wx * iy - wy * ix, wx * ty - wy * tx
+        jn = (ch * ix + sh * iy, ch * iy - sh * ix, 0.0)
+        jt = (ch * tx + sh * ty, ch * ty - sh * tx, radius)
+        nn, nt, tt = 0.0, 0.0, 0.0
+        for a in range(3):
+            for b in range(3):
+                k = model.compliance[r, a, b]
+                nn += jn[a] * k * jn[b]
+                nt += jn[a] * k * jt[b]
+                tt += jt[a] * k * jt[b]
+        row[_YIELD_NN], row[_YIELD_NT], row[_YIELD_TT] = nn, nt, tt
+        row[_WANT_N] = jn[0] * twist[0] + jn[1] * twist[1] - gap / dt
+        row[_WANT_T] = jt[0] * twist[0] + jt[1] * twist[1] + radius * twist[2]
+    return found
 
 
-@njit(cache=True)
-def _robot_velocity(heading, twist, compliance, arms, inward, fn, ft):  # type: ignore[no-untyped-def]
-    """Return the world velocity and yaw rate of a robot under its contact force."""
-    cos, sin = np.cos(heading), np.sin(heading)
-    vx, vy, w = twist[0], twist[1], twist[2]
-    if fn > 0.0:
-        fx = -(fn * inward[0] - ft * inward[1])
-        fy = -(fn * inward[1] + ft * inward[0])
-        torque = arms[0] * fy - arms[1] * fx
-        bx, by = cos * fx + sin * fy, cos * fy - sin * fx
-        vx += compliance[0, 0] * bx + compliance[0, 1] * by + compliance[0, 2] * torque
-        vy += compliance[1, 0] * bx + compliance[1, 1] * by + compliance[1, 2] * torque
-        w += compliance[2, 0] * bx + compliance[2, 1] * by + compliance[2, 2] * torque
-    return cos * vx - sin * vy, sin * vx + cos * vy, w
-
-
-@njit(cache=True)
-def _solve(now, twists, choice, dt, model, gaps, inward, arms, force_n, force_t, rho2):  # type: ignore[no-untyped-def]
+@njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
+def _solve(contacts, dt, model):  # type: ignore[no-untyped-def]
     """Find the contact forces; return the velocity of the box."""
-    n = len(now)
-    force_n[:] = 0.0
-    force_t[:] = 0.0
-    drag = model.friction_force / 0.05
+    rho2 = model.friction_radius**2
+    mobility = START_SPEED / model.friction_force
     ux, uy, uw = 0.0, 0.0, 0.0
     for _ in range(SWEEPS):
-        for r in range(n):
-            if gaps[r] == np.inf:
+        for r in range(len(contacts)):
+            row = contacts[r]
+            if row[_ACTIVE] == 0.0:
                 continue
-            ix, iy = inward[r]
-            tx, ty = -iy, ix
-            # Box at the contact: normal and tangential velocity, and its mobility there.
-            px, py = arms[r, 2], arms[r, 3]
-            pn, pt = px * iy - py * ix, px * ty - py * tx
-            wx, wy, w = _wrench(inward, arms, force_n, force_t)
-            ux, uy, uw = wx / drag, wy / drag, w / (drag * rho2)
-            box_n = ux * ix + uy * iy + uw * pn
-            box_t = ux * tx + uy * ty + uw * pt
-            bnn, btt = (1.0 + pn * pn / rho2) / drag, (1.0 + pt * pt / rho2) / drag
-            bnt = pn * pt / rho2 / drag
-            # Robot at the contact, likewise; its mobility comes from its compliance.
-            cos, sin = np.cos(now[r, 2]), np.sin(now[r, 2])
-            ax, ay = arms[r, 0], arms[r, 1]
-            jn = (cos * ix + sin * iy, cos * iy - sin * ix, ax * iy - ay * ix)
-            jt = (cos * tx + sin * ty, cos * ty - sin * tx, ax * ty - ay * tx)
-            rnn, rnt, rtt = 0.0, 0.0, 0.0
-            for a in range(3):
-                for b in range(3):
-                    k = model.compliance[r, a, b]
-                    rnn += jn[a] * k * jn[b]
-                    rnt += jn[a] * k * jt[b]
-                    rtt += jt[a] * k * jt[b]
-            twist = twists[r, choice[r]]
-            want_n = jn[0] * twist[0] + jn[1] * twist[1] + jn[2] * twist[2]
-            want_t = jt[0] * twist[0] + jt[1] * twist[1] + jt[2] * twist[2]
-            fn, ft = force_n[r], force_t[r]
-            res_n = want_n - rnn * fn - rnt * ft - box_n - gaps[r] / dt
-            res_t = want_t - rnt * fn - rtt * ft - box_t
-            gnn, gnt, gtt = rnn + bnn, rnt + bnt, rtt + btt
-            # Solve for the force at which both residuals vanish: contact that sticks.
-            goal_n, goal_t = res_n + gnn * fn + gnt * ft, res_t + gnt * fn + gtt * ft
-            det = gnn * gtt - gnt * gnt
-            new_n, new_t = 0.0, 0.0
-            if det > 1e-12 * gnn * gtt:
-                new_n = (gtt * goal_n - gnt * goal_t) / det
-                new_t = (gnn * goal_t - gnt * goal_n) / det
-            mu = model.contact_friction
-            if abs(new_t) > mu * new_n:
-                # It slips: the tangential force is the cone's, against the slip.
-                mu = mu if new_t > 0.0 else -mu
-                new_n = goal_n / (gnn + mu * gnt)
-                new_t = mu * new_n
-            if new_n <= 0.0:
-                new_n, new_t = 0.0, 0.0
-            force_n[r], force_t[r] = new_n, new_t
-        wx, wy, w = _wrench(inward, arms, force_n, force_t)
-        ux, uy, uw = wx / drag, wy / drag, w / (drag * rho2)
-        drag = model.friction_force / max(CREEP, np.sqrt(ux * ux + uy * uy + rho2 * uw * uw))
+            ix, iy, pn, pt = row[_NX], row[_NY], row[_LEVER_N], row[_LEVER_T]
+            fx, fy, torque = _wrench(contacts, r)
+            # What is left to give by this robot once the others' forces have acted.
+            want_n = row[_WANT_N] - mobility * (fx * ix + fy * iy + torque * pn / rho2)
+            want_t = row[_WANT_T] - mobility * (fy * ix - fx * iy + torque * pt / rho2)
+            nn = row[_YIELD_NN] + mobility * (1.0 + pn * pn / rho2)
+            nt = row[_YIELD_NT] + mobility * pn * pt / rho2
+            tt = row[_YIELD_TT] + mobility * (1.0 + pt * pt / rho2)
+            # The force at which both bodies move alike there: a contact that sticks.
+            det = nn * tt - nt * nt
+            force_n, force_t = 0.0, 0.0
+            if det > 1e-12 * nn * tt:
+                force_n = (tt * want_n - nt * want_t) / det
+                force_t = (nn * want_t - nt * want_n) / det
+            if abs(force_t) > model.contact_friction * force_n:
+                # It slips: the tangential force is the friction cone's, against the slip.
+                ratio = model.contact_friction if force_t > 0.0 else -model.contact_friction
+                force_n = want_n / (nn + ratio * nt)
+                force_t = ratio * force_n
+            if force_n <= 0.0:
+                force_n, force_t = 0.0, 0.0
+            row[_FORCE_N], row[_FORCE_T] = force_n, force_t
+        fx, fy, torque = _wrench(contacts, -1)
+        ux, uy, uw = mobility * fx, mobility * fy, mobility * torque / rho2
+        speed = np.sqrt(ux * ux + uy * uy + rho2 * uw * uw)
+        mobility = max(CREEP, speed) / model.friction_force
     return ux, uy, uw
 
 
-@njit(cache=True)
-def _wrench(inward, arms, force_n, force_t):  # type: ignore[no-untyped-def]
-    """Return the force and torque of all contacts on the box."""
-    wx, wy, w = 0.0, 0.0, 0.0
-    for r in range(len(force_n)):
-        if force_n[r] > 0.0:
-            fx = force_n[r] * inward[r, 0] - force_t[r] * inward[r, 1]
-            fy = force_n[r] * inward[r, 1] + force_t[r] * inward[r, 0]
-            wx += fx
-            wy += fy
-            w += arms[r, 2] * fy - arms[r, 3] * fx
-    return wx, wy, w
+@njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
+def _wrench(contacts, leave_out: int):  # type: ignore[no-untyped-def]
+    """Return the force and torque on the box of all contacts but one."""
+    fx, fy, torque = 0.0, 0.0, 0.0
+    for r in range(len(contacts)):
+        row = contacts[r]
+        if r != leave_out and row[_FORCE_N] > 0.0:
+            fx += row[_FORCE_N] * row[_NX] - row[_FORCE_T] * row[_NY]
+            fy += row[_FORCE_N] * row[_NY] + row[_FORCE_T] * row[_NX]
+            torque += row[_FORCE_N] * row[_LEVER_N] + row[_FORCE_T] * row[_LEVER_T]
+    return fx, fy, torque
+
+
+@njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
+def _move(pose, twist, row, compliance, dt):  # type: ignore[no-untyped-def]
+    """Move a robot for one substep under its twist and its contact force."""
+    cos, sin = row[_COS], row[_SIN]
+    ahead, left, turn = twist[0], twist[1], twist[2]
+    if row[_FORCE_N] > 0.0:
+        fx = row[_FORCE_T] * row[_NY] - row[_FORCE_N] * row[_NX]
+        fy = -row[_FORCE_N] * row[_NY] - row[_FORCE_T] * row[_NX]
+        torque = row[_ARM_X] * fy - row[_ARM_Y] * fx
+        lx, ly = cos * fx + sin * fy, cos * fy - sin * fx
+        ahead += compliance[0, 0] * lx + compliance[0, 1] * ly + compliance[0, 2] * torque
+        left += compliance[1, 0] * lx + compliance[1, 1] * ly + compliance[1, 2] * torque
+        turn += compliance[2, 0] * lx + compliance[2, 1] * ly + compliance[2, 2] * torque
+    # The heading halfway, to second order in the turn: chords, not tangents, of the arc.
+    half = 0.5 * turn * dt
+    c, s = cos - half * sin - 0.5 * half * half * cos, sin + half * cos - 0.5 * half * half * sin
+    pose[0] += (c * ahead - s * left) * dt
+    pose[1] += (s * ahead + c * left) * dt
+    pose[2] += turn * dt

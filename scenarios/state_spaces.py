@@ -52,11 +52,14 @@ class BoxStateSpace:
         ``own(poses (m, 3), speeds (m,), goal (3,)) -> (m, n_own)``.
     shared
         ``shared(view, robot) -> (m, d - n_own)`` for the agents of one robot.
+    own_needs_pose
+        Whether `own` reads the poses; if not, none need be predicted for it.
     """
 
     space: StateSpace
     own: Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
     shared: Callable[[View, int], FloatArray]
+    own_needs_pose: bool
 
 
 def wrap(angle: FloatArray) -> FloatArray:
@@ -147,6 +150,7 @@ STATE_SPACES: dict[str, BoxStateSpace] = {
         ),
         _paper_own,
         _paper_shared,
+        own_needs_pose=True,
     ),
     # What matters for pushing, seen from one robot.
     "relational": BoxStateSpace(
@@ -165,6 +169,7 @@ STATE_SPACES: dict[str, BoxStateSpace] = {
         ),
         _relational_own,
         _relational_shared,
+        own_needs_pose=False,
     ),
 }
 """State spaces by the name that specs use."""
