@@ -33,6 +33,7 @@ PROGRAM = "nested-agents"
 DESCRIPTION = """How learning scales in hierarchies of fuzzy reinforcement-learning agents.
 
 To begin with: nested-agents demo
+
 For the version: nested-agents --version"""
 
 
@@ -98,16 +99,15 @@ def _deferred(command: Callable[..., int]) -> Callable[..., Callable[[], int]]:
 
 def _separate_sets(arguments: Sequence[str]) -> Iterator[str]:
     """Let one ``--set`` take several assignments: each gets a ``--set`` of its own."""
-    inside = False
+    seen = 0
     for argument in arguments:
-        if inside and "=" in argument and not argument.startswith("-"):
+        if argument == "--set":
+            seen = 1
+        elif seen == 2 and "=" in argument and not argument.startswith("-"):
             yield "--set"
-            yield argument
-        elif argument == "--set":
-            inside = True
         else:
-            inside = False
-            yield argument
+            seen = 2 if seen == 1 else 0
+        yield argument
 
 
 def _one_line(box: str) -> str:

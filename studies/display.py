@@ -86,14 +86,15 @@ def print_table(lines: Sequence[Summary]) -> None:
         print("no trial has finished")
         return
     table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, header_style="bold")
-    table.add_column("", no_wrap=False)
+    table.add_column("", overflow="fold")
     for title in lines[0].estimates:
-        table.add_column(title, justify="right", vertical="top")
+        table.add_column(escape(title), justify="right", overflow="fold")
     for line in lines:
         estimates = line.estimates.values()
         cells = [f"{number(float(e.value))}\n[dim]{interval(e)}[/]" for e in estimates]
         table.add_row(f"{escape(line.condition)}\n[dim]{line.seeds} seeds[/]", *cells)
     Console().print(table)
+    print("\nMeans over seeds, and below them their 95 % intervals.")
 
 
 def print_places(directory: Path, paths: Sequence[Path]) -> None:

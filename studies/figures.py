@@ -15,7 +15,7 @@ from .statistics import Estimate
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Distinct to colour-blind readers (Okabe and Ito 2008); the palest is left out."""
-STYLES = ("-", "--", "-.", ":")
+STYLES = ("-", (0, (5, 2)), (0, (1, 1.2)), (0, (6, 1.5, 1, 1.5)))
 PANELS = (
     ("success", "success rate", (-0.03, 1.03)),
     ("final_distance_m", "final distance to goal [m]", None),
@@ -35,8 +35,8 @@ SETTINGS: dict[str, Any] = {
 def draw(analysis: LearningCurves, directory: Path) -> list[Path]:
     """Write ``learning-curves`` as PNG and SVG into an existing directory; return the paths.
 
-    Lines are means over seeds, bands their 95 % intervals. Colour is the condition, and past the
-    seventh the line's style.
+    Lines are means over seeds, bands their 95 % intervals. A condition has a colour and a style of
+    line of its own, so that lines upon each other are told apart.
     """
     with mpl.rc_context(SETTINGS):  # type: ignore[arg-type]
         figure = Figure(figsize=(7.2, 5.4), layout="constrained")
@@ -49,7 +49,8 @@ def draw(analysis: LearningCurves, directory: Path) -> list[Path]:
                 axes.set_ylim(*limits)
             else:
                 axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
-            axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
+            ticks = MaxNLocator(integer=True, min_n_ticks=1, steps=[1, 2, 5, 10])
+            axes.xaxis.set_major_locator(ticks)
             axes.grid(axis="y", alpha=0.25)
         for axes in panels[-1]:
             axes.set_xlabel("episode")
@@ -65,9 +66,9 @@ def draw(analysis: LearningCurves, directory: Path) -> list[Path]:
 def _curve(axes: Axes, estimate: Estimate, index: int) -> None:
     episodes = range(1, len(estimate.value) + 1)
     colour = COLOURS[index % len(COLOURS)]
-    style = STYLES[index // len(COLOURS) % len(STYLES)]
+    style = STYLES[index % len(STYLES)]
     marker = "o" if len(estimate.value) == 1 else None
-    axes.fill_between(episodes, estimate.low, estimate.high, color=colour, alpha=0.15, lw=0)
+    axes.fill_between(episodes, estimate.low, estimate.high, color=colour, alpha=0.12, lw=0)
     axes.plot(episodes, estimate.value, color=colour, ls=style, lw=1.6, marker=marker)
 
 

@@ -14,9 +14,8 @@ import time
 import traceback
 import warnings
 from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import closing
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 import joblib
@@ -25,6 +24,7 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from .store import Store
 from .trial import Trial, TrialResult
+from .worker import begin
 
 ATTEMPTS = 2
 """How often a trial is run whose worker dies while nothing else runs."""
@@ -105,14 +105,16 @@ def _parallel(
             started.append(trial)
             yield joblib.delayed(_attempt)(measure, trial)
 
-    with joblib.parallel_config(backend="loky", inner_max_num_threads=1):
+    worker = {"initializer": begin, "initargs": (os.getpid(),)}
+    with joblib.parallel_config(backend="loky", inner_max_num_threads=1, **worker):
         # joblib runs a single job in this process: ask for two workers and feed them singly.
         parallel = joblib.Parallel(
             n_jobs=max(jobs, 2), pre_dispatch=jobs, batch_size=1, return_as="generator_unordered"
         )
         arriving = parallel(tasks())
     try:
-        for arrival in arriving:  # not `yield from`, which would close it before we can
+        # Not `yield from`, which would close `arriving` before we can.
+        for arrival in arriving:  # noqa: UP028
             yield arrival
     except (GeneratorExit, KeyboardInterrupt):
         with warnings.catch_warnings():
@@ -137,33 +139,35 @@ def _alone(trial: Trial, store: Store, measure: Measure) -> Outcome:
 def _keep(
     store: Store, trial: Trial, result: TrialResult | None, error: str | None, seconds: float
 ) -> Outcome:
-    if result is None:
-        store.fail(trial, error or "")
-    else:
-        store.save(trial, result, seconds)
+    with _undisturbed():
+        if result is None:
+            store.fail(trial, error or "")
+        else:
+            store.save(trial, result, seconds)
     return Outcome(trial, error, seconds)
+
+
+@contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Put off Ctrl-C until what is being kept is kept."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # only the main thread is interrupted by it
+        return
+    pressed: list[int] = []
+    usual = signal.signal(signal.SIGINT, lambda number, _: pressed.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, usual)
+    if pressed:
+        raise KeyboardInterrupt
 
 
 def _attempt(measure: Measure, trial: Trial) -> Arrival:
     """Run one trial in a worker; what goes wrong is returned as text."""
-    _become_worker()
     begin = time.perf_counter()
     try:
         result = measure(trial)
     except Exception:
         return trial, None, traceback.format_exc(), time.perf_counter() - begin
     return trial, result, None, time.perf_counter() - begin
-
-
-@cache
-def _become_worker() -> None:
-    """Leave Ctrl-C to the parent, and do not outlive it when it is killed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    parent = os.getppid()
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(0.5)
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()

@@ -29,18 +29,18 @@ class Summary:
 
 
 def number(value: float) -> str:
-    """Return a number in two or three figures, without the zero before the point.
+    """Return a number in two figures and at most two decimals, without a leading zero.
 
     Examples
     --------
-    >>> [number(x) for x in (0.975, 1.0, -0.0312, 0.00021, 12.34, 240.0, 0.0)]
-    ['.97', '1.0', '-.031', '.00021', '12', '240', '0']
+    >>> [number(x) for x in (0.975, 1.0, -0.0312, 0.0021, 12.34, 240.0)]
+    ['.97', '1.0', '-.03', '0', '12', '240']
     """
     if np.isnan(value):
         return "?"
-    if value == 0.0:
+    if abs(value) < 0.005:
         return "0"
-    digits = max(0, 1 - int(np.floor(np.log10(abs(value)))))
+    digits = min(2, max(0, 1 - int(np.floor(np.log10(abs(value))))))
     text = f"{value:.{digits}f}"
     return text.replace("0.", ".", 1) if text.lstrip("-").startswith("0.") else text
 

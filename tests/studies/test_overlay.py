@@ -24,7 +24,9 @@ def test_another_kind_keeps_what_both_inherit():
 
 def test_the_same_kind_keeps_everything():
     base = {"kind": "td-lambda", "trace_decay": 0.4}
-    assert overlay(base, {"kind": "td-lambda", "discount": 0.9}, LEARNER) == base | {"discount": 0.9}
+    assert overlay(base, {"kind": "td-lambda", "discount": 0.9}, LEARNER) == base | {
+        "discount": 0.9
+    }
 
 
 def test_fields_that_only_share_their_name_are_not_kept():

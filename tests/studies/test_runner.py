@@ -75,7 +75,9 @@ def test_a_failed_trial_is_run_again_only_on_request(tmp_path, uninterrupted):
 
 def test_a_killed_worker_costs_nothing(tmp_path, monkeypatch, uninterrupted):
     monkeypatch.setenv("MADE_UP_MARK", str(tmp_path / "mark"))
-    get_reusable_executor().shutdown(kill_workers=True)  # workers have the environment of their birth
+    get_reusable_executor().shutdown(
+        kill_workers=True
+    )  # workers have the environment of their birth
     outcomes, rows, failed = run(tmp_path / "study", made_up.deadly_once)
     assert (tmp_path / "mark").exists()
     assert sorted(o.trial.identity for o in outcomes) == sorted(t.identity for t in made_up.TRIALS)

@@ -9,11 +9,19 @@ from nested_agents.studies.statistics import STATISTICS, bootstrap, rate, rates
 RNG = np.random.default_rng(0)
 
 
+def interquartile_mean(values, axis):
+    return stats.trim_mean(values, 0.25, axis)
+
+
 @pytest.mark.parametrize("statistic", STATISTICS)
 def test_one_stratum_agrees_with_scipy(statistic):
     values = RNG.normal(size=30)
     estimate = bootstrap(values, statistic=statistic, resamples=20_000)
-    function = {"mean": np.mean, "median": np.median, "iqm": lambda x, axis: stats.trim_mean(x, 0.25, axis)}
+    function = {
+        "mean": np.mean,
+        "median": np.median,
+        "iqm": lambda x, axis: stats.trim_mean(x, 0.25, axis),
+    }
     reference = stats.bootstrap(
         (values,), function[statistic], method="percentile", n_resamples=20_000, rng=RNG, axis=0
     ).confidence_interval  # fmt: skip
@@ -25,8 +33,8 @@ def test_strata_agree_with_an_independent_implementation():
     a, b = RNG.normal(size=10), RNG.normal(5.0, size=25)
     estimate = bootstrap(a, b, statistic="iqm", resamples=20_000)
     pooled = [
-        stats.trim_mean(np.concatenate([RNG.choice(a, 10), RNG.choice(b, 25)]), 0.25)
-        for _ in range(20_000)
+        interquartile_mean(np.concatenate([RNG.choice(a, 10), RNG.choice(b, 25)]), 0)
+        for _ in range(8_000)
     ]
     assert estimate.value == pytest.approx(stats.trim_mean(np.concatenate([a, b]), 0.25))
     assert estimate.low == pytest.approx(np.quantile(pooled, 0.025), abs=0.03)
