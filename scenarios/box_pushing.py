@@ -53,6 +53,9 @@ class BoxPushing:
     """
 
     def __init__(self, settings: ScenarioSettings) -> None:
+        if settings.robot not in ROBOTS:
+            known = ", ".join(sorted(ROBOTS))
+            raise ValueError(f"scenario.robot = {settings.robot!r}, allowed {known}")
         self.settings = settings
         self.robot = ROBOTS[settings.robot]
         self.box = box_for(settings.box, settings.robots)
