@@ -149,7 +149,9 @@ class ReplaySettings(LearnerSettings):
     ridge: Positive = 10.0
     """Weight of the squared consequents against squared errors of rewards scaled by 100."""
     sweeps: Annotated[int, Field(ge=1)] = 30
-    """Regressions on freshly discounted targets after every episode."""
+    """Solutions for freshly discounted targets in every regression."""
+    every: Annotated[int, Field(ge=1)] = 50
+    """Steps after which to regress within an episode, too: a stall is unlearned while it lasts."""
 
 
 class BatchTDSettings(ReplaySettings):

@@ -1,6 +1,7 @@
 """Learning by ridge regression on all experience (Ernst, Geurts and Wehenkel 2005).
 
-After every episode, several times over: give every after-state s in memory a target, and find the
+After every episode, and every few steps within it, several times over: give every after-state s
+in memory a target, and find the
 weights that minimise the squared errors of f plus ``ridge`` times the squared weights. Batch TD(0)
 aims at ``R(s) + gamma f(s')`` with the state s' that followed; fitted value iteration (the value
 iteration of Section VII) at ``R(s) + gamma max_a f(s_a)`` over predicted next states s_a, so that
@@ -47,11 +48,10 @@ class BatchTD:
             )
         self.settings, self.rules = settings, rules
         self.theta: FloatArray = np.zeros((n_agents, rules.n_rules))
-        self._gram: FloatArray = np.zeros((n_agents, rules.n_rules, rules.n_rules))
         self._states: list[FloatArray] = []
         self._rewards: list[float] = []
         self._follower: list[int] = []
-        self._regressed = 0
+        # Active rules and strengths of the after-states so far regressed on, per agent.
         self._rows: list[tuple[IntArray, FloatArray]] = []
 
     def begin_episode(self) -> None:
@@ -65,25 +65,36 @@ class BatchTD:
         terminated: bool,
         candidates: FloatArray | None = None,
     ) -> int:
-        """Remember an after-state."""
+        """Remember an after-state; now and then, regress."""
         self._states.append(states.copy())
         self._rewards.append(reward)
         self._follower.append(TERMINAL if terminated else len(self._states))
-        return 0
+        if len(self._states) % self.settings.every or terminated:
+            return 0
+        return self._regress()
 
     def end_episode(self) -> int:
         """Regress on all experience."""
-        if not self._states:
-            return 0
         self._cut_off()
+        return self._regress() if self._states else 0
+
+    def _cut_off(self) -> None:
+        if self._follower and self._follower[-1] == len(self._states):
+            self._follower[-1] = CUT_OFF
+
+    def _regress(self) -> int:
         self._extend()
         rewards = REWARD_SCALE * np.array(self._rewards)
         follower = np.array(self._follower)
+        # In the middle of an episode the last after-state has no follower yet.
+        follower[follower == len(follower)] = CUT_OFF
+        known = (follower != CUT_OFF).astype(float)
         gamma = self.settings.discount
         low, high = rewards.min() / (1.0 - gamma), rewards.max() / (1.0 - gamma)
-        ridge = self.settings.ridge * np.eye(self.rules.n_rules)
         for i, (active, strengths) in enumerate(self._rows):
-            factor = cho_factor(self._gram[i] + ridge, check_finite=False)
+            gram = self.settings.ridge * np.eye(self.rules.n_rules)
+            _add_gram(gram, active, strengths, known)
+            factor = cho_factor(gram, check_finite=False)
             theta = self.theta[i] * REWARD_SCALE
             for _ in range(self.settings.sweeps):
                 targets = np.where(
@@ -91,16 +102,11 @@ class BatchTD:
                     rewards / (1.0 - gamma),
                     rewards + gamma * self._continuation(i, theta, follower),
                 )
-                moment = _moment(
-                    active, strengths, np.clip(targets, low, high), follower, self.rules.n_rules
-                )
+                targets = known * np.clip(targets, low, high)
+                moment = _moment(active, strengths, targets, self.rules.n_rules)
                 theta = cho_solve(factor, moment, check_finite=False)
             self.theta[i] = theta / REWARD_SCALE
         return self.theta.size
-
-    def _cut_off(self) -> None:
-        if self._follower and self._follower[-1] == len(self._states):
-            self._follower[-1] = CUT_OFF
 
     def _continuation(self, agent: int, theta: FloatArray, follower: IntArray) -> FloatArray:
         """Return f ``(N,)`` of what comes after every after-state; arbitrary where unknown."""
@@ -108,42 +114,36 @@ class BatchTD:
         return values[np.maximum(follower, 0)]
 
     def _extend(self) -> None:
-        """Take the newest episode into active rules and Gram matrices."""
-        new = np.array(self._states[self._regressed :])
-        usable = np.array(self._follower[self._regressed :]) != CUT_OFF
-        for i in range(len(self.theta)):
-            active, strengths = self.rules.active(new[:, i])
-            _add_gram(self._gram[i], active[usable], strengths[usable])
-            if i < len(self._rows):
-                active = np.concatenate([self._rows[i][0], active])
-                strengths = np.concatenate([self._rows[i][1], strengths])
-                self._rows[i] = (active, strengths)
-            else:
-                self._rows.append((active, strengths))
-        self._regressed = len(self._states)
+        """Find the active rules of the after-states that are new since the last regression."""
+        done = len(self._rows[0][0]) if self._rows else 0
+        new = np.array(self._states[done:])
+        if not len(new):
+            return
+        rows = [self.rules.active(new[:, i]) for i in range(len(self.theta))]
+        if self._rows:
+            rows = [
+                (np.concatenate([old[0], row[0]]), np.concatenate([old[1], row[1]]))
+                for old, row in zip(self._rows, rows, strict=True)
+            ]
+        self._rows = rows
 
     def arrays(self) -> dict[str, FloatArray]:
-        """Return weights, Gram matrices and all experience."""
+        """Return weights and all experience."""
         n, d = len(self.theta), len(self.rules.partitions)
         return {
             "theta": self.theta,
-            "gram": self._gram,
             "states": np.array(self._states).reshape(-1, n, d),
             "rewards": np.array(self._rewards),
             "follower": np.array(self._follower, dtype=np.int64),
-            "regressed": np.array(self._regressed),
         }
 
     def restore(self, arrays: Mapping[str, FloatArray]) -> None:
         """Continue from `arrays`."""
-        self.theta, self._gram = arrays["theta"].copy(), arrays["gram"].copy()
+        self.theta = arrays["theta"].copy()
         self._states = list(arrays["states"])
         self._rewards = [float(r) for r in arrays["rewards"]]
         self._follower = [int(f) for f in arrays["follower"]]
-        self._regressed = int(arrays["regressed"])
-        past = arrays["states"][: self._regressed]
-        agents = range(len(self.theta)) if len(past) else ()
-        self._rows = [self.rules.active(past[:, i]) for i in agents]
+        self._rows = []
 
 
 class FittedValue(BatchTD):
@@ -183,12 +183,16 @@ class FittedValue(BatchTD):
 
 
 @njit(cache=True)
-def _add_gram(gram: FloatArray, active: IntArray, strengths: FloatArray) -> None:
-    """Add phi phi' of every row to `gram`."""
+def _add_gram(
+    gram: FloatArray, active: IntArray, strengths: FloatArray, weights: FloatArray
+) -> None:
+    """Add the weighted phi phi' of every row to `gram`."""
     for s in range(len(active)):
         for a in range(active.shape[1]):
-            for b in range(active.shape[1]):
-                gram[active[s, a], active[s, b]] += strengths[s, a] * strengths[s, b]
+            weighted = weights[s] * strengths[s, a]
+            if weighted > 0.0:
+                for b in range(active.shape[1]):
+                    gram[active[s, a], active[s, b]] += weighted * strengths[s, b]
 
 
 @njit(cache=True)
@@ -203,12 +207,11 @@ def _row_values(theta: FloatArray, active: IntArray, strengths: FloatArray) -> F
 
 @njit(cache=True)
 def _moment(
-    active: IntArray, strengths: FloatArray, targets: FloatArray, follower: IntArray, n_rules: int
+    active: IntArray, strengths: FloatArray, targets: FloatArray, n_rules: int
 ) -> FloatArray:
-    """Return the sum of phi times target over all rows whose follower is known."""
+    """Return the sum of phi times target over all rows."""
     moment = np.zeros(n_rules)
     for s in range(len(active)):
-        if follower[s] != -2:  # CUT_OFF
-            for a in range(active.shape[1]):
-                moment[active[s, a]] += strengths[s, a] * targets[s]
+        for a in range(active.shape[1]):
+            moment[active[s, a]] += strengths[s, a] * targets[s]
     return moment

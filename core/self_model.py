@@ -1,0 +1,88 @@
+"""A robot's model of itself: what each of its wheels does to its motion, learned while moving.
+
+The twist of a robot in its own frame is taken as linear in its commanded wheel speeds::
+
+    twist = effect @ [u_1, ..., u_w, 1] + noise
+
+For each of its three components a Kalman filter tracks the row of the ``(3, w + 1)`` effect,
+starting from the nominal geometry. When an innovation is larger than the filter believes possible,
+its covariance is inflated: something has changed, so old experience counts less. The effect feeds
+the predictor; this is how a team learns that a wheel has failed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from .arrays import FloatArray
+from .config import SelfModelSettings
+
+
+class SelfModel:
+    """Kalman filters on the wheel effects of all robots.
+
+    Parameters
+    ----------
+    settings
+        Uncertainties of prior and measurement.
+    nominal
+        Per robot the ``(3, w + 1)`` effect of its nominal geometry: rows are the speed ahead and
+        to the left [m/s] and the turning rate [rad/s], columns the wheel speeds [m/s] and 1.
+
+    Examples
+    --------
+    A cart with one wheel, which turns out to be seized.
+
+    >>> nominal = np.array([[1.0, 0.0], [0.0, 0.0], [0.0, 0.0]])
+    >>> model = SelfModel(SelfModelSettings(enabled=True), [nominal])
+    >>> for speed in (0.1, -0.1, 0.1, -0.1):
+    ...     model.observe(0, np.array([speed]), np.zeros(3))
+    >>> abs(float(model.effects[0][0, 0])) < 0.01
+    True
+    """
+
+    def __init__(self, settings: SelfModelSettings, nominal: Sequence[FloatArray]) -> None:
+        self.settings = settings
+        self.effects = tuple(np.array(effect, dtype=float) for effect in nominal)
+        # A turning rate is measured in units of the nominal robot's own turning per wheel speed.
+        self._units = tuple(
+            np.array([1.0, 1.0, max(1.0, float(np.abs(effect[2]).max()))]) for effect in nominal
+        )
+        self._prior = tuple(self._spread(effect.shape[1]) for effect in nominal)
+        self._covariances = tuple(np.stack([prior] * 3) for prior in self._prior)
+
+    def _spread(self, size: int) -> FloatArray:
+        spread = np.full(size, self.settings.prior_effect**2)
+        spread[-1] = self.settings.prior_constant**2
+        return np.diag(spread)
+
+    def observe(self, robot: int, speeds: FloatArray, twist: FloatArray) -> None:
+        """Take in one twist ``(3,)`` measured under commanded wheel speeds ``(w,)``."""
+        noise = self.settings.noise**2
+        regressor = np.append(speeds, 1.0)
+        effect, covariances = self.effects[robot], self._covariances[robot]
+        for row, unit in enumerate(self._units[robot]):
+            innovation = float(twist[row] - effect[row] @ regressor) / unit
+            carried = covariances[row] @ regressor
+            expected = float(regressor @ carried) + noise
+            if innovation**2 > self.settings.surprise * expected:
+                covariances[row] += self.settings.inflation * self._prior[robot]
+                carried = covariances[row] @ regressor
+                expected = float(regressor @ carried) + noise
+            gain = carried / expected
+            effect[row] += gain * innovation * unit
+            covariances[row] -= np.outer(gain, carried)
+
+    def arrays(self) -> dict[str, FloatArray]:
+        """Return effects and covariances by robot."""
+        named: dict[str, FloatArray] = {}
+        for r, (effect, covariance) in enumerate(zip(self.effects, self._covariances, strict=True)):
+            named[f"effect{r}"], named[f"covariance{r}"] = effect, covariance
+        return named
+
+    def restore(self, arrays: Mapping[str, FloatArray]) -> None:
+        """Continue from `arrays`."""
+        for r, (effect, covariance) in enumerate(zip(self.effects, self._covariances, strict=True)):
+            effect[:], covariance[:] = arrays[f"effect{r}"], arrays[f"covariance{r}"]
