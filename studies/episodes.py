@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -67,8 +68,14 @@ class EpisodeMeter:
         self._return += float(transition.reward)
 
     def row(self, last: Transition) -> EpisodeRow:
-        """Return the measurements of an episode that ended with the transition `last`."""
-        return EpisodeRow(
+        """Return the measurements of an episode that ended with the transition `last`.
+
+        Raises
+        ------
+        FloatingPointError
+            If one of them is not finite: the trial has come to nothing, and says so.
+        """
+        row = EpisodeRow(
             phase=self._phase,
             episode=self._episode,
             steps=self._steps,
@@ -79,6 +86,11 @@ class EpisodeMeter:
             contact_fraction=self._contact / self._steps,
             return_=self._return,
         )
+        for name, value in zip(COLUMNS[2:], row[2:], strict=True):
+            if not isfinite(value):
+                where = f"{self._phase} episode {self._episode}"
+                raise FloatingPointError(f"{name} = {value} in {where}")
+        return row
 
 
 class Stopwatch:
