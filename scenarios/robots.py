@@ -107,8 +107,8 @@ class RobotSpec:
             raise ValueError(f"robot {self.name!r}: sensors {self.sensors}, must be finite angles")
         if np.linalg.cond(_resistance(self)) > 1e12:
             raise ValueError(
-                f"robot {self.name!r}: its wheels cannot resist turning; a single wheel at the "
-                "centre of the body is not enough"
+                f"robot {self.name!r}: its wheels cannot resist turning, "
+                "there must be two at different places"
             )
 
     @property
