@@ -10,10 +10,8 @@ from __future__ import annotations
 import os
 import signal
 import threading
-import time
-import traceback
 import warnings
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from typing import Any
@@ -24,12 +22,10 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from .store import Store
 from .trial import Trial, TrialResult
-from .worker import begin
+from .worker import Arrival, Measure, attempt, begin
 
 ATTEMPTS = 2
 """How often a trial is run whose worker dies while nothing else runs."""
-
-Measure = Callable[[Trial], TrialResult]
 
 
 @dataclass(frozen=True)
@@ -92,9 +88,6 @@ def run_trials(
         queue = [trial for trial in queue if trial.identity not in finished]
 
 
-Arrival = tuple[Trial, TrialResult | None, str | None, float]
-
-
 def _parallel(
     trials: Sequence[Trial], measure: Measure, jobs: int, started: list[Trial]
 ) -> Generator[Arrival]:
@@ -103,7 +96,7 @@ def _parallel(
     def tasks() -> Iterator[Any]:
         for trial in trials:
             started.append(trial)
-            yield joblib.delayed(_attempt)(measure, trial)
+            yield joblib.delayed(attempt)(measure, trial)
 
     worker = {"initializer": begin, "initargs": (os.getpid(),)}
     with joblib.parallel_config(backend="loky", inner_max_num_threads=1, **worker):
@@ -111,7 +104,8 @@ def _parallel(
         parallel = joblib.Parallel(
             n_jobs=max(jobs, 2), pre_dispatch=jobs, batch_size=1, return_as="generator_unordered"
         )
-        arriving = parallel(tasks())
+        with _deaf():
+            arriving = parallel(tasks())
     try:
         # Not `yield from`, which would close `arriving` before we can.
         for arrival in arriving:  # noqa: UP028
@@ -150,24 +144,27 @@ def _keep(
 @contextmanager
 def _undisturbed() -> Iterator[None]:
     """Put off Ctrl-C until what is being kept is kept."""
-    if threading.current_thread() is not threading.main_thread():
-        yield  # only the main thread is interrupted by it
-        return
     pressed: list[int] = []
-    usual = signal.signal(signal.SIGINT, lambda number, _: pressed.append(number))
-    try:
+    with _handling(lambda number, _: pressed.append(number)):
         yield
-    finally:
-        signal.signal(signal.SIGINT, usual)
     if pressed:
         raise KeyboardInterrupt
 
 
-def _attempt(measure: Measure, trial: Trial) -> Arrival:
-    """Run one trial in a worker; what goes wrong is returned as text."""
-    begin = time.perf_counter()
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Ignore Ctrl-C, as the processes started meanwhile will do for ever: it is for the parent."""
+    with _handling(signal.SIG_IGN):
+        yield
+
+
+@contextmanager
+def _handling(handler: Any) -> Iterator[None]:
+    if threading.current_thread() is not threading.main_thread():
+        yield  # Python tells the main thread only, and lets no other change that
+        return
+    usual = signal.signal(signal.SIGINT, handler)
     try:
-        result = measure(trial)
-    except Exception:
-        return trial, None, traceback.format_exc(), time.perf_counter() - begin
-    return trial, result, None, time.perf_counter() - begin
+        yield
+    finally:
+        signal.signal(signal.SIGINT, usual)

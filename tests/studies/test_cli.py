@@ -144,9 +144,13 @@ def test_the_same_command_again_runs_nothing(study, spec_file, capsys):
 def test_interrupted_and_continued_is_as_if_never_interrupted(
     how, study, spec_file, tmp_path, capsys
 ):
-    process = start("slow", "run", spec_file, "--out", tmp_path, "--jobs", 2)
+    arguments = ["run", spec_file, "--out", tmp_path, "--jobs", 2]
+    process = start("slow", *arguments, start_new_session=True)
     wait_for_results(tmp_path, process)
-    process.send_signal(how)
+    if how == signal.SIGINT:  # as a terminal does it: to the parent and its workers
+        os.killpg(process.pid, how)
+    else:
+        process.send_signal(how)
     status, _, err = finish(process)
     if how == signal.SIGINT:
         assert status == 130
