@@ -38,7 +38,7 @@ def test_kernel_equals_its_twin(box: str) -> None:
         twin = infrared_readings_numpy(robots, radii, sensors, pose, outline, SPEC)
         np.testing.assert_allclose(got, twin, atol=1e-6)
         assert ((got >= 0) & (got <= 1)).all()
-        seen += np.count_nonzero(got)
+        seen += int(np.count_nonzero(got))
     assert seen > 100
 
 

@@ -1,0 +1,372 @@
+"""A scripted controller: the proof that box pushing can be solved with the agents' own actions.
+
+It picks the side of the box that faces away from the goal, gives every robot a slot along that
+side, drives the robots that are not at their slot there (a short search over sequences of actions
+of one robot, around the box and clear of the others), and once all are, pushes: it tries the joint
+actions on the push predictor and takes the one after which the box is nearest to the goal and best
+aligned, with the robots still at their slots. It knows the whole situation and remembers nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import product
+from math import atan2, cos, pi, sin
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from scipy.optimize import linear_sum_assignment
+
+from ..core.arrays import FloatArray, IntArray
+from ..core.spaces import ActionSet
+from .boxes import BoxSpec
+from .geometry import surface
+from .push import PushModel, push
+from .robots import RobotSpec, compliance, nominal_effect
+
+CLEARANCE = 0.006
+"""Least gap [m] to box and other robots on the way to a slot."""
+SLOT_GAP = 0.015
+"""Gap to the box at which a robot waits at its slot [m]."""
+LONGEST_SEARCH = 5000
+"""Action sequences tried per robot and decision."""
+WIDEST_JOINT = 300
+"""Joint actions tried at once; above, robots choose in turn."""
+
+
+class Side(NamedTuple):
+    """A side of the box to push at, in the frame of the box.
+
+    Attributes
+    ----------
+    direction
+        Of pushing [rad].
+    depth
+        Distance of the side from the centre, against `direction` [m].
+    middle, half
+        Middle and half the length of the usable side, to the left of `direction` [m].
+    """
+
+    direction: float
+    depth: float
+    middle: float
+    half: float
+
+
+class ScriptedController:
+    """Drives robots to push a box to its goal.
+
+    Parameters
+    ----------
+    robots, box
+        What is in the world.
+    action_set, increment, seconds
+        As in the scenario: actions, what an increment changes as a fraction of the greatest
+        speed, and the decision period [s].
+
+    Examples
+    --------
+    >>> from nested_agents.scenarios import ScenarioSettings, build
+    >>> scenario = build(ScenarioSettings(start="easy"))
+    >>> _ = scenario.reset(1)
+    >>> controller = ScriptedController(scenario.world.robots, scenario.box)
+    >>> for step in range(60):
+    ...     transition = scenario.step(controller.act(scenario.measure()))
+    ...     if transition.terminated:
+    ...         break
+    >>> transition.terminated
+    True
+    """
+
+    def __init__(
+        self,
+        robots: Sequence[RobotSpec],
+        box: BoxSpec,
+        action_set: ActionSet | None = None,
+        increment: float = 0.5,
+        seconds: float = 0.512,
+    ) -> None:
+        self.robots = tuple(robots)
+        self.box = box
+        self.actions = action_set or ActionSet()
+        self.increment = increment
+        self.seconds = seconds
+        self._radii: FloatArray = np.array([robot.radius for robot in robots])
+        self._choices = [_local_actions(robot, len(self.actions)) for robot in robots]
+        self._effects = [nominal_effect(robot) for robot in robots]
+        counts = np.cumsum([0] + [len(robot.wheels) for robot in robots])
+        self._wheels = [slice(a, b) for a, b in zip(counts, counts[1:], strict=False)]
+        self._model = PushModel(
+            edges=box.outline.edges,
+            rounding=box.outline.rounding,
+            reach=box.reach,
+            radii=self._radii,
+            compliance=np.stack([compliance(robot) for robot in robots]),
+            friction_force=box.friction_force,
+            friction_radius=box.friction_radius,
+            contact_friction=box.contact_friction,
+        )
+        self._sides = _sides(box)
+
+    def act(self, measurements: Mapping[str, Any]) -> IntArray:
+        """Return the joint action ``(n,)`` in a situation.
+
+        Parameters
+        ----------
+        measurements
+            ``robot_poses`` (M, 3), ``box_pose`` (3,), ``goal_pose`` (3,) and commanded
+            ``wheel_speeds`` (n,), as `BoxPushing.measure` returns them.
+        """
+        robots, box = measurements["robot_poses"], measurements["box_pose"]
+        goal, speeds = measurements["goal_pose"], measurements["wheel_speeds"]
+        side, slots = self._plan(robots, box, goal)
+        heading = box[2] + side.direction
+        away = [r for r, pose in enumerate(robots) if not self._at_slot(pose, slots[r], heading, r)]
+        local: list[int] = []
+        if away:
+            for r in range(len(robots)):
+                target = np.array([*slots[r], heading])
+                local.append(self._drive(r, robots, box, speeds, target, wait=r not in away))
+        else:
+            local = self._push(robots, box, goal, speeds, side, slots)
+        return np.concatenate([choices[k] for choices, k in zip(self._choices, local, strict=True)])
+
+    def _plan(
+        self, robots: FloatArray, box: FloatArray, goal: FloatArray
+    ) -> tuple[Side, FloatArray]:
+        """Return the side to push at and each robot's slot ``(M, 2)`` in the world."""
+        course = atan2(goal[1] - box[1], goal[0] - box[0]) - box[2]
+        sides = self._sides or [Side(course, self.box.reach, 0.0, 0.6 * self.box.reach)]
+        best = None
+        for side in sides:
+            slots = self._slots(side, box)
+            costs = np.array(
+                [
+                    _paths(
+                        np.ascontiguousarray(pose[None]), slot, box, self._model.edges,
+                        self._model.rounding, radius + CLEARANCE, self.box.reach,
+                    )[0]
+                    for pose, radius in zip(robots, self._radii, strict=True)
+                    for slot in slots
+                ]
+            ).reshape(len(robots), -1)  # fmt: skip
+            rows, columns = linear_sum_assignment(costs)
+            cost = abs(_wrap(course - side.direction)) + costs[rows, columns].mean() / 0.3
+            if best is None or cost < best[0]:
+                best = cost, side, slots[columns]
+        assert best is not None
+        return best[1], best[2]
+
+    def _slots(self, side: Side, box: FloatArray) -> FloatArray:
+        """Return the slots ``(M, 2)`` along a side, evenly spread, in the world."""
+        n = len(self.robots)
+        spread = min(side.half - float(self._radii.max()), 0.055 * n / 2)
+        offsets = np.linspace(1, -1, n) * spread if n > 1 else np.zeros(1)
+        angle = box[2] + side.direction
+        ahead, left = np.array([cos(angle), sin(angle)]), np.array([-sin(angle), cos(angle)])
+        slots = []
+        for offset, radius in zip(offsets, self._radii, strict=True):
+            back = side.depth + radius + SLOT_GAP
+            if not self._sides:
+                back = np.sqrt((self.box.reach + radius + SLOT_GAP) ** 2 - offset**2)
+            slots.append(box[:2] - back * ahead + (side.middle + offset) * left)
+        return np.array(slots)
+
+    def _at_slot(self, pose: FloatArray, slot: FloatArray, heading: float, robot: int) -> bool:
+        dx, dy = pose[:2] - slot
+        along, aside = cos(heading) * dx + sin(heading) * dy, cos(heading) * dy - sin(heading) * dx
+        return -0.05 < along < 0.04 and abs(aside) < 0.03 and abs(_wrap(pose[2] - heading)) < 0.6
+
+    def _next(self, robot: int, speeds: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return wheel speeds ``(m, k, w)`` and twists ``(m, k, 3)`` after the k local actions.
+
+        `speeds` is ``(m, w)``.
+        """
+        limit = np.full(speeds.shape[-1], self.robots[robot].max_speed)
+        after = self.actions.apply(
+            speeds[:, None], self._choices[robot][None], self.increment * limit, limit
+        )
+        effect = self._effects[robot]
+        return after, after @ effect[:, :-1].T + effect[:, -1]
+
+    def _drive(
+        self,
+        robot: int,
+        robots: FloatArray,
+        box: FloatArray,
+        speeds: FloatArray,
+        target: FloatArray,
+        *,
+        wait: bool,
+    ) -> int:
+        """Return the local action that leads a robot towards a pose, or stops it if it waits."""
+        now = speeds[self._wheels[robot]][None]
+        if wait:
+            after, _ = self._next(robot, now)
+            return int(np.abs(after[0]).sum(axis=1).argmin())
+        others = np.delete(robots[:, :2], robot, axis=0)
+        spans = self._radii[robot] + np.delete(self._radii, robot) + CLEARANCE
+        poses, first = robots[robot][None], None
+        cost = np.zeros(1)
+        while len(poses) * len(self._choices[robot]) <= LONGEST_SEARCH:
+            after, twists = self._next(robot, now)
+            options = twists.shape[1]
+            poses = np.repeat(poses, options, axis=0)
+            cost = np.repeat(cost, options)
+            first = np.arange(options) if first is None else np.repeat(first, options)
+            now = after.reshape(-1, now.shape[1])
+            twists = twists.reshape(-1, 3)
+            for _ in range(2):
+                poses = _moved(poses, twists, self.seconds / 2)
+                apart = np.hypot(*(poses[:, None, :2] - others).transpose(2, 0, 1))
+                cost = cost + 10.0 * np.maximum(spans - apart, 0.0).sum(axis=1)
+                path = _paths(
+                    poses, target[:2], box, self._model.edges, self._model.rounding,
+                    self._radii[robot] + CLEARANCE, self.box.reach,
+                )  # fmt: skip
+                turn = np.abs(_wrap(poses[:, 2] - target[2]))
+                cost = cost + 0.1 * (path + 0.06 * turn * np.exp(-path / 0.05))
+            arrived = path + 0.06 * turn * np.exp(-path / 0.05)
+        assert first is not None
+        return int(first[(cost + arrived).argmin()])
+
+    def _push(
+        self,
+        robots: FloatArray,
+        box: FloatArray,
+        goal: FloatArray,
+        speeds: FloatArray,
+        side: Side,
+        slots: FloatArray,
+    ) -> list[int]:
+        """Return the local actions that push best, as far as the push predictor can tell."""
+        tables = [self._next(r, speeds[w][None])[1][0] for r, w in enumerate(self._wheels)]
+        twists = np.zeros((len(tables), max(map(len, tables)), 3))
+        for r, table in enumerate(tables):
+            twists[r, : len(table)] = table
+        cos_, sin_ = cos(box[2] + side.direction), sin(box[2] + side.direction)
+        aside = cos_ * (slots[:, 1] - box[1]) - sin_ * (slots[:, 0] - box[0])
+
+        def best(options: IntArray) -> IntArray:
+            after, boxes, gaps = push(robots, box, twists, options, self.seconds, self._model)
+            costs = self._cost(after, boxes, gaps, goal, side, aside)
+            return options[int(costs.argmin())]
+
+        sizes = [range(len(table)) for table in tables]
+        if np.prod([len(size) for size in sizes]) <= WIDEST_JOINT:
+            return list(best(np.array(list(product(*sizes)))))
+        # Coordinate ascent: everyone ahead at first, then each improves on the others' choice.
+        choice = np.array([int(table[:, 0].argmax()) for table in tables])
+        for _ in range(3):
+            for r, size in enumerate(sizes):
+                options = np.repeat(choice[None], len(size), axis=0)
+                options[:, r] = size
+                choice = best(options)
+        return list(choice)
+
+    def _cost(
+        self,
+        robots: FloatArray,
+        box: FloatArray,
+        gaps: FloatArray,
+        goal: FloatArray,
+        side: Side,
+        aside: FloatArray,
+    ) -> FloatArray:
+        """Return how bad ``m`` predicted situations are [m]."""
+        ahead = goal[:2] - box[:, :2]
+        distance = np.hypot(ahead[:, 0], ahead[:, 1])
+        heading = box[:, 2] + side.direction
+        cost = distance.copy()
+        if self._sides:
+            error = _wrap(np.arctan2(ahead[:, 1], ahead[:, 0]) - heading)
+            cost += 0.12 * np.abs(error) * np.minimum(1.0, distance / 0.2)
+        for r in range(robots.shape[1]):
+            dx, dy = robots[:, r, 0] - box[:, 0], robots[:, r, 1] - box[:, 1]
+            off = np.cos(heading) * dy - np.sin(heading) * dx - aside[r]
+            cost += 0.3 * np.maximum(gaps[:, r], 0.0) + 3.0 * off**2
+            cost += 0.02 * _wrap(robots[:, r, 2] - heading) ** 2
+        return cost
+
+
+def _local_actions(robot: RobotSpec, n_actions: int) -> IntArray:
+    """Return the combinations ``(k, w)`` of actions to try: wheels of one side act alike."""
+    sides = [int(np.sign(wheel.y)) for wheel in robot.wheels]
+    groups = sorted(set(sides))
+    rows = product(range(n_actions), repeat=len(groups))
+    return np.array([[row[groups.index(side)] for side in sides] for row in rows])
+
+
+def _sides(box: BoxSpec) -> list[Side]:
+    """Return the sides of a polygon's convex hull; none for a disc, which may be pushed anywhere."""
+    if box.polygon is None:
+        return []
+    ring = np.asarray(box.polygon.convex_hull.exterior.coords)
+    if not box.polygon.convex_hull.exterior.is_ccw:
+        ring = ring[::-1]
+    sides = []
+    for a, b in zip(ring[:-1], ring[1:], strict=True):
+        along = b - a
+        direction = atan2(along[0], -along[1])  # inwards, left of the edge
+        left = np.array([-sin(direction), cos(direction)])
+        ends = sorted((a @ left, b @ left))
+        depth = -float(a @ np.array([cos(direction), sin(direction)]))
+        sides.append(Side(direction, depth, sum(ends) / 2, (ends[1] - ends[0]) / 2))
+    longest = max(side.half for side in sides)
+    return [side for side in sides if side.half > 0.5 * longest]
+
+
+def _wrap(angle: Any) -> Any:
+    return (angle + pi) % (2 * pi) - pi
+
+
+def _moved(poses: FloatArray, twists: FloatArray, seconds: float) -> FloatArray:
+    """Return poses ``(m, 3)`` after moving with constant body twists ``(m, 3)``."""
+    turn = twists[:, 2] * seconds
+    middle = poses[:, 2] + turn / 2
+    chord = seconds * np.sinc(turn / (2 * pi))
+    cosine, sine = np.cos(middle), np.sin(middle)
+    x = poses[:, 0] + chord * (cosine * twists[:, 0] - sine * twists[:, 1])
+    y = poses[:, 1] + chord * (sine * twists[:, 0] + cosine * twists[:, 1])
+    return np.stack([x, y, poses[:, 2] + turn], axis=1)
+
+
+@njit(cache=True)
+def _paths(
+    poses: FloatArray,
+    target: FloatArray,
+    box: FloatArray,
+    edges: FloatArray,
+    rounding: float,
+    margin: float,
+    reach: float,
+) -> FloatArray:
+    """Return about how far ``(m,)`` it is from poses to a target, around the box.
+
+    Straight if all of the way keeps `margin` from the box, else along a circle around it. Standing
+    too close to the box is penalised.
+    """
+    out = np.empty(len(poses))
+    cos_, sin_ = np.cos(box[2]), np.sin(box[2])
+    tx, ty = target[0] - box[0], target[1] - box[1]
+    ring = reach + margin + 0.01
+    for i in range(len(poses)):
+        x, y = poses[i, 0] - box[0], poses[i, 1] - box[1]
+        here = surface(edges, rounding, cos_ * x + sin_ * y, cos_ * y - sin_ * x)[0]
+        near = max(margin - here, 0.0)
+        blocked = False
+        for k in range(1, 9):
+            px, py = x + (tx - x) * k / 8, y + (ty - y) * k / 8
+            gap = surface(edges, rounding, cos_ * px + sin_ * py, cos_ * py - sin_ * px)[0]
+            if gap < min(margin, here):
+                blocked = True
+                break
+        if blocked:
+            rho = np.sqrt(x * x + y * y)
+            turn = np.arctan2(x * ty - y * tx, x * tx + y * ty)
+            out[i] = ring * abs(turn) + abs(rho - ring) + abs(np.sqrt(tx * tx + ty * ty) - ring)
+        else:
+            out[i] = np.sqrt((tx - x) ** 2 + (ty - y) ** 2)
+        out[i] += 5.0 * near
+    return out
