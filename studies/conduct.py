@@ -54,6 +54,8 @@ def conduct(
         if retry_failed:
             store.forget_failed()
         pending = store.pending(trials)
+        if pending:
+            display.announce(spec, directory, jobs)
         try:
             with closing(run_trials(pending, store, study.measure, jobs)) as outcomes:
                 display.follow(outcomes, len(trials), len(trials) - len(pending))
@@ -69,8 +71,8 @@ def conduct(
     display.print_table(analysis.table)
     figures = directory / "figures"
     figures.mkdir(exist_ok=True)
-    paths = study.draw(analysis, figures) if analysis.table else []
-    display.print_places(directory, [*paths, *replays])
+    pictures = study.draw(analysis, figures) if analysis.table else []
+    display.print_places(directory, pictures, replays)
     if failed:
         display.say(f"{len(failed)} trials failed: nested-agents status {directory}")
     return 1 if failed else 0

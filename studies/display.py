@@ -20,7 +20,7 @@ from rich.progress import (
 from rich.table import Table
 
 from .runner import Outcome
-from .store import DATABASE
+from .spec import Spec
 from .summary import Summary, interval, number
 
 PLAIN_SECONDS = 10.0
@@ -30,6 +30,20 @@ PLAIN_SECONDS = 10.0
 def say(line: str) -> None:
     """Print a line on standard error."""
     print(line, file=sys.stderr, flush=True)
+
+
+def announce(spec: Spec, directory: Path, jobs: int) -> None:
+    """Say what is about to be run."""
+    conditions, seeds = len(spec.conditions()), len(spec.seeds)
+    say(
+        f"{spec.study}: {_count(conditions, 'condition')} x {_count(seeds, 'seed')}, "
+        f"{_count(spec.episodes, 'episode')} of up to {_count(spec.steps, 'step')}, "
+        f"{_count(jobs, 'process', 'es')}, kept in {directory}"
+    )
+
+
+def _count(number: int, what: str, plural: str = "s") -> str:
+    return f"{number} {what}{'' if number == 1 else plural}"
 
 
 def follow(outcomes: Iterable[Outcome], total: int, done: int) -> None:
@@ -92,14 +106,15 @@ def print_table(lines: Sequence[Summary]) -> None:
     for line in lines:
         estimates = line.estimates.values()
         cells = [f"{number(float(e.value))}\n[dim]{interval(e)}[/]" for e in estimates]
-        table.add_row(f"{escape(line.condition)}\n[dim]{line.seeds} seeds[/]", *cells)
+        table.add_row(f"{escape(line.condition)}\n[dim]{_count(line.seeds, 'seed')}[/]", *cells)
     Console().print(table)
     print("\nMeans over seeds, and below them their 95 % intervals.")
 
 
-def print_places(directory: Path, paths: Sequence[Path]) -> None:
-    """Say where results and pictures are."""
+def print_places(directory: Path, figures: Sequence[Path], replays: Sequence[Path]) -> None:
+    """Say where pictures and results are."""
     print()
-    for path in paths:
-        print(path)
-    print(f"{directory / DATABASE}: nested-agents results {directory} --format csv")
+    for what, paths in (("figure", figures), ("replay", replays)):
+        for path in paths:
+            print(f"{what:<8}{path}")
+    print(f"{'rows':<8}nested-agents results {directory} --format csv")

@@ -47,7 +47,7 @@ def _differences(
     before_keys, after_keys = _columns(old), _columns(new)
     if before_keys != after_keys:
         yield f"sweep keys = {show(before_keys)} there, {show(after_keys)} here"
-    for label in settings.keys() & old_settings.keys():
+    for label in [label for label in settings if label in old_settings]:
         before, after = dict(flat(old_settings[label])), dict(flat(settings[label]))
         for key in sorted(before.keys() | after.keys()):
             if before.get(key) != after.get(key):
