@@ -75,7 +75,8 @@ class Decision(Settings):
     """How values become a joint action."""
 
     rule: Literal["value", "reward", "reward-and-value", "random"] = "value"
-    """Decide by f of the predicted state, by predicted reward, by their discounted sum, or not."""
+    """Decide by f of the predicted state, by its predicted reward, by reward + discount f, or at
+    random. f of an after-state contains its reward already: the sum weighs the reward twice."""
     others: Literal["max", "mean", "observed"] = "max"
     """What the agents below are expected to do: the best for this agent, anything with equal
     chance, or what they were seen to do so far (the paper's "stochastically observing")."""
@@ -149,15 +150,15 @@ class ReplaySettings(LearnerSettings):
     ridge: Positive = 10.0
     """Weight of the squared consequents against squared errors of rewards scaled by 100."""
     sweeps: Annotated[int, Field(ge=1)] = 30
-    """Solutions for freshly discounted targets in every regression."""
-    every: Annotated[int, Field(ge=1)] = 50
-    """Steps after which to regress within an episode, too: a stall is unlearned while it lasts."""
+    """Regressions on freshly discounted targets after every episode."""
 
 
 class BatchTDSettings(ReplaySettings):
-    """Batch TD(0): towards the state that followed."""
+    """Batch TD(lambda): towards what followed."""
 
     kind: Literal["batch-td"] = "batch-td"
+    trace_decay: Fraction = 0.5
+    """lambda: 0 bootstraps from the next state, 1 sums the rewards of the whole episode."""
 
 
 class FittedValueSettings(ReplaySettings):

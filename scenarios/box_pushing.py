@@ -127,7 +127,8 @@ class BoxPushing:
         if terminated:
             measured["stopped_at_goal"] = self._stays()
         measured["seconds"] = {"physics": moved - begin, "sensors": sensed - moved}
-        return Transition(states, float(gained[0]), terminated, False, measured, motions)
+        truncated = not terminated and measured["distance_m"] > self.settings.arena
+        return Transition(states, float(gained[0]), terminated, truncated, measured, motions)
 
     @property
     def nominal_effects(self) -> tuple[FloatArray, ...]:
@@ -146,7 +147,7 @@ class BoxPushing:
                 self._speeds, tuple(effects), self.groups,
             ),
             self._model, self._space, self.action_set, self.settings.reward,
-            self.settings.hold * CONTROL_PERIOD, self.settings.speed_increment, self._limits,
+            self.settings.lookahead * CONTROL_PERIOD, self.settings.speed_increment, self._limits,
         )  # fmt: skip
 
     def measure(self) -> dict[str, Any]:

@@ -22,6 +22,9 @@ class RewardSettings(Settings):
     """Per unit of infrared reading of a robot (R2 and R3 of Eq. 16 for any number of robots)."""
     c4: NonNegative = 0.0003
     """Per radian of the box's orientation error."""
+    least_approach: NonNegative = 0.001
+    """By how much the box must have come nearer in a decision period for a negative Delta D [m];
+    with 0 a box that creeps by rounding errors is paid as one that is pushed."""
     receding: float = 0.000001
     """Reward under Condition 2."""
     some_out_of_range: float = -0.0015
@@ -49,9 +52,13 @@ class ScenarioSettings(Settings):
     reward: RewardSettings = RewardSettings()
     hold: Count = 8
     """Control periods of 64 ms for which a decision is held."""
+    lookahead: Count = 24
+    """Control periods that predictions look ahead, the decision being held for all of them."""
     speed_increment: Annotated[float, Field(gt=0, le=1)] = 0.5
     """What increase and decrease change, as a fraction of the greatest wheel speed."""
     tolerance: Positive = 0.05
     """Distance of the box from the goal that counts as reached [m]."""
+    arena: Positive = 1.5
+    """Distance of the box from the goal [m] beyond which an episode is broken off."""
     orientation_tolerance: Positive | None = None
     """Orientation error that still counts as reached [rad]; none: any."""

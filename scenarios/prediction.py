@@ -60,32 +60,41 @@ class BoxPrediction:
     limits: FloatArray
 
     @cached_property
-    def _local_speeds(self) -> list[FloatArray]:
-        """Per robot ``(A ** w, w)``: the wheel speeds of every local code."""
-        a = len(self.action_set)
-        tables = []
+    def _drives(self) -> list[tuple[FloatArray, IntArray]]:
+        """Per robot the distinct wheel speeds ``(K, w)``, and which of them each local code gives.
+
+        Several actions often command one speed (a resting wheel is maintained or zeroed, one at
+        its limit is maintained or increased), so that K is far below ``A ** w``.
+        """
+        everything = np.arange(len(self.action_set))
+        per_robot = []
         for group in self.situation.groups:
-            digits = np.indices((a,) * len(group)).reshape(len(group), -1).T
-            tables.append(
-                self.action_set.apply(
-                    self.situation.speeds[list(group)],
-                    digits,
-                    self.increment * self.limits[list(group)],
-                    self.limits[list(group)],
-                )
-            )
-        return tables
+            drives, which = np.zeros((1, 0)), np.zeros(1, dtype=np.int64)
+            for agent in group:
+                wanted = self.action_set.apply(
+                    self.situation.speeds[agent], everything,
+                    self.increment * self.limits[agent], self.limits[agent],
+                ).tolist()  # fmt: skip
+                distinct = sorted(set(wanted))
+                number = np.array([distinct.index(speed) for speed in wanted])
+                column = np.tile(distinct, len(drives))[:, None]
+                drives = np.hstack([np.repeat(drives, len(distinct), axis=0), column])
+                which = (which[:, None] * len(distinct) + number).ravel()
+            per_robot.append((drives, which))
+        return per_robot
 
     @cached_property
     def _twists(self) -> FloatArray:
-        """``(M, K, 3)`` twists of every local code, padded to the robot with most wheels."""
-        tables = self._local_speeds
-        twists = np.zeros((len(tables), max(len(t) for t in tables), 3))
-        for r, (speeds, effect) in enumerate(zip(tables, self.situation.effects, strict=True)):
-            twists[r, : len(speeds)] = speeds @ effect[:, :-1].T + effect[:, -1]
+        """``(M, K, 3)`` twists of every drive, padded to the robot with most."""
+        twists = np.zeros((len(self._drives), max(len(drives) for drives, _ in self._drives), 3))
+        for r, ((drives, _), effect) in enumerate(
+            zip(self._drives, self.situation.effects, strict=True)
+        ):
+            twists[r, : len(drives)] = drives @ effect[:, :-1].T + effect[:, -1]
         return twists
 
     def _view(self, choices: IntArray) -> View:
+        """Return where the robots' drives ``(m, M)`` lead."""
         robots, box, gaps = push(
             self.situation.robots, self.situation.box, self._twists, choices, self.seconds,
             self.model,
@@ -93,33 +102,35 @@ class BoxPrediction:
         return View(robots, box, gaps, self.situation.goal)
 
     def _choices(self, joint_actions: IntArray) -> IntArray:
-        """Return the local code ``(m, M)`` of each robot in joint actions ``(m, n)``."""
+        """Return the drive ``(m, M)`` of each robot in joint actions ``(m, n)``."""
         a = len(self.action_set)
-        codes = np.empty((len(joint_actions), len(self.situation.groups)), dtype=np.int64)
+        choices = np.empty((len(joint_actions), len(self.situation.groups)), dtype=np.int64)
         for r, group in enumerate(self.situation.groups):
             places = a ** np.arange(len(group) - 1, -1, -1)
-            codes[:, r] = joint_actions[:, list(group)] @ places
-        return codes
+            choices[:, r] = self._drives[r][1][joint_actions[:, list(group)] @ places]
+        return choices
 
     @cached_property
-    def _all(self) -> View:
-        """All joint actions by code."""
-        a = len(self.action_set)
-        shape = tuple(a ** len(group) for group in self.situation.groups)
+    def _table(self) -> tuple[View, IntArray]:
+        """Where all combinations of drives lead, and the row of every joint-action code."""
+        shape = tuple(len(drives) for drives, _ in self._drives)
         choices = np.indices(shape).reshape(len(shape), -1).T
-        return self._view(np.ascontiguousarray(choices, dtype=np.int64))
+        row = np.zeros(1, dtype=np.int64)
+        for (_, which), size in zip(self._drives, shape, strict=True):
+            row = (row[:, None] * size + which).ravel()
+        return self._view(np.ascontiguousarray(choices, dtype=np.int64)), row
 
     @cached_property
     def _alone(self) -> list[FloatArray]:
-        """Per robot ``(A ** w, 3)``: its pose after every local code if it pushed alone."""
+        """Per robot ``(K, 3)``: its pose after every drive if it pushed alone."""
         poses = []
-        for r, speeds in enumerate(self._local_speeds):
+        for r, (drives, _) in enumerate(self._drives):
             model = self.model._replace(
                 radii=self.model.radii[r : r + 1], compliance=self.model.compliance[r : r + 1]
             )
             robots, _, _ = push(
                 self.situation.robots[r : r + 1], self.situation.box,
-                self._twists[r : r + 1], np.arange(len(speeds))[:, None], self.seconds, model,
+                self._twists[r : r + 1], np.arange(len(drives))[:, None], self.seconds, model,
             )  # fmt: skip
             poses.append(robots[:, 0])
         return poses
@@ -138,10 +149,11 @@ class BoxPrediction:
         """Return the next states of `agent` for all joint actions, own block as if alone."""
         r, wheel = self._robot_of(agent)
         if r not in self._shared:
-            self._shared[r] = self.space.shared(self._all, r)
-        speeds = self._local_speeds[r][:, wheel]
-        poses = self._alone[r] if self.space.own_needs_pose else np.zeros((len(speeds), 3))
-        own = self.space.own(poses, speeds, self.situation.goal)
+            view, row = self._table
+            self._shared[r] = self.space.shared(view, r)[row]
+        drives, which = self._drives[r]
+        poses = self._alone[r] if self.space.own_needs_pose else np.zeros((len(drives), 3))
+        own = self.space.own(poses, drives[:, wheel], self.situation.goal)[which]
         behind = sum(len(group) for group in self.situation.groups[r + 1 :])
         return Blocks(own, self._shared[r], len(self.action_set) ** behind)
 
@@ -150,7 +162,7 @@ class BoxPrediction:
         r, wheel = self._robot_of(agent)
         choices = self._choices(joint_actions)
         view = self._view(choices)
-        speeds = self._local_speeds[r][choices[:, r], wheel]
+        speeds = self._drives[r][0][choices[:, r], wheel]
         own = self.space.own(view.robots[:, r], speeds, self.situation.goal)
         return np.concatenate([own, self.space.shared(view, r)], axis=1)
 
@@ -166,7 +178,9 @@ class BoxPrediction:
     def commands(self, joint_action: IntArray) -> FloatArray:
         """Return the wheel speeds ``(n,)`` that a joint action ``(n,)`` would command [m/s]."""
         choices = self._choices(joint_action[None])[0]
-        return np.concatenate([t[c] for t, c in zip(self._local_speeds, choices, strict=True)])
+        return np.concatenate(
+            [drives[c] for (drives, _), c in zip(self._drives, choices, strict=True)]
+        )
 
     def slips(self, joint_action: IntArray) -> FloatArray:
         """Return by how much contact is predicted to change the robots' twists, ``(M, 3)``."""
@@ -181,7 +195,8 @@ class BoxPrediction:
 
     def reward_table(self) -> FloatArray:
         """Return the predicted rewards ``(A ** n,)`` of all joint actions."""
-        return self._rewards(self._all)
+        view, row = self._table
+        return self._rewards(view)[row]
 
     def _rewards(self, view: View) -> FloatArray:
         goal, before = self.situation.goal, self.situation.box

@@ -52,8 +52,9 @@ def reward(
     touching = contact.astype(bool).all(axis=1)
     within = readings > 0.0
     near = -r2_r3 + (r1 if settings.attraction_without_contact else 0.0)
+    nearer = approach < -settings.least_approach
     return np.select(
-        [touching & (approach < 0.0), touching, within.all(axis=1), ~within.any(axis=1)],
+        [touching & nearer, touching, within.all(axis=1), ~within.any(axis=1)],
         [r1 - r2_r3 - r4, np.full_like(r1, settings.receding), near, settings.all_out_of_range],
         default=settings.some_out_of_range,
     )

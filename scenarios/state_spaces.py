@@ -92,13 +92,15 @@ def _relational_shared(view: View, robot: int) -> FloatArray:
     azimuth = np.arctan2(to_box[:, 1], to_box[:, 0])
     course = np.arctan2(to_goal[:, 1], to_goal[:, 0])
     others = np.delete(view.gaps, robot, axis=1)
+    pushed = box[:, :2] - view.robots[:, :, :2].mean(axis=1)
     return np.stack(
         [
             view.gaps[:, robot],
             wrap(azimuth - pose[:, 2]),
             wrap(azimuth - course),
             others.max(axis=1) if others.shape[1] else view.gaps[:, robot],
-            wrap(course - box[:, 2]),
+            wrap(np.arctan2(pushed[:, 1], pushed[:, 0]) - course),
+            wrap(box[:, 2] - goal[2]),
             np.hypot(to_goal[:, 0], to_goal[:, 1]),
         ],
         axis=1,
@@ -152,7 +154,10 @@ STATE_SPACES: dict[str, BoxStateSpace] = {
         _paper_shared,
         own_needs_pose=True,
     ),
-    # What matters for pushing, seen from one robot.
+    # What matters for pushing, seen from one robot: where it stands (gap, bearing of the box,
+    # side of the box as seen along the course to the goal), how far off the others are, where the
+    # robots' middle would push the box relative to the course, how the box is turned relative to
+    # the goal pose, and how far it has to go.
     "relational": BoxStateSpace(
         StateSpace(
             "relational",
@@ -162,7 +167,8 @@ STATE_SPACES: dict[str, BoxStateSpace] = {
                 _angle("box_bearing", _SIDES, _TURNS),
                 _angle("side", _SIDES, ("far left", "left", "behind", "right", "far right")),
                 Variable("others_gap", "m", 0.0, 0.5, centres=_GAPS, labels=_NEARNESS),
-                _angle("box_goal_bearing", _SIDES, _TURNS),
+                _angle("push_bearing", _SIDES, _TURNS),
+                _angle("box_turn", _SIDES, _TURNS),
                 _DISTANCE,
             ),
             n_own=1,

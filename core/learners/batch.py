@@ -1,12 +1,11 @@
 """Learning by ridge regression on all experience (Ernst, Geurts and Wehenkel 2005).
 
-After every episode, and every few steps within it, several times over: give every after-state s
-in memory a target, and find the
-weights that minimise the squared errors of f plus ``ridge`` times the squared weights. Batch TD(0)
-aims at ``R(s) + gamma f(s')`` with the state s' that followed; fitted value iteration (the value
-iteration of Section VII) at ``R(s) + gamma max_a f(s_a)`` over predicted next states s_a, so that
-experience under exploration teaches the value of acting well. Targets are clipped to the range
-that discounted sums of the rewards seen so far can reach: no extrapolation can run away.
+After every episode, several times over: give every after-state s in memory a target, and find the
+weights that minimise the squared errors of f plus ``ridge`` times the squared weights. Batch
+TD(lambda) aims at the lambda-return of what followed; fitted value iteration (the value iteration
+of Section VII) at ``R(s) + gamma max_a f(s_a)`` over predicted next states s_a, so that experience
+under exploration teaches the value of acting well. Targets are clipped to the range that
+discounted sums of the rewards seen so far can reach: no extrapolation can run away.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ TERMINAL, CUT_OFF = -1, -2
 
 
 class BatchTD:
-    """Batch TD(0).
+    """Batch TD(lambda).
 
     Raises
     ------
@@ -65,13 +64,11 @@ class BatchTD:
         terminated: bool,
         candidates: FloatArray | None = None,
     ) -> int:
-        """Remember an after-state; now and then, regress."""
+        """Remember an after-state."""
         self._states.append(states.copy())
         self._rewards.append(reward)
         self._follower.append(TERMINAL if terminated else len(self._states))
-        if len(self._states) % self.settings.every or terminated:
-            return 0
-        return self._regress()
+        return 0
 
     def end_episode(self) -> int:
         """Regress on all experience."""
@@ -86,8 +83,6 @@ class BatchTD:
         self._extend()
         rewards = REWARD_SCALE * np.array(self._rewards)
         follower = np.array(self._follower)
-        # In the middle of an episode the last after-state has no follower yet.
-        follower[follower == len(follower)] = CUT_OFF
         known = (follower != CUT_OFF).astype(float)
         gamma = self.settings.discount
         low, high = rewards.min() / (1.0 - gamma), rewards.max() / (1.0 - gamma)
@@ -97,21 +92,20 @@ class BatchTD:
             factor = cho_factor(gram, check_finite=False)
             theta = self.theta[i] * REWARD_SCALE
             for _ in range(self.settings.sweeps):
-                targets = np.where(
-                    follower == TERMINAL,
-                    rewards / (1.0 - gamma),
-                    rewards + gamma * self._continuation(i, theta, follower),
-                )
-                targets = known * np.clip(targets, low, high)
+                targets = known * np.clip(self._targets(i, theta, rewards, follower), low, high)
                 moment = _moment(active, strengths, targets, self.rules.n_rules)
                 theta = cho_solve(factor, moment, check_finite=False)
             self.theta[i] = theta / REWARD_SCALE
         return self.theta.size
 
-    def _continuation(self, agent: int, theta: FloatArray, follower: IntArray) -> FloatArray:
-        """Return f ``(N,)`` of what comes after every after-state; arbitrary where unknown."""
+    def _targets(
+        self, agent: int, theta: FloatArray, rewards: FloatArray, follower: IntArray
+    ) -> FloatArray:
+        """Return the lambda-returns ``(N,)`` of all after-states; arbitrary where cut off."""
         values = _row_values(theta, *self._rows[agent])
-        return values[np.maximum(follower, 0)]
+        return _lambda_returns(
+            values, rewards, follower, self.settings.discount, self.settings.trace_decay
+        )
 
     def _extend(self) -> None:
         """Find the active rules of the after-states that are new since the last regression."""
@@ -153,6 +147,11 @@ class FittedValue(BatchTD):
         super().__init__(settings, rules, n_agents)
         self.candidates = settings.candidates
         self._candidates: list[FloatArray] = []
+        self._nexts: FloatArray = np.zeros((n_agents, 0, self.candidates, 0))
+
+    def _regress(self) -> int:
+        self._nexts = np.stack(self._candidates, axis=1).astype(float)
+        return super()._regress()
 
     def observe(
         self,
@@ -167,10 +166,15 @@ class FittedValue(BatchTD):
         self._candidates.append(candidates.astype(np.float32))
         return super().observe(states, reward, terminated)
 
-    def _continuation(self, agent: int, theta: FloatArray, follower: IntArray) -> FloatArray:
-        nexts = np.array([c[agent] for c in self._candidates], dtype=float)
+    def _targets(
+        self, agent: int, theta: FloatArray, rewards: FloatArray, follower: IntArray
+    ) -> FloatArray:
+        """Return R plus the discounted best predicted value ``(N,)``."""
+        nexts = self._nexts[agent]
         values = self.rules.values(theta, nexts.reshape(-1, nexts.shape[2]))
-        return values.reshape(nexts.shape[:2]).max(axis=1)
+        best = values.reshape(nexts.shape[:2]).max(axis=1)
+        gamma = self.settings.discount
+        return np.where(follower == TERMINAL, rewards / (1.0 - gamma), rewards + gamma * best)
 
     def arrays(self) -> dict[str, FloatArray]:
         """Return what batch TD returns, and the predicted next states."""
@@ -215,3 +219,24 @@ def _moment(
         for a in range(active.shape[1]):
             moment[active[s, a]] += strengths[s, a] * targets[s]
     return moment
+
+
+@njit(cache=True)
+def _lambda_returns(
+    values: FloatArray, rewards: FloatArray, follower: IntArray, discount: float, decay: float
+) -> FloatArray:
+    """Return the lambda-return of every row, by recursion from the end of each episode.
+
+    ``G(s) = R(s) + gamma ((1 - lambda) f(s') + lambda G(s'))``
+    """
+    returns = np.empty(len(values))
+    for s in range(len(values) - 1, -1, -1):
+        if follower[s] == -1:  # TERMINAL
+            returns[s] = rewards[s] / (1.0 - discount)
+        elif follower[s] == -2:  # CUT_OFF
+            returns[s] = values[s]
+        else:
+            after = follower[s]
+            ahead = (1.0 - decay) * values[after] + decay * returns[after]
+            returns[s] = rewards[s] + discount * ahead
+    return returns

@@ -36,6 +36,18 @@ def feed(learner: BatchTD, episode: tuple) -> int:
     return learner.end_episode()
 
 
+def lambda_return(
+    t: int, values: np.ndarray, rewards: np.ndarray, terminal: bool, settings: BatchTDSettings
+) -> float:
+    """(1 - lambda) V(t) + lambda G(t), G(t) = R(t) + gamma times the same of t + 1."""
+    gamma, decay = settings.discount, settings.trace_decay
+    if t == len(values) - 1:
+        ahead = rewards[t] / (1 - gamma) if terminal else values[t]
+    else:
+        ahead = rewards[t] + gamma * lambda_return(t + 1, values, rewards, terminal, settings)
+    return float((1 - decay) * values[t] + decay * ahead)
+
+
 def ridge_by_hand(
     rules: RuleBase, episodes: list[tuple], settings: BatchTDSettings | FittedValueSettings
 ) -> np.ndarray:
@@ -61,7 +73,9 @@ def ridge_by_hand(
                         elif fitted:
                             target = reward + gamma * (rules.features(nexts[t, i]) @ w).max()
                         else:
-                            target = reward + gamma * phi[t + 1] @ w
+                            target = reward + gamma * lambda_return(
+                                t + 1, phi @ w, REWARD_SCALE * rewards, terminal, settings
+                            )
                         rows.append(phi[t])
                         targets.append(min(max(target, low), high))
                 x = np.array(rows).reshape(-1, rules.n_rules)
@@ -73,8 +87,12 @@ def ridge_by_hand(
 
 @pytest.mark.parametrize("membership", ["triangular", "sigmoid"])
 @pytest.mark.parametrize("ridge", [0.01, 10.0])
-def test_batch_td_is_the_ridge_regression_written_out(membership: str, ridge: float) -> None:
-    rules, settings = fuzzy(membership), BatchTDSettings(ridge=ridge, sweeps=4, discount=0.8)
+@pytest.mark.parametrize("decay", [0.0, 0.5, 1.0])
+def test_batch_td_is_the_ridge_regression_written_out(
+    membership: str, ridge: float, decay: float
+) -> None:
+    rules = fuzzy(membership)
+    settings = BatchTDSettings(ridge=ridge, sweeps=4, discount=0.8, trace_decay=decay)
     episodes = episodes_of(np.random.default_rng(1), 2)
     learner = BatchTD(settings, rules, 2)
     for episode in episodes:
