@@ -27,7 +27,13 @@ PRESETS: dict[str, Preset] = {
     "paper": Preset(
         "constants as printed in the paper; what it does not print is in docs/fidelity.md",
         {
-            "scenario": {"state_space": "paper", "hold": 1, "speed_increment": 0.25},
+            "scenario": {
+                "state_space": "paper",
+                "hold": 1,
+                "lookahead": 1,
+                "speed_increment": 0.25,
+                "reward": {"least_approach": 0.0, "attraction_without_contact": True},
+            },
             "topology": {"kind": "chain"},
             "learner": {
                 "kind": "td-lambda",
