@@ -48,13 +48,17 @@ class Situation:
 
 @dataclass(frozen=True)
 class BoxPrediction:
-    """Predicts from one situation; see `nested_agents.core.protocols.Prediction`."""
+    """Predicts from one situation; see `nested_agents.core.protocols.Prediction`.
+
+    A decision stands for `hold` seconds; predictions look `seconds` ahead.
+    """
 
     situation: Situation
     model: PushModel
     space: BoxStateSpace
     action_set: ActionSet
     rewards_of: RewardSettings
+    hold: float
     seconds: float
     increment: float
     limits: FloatArray
@@ -95,10 +99,12 @@ class BoxPrediction:
 
     def _view(self, choices: IntArray) -> View:
         """Return where the robots' drives ``(m, M)`` lead."""
+        return self._after(choices, self.seconds)
+
+    def _after(self, choices: IntArray, seconds: float) -> View:
         robots, box, gaps = push(
-            self.situation.robots, self.situation.box, self._twists, choices, self.seconds,
-            self.model,
-        )  # fmt: skip
+            self.situation.robots, self.situation.box, self._twists, choices, seconds, self.model
+        )
         return View(robots, box, gaps, self.situation.goal)
 
     def _choices(self, joint_actions: IntArray) -> IntArray:
@@ -167,8 +173,8 @@ class BoxPrediction:
         return np.concatenate([own, self.space.shared(view, r)], axis=1)
 
     def poses(self, joint_actions: IntArray) -> View:
-        """Return the predicted situations of joint actions ``(m, n)``."""
-        return self._view(self._choices(joint_actions))
+        """Return the situations that joint actions ``(m, n)`` lead to in a decision period."""
+        return self._after(self._choices(joint_actions), self.hold)
 
     @property
     def groups(self) -> tuple[tuple[int, ...], ...]:
@@ -183,11 +189,14 @@ class BoxPrediction:
         )
 
     def slips(self, joint_action: IntArray) -> FloatArray:
-        """Return by how much contact is predicted to change the robots' twists, ``(M, 3)``."""
+        """Return by how much contact is predicted to change the robots' twists, ``(M, 3)``.
+
+        Over the decision period, to be held against what is measured in it.
+        """
         choices = self._choices(joint_action[None])
-        after = self._view(choices).robots[0]
+        after = self._after(choices, self.hold).robots[0]
         free = self._twists[np.arange(len(after)), choices[0]]
-        return mean_twists(self.situation.robots, after, self.seconds) - free
+        return mean_twists(self.situation.robots, after, self.hold) - free
 
     def rewards(self, joint_actions: IntArray) -> FloatArray:
         """Return the predicted rewards ``(m,)`` of joint actions ``(m, n)``."""
