@@ -1,4 +1,4 @@
-"""Array types: floating-point and integer NumPy arrays of any precision."""
+"""Array types: floating-point and integer NumPy arrays of any precision, and masks."""
 
 from typing import Any
 
@@ -7,3 +7,4 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.floating[Any]]
 IntArray = NDArray[np.integer[Any]]
+BoolArray = NDArray[np.bool_]

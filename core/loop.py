@@ -86,7 +86,7 @@ def control_loop(
         Whether the team explores and learns, or is evaluated greedily.
     """
     for episode in range(first_episode, first_episode + episodes):
-        states = scenario.reset(world_seed(seed, episode))
+        states = scenario.reset(world_seed(seed, episode), episode)
         if learn:
             team.begin_episode()
         prediction = team.predict(scenario)

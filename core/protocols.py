@@ -111,8 +111,11 @@ class Scenario(Protocol):
         """The actions of every agent."""
         ...
 
-    def reset(self, seed: int | np.random.SeedSequence) -> FloatArray:
-        """Start an episode; everything random in it follows from `seed`. Return states (n, d)."""
+    def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
+        """Start an episode and return states ``(n, d)``.
+
+        Everything random in it follows from `seed`; what is scheduled, from its number `episode`.
+        """
         ...
 
     def step(self, joint_action: IntArray) -> Transition:

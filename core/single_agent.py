@@ -59,9 +59,9 @@ class SingleAgent:
         )
         self.state_space = StateSpace(f"joint {space.name}", variables)
 
-    def reset(self, seed: int | np.random.SeedSequence) -> FloatArray:
+    def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
         """Start an episode; return the joint state ``(1, n * d)``."""
-        return self.scenario.reset(seed).reshape(1, -1)
+        return self.scenario.reset(seed, episode).reshape(1, -1)
 
     def step(self, joint_action: IntArray) -> Transition:
         """Carry out the joint action of code ``joint_action[0]``."""
@@ -104,7 +104,7 @@ class SingleAgentPrediction:
     def blocks(self, agent: int) -> Blocks:
         """Return the next joint states of all codes; no variable is the agent's own alone."""
         codes = np.arange(len(self._joint))[:, None]
-        return Blocks(np.zeros((len(codes), 0)), self.states(0, codes), 1)
+        return Blocks(np.zeros((1, 0)), self.states(0, codes), 1)
 
     def reward_table(self) -> FloatArray:
         """Return the predicted rewards of all codes."""

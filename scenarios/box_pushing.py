@@ -13,11 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from ..core.arrays import FloatArray, IntArray
+from ..core.arrays import BoolArray, FloatArray, IntArray
 from ..core.protocols import Transition
 from ..core.spaces import ActionSet, StateSpace
 from .boxes import box_for
 from .config import ScenarioSettings
+from .failures import Failures
 from .infrared import strongest_reading
 from .prediction import BoxPrediction, Situation, mean_twists
 from .push import PushModel
@@ -49,7 +50,7 @@ class BoxPushing:
     >>> scenario.agents
     ('robot1.left', 'robot1.right', 'robot2.left', 'robot2.right')
     >>> scenario.reset(0).shape
-    (4, 7)
+    (4, 8)
     """
 
     def __init__(self, settings: ScenarioSettings) -> None:
@@ -83,22 +84,33 @@ class BoxPushing:
             friction_radius=self.box.friction_radius,
             contact_friction=self.box.contact_friction,
         )
+        self._failures = (
+            Failures(settings.failures, self.agents, self._limits) if settings.failures else None
+        )
         self._goal: FloatArray = np.zeros(3)
         self._speeds: FloatArray = np.zeros(len(self.agents))
+        self._step = 0
 
     @property
     def state_space(self) -> StateSpace:
         """The state variables of every agent."""
         return self._space.space
 
-    def reset(self, seed: int | np.random.SeedSequence) -> FloatArray:
-        """Place robots, box and goal by the start distribution; return states ``(n, d)``."""
+    def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
+        """Place robots, box and goal by the start distribution; return states ``(n, d)``.
+
+        Failures are scheduled by the number of the `episode`.
+        """
         rng = np.random.default_rng(seed)
         robots, box, self._goal = place(
             self.settings.start, rng, [self.robot] * self.settings.robots, self.box
         )
         self.world.place(robots, box)
         self._speeds = np.zeros(len(self.agents))
+        self._step = 0
+        if self._failures is not None:
+            self._failures.begin(seed, episode)
+            self.world.set_grip(self._failures.grip)
         return self._observe()
 
     def step(self, joint_action: IntArray) -> Transition:
@@ -107,7 +119,7 @@ class BoxPushing:
         self._speeds = self.action_set.apply(self._speeds, joint_action, unit, self._limits)
         before, poses = self._distance(), self.world.robot_poses.copy()
         begin = perf_counter()
-        self.world.advance(self._speeds, self.settings.hold)
+        self._advance(self._speeds)
         moved = perf_counter()
         states = self._observe()
         period = self.settings.hold * CONTROL_PERIOD
@@ -126,6 +138,7 @@ class BoxPushing:
         sensed = perf_counter()
         if terminated:
             measured["stopped_at_goal"] = self._stays()
+        self._step += 1
         measured["seconds"] = {"physics": moved - begin, "sensors": sensed - moved}
         truncated = not terminated and measured["distance_m"] > self.settings.arena
         return Transition(states, float(gained[0]), terminated, truncated, measured, motions)
@@ -147,7 +160,8 @@ class BoxPushing:
                 self._speeds, tuple(effects), self.groups,
             ),
             self._model, self._space, self.action_set, self.settings.reward,
-            self.settings.lookahead * CONTROL_PERIOD, self.settings.speed_increment, self._limits,
+            self.settings.hold * CONTROL_PERIOD, self.settings.lookahead * CONTROL_PERIOD,
+            self.settings.speed_increment, self._limits,
         )  # fmt: skip
 
     def measure(self) -> dict[str, Any]:
@@ -155,7 +169,8 @@ class BoxPushing:
 
         Keys: ``robot_poses`` (M, 3), ``box_pose``, ``goal_pose`` [m, m, rad], ``wheel_speeds``
         (n,) as commanded [m/s], ``contact`` (M,) now, ``contact_time`` (M,) as a fraction of the
-        last decision period, ``distance_m``, ``orientation_rad`` of the box from the goal pose.
+        last decision period, ``failed`` (n,) wheels, ``distance_m``, ``orientation_rad`` of the box
+        from the goal pose.
         """
         return {
             "robot_poses": self.world.robot_poses.copy(),
@@ -164,9 +179,31 @@ class BoxPushing:
             "wheel_speeds": self._speeds,
             "contact": self.world.contact.copy(),
             "contact_time": self.world.contact_time.copy(),
+            "failed": self.failed,
             "distance_m": self._distance(),
             "orientation_rad": self._orientation(),
         }
+
+    @property
+    def failed(self) -> BoolArray:
+        """Whether each wheel is under a failure now, ``(n,)``."""
+        if self._failures is None:
+            return np.zeros(len(self.agents), dtype=bool)
+        return self._failures.failed.copy()
+
+    def _advance(self, commands: FloatArray) -> None:
+        """Let the world go on for one decision period, the wheels being told `commands`."""
+        hold = self.settings.hold
+        if self._failures is None:
+            self.world.advance(commands, hold)
+            return
+        if self._failures.strike(self._step):
+            self.world.set_grip(self._failures.grip)
+        touched = np.zeros(len(self.groups))
+        for speeds in self._failures.driven(commands, hold):
+            self.world.advance(speeds, 1)
+            touched += self.world.contact_time
+        self.world.contact_time = touched / hold
 
     def _distance(self) -> float:
         ahead = self._goal[:2] - self.world.box_pose[:2]
@@ -182,7 +219,7 @@ class BoxPushing:
 
     def _stays(self) -> bool:
         """Stop all wheels and tell whether the box comes to rest within the tolerance."""
-        self.world.advance(np.zeros(len(self.agents)), self.settings.hold)
+        self._advance(np.zeros(len(self.agents)))
         return self._reached()
 
     def _observe(self) -> FloatArray:

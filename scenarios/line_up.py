@@ -64,7 +64,7 @@ class LineUp:
         self._speeds: FloatArray = np.zeros(n_agents)
         self._commands: FloatArray = np.zeros(n_agents)
 
-    def reset(self, seed: int | np.random.SeedSequence) -> FloatArray:
+    def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
         """Put the carts at rest, each 0.2 to 1 m from the line on the same side."""
         rng = np.random.default_rng(seed)
         n = len(self.agents)

@@ -125,9 +125,9 @@ class Opened:
         self.state_space: StateSpace = scenario.state_space
         self.action_set: ActionSet = scenario.action_set
 
-    def reset(self, seed: int | np.random.SeedSequence) -> FloatArray:
+    def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
         """Start an episode and note its first measurements."""
-        states = self.scenario.reset(seed)
+        states = self.scenario.reset(seed, episode)
         self.opening = self.scenario.measure()
         return states
 

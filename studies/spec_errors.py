@@ -67,7 +67,8 @@ def explain(error: ValidationError, model: type[BaseModel], data: Mapping[str, A
         known = set() if owner is None else set(owner.model_fields)
         return f"{path} = {show(first['input'])}: unknown key{kind}; {closest(keys[-1], known)}"
     if first["type"] == "missing":
-        return f"{path}: missing"
+        name = str(first["loc"][-1])
+        return f"{path}: missing" if keys == (name,) else f"{path}.{name}: missing"
     value = first["input"]
     if first["type"].startswith("union_tag"):
         path, value = f"{path}.kind", value.get("kind") if isinstance(value, Mapping) else value
@@ -114,6 +115,9 @@ def _dotted(keys: Sequence[int | str]) -> str:
 def _annotation(keys: Sequence[int | str], model: type[BaseModel], data: Any) -> Any:
     annotation: Any = model
     for key in keys:
+        if isinstance(key, int):  # an item of a list is one of the models that the list may hold
+            data = data[key]
+            continue
         owner = model_at(annotation, data)
         field = owner.model_fields.get(str(key)) if owner is not None else None
         if field is None:

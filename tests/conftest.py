@@ -39,7 +39,7 @@ class LineWorld:
         self.closed = closed
         self.shape = (carts, wheels)
 
-    def reset(self, seed: int | np.random.SeedSequence) -> np.ndarray:
+    def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> np.ndarray:
         rng = np.random.default_rng(seed)
         self.speeds = np.zeros(len(self.agents))
         self.phases = rng.uniform(-pi, pi, self.shape[0])

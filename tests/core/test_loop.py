@@ -78,9 +78,9 @@ def test_a_terminal_state_ends_the_episode(line_world) -> None:
 
 def test_a_truncated_episode_ends(line_world) -> None:
     class Hasty(line_world):
-        def reset(self, seed):
+        def reset(self, seed, episode=0):
             self.left = 4
-            return super().reset(seed)
+            return super().reset(seed, episode)
 
         def step(self, joint_action):
             self.left -= 1
