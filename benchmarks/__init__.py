@@ -1,1 +1,4 @@
-"""What a step costs, and how that grows with the number of agents."""
+"""Benchmarks: what a control step costs, as ratios of paired rounds in one process.
+
+``python -m benchmarks`` (or ``./dev bench``) prints tables, ``--json FILE`` writes them.
+"""

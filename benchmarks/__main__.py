@@ -1,0 +1,64 @@
+"""Run the benchmarks: ``python -m benchmarks [--full] [--json FILE]``."""
+
+from __future__ import annotations
+
+import os
+
+# One core: ratios to a threaded BLAS would say more about the machine than about the code.
+for _name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS"):
+    os.environ[_name] = "1"
+
+import argparse
+import json
+import platform
+from pathlib import Path
+
+from rich.console import Console
+
+from . import measures, tables
+
+
+def main() -> None:
+    """Measure, print, and write what was asked for."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    size = parser.add_mutually_exclusive_group()
+    size.add_argument("--quick", action="store_true", help="under a minute; the default")
+    size.add_argument("--full", action="store_true", help="all sizes, longer rounds")
+    size.add_argument("--smoke", action="store_true", help="one tiny case, to see that it runs")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="also write everything here")
+    options = parser.parse_args()
+    exact = {"dense": (2, 4, 6), "compact": (2, 4, 6), "order 1": (4,)}
+    beyond, budget = {"order 1": (16, 64, 128)}, 1.0
+    if options.full:
+        exact = {"dense": (2, 4, 6, 8, 10), "compact": (2, 4, 6, 8, 10), "order 1": (2, 4, 8)}
+        beyond = {"order 1": (8, 16, 32, 64, 128), "compact": (128,)}
+        budget = 5.0
+    if options.smoke:
+        exact, beyond, budget = {"compact": (2,), "order 1": (2,)}, {"order 1": (16,)}, 0.0
+    console = Console(width=80)
+    began = os.getloadavg()[0]
+    steps = [measures.steps(kind, n, budget) for kind, ns in exact.items() for n in ns]
+    tables.show(console, "Decision + TD update, exact enumeration", tables.STEPS, steps)
+    large = [measures.large(kind, n, budget) for kind, ns in beyond.items() for n in ns]
+    tables.show(console, "A control step beyond enumeration", tables.LARGE, large)
+    imports = measures.import_seconds(1 if options.smoke else 3)
+    for name, seconds in imports.items():
+        console.print(f"{name:>14} {seconds:5.2f} s to start and import")
+    machine = {
+        "processor": platform.machine(),
+        "cores": os.cpu_count(),
+        "python": platform.python_version(),
+        "load_at_start": began,
+        "load_at_end": os.getloadavg()[0],
+    }
+    console.print(
+        f"load {began:.1f} before, {machine['load_at_end']:.1f} after, on {os.cpu_count()} cores; "
+        f"ja: joint action"
+    )
+    if options.json:
+        result = {"machine": machine, "exact": steps, "beyond": large, "import_seconds": imports}
+        options.json.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,123 @@
+"""The measures: each returns rows, plain dictionaries that go to the table and to the JSON file."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from typing import Any
+
+import numpy as np
+
+from nested_agents.core.arrays import FloatArray
+
+from .baselines import Baselines
+from .situations import ADDITIVE, COMPACT, DENSE, Situation, situation
+from .timing import paired
+
+Row = dict[str, Any]
+
+RULE_BASES = {"dense": DENSE, "compact": COMPACT, "order 1": ADDITIVE}
+LARGEST_LITERAL = 4
+"""Agents up to which the literal step is timed whole; it takes 20 s for 8."""
+
+
+def steps(kind: str, n_agents: int, budget: float) -> Row:
+    """Time decision + update by exact enumeration against the baselines.
+
+    The tables of predicted states are common to all and not timed; "foresee" is prediction and
+    decision together.
+
+    Raises
+    ------
+    ArithmeticError
+        If the values of the three differ: they would not be timed doing the same.
+    """
+    moment = situation(n_agents, RULE_BASES[kind], {"evaluator": "exact"})
+    candidates = {"ours": moment.step, "decide": moment.act, "foresee": moment.foresee}
+    baselines = None
+    if kind != "order 1":
+        baselines = Baselines(moment)
+        _check(moment, baselines)
+        candidates |= {
+            "factorised": baselines.factorised_step, "streaming": baselines.streaming_step
+        }  # fmt: skip
+        if n_agents <= LARGEST_LITERAL:
+            candidates["literal"] = baselines.literal_step
+    times = paired(candidates, budget=budget)
+    ours = times.median("ours")
+    return {
+        "rule_base": kind,
+        "agents": n_agents,
+        "joint_actions": moment.joint_actions,
+        "ours_us": 1e6 * ours,
+        "decide_ns_per_joint_action": 1e9 * times.median("decide") / moment.joint_actions,
+        "foresee_ns_per_joint_action": 1e9 * times.median("foresee") / moment.joint_actions,
+        "literal_ratio": times.ratio("literal", "ours") if "literal" in candidates else None,
+        "factorised_ratio": times.ratio("factorised", "ours") if baselines else None,
+        "streaming_ratio": times.ratio("ours", "streaming") if baselines else None,
+        "bytes_per_agent": memory_per_agent(moment),
+        "rounds": len(times.seconds["ours"]),
+    }
+
+
+def _check(moment: Situation, baselines: Baselines) -> None:
+    rng = np.random.default_rng(0)
+    last = len(moment.scenario.agents) - 1
+    for agent in {0, last}:
+        codes = rng.choice(baselines.codes(agent, np.zeros(last + 1, dtype=np.int64)), 8)
+        literal = baselines.literal(agent, codes)
+        baselines._features = {}
+        ours = baselines.rules.block_values(baselines.theta[agent], baselines.blocks[agent], codes)
+        for name, values in (("ours", ours), ("factorised", baselines.factorised(agent, codes))):
+            if np.abs(values - literal).max() > 1e-5 * np.abs(literal).max():
+                raise ArithmeticError(f"{name} and literal values differ at agent {agent}")
+
+
+def large(kind: str, n_agents: int, budget: float) -> Row:
+    """Time a control step of a team beyond enumeration: simulate, predict, decide, learn."""
+    moment = situation(n_agents, RULE_BASES[kind])
+    neutral = np.full(n_agents, moment.scenario.action_set.neutral)
+    times = paired(
+        {
+            "simulate": lambda: moment.scenario.step(neutral),
+            "foresee": moment.foresee,
+            "learn": moment.learn,
+        },
+        budget=budget,
+        most_rounds=20,
+    )
+    row: Row = {f"{name}_ms": 1e3 * times.median(name) for name in times.seconds}
+    total = sum(row.values())
+    return {
+        "rule_base": kind, "agents": n_agents, "evaluator": type(moment.team.evaluator).__name__,
+        **row, "total_ms": total, "us_per_agent": 1e3 * total / n_agents,
+        "bytes_per_agent": memory_per_agent(moment),
+    }  # fmt: skip
+
+
+def memory_per_agent(moment: Situation) -> int:
+    """Return the bytes that the team holds per agent in arrays."""
+    arrays: dict[str, FloatArray] = moment.team.arrays()
+    return sum(array.nbytes for array in arrays.values()) // len(moment.scenario.agents)
+
+
+def import_seconds(repeats: int = 3) -> Row:
+    """Return the least time [s] that a fresh interpreter takes to import the package.
+
+    The least of several, since it is the interpreter's start that is subtracted.
+    """
+    row: Row = {}
+    for name, statement in {
+        "interpreter": "pass",
+        "nested_agents": "import nested_agents",
+        "core.team": "import nested_agents.core.team",
+        "studies.cli": "import nested_agents.studies.cli",
+    }.items():
+        taken = []
+        for _ in range(repeats):
+            begin = time.perf_counter()
+            subprocess.run([sys.executable, "-c", statement], check=True)
+            taken.append(time.perf_counter() - begin)
+        row[name] = min(taken)
+    return row

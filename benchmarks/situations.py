@@ -1,0 +1,107 @@
+"""What is timed: a team of n wheel agents in the middle of an episode of box pushing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from pydantic import TypeAdapter
+
+from nested_agents.core.arrays import FloatArray, IntArray
+from nested_agents.core.config import Learner as LearnerSettings
+from nested_agents.core.hierarchy import Hierarchy
+from nested_agents.core.learners import TDLambda
+from nested_agents.core.protocols import Prediction
+from nested_agents.core.team import Team
+from nested_agents.scenarios import BoxPushing, ScenarioSettings, build
+
+SETTLING = 12
+"""Random steps taken before anything is timed, so that robots are in motion."""
+
+DENSE: dict[str, Any] = {"membership": "sigmoid", "memberships": 5, "order": 7}
+"""The paper's rule base: 5^7 rules, all of them active everywhere."""
+COMPACT: dict[str, Any] = {"membership": "triangular", "memberships": 5, "order": 7}
+"""The same rules with triangular membership functions: 2^7 active."""
+ADDITIVE: dict[str, Any] = {"membership": "triangular", "memberships": 5, "order": 1}
+"""One rule per variable and membership function."""
+
+
+@dataclass
+class Situation:
+    """A team, the world it acts in, and the moment at which it is timed.
+
+    Attributes
+    ----------
+    scenario, hierarchy, team
+        The world, a chain over its agents, and a team with random consequent weights.
+    prediction
+        Of the moment.
+    states
+        Two successive states ``(2, n, d)`` and the rewards ``(2,)`` on entering them.
+    """
+
+    scenario: BoxPushing
+    hierarchy: Hierarchy
+    team: Team
+    prediction: Prediction
+    states: FloatArray
+    rewards: FloatArray
+
+    @property
+    def joint_actions(self) -> int:
+        """Joint actions that the whole chain tries in a decision by exact enumeration."""
+        return self.hierarchy.joint_actions(len(self.scenario.action_set))
+
+    def act(self) -> IntArray:
+        """Decide greedily in the moment, from the tables that the prediction already holds."""
+        return self.team.act(self.prediction, explore=False)
+
+    def foresee(self) -> IntArray:
+        """Predict anew and decide."""
+        self.prediction = self.scenario.predict()
+        return self.act()
+
+    def learn(self) -> None:
+        """Make one TD update of all agents."""
+        learner = self.team.learner
+        assert isinstance(learner, TDLambda)
+        self._side = 1 - getattr(self, "_side", 0)
+        learner.observe(self.states[self._side], float(self.rewards[self._side]), False)
+
+    def step(self) -> None:
+        """Decide and learn."""
+        self.act()
+        self.learn()
+
+
+def situation(
+    n_agents: int,
+    rule_base: Mapping[str, Any],
+    decision: Mapping[str, Any] | None = None,
+    seed: int = 6,
+) -> Situation:
+    """Bring `n_agents` wheel agents, two to an e-puck, into the middle of an episode."""
+    scenario = build(ScenarioSettings(robots=n_agents // 2, state_space="paper"))
+    hierarchy = Hierarchy(scenario.agents, list(pairwise(scenario.agents)))
+    settings = TypeAdapter(LearnerSettings).validate_python(
+        {
+            "kind": "td-lambda",
+            "rule_base": dict(rule_base),
+            "decision": {"others": "observed", **(decision or {})},
+        }
+    )
+    team = Team.build(settings, scenario, hierarchy, np.random.SeedSequence(seed))
+    rng = np.random.default_rng(seed)
+    scenario.reset(seed)
+    history = []
+    for _ in range(SETTLING):
+        taken = scenario.step(rng.integers(len(scenario.action_set), size=n_agents))
+        history.append((taken.states, taken.reward))
+    theta = team.learner.theta
+    theta[:] = rng.normal(scale=0.01, size=theta.shape)
+    states = np.array([states for states, _ in history[-2:]])
+    rewards = np.array([reward for _, reward in history[-2:]])
+    return Situation(scenario, hierarchy, team, scenario.predict(), states, rewards)

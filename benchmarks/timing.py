@@ -1,0 +1,63 @@
+"""Paired timing: every candidate once per round, the medians of times and of ratios."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from statistics import median
+from time import perf_counter
+
+
+@dataclass(frozen=True)
+class Paired:
+    """Times of several candidates, round by round.
+
+    Attributes
+    ----------
+    seconds
+        Per candidate its time in every round.
+    """
+
+    seconds: Mapping[str, list[float]]
+
+    def median(self, name: str) -> float:
+        """Return the median time [s] of a candidate."""
+        return median(self.seconds[name])
+
+    def ratio(self, of: str, to: str) -> float:
+        """Return the median over rounds of one candidate's time over another's.
+
+        Examples
+        --------
+        >>> Paired({"slow": [4.0, 9.0, 6.0], "fast": [2.0, 3.0, 3.0]}).ratio("slow", "fast")
+        2.0
+        """
+        pairs = zip(self.seconds[of], self.seconds[to], strict=True)
+        return median(one / other for one, other in pairs)
+
+
+def paired(
+    candidates: Mapping[str, Callable[[], object]], *, budget: float, most_rounds: int = 200
+) -> Paired:
+    """Time candidates in turns until `budget` seconds are spent; at least three rounds.
+
+    A fast candidate is repeated within its turn until the turn takes a millisecond. All are called
+    once beforehand, so that nothing is compiled while the clock runs.
+    """
+    repeats = {}
+    for name, call in candidates.items():
+        call()
+        begin = perf_counter()
+        call()
+        repeats[name] = max(1, min(1000, int(1.0e-3 / (perf_counter() - begin + 1e-9))))
+    seconds: dict[str, list[float]] = {name: [] for name in candidates}
+    start = perf_counter()
+    rounds = 0
+    while rounds < 3 or (perf_counter() - start < budget and rounds < most_rounds):
+        for name, call in candidates.items():
+            begin = perf_counter()
+            for _ in range(repeats[name]):
+                call()
+            seconds[name].append((perf_counter() - begin) / repeats[name])
+        rounds += 1
+    return Paired(seconds)

@@ -1,0 +1,21 @@
+"""The benchmarks run and agree with their baselines; how fast they are is no test's business."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.mark.slow
+def test_the_smallest_benchmark_runs(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "benchmarks", "--smoke", "--json", str(tmp_path / "b.json")]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert all(len(line) <= 80 for line in run.stdout.splitlines())
+    result = json.loads((tmp_path / "b.json").read_text(encoding="utf-8"))
+    assert [row["agents"] for row in result["exact"]] == [2, 2]
+    assert result["exact"][0]["literal_ratio"] > 0
+    assert result["beyond"][0]["total_ms"] > 0
