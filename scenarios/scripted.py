@@ -122,13 +122,17 @@ class ScriptedController:
         goal, speeds = measurements["goal_pose"], measurements["wheel_speeds"]
         side, slots = self._plan(robots, box, goal)
         heading = box[2] + side.direction
-        away = [r for r, pose in enumerate(robots) if not self._at_slot(pose, slots[r], heading, r)]
-        local: list[int] = []
-        if away:
-            for r in range(len(robots)):
-                target = np.array([*slots[r], heading])
-                local.append(self._drive(r, robots, box, speeds, target, wait=r not in away))
-        else:
+        away = [r for r, pose in enumerate(robots) if not self._at_slot(pose, slots[r], heading)]
+        local = [
+            self._drive(r, robots, box, speeds, np.array([*slots[r], heading]), wait=r not in away)
+            for r in range(len(robots))
+        ]
+        # With steps as coarse as the actions' a robot may find no better place than it has.
+        stuck = not any(speeds) and not any(
+            self._next(r, speeds[w][None])[0][0, k].any()
+            for r, (w, k) in enumerate(zip(self._wheels, local, strict=True))
+        )
+        if stuck or not away:
             local = self._push(robots, box, goal, speeds, side, slots)
         return np.concatenate([choices[k] for choices, k in zip(self._choices, local, strict=True)])
 
@@ -173,10 +177,12 @@ class ScriptedController:
             slots.append(box[:2] - back * ahead + (side.middle + offset) * left)
         return np.array(slots)
 
-    def _at_slot(self, pose: FloatArray, slot: FloatArray, heading: float, robot: int) -> bool:
+    def _at_slot(self, pose: FloatArray, slot: FloatArray, heading: float) -> bool:
         dx, dy = pose[:2] - slot
         along, aside = cos(heading) * dx + sin(heading) * dy, cos(heading) * dy - sin(heading) * dx
-        return -0.05 < along < 0.04 and abs(aside) < 0.03 and abs(_wrap(pose[2] - heading)) < 0.6
+        allowed = 0.03 if along < 0 else 0.045  # once it pushes, it is left alone for longer
+        turn = abs(_wrap(pose[2] - heading))
+        return bool(-0.05 < along < 0.04 and abs(aside) < allowed and turn < 0.7)
 
     def _next(self, robot: int, speeds: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return wheel speeds ``(m, k, w)`` and twists ``(m, k, 3)`` after the k local actions.
