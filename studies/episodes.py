@@ -9,10 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.arrays import FloatArray, IntArray
 from ..core.loop import StepRecord
-from ..core.protocols import Prediction, Scenario, Transition
-from ..core.spaces import ActionSet, StateSpace
+from ..core.protocols import Transition
 
 Recording = dict[str, NDArray[Any]]
 """Arrays of one episode by name; with T steps, M robots and n agents: `robot_poses` (T + 1, M, 3),
@@ -106,42 +104,6 @@ class Stopwatch:
         self.seconds["physics"] += spent.get("physics", 0.0)
         self.seconds["sensors"] += spent.get("sensors", 0.0)
         self.seconds["learning"] += record.learning
-
-
-class Opened:
-    """A scenario that also remembers how its episode began, which no step record says.
-
-    Parameters
-    ----------
-    scenario
-        The scenario that does everything else.
-    """
-
-    def __init__(self, scenario: Scenario) -> None:
-        self.scenario = scenario
-        self.opening: Mapping[str, Any] = {}
-        self.agents: tuple[str, ...] = scenario.agents
-        self.groups: tuple[tuple[int, ...], ...] = scenario.groups
-        self.state_space: StateSpace = scenario.state_space
-        self.action_set: ActionSet = scenario.action_set
-
-    def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
-        """Start an episode and note its first measurements."""
-        states = self.scenario.reset(seed, episode)
-        self.opening = self.scenario.measure()
-        return states
-
-    def step(self, joint_action: IntArray) -> Transition:
-        """Carry out a joint action."""
-        return self.scenario.step(joint_action)
-
-    def predict(self) -> Prediction:
-        """Predict from the present state."""
-        return self.scenario.predict()
-
-    def measure(self) -> Mapping[str, Any]:
-        """Return the measurements of the present state."""
-        return self.scenario.measure()
 
 
 class EpisodeRecorder:

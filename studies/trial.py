@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 from .. import scenarios, topologies
-from ..core.loop import control_loop, policy_seed
+from ..core.loop import control_loop, policy_seed, world_seed
+from ..core.protocols import Scenario
 from ..core.team import Team
 from .conditions import ConditionSettings
-from .episodes import EpisodeMeter, EpisodeRecorder, EpisodeRow, Opened, Recording, Stopwatch
+from .episodes import EpisodeMeter, EpisodeRecorder, EpisodeRow, Recording, Stopwatch
 from .spec import Spec
 from .spec_errors import SpecError
 
@@ -102,7 +105,7 @@ def trials_of(spec: Spec) -> tuple[Trial, ...]:
     )
 
 
-def build(settings: ConditionSettings, seed: int) -> tuple[Opened, Team]:
+def build(settings: ConditionSettings, seed: int) -> tuple[Scenario, Team]:
     """Return the scenario and the untrained team of a condition.
 
     Raises
@@ -110,8 +113,7 @@ def build(settings: ConditionSettings, seed: int) -> tuple[Opened, Team]:
     ValueError
         If the settings do not fit together; one line.
     """
-    arranged, hierarchy = topologies.arrange(settings.topology, scenarios.build(settings.scenario))
-    scenario = Opened(arranged)
+    scenario, hierarchy = topologies.arrange(settings.topology, scenarios.build(settings.scenario))
     return scenario, Team.build(settings.learner, scenario, hierarchy, policy_seed(seed))
 
 
@@ -151,7 +153,8 @@ def run_trial(trial: Trial) -> TrialResult:
         ):  # fmt: skip
             if record.step == 0:
                 meter = EpisodeMeter(phase, record.episode - first)
-                recorder = EpisodeRecorder(scenario.opening)
+            if record.step == 0 and record.episode in kept:
+                recorder = EpisodeRecorder(_opening(trial, record.episode))
             meter.add(record.transition)
             if record.episode in kept:
                 recorder.add(record.transition)
@@ -162,3 +165,10 @@ def run_trial(trial: Trial) -> TrialResult:
                 if record.episode in kept:
                     recordings[kept[record.episode]] = recorder.recording(**constants)
     return TrialResult(tuple(rows), recordings, watch.seconds)
+
+
+def _opening(trial: Trial, episode: int) -> Mapping[str, Any]:
+    """Return the measurements before an episode's first step, which no step record holds."""
+    scenario = scenarios.build(trial.settings.scenario)
+    scenario.reset(world_seed(trial.seed, episode), episode)
+    return scenario.measure()

@@ -96,6 +96,12 @@ def test_success_ends_the_episode_and_says_whether_the_box_stayed():
     ] * 3
 
 
+def test_a_team_with_self_models_is_measured_too():
+    result = run_trial(only(learner={"self_model": {"noise": 0.01}}))
+    assert len(result.rows) == 3
+    assert result.rows == run_trial(only(learner={"self_model": {"noise": 0.01}})).rows
+
+
 def test_the_identity_is_of_the_content_not_of_its_wording():
     trial = only(topology="chain:listed", preset="default")
     assert trial.identity == only(learner={"ridge": 10}).identity
