@@ -9,6 +9,7 @@ import sys
 import time
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
+from types import ModuleType
 
 import made_up
 import pytest
@@ -193,6 +194,21 @@ def test_presets(capsys):
     assert main(["presets", "paper"]) == 0
     assert "paper" in listed
     assert "step_size = 0.00012" in capsys.readouterr().out
+
+
+def test_a_replay_of_the_first_and_the_last_episode_is_drawn_once(tmp_path, monkeypatch):
+    drawn = []
+    rendering = ModuleType("rendering")
+    rendering.animate = lambda recording, path: (drawn.append(recording), path.touch())
+    monkeypatch.setitem(sys.modules, "nested_agents.scenarios.rendering", rendering)
+    monkeypatch.setattr(learning_curve, "measure", made_up.measure)
+    monkeypatch.setattr(conduct, "check", lambda spec: None)
+    for _ in range(2):
+        assert conduct.conduct(made_up.SPEC, tmp_path, 2, replay=True) == 0
+    assert len(drawn) == 2
+    assert sorted(p.name for p in (tmp_path / "replay").iterdir()) == [
+        "first-episode.gif", "last-episode.gif",
+    ]  # fmt: skip
 
 
 def test_the_demos_spec_is_valid_toml(capsys, tmp_path):
