@@ -26,6 +26,8 @@ COMMANDS: dict[str, str] = {
     "retry": "retry",
     "presets": "presets",
     "topology": "topology",
+    "check": "check",
+    "cost": "cost",
 }
 """The module of every command by name, in the order of the help."""
 

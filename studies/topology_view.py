@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import shutil
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from pathlib import Path
 from typing import Any, Literal
 
@@ -200,9 +202,9 @@ def printed(shown: View, form: Form) -> str:
 
 
 def aligned(rows: Sequence[Sequence[str]], sides: str) -> list[str]:
-    """Return rows as lines, columns aligned to `sides` (< or >), cut to the terminal's width."""
+    """Return rows as lines, columns aligned to `sides` (< or >), cut to a terminal's width."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    most = shutil.get_terminal_size().columns
+    most = shutil.get_terminal_size().columns if sys.stdout.isatty() else sys.maxsize
     lines = []
     for row in rows:
         cells = (f"{c:{s}{w}}" for c, s, w in zip(row, sides, widths, strict=True))
@@ -211,16 +213,14 @@ def aligned(rows: Sequence[Sequence[str]], sides: str) -> list[str]:
     return lines
 
 
-def readable(number: int) -> str:
-    """Return an integer with all digits if they are few, else in powers of ten.
+def readable(number: int, few: int = 10**9) -> str:
+    """Return an integer with all digits if it is below `few`, else in powers of ten.
 
     Examples
     --------
     >>> readable(1364), readable(4**40)
     ('1,364', '1.209e24')
     """
-    if number < 10**9:
+    if number < few:
         return f"{number:,}"
-    from decimal import Decimal
-
     return f"{Decimal(number):.3e}".replace("e+", "e")

@@ -1,0 +1,74 @@
+"""``nested-agents cost``: what hierarchies cost, by the paper's formulas and measured."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+
+def command(
+    agents: str = "4",
+    topology: tuple[str, ...] = ("chain",),
+    rules: int = 5**7,
+    actions: int = 4,
+    iterations: int = 450,
+    measured: bool = False,
+    format: Literal["table", "json", "csv", "latex"] = "table",
+    plot: Path | None = None,
+) -> int:
+    """Print the cost of hierarchies, by formula (Eq. 18-23) and, if asked, measured.
+
+    Parameters
+    ----------
+    agents
+        Number of agents, or a range: 4, 1:16, 2:64:2.
+    topology
+        Topologies as in a spec: chain teams tree:2 ...
+    rules
+        |S|, rules of one agent.
+    actions
+        |A|, actions of one agent.
+    iterations
+        L.
+    measured
+        Also count and time steps of the running system.
+    format
+        How to print it.
+    plot
+        A figure to write: SVG, PNG or PDF by suffix.
+    """
+    from ...core.cost import Problem
+    from ..cost import cost_rows
+    from ..cost_table import written
+    from ..spec_errors import SpecError
+
+    try:
+        problem = Problem(rules, actions, iterations)
+        rows = list(cost_rows(topology, numbers(agents), problem, measured=measured))
+        if plot is not None:
+            from ..cost_figure import draw
+
+            draw(rows, plot)
+    except ValueError as error:
+        raise SpecError(str(error)) from None
+    print(written(rows, format))
+    return 0
+
+
+def numbers(text: str) -> range:
+    """Return the numbers that ``"4"``, ``"1:16"`` (both ends included) or ``"2:64:2"`` name.
+
+    Examples
+    --------
+    >>> list(numbers("4")), list(numbers("1:3")), list(numbers("2:6:2"))
+    ([4], [1, 2, 3], [2, 4, 6])
+    """
+    try:
+        parts = [int(part) for part in text.split(":")]
+        first, last = parts[0], parts[min(1, len(parts) - 1)]
+        found = range(first, last + 1, *parts[2:])
+    except (ValueError, TypeError):
+        found = range(0)
+    if not found or found[0] < 1:
+        raise ValueError(f"agents = {text!r}, allowed: 4, 1:16 or 2:64:2, from 1 upwards")
+    return found
