@@ -15,9 +15,10 @@ from ..core.protocols import Transition
 Recording = dict[str, NDArray[Any]]
 """Arrays of one episode by name; with T steps, M robots and n agents: `robot_poses` (T + 1, M, 3),
 `box_pose` (T + 1, 3), `goal_pose` (3,), `wheel_speeds` (T + 1, n), `contact` (T + 1, M),
-`reward` (T,), `dt` [s] () of one decision, `robot` and `box` () by name."""
+`failed` (T + 1, n) wheels, `reward` (T,), `dt` [s] () of one decision, `robot` and `box` () by
+name."""
 
-RECORDED = ("robot_poses", "box_pose", "wheel_speeds", "contact")
+RECORDED = ("robot_poses", "box_pose", "wheel_speeds", "contact", "failed")
 
 
 class EpisodeRow(NamedTuple):

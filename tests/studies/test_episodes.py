@@ -10,6 +10,7 @@ def transition(reward=0.5, terminated=False, **info):
         "distance_m": 0.3, "orientation_rad": -0.2, "contact_time": np.array([0.5, 1.0]),
         "robot_poses": np.zeros((2, 3)), "box_pose": np.ones(3), "goal_pose": np.ones(3),
         "wheel_speeds": np.zeros(4), "contact": np.array([True, False]),
+        "failed": np.zeros(4, dtype=bool),
     }  # fmt: skip
     return Transition(np.zeros((4, 7)), reward, terminated, False, measured | info)
 

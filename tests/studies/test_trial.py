@@ -70,6 +70,7 @@ def test_a_recording_has_a_frame_for_every_step_and_the_beginning(result):
     assert recording["reward"].shape == (steps,)
     assert recording["robot_poses"].shape == (steps + 1, 2, 3)
     assert recording["contact"].dtype == bool
+    assert not recording["failed"].any()
     assert recording["wheel_speeds"].shape == (steps + 1, 4)
     assert (recording["wheel_speeds"][0] == 0.0).all()
     assert recording["reward"].sum() == pytest.approx(result.rows[1].return_)
