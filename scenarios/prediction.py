@@ -71,7 +71,7 @@ class BoxPrediction:
         its limit is maintained or increased), so that K is far below ``A ** w``.
         """
         everything = np.arange(len(self.action_set))
-        per_robot = []
+        per_robot: list[tuple[FloatArray, IntArray]] = []
         for group in self.situation.groups:
             drives, which = np.zeros((1, 0)), np.zeros(1, dtype=np.int64)
             for agent in group:
@@ -154,14 +154,14 @@ class BoxPrediction:
     def blocks(self, agent: int) -> Blocks:
         """Return the next states of `agent` for all joint actions, own block as if alone."""
         r, wheel = self._robot_of(agent)
+        view, row = self._table
         if r not in self._shared:
-            view, row = self._table
-            self._shared[r] = self.space.shared(view, r)[row]
+            self._shared[r] = self.space.shared(view, r)
         drives, which = self._drives[r]
         poses = self._alone[r] if self.space.own_needs_pose else np.zeros((len(drives), 3))
-        own = self.space.own(poses, drives[:, wheel], self.situation.goal)[which]
+        own = self.space.own(poses, drives[:, wheel], self.situation.goal)
         behind = sum(len(group) for group in self.situation.groups[r + 1 :])
-        return Blocks(own, self._shared[r], len(self.action_set) ** behind)
+        return Blocks(own, self._shared[r], len(self.action_set) ** behind, which, row)
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""

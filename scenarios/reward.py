@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..core.arrays import FloatArray
+from ..core.arrays import BoolArray, FloatArray
 from .config import RewardSettings
 
 
@@ -19,7 +19,7 @@ def reward(
     distance: FloatArray,
     approach: FloatArray,
     orientation: FloatArray,
-    contact: FloatArray,
+    contact: BoolArray,
     readings: FloatArray,
 ) -> FloatArray:
     """Return the reward ``(m,)`` of ``m`` situations.
@@ -43,13 +43,14 @@ def reward(
     --------
     Out of range of both robots (Condition 5):
 
-    >>> reward(RewardSettings(), *np.ones((3, 1)), np.zeros((1, 2)), np.zeros((1, 2))).tolist()
+    >>> ones, none = np.ones(1), np.zeros((1, 2))
+    >>> reward(RewardSettings(), ones, ones, ones, none.astype(bool), none).tolist()
     [-0.002]
     """
     r1 = settings.c1 * np.exp(-settings.r1 * distance)
     r2_r3 = (settings.c2 * np.exp(-settings.r2 * readings)).sum(axis=1)
     r4 = settings.c4 * np.abs(orientation)
-    touching = contact.astype(bool).all(axis=1)
+    touching = contact.all(axis=1)
     within = readings > 0.0
     near = -r2_r3 + (r1 if settings.attraction_without_contact else 0.0)
     nearer = approach < -settings.least_approach
