@@ -2,5 +2,6 @@
 
 STUDIES: dict[str, str] = {
     "learning-curve": "learning_curve",
+    "chain-order": "chain_order",
 }
 """The module of every study by name; see `nested_agents.studies.study`."""

@@ -69,6 +69,8 @@ def conduct(
         replays = _replay(store, trials[0]) if replay and not failed else []
     analysis = study.analyse(results)
     display.print_table(analysis.table)
+    for note in getattr(analysis, "notes", ()):
+        print(note)
     figures = directory / "figures"
     figures.mkdir(exist_ok=True)
     pictures = study.draw(analysis, figures) if analysis.table else []

@@ -22,7 +22,10 @@ class Study(Protocol):
         ...
 
     def analyse(self, results: Results) -> Any:
-        """Turn results into estimates; its attribute `table` holds the `Summary` lines."""
+        """Turn results into estimates; its attribute `table` holds the `Summary` lines.
+
+        An attribute `notes`, if there is one, holds lines that are printed below the table.
+        """
         ...
 
     def draw(self, analysis: Any, directory: Path) -> list[Path]:

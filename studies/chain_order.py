@@ -1,0 +1,160 @@
+"""The chain-order study: whether it matters who is above whom in a chain.
+
+The paper calls its chain "in fact arbitrary" (Section X-A). Conditions are orders of the agents;
+all meet the same worlds, seed by seed. Two measures were fixed beforehand: how fast a team learns
+(success over all of training) and how well it ends (success greedy, after training). For each,
+Friedman's test asks whether the orders differ at all, and the first condition is compared with each
+other one; p-values are adjusted by Holm's method over the two tests, and over all comparisons.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .paired_tests import Friedman, friedman, holm, paired_permutation
+from .results import Results
+from .statistics import Estimate, bootstrap, rate
+from .summary import Summary
+from .trial import run_trial as measure
+
+LEVEL = 0.05
+"""What p must stay below for a difference to be called one."""
+
+
+@dataclass(frozen=True)
+class Measure:
+    """What the orders are compared by: the mean of a phase's success rates."""
+
+    title: str
+    phase: Literal["training", "evaluation"]
+
+
+MEASURES = (
+    Measure("success, all training", "training"),
+    Measure("success, greedy", "evaluation"),
+)
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """All orders by one measure.
+
+    Attributes
+    ----------
+    title
+        The measure.
+    orders
+        Labels of the conditions.
+    values
+        ``(n_seeds, n_orders)``, seeds that all orders have finished.
+    test
+        Whether the orders differ at all.
+    p
+        Its p, adjusted over the measures.
+    against_first
+        ``(n_orders - 1,)`` p of every other order against the first, adjusted over all of them and
+        all measures.
+    """
+
+    title: str
+    orders: tuple[str, ...]
+    values: NDArray[np.float64]
+    test: Friedman
+    p: float
+    against_first: NDArray[np.float64]
+
+    @property
+    def differences(self) -> list[Estimate]:
+        """Every other order less the first, with its interval, unadjusted."""
+        return [bootstrap(column - self.values[:, 0]) for column in self.values[:, 1:].T]
+
+
+@dataclass(frozen=True)
+class ChainOrders:
+    """The analysis.
+
+    Attributes
+    ----------
+    table
+        One line per order.
+    comparisons
+        One per measure.
+    notes
+        The verdict, for printing.
+    """
+
+    table: tuple[Summary, ...]
+    comparisons: tuple[Comparison, ...]
+    notes: tuple[str, ...]
+
+
+def analyse(results: Results) -> ChainOrders:
+    """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
+    conditions = list(results.training)
+    table = []
+    for condition in conditions:
+        estimates = {
+            m.title: rate(phase[condition]["success"])
+            for m in MEASURES
+            if condition in (phase := getattr(results, m.phase))
+        }
+        seeds = len(results.training[condition]["success"])
+        table.append(Summary(condition, seeds, estimates))
+    comparisons = _compared(results, conditions)
+    return ChainOrders(tuple(table), comparisons, tuple(_verdict(comparisons)))
+
+
+def draw(analysis: ChainOrders, directory: Path) -> list[Path]:
+    """Write the figure into an existing directory; return its paths."""
+    from . import chain_order_figure
+
+    return chain_order_figure.draw(analysis, directory) if analysis.comparisons else []
+
+
+def _compared(results: Results, conditions: list[str]) -> tuple[Comparison, ...]:
+    found = []
+    for m in MEASURES:
+        phase = getattr(results, m.phase)
+        if any(condition not in phase for condition in conditions):
+            continue
+        columns = [phase[condition]["success"].mean(axis=1) for condition in conditions]
+        if len(columns) < 2 or len(set(map(len, columns))) > 1 or len(columns[0]) < 2:
+            continue  # unfinished: seeds cannot be paired
+        values = np.stack(columns, axis=1)
+        against = np.array([paired_permutation(c, columns[0]) for c in columns[1:]])
+        found.append((m.title, values, friedman(values), against))
+    if not found:
+        return ()
+    omnibus = holm([test.p for _, _, test, _ in found])
+    adjusted = holm(np.concatenate([against for *_, against in found])).reshape(len(found), -1)
+    return tuple(
+        Comparison(title, tuple(conditions), values, test, float(p), ps)
+        for (title, values, test, _), p, ps in zip(found, omnibus, adjusted, strict=True)
+    )
+
+
+def _verdict(comparisons: tuple[Comparison, ...]) -> list[str]:
+    lines = []
+    for c in comparisons:
+        n, k = c.values.shape
+        means = c.values.mean(axis=0)
+        best, worst = int(means.argmax()), int(means.argmin())
+        differ = "differ" if c.p < LEVEL else "are not told apart"
+        named = int((c.against_first < LEVEL).sum())
+        lines.append(
+            f"{c.title}: {k} orders {differ} (Friedman {c.test.statistic:.1f}, p = {c.p:.3g}, "
+            f"W = {c.test.concordance:.3f}, {n} seeds); means {means[worst]:.3f} to "
+            f"{means[best]:.3f}, of the first {means[0]:.3f}; {named} of {k - 1} differ from the "
+            f"first (least p = {c.against_first.min():.3g})"
+        )
+        lines.append(f"  best: {c.orders[best]}")
+        lines.append(f"  worst: {c.orders[worst]}")
+    return lines
+
+
+__all__ = ["MEASURES", "ChainOrders", "Comparison", "analyse", "draw", "measure"]

@@ -1,0 +1,97 @@
+"""Tests of conditions that met the same worlds: rows are seeds, columns are conditions.
+
+All are permutation tests: they need no distribution, and bear the many ties of success rates.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import stats
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Friedman:
+    """Whether conditions differ at all (Friedman 1937).
+
+    Attributes
+    ----------
+    statistic
+        Friedman's chi square, corrected for ties.
+    p
+        By permutation within seeds.
+    concordance
+        Kendall's W: 0, seeds rank the conditions independently; 1, all alike.
+    """
+
+    statistic: float
+    p: float
+    concordance: float
+
+
+def friedman(values: ArrayLike, permutations: int = 9999, seed: int = 0) -> Friedman:
+    """Test whether the conditions of ``(n_seeds, n_conditions)`` values differ.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> noise = rng.normal(size=(20, 4))
+    >>> friedman(noise).p > 0.05, friedman(noise + [0, 0, 0, 2]).p < 0.01
+    (True, True)
+    """
+    array = np.asarray(values, dtype=float)
+    n, k = array.shape
+    if n < 2 or k < 2:
+        raise ValueError(f"friedman: {n} seeds x {k} conditions, allowed: 2 x 2 or more")
+    ranks = stats.rankdata(array, axis=1) - (k + 1) / 2
+    spread = (ranks**2).sum() / (k - 1)  # per-seed variance summed: what ties leave of the ranks
+    if spread == 0.0:
+        return Friedman(0.0, 1.0, 0.0)
+    statistic = float((ranks.sum(axis=0) ** 2).sum() / spread)
+    rng = np.random.default_rng(seed)
+    shuffled = (rng.permuted(ranks, axis=1).sum(axis=0) for _ in range(permutations))
+    reached = sum(float((sums**2).sum() / spread) >= statistic - 1e-9 for sums in shuffled)
+    return Friedman(statistic, (1 + reached) / (1 + permutations), statistic / (n * (k - 1)))
+
+
+def paired_permutation(
+    first: ArrayLike, second: ArrayLike, permutations: int = 99999, seed: int = 0
+) -> float:
+    """Return the two-sided p of equal means of paired values ``(n_seeds,)``, by sign flips.
+
+    All ``2 ** n_seeds`` sign patterns are tried if they are no more than `permutations`.
+
+    Examples
+    --------
+    >>> paired_permutation([1, 2, 3, 4, 5, 6], [0, 1, 2, 3, 4, 5])
+    0.03125
+    """
+    difference = np.asarray(first, dtype=float) - np.asarray(second, dtype=float)
+    n = len(difference)
+    observed = abs(difference.sum()) - 1e-12
+    if 2**n <= permutations:
+        codes = np.arange(2**n)[:, None] >> np.arange(n) & 1
+        return float((abs((2 * codes - 1) @ difference) >= observed).mean())
+    signs = np.random.default_rng(seed).integers(0, 2, size=(permutations, n)) * 2 - 1
+    reached = int((abs(signs @ difference) >= observed).sum())
+    return (1 + reached) / (1 + permutations)
+
+
+def holm(ps: ArrayLike) -> Array:
+    """Return p-values adjusted for their number (Holm 1979).
+
+    Examples
+    --------
+    >>> holm([0.01, 0.04, 0.03]).round(3).tolist()
+    [0.03, 0.06, 0.06]
+    """
+    array = np.asarray(ps, dtype=float)
+    order = np.argsort(array)
+    scaled = array[order] * np.arange(len(array), 0, -1)
+    adjusted = np.empty_like(array)
+    adjusted[order] = np.minimum(np.maximum.accumulate(scaled), 1.0)
+    return adjusted
