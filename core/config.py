@@ -151,13 +151,16 @@ class ReplaySettings(LearnerSettings):
     """Weight of the squared consequents against squared errors of rewards scaled by 100."""
     sweeps: Annotated[int, Field(ge=1)] = 30
     """Regressions on freshly discounted targets after every episode."""
+    mixing: Annotated[float, Field(gt=0, le=1)] = 0.5
+    """Share of the way that the weights go towards the last regression's: below 1 the policy does
+    not jump from episode to episode."""
 
 
 class BatchTDSettings(ReplaySettings):
     """Batch TD(lambda): towards what followed."""
 
     kind: Literal["batch-td"] = "batch-td"
-    trace_decay: Fraction = 0.5
+    trace_decay: Fraction = 0.0
     """lambda: 0 bootstraps from the next state, 1 sums the rewards of the whole episode."""
 
 

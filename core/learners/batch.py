@@ -95,7 +95,7 @@ class BatchTD:
                 targets = known * np.clip(self._targets(i, theta, rewards, follower), low, high)
                 moment = _moment(active, strengths, targets, self.rules.n_rules)
                 theta = cho_solve(factor, moment, check_finite=False)
-            self.theta[i] = theta / REWARD_SCALE
+            self.theta[i] += self.settings.mixing * (theta / REWARD_SCALE - self.theta[i])
         return self.theta.size
 
     def _targets(

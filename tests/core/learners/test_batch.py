@@ -81,7 +81,7 @@ def ridge_by_hand(
                 x = np.array(rows).reshape(-1, rules.n_rules)
                 gram = x.T @ x + settings.ridge * np.eye(rules.n_rules)
                 w = np.linalg.solve(gram, x.T @ np.array(targets))
-            theta[i] = w / REWARD_SCALE
+            theta[i] += settings.mixing * (w / REWARD_SCALE - theta[i])
     return theta
 
 
@@ -116,7 +116,7 @@ def test_fitted_value_is_the_ridge_regression_written_out(membership: str) -> No
 def test_batch_td_solves_a_known_chain() -> None:
     # The chain of test_td: V(4) = 0.3 / 0.1 = 3, 2.7, -2 + 2.43 = 0.43, 0.387, 1 + 0.3483. The
     # targets stay within the range -2 / 0.1 to 1 / 0.1 of discounted sums.
-    settings = BatchTDSettings(ridge=1e-13, sweeps=300, discount=0.9)
+    settings = BatchTDSettings(ridge=1e-13, sweeps=300, discount=0.9, mixing=1.0)
     learner = BatchTD(settings, TABLE, 1)
     states = np.arange(5.0).reshape(5, 1, 1)
     feed(learner, (states, np.array([1.0, 0.0, -2.0, 0.0, 0.3]), True, [None] * 5))
@@ -126,7 +126,7 @@ def test_batch_td_solves_a_known_chain() -> None:
 def test_fitted_value_solves_a_known_decision() -> None:
     # In state 0 one may stay (reward 0.1 for ever: worth 1) or enter 1, terminal, reward 0.3,
     # worth 3. Experience only ever stays; V(0) = 0.1 + 0.9 * max(V(0), 3) = 2.8.
-    settings = FittedValueSettings(ridge=1e-13, sweeps=300, discount=0.9, candidates=2)
+    settings = FittedValueSettings(ridge=1e-13, sweeps=300, discount=0.9, candidates=2, mixing=1.0)
     learner = FittedValue(settings, TABLE, 1)
     both = np.array([[[0.0], [1.0]]])
     feed(learner, (np.ones((1, 1, 1)), np.array([0.3]), True, [both]))
@@ -136,7 +136,7 @@ def test_fitted_value_solves_a_known_decision() -> None:
 
 def test_targets_stay_within_what_rewards_can_sum_to() -> None:
     # theta far too large: the first target R + 0.9 * 1e6 is cut to 1 / (1 - 0.9) = 10.
-    learner = BatchTD(BatchTDSettings(ridge=1e-13, sweeps=1, discount=0.9), TABLE, 1)
+    learner = BatchTD(BatchTDSettings(ridge=1e-13, sweeps=1, discount=0.9, mixing=1.0), TABLE, 1)
     learner.theta[:] = 1e6
     feed(learner, (np.array([[[0.0]], [[1.0]]]), np.array([1.0, -1.0]), False, [None] * 2))
     assert learner.theta[0, :2] == pytest.approx([10.0, 0.0], rel=0, abs=1e-10)
