@@ -144,7 +144,8 @@ class ScriptedController:
         sides = self._sides or [Side(course, self.box.reach, 0.0, 0.6 * self.box.reach)]
         best = None
         for side in sides:
-            slots = self._slots(side, box)
+            error = float(_wrap(course - side.direction))
+            slots = self._slots(side, box, error)
             costs = np.array(
                 [
                     _paths(
@@ -156,17 +157,28 @@ class ScriptedController:
                 ]
             ).reshape(len(robots), -1)  # fmt: skip
             rows, columns = linear_sum_assignment(costs)
-            cost = abs(_wrap(course - side.direction)) + costs[rows, columns].mean() / 0.3
+            # Past a right angle pushing leads away from the goal.
+            steer = abs(error) + 4.0 * max(abs(error) - 1.2, 0.0)
+            cost = steer + costs[rows, columns].mean() / 0.3
             if best is None or cost < best[0]:
                 best = cost, side, slots[columns]
         assert best is not None
         return best[1], best[2]
 
-    def _slots(self, side: Side, box: FloatArray) -> FloatArray:
-        """Return the slots ``(M, 2)`` along a side, evenly spread, in the world."""
+    def _spread(self, side: Side) -> float:
+        """Return how far from the middle of a side the outermost slots are [m]."""
+        least = (len(self.robots) - 1) * (float(self._radii.max()) + CLEARANCE)
+        return max(0.55 * side.half, least)
+
+    def _slots(self, side: Side, box: FloatArray, error: float) -> FloatArray:
+        """Return the slots ``(M, 2)`` along a side, evenly spread, in the world.
+
+        `error` is the angle from the side's direction to the goal [rad].
+        """
         n = len(self.robots)
-        spread = min(side.half - float(self._radii.max()), 0.055 * n / 2)
-        offsets = np.linspace(1, -1, n) * spread if n > 1 else np.zeros(1)
+        offsets = np.linspace(1, -1, n) * self._spread(side)
+        if n == 1:  # steers by where it pushes
+            offsets = -0.5 * side.half * np.clip([2.0 * error], -1, 1)
         angle = box[2] + side.direction
         ahead, left = np.array([cos(angle), sin(angle)]), np.array([-sin(angle), cos(angle)])
         slots = []
@@ -257,6 +269,7 @@ class ScriptedController:
         def best(options: IntArray) -> IntArray:
             after, boxes, gaps = push(robots, box, twists, options, self.seconds, self._model)
             costs = self._cost(after, boxes, gaps, goal, side, aside)
+            costs[[not twists[range(len(o)), o].any() for o in options]] += 1.0  # never rest
             return options[int(costs.argmin())]
 
         sizes = [range(len(table)) for table in tables]
@@ -287,7 +300,8 @@ class ScriptedController:
         cost = distance.copy()
         if self._sides:
             error = _wrap(np.arctan2(ahead[:, 1], ahead[:, 0]) - heading)
-            cost += 0.12 * np.abs(error) * np.minimum(1.0, distance / 0.2)
+            steer = 2.2 * self._spread(side) * np.abs(error)
+            cost += steer * np.minimum(1.0, distance / 0.2)
         for r in range(robots.shape[1]):
             dx, dy = robots[:, r, 0] - box[:, 0], robots[:, r, 1] - box[:, 1]
             off = np.cos(heading) * dy - np.sin(heading) * dx - aside[r]
