@@ -33,13 +33,14 @@ def number(value: float) -> str:
 
     Examples
     --------
-    >>> [number(x) for x in (0.975, 1.0, -0.0312, 0.0021, 12.34, 240.0)]
+    >>> [number(x) for x in (0.975, 0.998, -0.0312, 0.0021, 12.34, 240.0)]
     ['.97', '1.0', '-.03', '0', '12', '240']
     """
     if np.isnan(value):
         return "?"
     if abs(value) < 0.005:
         return "0"
+    value = float(f"{value:.2g}")
     digits = min(2, max(0, 1 - int(np.floor(np.log10(abs(value))))))
     text = f"{value:.{digits}f}"
     return text.replace("0.", ".", 1) if text.lstrip("-").startswith("0.") else text
