@@ -96,6 +96,20 @@ class BoxPushing:
         """The state variables of every agent."""
         return self._space.space
 
+    @property
+    def bounds(self) -> FloatArray:
+        """What the state variables cannot leave, ``(d, 2)``; infinite where there is no limit."""
+        depth = self.robot.radius + self.box.reach
+        limits = []
+        for variable in self.state_space.variables:
+            if variable.periodic:
+                limits.append((variable.low, variable.high))
+            elif variable.unit == "m/s":
+                limits.append((-self.robot.max_speed, self.robot.max_speed))
+            else:
+                limits.append((-depth if variable.name.endswith("gap") else 0.0, np.inf))
+        return np.array(limits)
+
     def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
         """Place robots, box and goal by the start distribution; return states ``(n, d)``.
 

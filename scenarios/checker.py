@@ -153,18 +153,23 @@ def _finite(of: Examination) -> str | None:
 
 
 def _bounds(of: Examination) -> str | None:
-    """Check that periodic variables stay within their period."""
+    """Check that variables stay within their period, and within `bounds` if a scenario has them."""
     for seed, episode in _all(of):
         scenario = of.factory()
+        limits = [
+            (v.low, v.high) if v.periodic else (-np.inf, np.inf)
+            for v in scenario.state_space.variables
+        ]
+        low, high = np.array(getattr(scenario, "bounds", limits)).T
         for step, frame in enumerate(of.play(scenario, seed, episode)):
-            for i, variable in enumerate(scenario.state_space.variables):
-                values = np.asarray(frame["states"])[:, i]
-                inside = (variable.low <= values) & (values <= variable.high)
-                if variable.periodic and not inside.all():
-                    return (
-                        f"{variable.name} = {values[~inside][0]} {at(step)} of seed {seed}, "
-                        f"must be within [{variable.low}, {variable.high}]"
-                    )
+            states = np.asarray(frame["states"])
+            outside = np.argwhere((states < low) | (states > high))
+            if len(outside):
+                i = outside[0, 1]
+                return (
+                    f"{scenario.state_space.variables[i].name} leaves [{low[i]}, {high[i]}] "
+                    f"{at(step)} of seed {seed}"
+                )
     return None
 
 

@@ -151,6 +151,13 @@ class _Stage:
         return np.asarray(self.canvas.buffer_rgba())[..., :3].copy()
 
 
+def picture(recording: Recording, step: int) -> Pixels:
+    """Return the moment after `step` steps as ``(height, width, 3)`` bytes."""
+    stage = _Stage(recording)
+    stage.draw(step)
+    return stage.pixels()
+
+
 def snapshot(recording: Recording, step: int, path: Path) -> None:
     """Draw the moment after `step` steps (negative: from the end) to a picture file."""
     stage = _Stage(recording)

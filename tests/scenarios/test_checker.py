@@ -194,7 +194,7 @@ FAULTS: dict[str, tuple[Callable[[], Scenario], str]] = {
         line(save=half_saved, restore=half_restored),
         "save and restore: the future of a restored scenario differs at step",
     ),
-    "period": (line(__init__=angle_out_of_range), "bounds: lead = .*, must be within"),
+    "period": (line(__init__=angle_out_of_range), "bounds: lead leaves .* at the start"),
     "shape": (line(_states=short_states), r"form: states of shape \(2, 1\) at the start"),
     "two rewards": (line(step=lengthy_reward), r"form: reward of shape \(2,\)"),
     "end": (line(step=uncertain_end), "form: terminated and truncated must be bool"),

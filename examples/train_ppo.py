@@ -1,0 +1,34 @@
+"""
+Train PPO on box pushing
+========================
+
+One agent drives all wheels, by stable-baselines3's PPO: a peer to compare hierarchies of fuzzy
+agents with. Needs PyTorch: ``pip install "nested-agents[peers]"``. Then ``python train_ppo.py``, or
+with a number of steps: ``python train_ppo.py 200000``.
+"""
+
+import sys
+
+from stable_baselines3 import PPO
+from stable_baselines3.common.evaluation import evaluate_policy
+from stable_baselines3.common.monitor import Monitor
+from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
+
+from nested_agents.scenarios.environments import BoxPushingEnv
+
+STEPS = int(sys.argv[1]) if len(sys.argv) > 1 else 20_000
+
+
+def make() -> Monitor:
+    """Return a world with an easy start."""
+    return Monitor(BoxPushingEnv({"start": "easy"}, steps=200))
+
+
+# Distances have no upper bound: normalise what the policy sees, and the small rewards.
+worlds = VecNormalize(DummyVecEnv([make] * 4), gamma=0.95)
+policy = PPO("MlpPolicy", worlds, n_steps=256, gamma=0.95, seed=0, verbose=1)
+policy.learn(STEPS)
+
+worlds.training, worlds.norm_reward = False, False
+mean, spread = evaluate_policy(policy, worlds, n_eval_episodes=10)
+print(f"sum of rewards after {STEPS} steps: {mean:.3f} +- {spread:.3f}")

@@ -1,0 +1,24 @@
+"""Every example runs; those that need what is not installed are at least read."""
+
+import runpy
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+
+
+def test_random_policy(capsys: pytest.CaptureFixture[str]) -> None:
+    runpy.run_path(str(EXAMPLES / "random_policy.py"), run_name="__main__")
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "8 wheels, 8 state variables each"
+    assert lines[1].startswith("sum of rewards ")
+    assert lines[2] == "failed wheels: 1"
+
+
+def test_ppo(monkeypatch: pytest.MonkeyPatch) -> None:
+    path = EXAMPLES / "train_ppo.py"
+    compile(path.read_text(encoding="utf-8"), str(path), "exec")
+    pytest.importorskip("stable_baselines3", reason="extra [peers]")
+    monkeypatch.setattr("sys.argv", ["train_ppo.py", "1024"])
+    runpy.run_path(str(path), run_name="__main__")
