@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-import os
-
-# One core: ratios to a threaded BLAS would say more about the machine than about the code.
-for _name in ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "NUMBA_NUM_THREADS"):
-    os.environ[_name] = "1"
-
 import argparse
 import json
+import os
 import platform
 from pathlib import Path
 

@@ -18,8 +18,8 @@ from nested_agents.core.learners import TDLambda
 
 from .situations import Situation
 
-CHUNK = 4
-"""Joint actions whose feature vectors the literal decision holds at once."""
+CHUNK = 1
+"""Joint actions whose feature vectors are built at once; more are slower, they leave the caches."""
 
 
 class Baselines:
@@ -58,8 +58,7 @@ class Baselines:
     def literal(self, agent: int, codes: IntArray) -> FloatArray:
         """Value joint actions by explicit feature vectors."""
         blocks, theta = self.blocks[agent], self.theta[agent]
-        own = blocks.own[codes // blocks.divisor % len(blocks.own)]
-        states = np.concatenate([own, blocks.shared[codes]], axis=1)
+        states = blocks.states(codes)
         parts = [
             self.rules.features(states[c : c + CHUNK]) @ theta for c in range(0, len(codes), CHUNK)
         ]
@@ -72,8 +71,9 @@ class Baselines:
         key = blocks.divisor
         if key not in self._features:
             self._features[key] = self._product(blocks.shared, self.rules.n_own)
-        local = codes // blocks.divisor % len(blocks.own)
-        return np.einsum("cs,cs->c", partial[local], self._features[key][codes])
+        local = codes // blocks.divisor % len(blocks.own_rows)
+        features = self._features[key][blocks.shared_rows[codes]]
+        return np.einsum("cs,cs->c", partial[blocks.own_rows[local]], features)
 
     def _product(self, states: FloatArray, first: int) -> FloatArray:
         product = np.ones((len(states), 1))

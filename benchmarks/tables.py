@@ -11,13 +11,13 @@ from rich.table import Table
 Row = dict[str, Any]
 
 STEPS = {
-    "rule_base": "rules", "agents": "n", "ours_us": "ours\n\\[us]", "literal_ratio": "literal\n/ours",
+    "rule_base": "rules", "agents": "n", "ours_us": "ours\n\\[us]", "literal_ratio": "liter.\n/ours",
     "factorised_ratio": "factor.\n/ours", "streaming_ratio": "ours/\nstream",
     "decide_ns_per_joint_action": "decide\n\\[ns/ja]",
     "foresee_ns_per_joint_action": "+predict\n\\[ns/ja]", "bytes_per_agent": "kB/\nagent",
 }  # fmt: skip
 LARGE = {
-    "rule_base": "rules", "agents": "n", "evaluator": "evaluator", "simulate_ms": "simulate\n\\[ms]",
+    "rule_base": "rules", "agents": "n", "evaluator": "evaluator", "simulate_ms": "world\n\\[ms]",
     "foresee_ms": "decide\n\\[ms]", "learn_ms": "learn\n\\[ms]", "total_ms": "step\n\\[ms]",
     "us_per_agent": "agent\n\\[us]", "bytes_per_agent": "kB/\nagent",
 }  # fmt: skip

@@ -33,6 +33,8 @@ class RuleBaseSettings(Settings):
     """Variables per rule: 1 sums one-variable rule bases, d is the paper's full product."""
     products: tuple[tuple[str, ...], ...] = ()
     """Further products of variables by name, summed to those of `order`."""
+    precision: Literal["float64", "float32"] = "float64"
+    """Of consequent weights and traces; float32 halves memory and traffic."""
 
 
 class PaperExploration(Settings):

@@ -10,13 +10,17 @@ read as a number are its *local code*.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from .arrays import FloatArray, IntArray
 from .spaces import ActionSet, StateSpace
+
+
+def _no_rows() -> IntArray:
+    return np.zeros(0, dtype=np.int64)
 
 
 @dataclass(frozen=True)
@@ -26,16 +30,29 @@ class Blocks:
     Attributes
     ----------
     own
-        ``(A ** w, n_own)`` own variables by the local code of the agent's group of ``w`` agents.
+        ``(K, n_own)`` own variables, one row per local code of the agent's group of ``w`` agents,
+        or fewer.
     shared
-        ``(A ** n, d - n_own)`` shared variables by joint-action code.
+        ``(R, d - n_own)`` shared variables, one row per joint-action code, or fewer.
     divisor
-        The local code of joint-action code ``c`` is ``c // divisor % len(own)``.
+        The local code of joint-action code ``c`` is ``c // divisor % A ** w``.
+    own_rows, shared_rows
+        The row of `own` of every local code ``(A ** w,)``, and of `shared` of every joint-action
+        code ``(A ** n,)``, where several codes lead to one; empty: each code has its row.
     """
 
     own: FloatArray
     shared: FloatArray
     divisor: int
+    own_rows: IntArray = field(default_factory=_no_rows)
+    shared_rows: IntArray = field(default_factory=_no_rows)
+
+    def states(self, codes: IntArray) -> FloatArray:
+        """Return the next states ``(m, d)`` of joint-action codes ``(m,)``."""
+        local = codes // self.divisor % (len(self.own_rows) or len(self.own))
+        own = self.own[self.own_rows[local] if len(self.own_rows) else local]
+        shared = self.shared[self.shared_rows[codes] if len(self.shared_rows) else codes]
+        return np.concatenate([own, shared], axis=1)
 
 
 class Prediction(Protocol):

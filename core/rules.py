@@ -37,6 +37,8 @@ class RuleBase:
         Index tuples into the variables, each increasing, all distinct.
     n_own
         How many leading variables form the own block (see `nested_agents.core.spaces`).
+    dtype
+        Type of the consequent weights that learners keep; states are double precision always.
 
     Examples
     --------
@@ -49,7 +51,11 @@ class RuleBase:
     """
 
     def __init__(
-        self, partitions: Sequence[Partition], terms: Sequence[tuple[int, ...]], n_own: int = 0
+        self,
+        partitions: Sequence[Partition],
+        terms: Sequence[tuple[int, ...]],
+        n_own: int = 0,
+        dtype: str = "float64",
     ) -> None:
         d = len(partitions)
         for term in terms:
@@ -69,7 +75,11 @@ class RuleBase:
         )
         self.n_rules = sum(self.sizes)
         self.layout = kernels.layout(self.partitions, self.terms, n_own)
+        self.n_rows = int(self.layout.own_sizes.sum())
+        self.dtype = np.dtype(dtype)
         self.compact = self.partitions[0].membership == "triangular"
+        # Looking up 2 ** order corners is cheaper than contracting theta for small orders only.
+        self._looks_up = self.compact and max(len(term) for term in self.terms) <= 3
 
     @classmethod
     def build(cls, space: StateSpace, settings: RuleBaseSettings) -> RuleBase:
@@ -99,7 +109,7 @@ class RuleBase:
             Partition.of(v, settings.membership, settings.memberships, settings.steepness)
             for v in space.variables
         ]
-        return cls(partitions, list(dict.fromkeys(terms)), space.n_own)
+        return cls(partitions, list(dict.fromkeys(terms)), space.n_own, settings.precision)
 
     def features(self, states: FloatArray) -> FloatArray:
         """Return phi ``(m, n_rules)`` of states ``(m, d)`` explicitly: the twin of every kernel."""
@@ -121,7 +131,10 @@ class RuleBase:
 
     def each(self, theta: FloatArray, states: FloatArray) -> FloatArray:
         """Return f ``(n,)`` of states ``(n, d)``, each by its own row of theta ``(n, n_rules)``."""
-        return np.array([self.values(theta[i], states[i : i + 1])[0] for i in range(len(states))])
+        states = np.ascontiguousarray(states, dtype=float)
+        if self.compact:
+            return kernels.each_compact(theta, states, self.layout)
+        return kernels.each_dense(theta, states, self.layout)
 
     def squared_lengths(self, states: FloatArray) -> FloatArray:
         """Return the squared length ``(m,)`` of phi of states ``(m, d)``.
@@ -148,8 +161,11 @@ class RuleBase:
     def block_values(self, theta: FloatArray, blocks: Blocks, codes: IntArray) -> FloatArray:
         """Return f ``(len(codes),)`` of the next states that joint-action `codes` lead to.
 
-        The own part of theta is contracted once per distinct own block (sigmoid), or looked up
-        (triangular); the feature vector of a joint action is never built.
+        The own part of theta is contracted once per distinct own block, or the few active rules
+        are looked up; the feature vector of a joint action is never built.
         """
-        kernel = kernels.block_values_compact if self.compact else kernels.block_values_dense
-        return kernel(theta, blocks.own, blocks.shared, blocks.divisor, codes, self.layout)
+        kernel = kernels.block_values_compact if self._looks_up else kernels.block_values_dense
+        return kernel(
+            theta, blocks.own, blocks.own_rows, blocks.shared, blocks.shared_rows, blocks.divisor,
+            codes, self.layout,
+        )  # fmt: skip

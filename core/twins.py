@@ -20,8 +20,7 @@ def values(rules: RuleBase, theta: FloatArray, states: FloatArray) -> FloatArray
 
 def block_values(rules: RuleBase, theta: FloatArray, blocks: Blocks, codes: IntArray) -> FloatArray:
     """Return f of joint-action codes, every next state written out."""
-    own = blocks.own[codes // blocks.divisor % len(blocks.own)]
-    return values(rules, theta, np.concatenate([own, blocks.shared[codes]], axis=1))
+    return values(rules, theta, blocks.states(codes))
 
 
 def td_update(

@@ -10,6 +10,7 @@ discounted sums of the rewards seen so far can reach: no extrapolation can run a
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 
 import numpy as np
@@ -17,7 +18,7 @@ from numba import njit
 from scipy.linalg import cho_factor, cho_solve
 
 from ..arrays import FloatArray, IntArray
-from ..config import FittedValueSettings, ReplaySettings
+from ..config import BatchTDSettings, FittedValueSettings, ReplaySettings
 from ..rules import RuleBase
 
 REWARD_SCALE = 100.0
@@ -27,8 +28,8 @@ TERMINAL, CUT_OFF = -1, -2
 """In place of the index of the next after-state: it is entered for ever; it is not known."""
 
 
-class BatchTD:
-    """Batch TD(lambda).
+class Replay(ABC):
+    """What the batch learners share: a memory of after-states, and the regression.
 
     Raises
     ------
@@ -46,7 +47,7 @@ class BatchTD:
                 f"allowed up to {self.largest}; lower learner.rule_base.order"
             )
         self.settings, self.rules = settings, rules
-        self.theta: FloatArray = np.zeros((n_agents, rules.n_rules))
+        self.theta: FloatArray = np.zeros((n_agents, rules.n_rules), rules.dtype)
         self._states: list[FloatArray] = []
         self._rewards: list[float] = []
         self._follower: list[int] = []
@@ -90,7 +91,7 @@ class BatchTD:
             gram = self.settings.ridge * np.eye(self.rules.n_rules)
             _add_gram(gram, active, strengths, known)
             factor = cho_factor(gram, check_finite=False)
-            theta = self.theta[i] * REWARD_SCALE
+            theta = self.theta[i].astype(float) * REWARD_SCALE
             for _ in range(self.settings.sweeps):
                 targets = known * np.clip(self._targets(i, theta, rewards, follower), low, high)
                 moment = _moment(active, strengths, targets, self.rules.n_rules)
@@ -98,14 +99,11 @@ class BatchTD:
             self.theta[i] += self.settings.mixing * (theta / REWARD_SCALE - self.theta[i])
         return self.theta.size
 
+    @abstractmethod
     def _targets(
         self, agent: int, theta: FloatArray, rewards: FloatArray, follower: IntArray
     ) -> FloatArray:
-        """Return the lambda-returns ``(N,)`` of all after-states; arbitrary where cut off."""
-        values = _row_values(theta, *self._rows[agent])
-        return _lambda_returns(
-            values, rewards, follower, self.settings.discount, self.settings.trace_decay
-        )
+        """Return the targets ``(N,)`` of all after-states; arbitrary where cut off."""
 
     def _extend(self) -> None:
         """Find the active rules of the after-states that are new since the last regression."""
@@ -140,7 +138,24 @@ class BatchTD:
         self._rows = []
 
 
-class FittedValue(BatchTD):
+class BatchTD(Replay):
+    """Batch TD(lambda)."""
+
+    def __init__(self, settings: BatchTDSettings, rules: RuleBase, n_agents: int) -> None:
+        super().__init__(settings, rules, n_agents)
+        self._decay = settings.trace_decay
+
+    def _targets(
+        self, agent: int, theta: FloatArray, rewards: FloatArray, follower: IntArray
+    ) -> FloatArray:
+        """Return the lambda-returns ``(N,)`` of all after-states; arbitrary where cut off."""
+        values = _row_values(theta, *self._rows[agent])
+        return _lambda_returns(
+            values, rewards, follower, self.settings.discount, self._decay
+        )
+
+
+class FittedValue(Replay):
     """Fitted value iteration over predicted next states."""
 
     def __init__(self, settings: FittedValueSettings, rules: RuleBase, n_agents: int) -> None:

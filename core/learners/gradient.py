@@ -35,15 +35,16 @@ class GradientTD:
 
     def __init__(self, settings: GradientTDSettings, rules: RuleBase, n_agents: int) -> None:
         self.settings, self.rules = settings, rules
-        self.theta: FloatArray = np.zeros((n_agents, rules.n_rules))
+        self.theta: FloatArray = np.zeros((n_agents, rules.n_rules), rules.dtype)
         self.second: FloatArray = np.zeros_like(self.theta)
         self.trace: FloatArray = np.zeros_like(self.theta)
+        self.reach: FloatArray = np.zeros((n_agents, rules.n_rows))
         self._previous: FloatArray | None = None
         self._reward = 0.0
 
     def begin_episode(self) -> None:
         """Clear the traces."""
-        self.trace[:] = 0.0
+        self.trace[:], self.reach[:] = 0.0, 0.0
         self._previous = None
 
     def observe(
@@ -70,8 +71,9 @@ class GradientTD:
         expected = rules.each(self.second, states)
         along = s.step_size * delta if s.correction == "tdc" else np.zeros_like(delta)
         kernels.td_update(
-            self.theta, self.trace, states, along, s.discount * s.trace_decay, rules.layout
-        )
+            self.theta, self.trace, self.reach, states, along, s.discount * s.trace_decay,
+            rules.layout,
+        )  # fmt: skip
         if s.correction == "gtd2":
             kernels.add_features(self.theta, states, s.step_size * expected, rules.layout)
         if entered is not None:
@@ -93,6 +95,7 @@ class GradientTD:
             "theta": self.theta,
             "second": self.second,
             "trace": self.trace,
+            "reach": self.reach,
             "previous": previous,
             "reward": np.array(self._reward),
         }
@@ -100,6 +103,6 @@ class GradientTD:
     def restore(self, arrays: Mapping[str, FloatArray]) -> None:
         """Continue from `arrays`."""
         self.theta, self.second = arrays["theta"].copy(), arrays["second"].copy()
-        self.trace = arrays["trace"].copy()
+        self.trace, self.reach = arrays["trace"].copy(), arrays["reach"].copy()
         self._previous = arrays["previous"].copy() if arrays["previous"].size else None
         self._reward = float(arrays["reward"])

@@ -65,7 +65,7 @@ class Frozen:
     candidates = 0
 
     def __init__(self, rules: RuleBase, n_agents: int) -> None:
-        self.theta: FloatArray = np.zeros((n_agents, rules.n_rules))
+        self.theta: FloatArray = np.zeros((n_agents, rules.n_rules), rules.dtype)
 
     def begin_episode(self) -> None:
         """Nothing to forget."""

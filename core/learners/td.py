@@ -32,14 +32,15 @@ class TDLambda:
 
     def __init__(self, settings: TDLambdaSettings, rules: RuleBase, n_agents: int) -> None:
         self.settings, self.rules = settings, rules
-        self.theta: FloatArray = np.zeros((n_agents, rules.n_rules))
+        self.theta: FloatArray = np.zeros((n_agents, rules.n_rules), rules.dtype)
         self.trace: FloatArray = np.zeros_like(self.theta)
+        self.reach: FloatArray = np.zeros((n_agents, rules.n_rows))
         self._previous: FloatArray | None = None
         self._reward = 0.0
 
     def begin_episode(self) -> None:
         """Clear the traces."""
-        self.trace[:] = 0.0
+        self.trace[:], self.reach[:] = 0.0, 0.0
         self._previous = None
 
     def observe(
@@ -70,7 +71,9 @@ class TDLambda:
         if self.settings.normalised:
             steps = steps / self.rules.squared_lengths(states)
         decay = self.settings.discount * self.settings.trace_decay
-        kernels.td_update(self.theta, self.trace, states, steps, decay, self.rules.layout)
+        kernels.td_update(
+            self.theta, self.trace, self.reach, states, steps, decay, self.rules.layout
+        )
         return self.theta.size
 
     def arrays(self) -> dict[str, FloatArray]:
@@ -79,6 +82,7 @@ class TDLambda:
         return {
             "theta": self.theta,
             "trace": self.trace,
+            "reach": self.reach,
             "previous": previous,
             "reward": np.array(self._reward),
         }
@@ -86,5 +90,6 @@ class TDLambda:
     def restore(self, arrays: Mapping[str, FloatArray]) -> None:
         """Continue from `arrays`."""
         self.theta, self.trace = arrays["theta"].copy(), arrays["trace"].copy()
+        self.reach = arrays["reach"].copy()
         self._previous = arrays["previous"].copy() if arrays["previous"].size else None
         self._reward = float(arrays["reward"])

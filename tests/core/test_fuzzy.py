@@ -30,7 +30,7 @@ def by_kernel(partition: Partition, x: np.ndarray) -> np.ndarray:
     lay = kernels.layout([partition], [(0,)], 0)
     out = np.empty((len(x), partition.size))
     for row, value in zip(out, x, strict=True):
-        kernels._strengths(0, value, lay, row)
+        kernels.strengths_of(0, value, lay, row)
     return out
 
 

@@ -41,7 +41,13 @@ def blocks_of(rng: np.random.Generator, n_own: int, d: int = 4) -> Blocks:
     own = states_of(rng, N_ACTIONS**GROUP, d)[:, :n_own]
     shared = states_of(rng, N_ACTIONS**N_AGENTS, d)[:, n_own:]
     divisor = int(rng.choice([1, N_ACTIONS, N_ACTIONS**GROUP]))
-    return Blocks(np.ascontiguousarray(own), np.ascontiguousarray(shared), divisor)
+    own_rows = shared_rows = np.zeros(0, dtype=np.int64)
+    if rng.random() < 0.7:  # several codes lead to one
+        own_rows = rng.integers(len(own), size=len(own))
+        shared_rows = rng.integers(len(shared) // 2, size=len(shared))
+    return Blocks(
+        np.ascontiguousarray(own), np.ascontiguousarray(shared), divisor, own_rows, shared_rows
+    )
 
 
 @pytest.fixture(params=[0, 2, 4], ids=lambda n: f"{n} own")
@@ -79,20 +85,50 @@ def test_block_values(base: RuleBase, rng: np.random.Generator) -> None:
     expected = twins.block_values(base, theta, blocks, codes)
     assert base.block_values(theta, blocks, codes) == pytest.approx(expected, rel=0, abs=1e-12)
     dense = kernels.block_values_dense(
-        theta, blocks.own, blocks.shared, blocks.divisor, codes, base.layout
-    )
+        theta, blocks.own, blocks.own_rows, blocks.shared, blocks.shared_rows, blocks.divisor,
+        codes, base.layout,
+    )  # fmt: skip
     assert dense == pytest.approx(expected, rel=0, abs=1e-12)
 
 
 def test_td_update(base: RuleBase, rng: np.random.Generator) -> None:
     theta, trace = rng.normal(size=(2, 3, base.n_rules))
     theta_twin, trace_twin = theta.copy(), trace.copy()
-    for _ in range(3):
+    reach = np.full((3, base.n_rows), 5.0)
+    for _ in range(60):
         states, steps = states_of(rng, 3), 0.1 * rng.normal(size=3)
-        kernels.td_update(theta, trace, states, steps, 0.38, base.layout)
+        kernels.td_update(theta, trace, reach, states, steps, 0.38, base.layout)
         twins.td_update(base, theta_twin, trace_twin, states, steps, 0.38)
     assert trace == pytest.approx(trace_twin, rel=0, abs=1e-12)
     assert theta == pytest.approx(theta_twin, rel=0, abs=1e-12)
+
+
+def test_each(base: RuleBase, rng: np.random.Generator) -> None:
+    theta, states = rng.normal(size=(5, base.n_rules)), states_of(rng, 5)
+    expected = np.einsum("ij,ij->i", base.features(states), theta)
+    assert base.each(theta, states) == pytest.approx(expected, rel=0, abs=1e-12)
+
+
+def test_single_precision(base: RuleBase, rng: np.random.Generator) -> None:
+    theta, trace = rng.normal(size=(2, 3, base.n_rules)).astype(np.float32)
+    blocks, codes = blocks_of(rng, base.n_own), rng.integers(N_ACTIONS**N_AGENTS, size=50)
+    states, steps = states_of(rng, 3), 0.1 * rng.normal(size=3)
+    wide = theta.astype(float), trace.astype(float)
+    scale = float(np.abs(theta).max())
+    for found, expected in (
+        (
+            base.block_values(theta[0], blocks, codes),
+            twins.block_values(base, wide[0][0], blocks, codes),
+        ),
+        (base.each(theta, states), np.einsum("ij,ij->i", base.features(states), wide[0])),
+    ):
+        assert found == pytest.approx(expected, rel=1e-5, abs=1e-5 * scale)
+    reach = np.full((3, base.n_rows), 5.0)
+    kernels.td_update(theta, trace, reach, states, steps, 0.38, base.layout)
+    twins.td_update(base, *wide, states, steps, 0.38)
+    assert theta.dtype == trace.dtype == np.float32
+    assert trace == pytest.approx(wide[1], rel=1e-5, abs=1e-5)
+    assert theta == pytest.approx(wide[0], rel=1e-5, abs=1e-5)
 
 
 def test_block_values_agree_with_values_of_the_states(
@@ -100,8 +136,7 @@ def test_block_values_agree_with_values_of_the_states(
 ) -> None:
     theta, blocks = rng.normal(size=base.n_rules), blocks_of(rng, base.n_own)
     codes = np.arange(N_ACTIONS**N_AGENTS)
-    own = blocks.own[codes // blocks.divisor % len(blocks.own)]
-    expected = base.values(theta, np.concatenate([own, blocks.shared], axis=1))
+    expected = base.values(theta, blocks.states(codes))
     assert base.block_values(theta, blocks, codes) == pytest.approx(expected, rel=0, abs=1e-12)
 
 
@@ -128,7 +163,8 @@ def test_the_papers_78125_rules(membership: str, rng: np.random.Generator) -> No
     theta, trace = rng.normal(size=(2, 2, base.n_rules))
     theta_twin, trace_twin = theta.copy(), trace.copy()
     steps = np.array([0.01, -0.02])
-    kernels.td_update(theta, trace, states[:2], steps, 0.3996, base.layout)
+    reach = np.full((2, base.n_rows), 5.0)
+    kernels.td_update(theta, trace, reach, states[:2], steps, 0.3996, base.layout)
     twins.td_update(base, theta_twin, trace_twin, states[:2], steps, 0.3996)
     assert np.abs(trace - trace_twin).max() <= 1e-12
     assert np.abs(theta - theta_twin).max() <= 1e-12

@@ -53,8 +53,7 @@ def test_predictions_are_those_of_the_world(pair) -> None:
     assert (prediction.rewards(codes) == expected.rewards(joint)).all()
     assert (prediction.reward_table() == expected.reward_table()).all()
     blocks = prediction.blocks(0)
-    own = blocks.own[np.arange(16) // blocks.divisor % len(blocks.own)]
-    assert (np.concatenate([own, blocks.shared], axis=1) == both).all()
+    assert (blocks.states(np.arange(16)) == both).all()
 
 
 def test_a_team_of_one_acts_and_learns(pair) -> None:

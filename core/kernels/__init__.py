@@ -1,0 +1,31 @@
+"""Compiled kernels of the rule base: the same numbers as the NumPy definitions, fast.
+
+Every kernel has a plain-NumPy twin: firing strengths in `nested_agents.core.fuzzy`, features in
+`RuleBase.features`, values and temporal differences in `nested_agents.core.twins`. Nothing is
+compiled on import; each kernel is compiled at its first call and cached on disk.
+
+The dense kernels leave out rows of rules whose own firing strength is below `NEGLIGIBLE`: firing
+strengths sum to one, so that a value changes by less than 1e-13 of the largest weight.
+"""
+
+from .compact import active_compact, block_values_compact, each_compact, values_compact
+from .dense import block_values_dense, each_dense, values_dense
+from .layout import Layout, layout
+from .strengths import NEGLIGIBLE, strengths_of
+from .updates import add_features, td_update
+
+__all__ = [
+    "NEGLIGIBLE",
+    "Layout",
+    "active_compact",
+    "add_features",
+    "block_values_compact",
+    "block_values_dense",
+    "each_compact",
+    "each_dense",
+    "layout",
+    "strengths_of",
+    "td_update",
+    "values_compact",
+    "values_dense",
+]
