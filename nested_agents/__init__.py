@@ -1,7 +1,58 @@
-"""Hierarchies of fuzzy reinforcement-learning agents, and how they scale."""
+"""Hierarchies of fuzzy reinforcement-learning agents, and how they scale.
 
+The names below are imported when they are first used, so that ``import nested_agents`` is quick.
+
+Examples
+--------
+Two e-Pucks, their four wheels in a chain, learning by the default settings:
+
+>>> import nested_agents as na
+>>> scenario = na.BoxPushing(na.ScenarioSettings())
+>>> hierarchy = na.build_hierarchy(na.parse_topology("chain"), scenario.agents)
+>>> team = na.Team.build(na.BatchTDSettings(), scenario, hierarchy, na.policy_seed(0))
+>>> steps = na.control_loop(scenario, team, episodes=1, steps=3, seed=0)
+>>> [record.step for record in steps]
+[0, 1, 2]
+"""
+
+from importlib import import_module
 from importlib.metadata import version
-
-__all__ = ["__version__"]
+from typing import Any
 
 __version__: str = version("nested-agents")
+
+_PLACES = {
+    "ActionSet": ("core.spaces", "ActionSet"),
+    "BatchTDSettings": ("core.config", "BatchTDSettings"),
+    "BoxPushing": ("scenarios.box_pushing", "BoxPushing"),
+    "FittedValueSettings": ("core.config", "FittedValueSettings"),
+    "FrozenSettings": ("core.config", "FrozenSettings"),
+    "GradientTDSettings": ("core.config", "GradientTDSettings"),
+    "Hierarchy": ("core.hierarchy", "Hierarchy"),
+    "Partition": ("core.fuzzy", "Partition"),
+    "RuleBase": ("core.rules", "RuleBase"),
+    "Scenario": ("core.protocols", "Scenario"),
+    "ScenarioSettings": ("scenarios.config", "ScenarioSettings"),
+    "Spec": ("studies.spec", "Spec"),
+    "StateSpace": ("core.spaces", "StateSpace"),
+    "TDLambdaSettings": ("core.config", "TDLambdaSettings"),
+    "Team": ("core.team", "Team"),
+    "Variable": ("core.spaces", "Variable"),
+    "build_hierarchy": ("topologies", "build"),
+    "control_loop": ("core.loop", "control_loop"),
+    "parse_topology": ("topologies", "parse"),
+    "policy_seed": ("core.loop", "policy_seed"),
+}
+
+__all__ = ["__version__", *_PLACES]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PLACES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module, attribute = _PLACES[name]
+    return getattr(import_module(f".{module}", __name__), attribute)
+
+
+def __dir__() -> list[str]:
+    return __all__

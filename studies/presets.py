@@ -32,6 +32,7 @@ PRESETS: dict[str, Preset] = {
                 "hold": 1,
                 "lookahead": 1,
                 "speed_increment": 0.25,
+                "arena": 100.0,
                 "reward": {"least_approach": 0.0, "attraction_without_contact": True},
             },
             "topology": {"kind": "chain"},
