@@ -10,7 +10,7 @@ aligned, with the robots still at their slots. It knows the whole situation and 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import product
+from itertools import pairwise, product
 from math import atan2, cos, pi, sin
 from typing import Any, NamedTuple
 
@@ -96,7 +96,7 @@ class ScriptedController:
         self._choices = [_local_actions(robot, len(self.actions)) for robot in robots]
         self._effects = [nominal_effect(robot) for robot in robots]
         counts = np.cumsum([0] + [len(robot.wheels) for robot in robots])
-        self._wheels = [slice(a, b) for a, b in zip(counts, counts[1:], strict=False)]
+        self._wheels = [slice(a, b) for a, b in pairwise(counts)]
         self._model = PushModel(
             edges=box.outline.edges,
             rounding=box.outline.rounding,
@@ -319,14 +319,14 @@ def _local_actions(robot: RobotSpec, n_actions: int) -> IntArray:
 
 
 def _sides(box: BoxSpec) -> list[Side]:
-    """Return the sides of a polygon's convex hull; none for a disc, which may be pushed anywhere."""
+    """Return the sides of a polygon's convex hull; none for a disc, pushed anywhere."""
     if box.polygon is None:
         return []
     ring = np.asarray(box.polygon.convex_hull.exterior.coords)
     if not box.polygon.convex_hull.exterior.is_ccw:
         ring = ring[::-1]
     sides = []
-    for a, b in zip(ring[:-1], ring[1:], strict=True):
+    for a, b in pairwise(ring):
         along = b - a
         direction = atan2(along[0], -along[1])  # inwards, left of the edge
         left = np.array([-sin(direction), cos(direction)])
@@ -388,5 +388,5 @@ def _paths(
             out[i] = ring * abs(turn) + abs(rho - ring) + abs(np.sqrt(tx * tx + ty * ty) - ring)
         else:
             out[i] = np.sqrt((tx - x) ** 2 + (ty - y) ** 2)
-        out[i] += 5.0 * near
+        out[i] += 20.0 * near
     return out

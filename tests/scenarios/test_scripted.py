@@ -1,0 +1,64 @@
+"""The scripted controller solves box pushing: the scenario is known to be solvable."""
+
+import numpy as np
+import pytest
+
+from nested_agents.scenarios import BoxPushing, ScenarioSettings, build
+from nested_agents.scenarios.boxes import BOXES
+from nested_agents.scenarios.robots import ROBOTS
+from nested_agents.scenarios.scripted import ScriptedController
+
+
+def solved(scenario: BoxPushing, seed: int, steps: int = 200) -> bool:
+    """Return whether the controller brings the box to the goal within `steps` decisions."""
+    controller = ScriptedController(scenario.world.robots, scenario.box)
+    scenario.reset(seed)
+    for _ in range(steps):
+        transition = scenario.step(controller.act(scenario.measure()))
+        if transition.terminated or transition.truncated:
+            return transition.terminated
+    return False
+
+
+@pytest.mark.parametrize("start", ["easy", "medium", "hard"])
+def test_two_robots_and_a_square(start: str) -> None:
+    scenario = build(ScenarioSettings(start=start))  # type: ignore[arg-type]
+    assert np.mean([solved(scenario, seed) for seed in range(20)]) >= 0.95
+
+
+@pytest.mark.parametrize("box", BOXES)
+def test_every_box(box: str) -> None:
+    scenario = build(ScenarioSettings(box=box))
+    assert np.mean([solved(scenario, seed) for seed in range(4)]) >= 0.75
+
+
+@pytest.mark.parametrize("robots", [1, 3, 4])
+def test_other_numbers_of_robots(robots: int) -> None:
+    scenario = build(ScenarioSettings(robots=robots))
+    assert np.mean([solved(scenario, seed) for seed in range(4)]) >= 0.75
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_every_robot(robot: str) -> None:
+    scenario = build(ScenarioSettings(robot=robot))
+    assert np.mean([solved(scenario, seed) for seed in range(3)]) > 0.5
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("start", ["easy", "medium", "hard"])
+@pytest.mark.parametrize("box", BOXES)
+def test_every_box_from_every_start(box: str, start: str) -> None:
+    scenario = build(ScenarioSettings(box=box, start=start))  # type: ignore[arg-type]
+    assert np.mean([solved(scenario, seed) for seed in range(20)]) >= 0.9
+
+
+def test_it_remembers_nothing() -> None:
+    scenario = build(ScenarioSettings(start="hard"))
+    old = ScriptedController(scenario.world.robots, scenario.box)
+    scenario.reset(3)
+    for _ in range(10):
+        measured = scenario.measure()
+        action = old.act(measured)
+        fresh = ScriptedController(scenario.world.robots, scenario.box)
+        np.testing.assert_array_equal(fresh.act(measured), action)
+        scenario.step(action)
