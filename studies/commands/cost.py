@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
+from .options import CORES, Jobs
+
 
 def command(
     agents: str = "4",
@@ -13,6 +15,8 @@ def command(
     actions: int = 4,
     iterations: int = 450,
     measured: bool = False,
+    learning: bool = False,
+    jobs: Jobs = CORES,
     format: Literal["table", "json", "csv", "latex"] = "table",
     plot: Path | None = None,
 ) -> int:
@@ -32,6 +36,11 @@ def command(
         L.
     measured
         Also count and time steps of the running system.
+    learning
+        Instead, let a chain and the single agent learn the same small task, for 1 to 3 agents, and
+        print what they learn beside what they cost. Takes some minutes.
+    jobs
+        Worker processes, for --learning.
     format
         How to print it.
     plot
@@ -42,6 +51,8 @@ def command(
     from ..cost_table import written
     from ..spec_errors import SpecError
 
+    if learning:
+        return _learning(jobs, format, plot)
     try:
         problem = Problem(rules, actions, iterations)
         rows = list(cost_rows(topology, numbers(agents), problem, measured=measured))
@@ -52,6 +63,22 @@ def command(
     except ValueError as error:
         raise SpecError(str(error)) from None
     print(written(rows, format))
+    return 0
+
+
+def _learning(jobs: int, format: str, plot: Path | None) -> int:
+    from ..single_agent import compare
+    from ..single_agent_report import draw, table
+    from ..spec_errors import SpecError
+
+    if format != "table":
+        raise SpecError(f"--format {format}: with --learning, allowed: table")
+    if plot is not None and plot.suffix not in (".svg", ".png", ".pdf"):
+        raise SpecError(f"{plot}: suffix must be .svg, .png or .pdf")
+    contests = compare(jobs=jobs)
+    if plot is not None:
+        draw(contests, plot)
+    print(table(contests))
     return 0
 
 
