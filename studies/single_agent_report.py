@@ -38,7 +38,7 @@ def table(contests: Sequence[Contest]) -> str:
         [
             *aligned(rows, "><>>>>>>>"),
             "",
-            f"Line-up task, {len(contests[0].curves)} seeds. last {BLOCK}, greedy: success with its",
+            f"Line-up, {len(contests[0].curves)} seeds. last {BLOCK}, greedy: success with its",
             "95 % interval; step: step size, chosen on other seeds; formula: operations per",
             "iteration, Eq. 18 and 23; counted: rule evaluations per step; ms: per step.",
         ]
