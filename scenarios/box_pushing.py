@@ -23,7 +23,7 @@ from .infrared import strongest_reading
 from .prediction import BoxPrediction, Situation, mean_twists
 from .push import PushModel
 from .reward import reward
-from .robots import ROBOTS, compliance, nominal_effect
+from .robots import compliance, nominal_effect, robot_for
 from .starts import place
 from .state_spaces import STATE_SPACES, View
 from .world import CONTROL_PERIOD, World
@@ -54,12 +54,11 @@ class BoxPushing:
     """
 
     def __init__(self, settings: ScenarioSettings) -> None:
-        if settings.robot not in ROBOTS:
-            known = ", ".join(sorted(ROBOTS))
-            raise ValueError(f"scenario.robot = {settings.robot!r}, allowed {known}")
         self.settings = settings
-        self.robot = ROBOTS[settings.robot]
+        self.robot = robot_for(settings.robot)
         self.box = box_for(settings.box, settings.robots)
+        # Whether they fit is better known now than in the middle of a study.
+        place(settings.start, np.random.default_rng(0), [self.robot] * settings.robots, self.box)
         wheels = len(self.robot.wheels)
         self.groups = tuple(
             tuple(range(r * wheels, (r + 1) * wheels)) for r in range(settings.robots)

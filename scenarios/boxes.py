@@ -3,8 +3,8 @@
 The frame of a box has its centre of mass at the origin and its back, where robots start in the
 easier start distributions, towards -x. Its weight rests on the ground as a distributed friction,
 stood for by four points, so that sliding and turning share one friction budget as they do for a
-real box. A further convex box is one `BoxSpec` and one line in `BOXES`; concave ones and holes go
-the same way.
+real box. A further box, concave or with holes, is one `BoxSpec` and one line in `BOXES`; a spec may
+also describe one by its vertices, and `BoxSpec.of` takes a shapely geometry.
 """
 
 from __future__ import annotations
@@ -15,8 +15,10 @@ from math import cos, isfinite, pi, sin, sqrt
 
 import numpy as np
 from shapely.geometry import Polygon
+from shapely.geometry.polygon import orient
 
 from ..core.arrays import FloatArray
+from .config import BoxSettings
 from .geometry import Outline
 from .polygons import Moments, Vertices, centred, convex_pieces, moments, polygon_edges
 from .robots import GRAVITY
@@ -77,6 +79,26 @@ class BoxSpec:
             raise ValueError(f"box {self.name!r}: needs either vertices or a radius")
         if self.vertices:
             self.__dict__["polygon"] = centred(self.name, self.vertices, self.holes)
+
+    @classmethod
+    def of(cls, name: str, geometry: Polygon, **quantities: float) -> BoxSpec:
+        """Return a box from a shapely polygon [m]; `quantities` as of the class.
+
+        Examples
+        --------
+        >>> from shapely.geometry import Point
+        >>> ring = Point(0, 0).buffer(0.1) - Point(0, 0).buffer(0.05)
+        >>> round(BoxSpec.of("ring", ring, mass=0.2).area, 4)
+        0.0235
+        """
+        if not isinstance(geometry, Polygon):
+            raise ValueError(f"box {name!r}: a {geometry.geom_type}, must be one Polygon")
+        polygon = orient(geometry)
+        outline, *holes = [
+            tuple((float(x), float(y)) for x, y in ring.coords[:-1])
+            for ring in (polygon.exterior, *polygon.interiors)
+        ]
+        return cls(name, outline, tuple(holes), **quantities)
 
     @cached_property
     def polygon(self) -> Polygon | None:
@@ -164,17 +186,17 @@ class BoxSpec:
         )
 
 
-def box_for(name: str, robots: int) -> BoxSpec:
-    """Return the box of that name for a number of robots.
+def box_for(box: str | BoxSettings, robots: int) -> BoxSpec:
+    """Return the box that a spec names or describes, or that `label` has written.
 
     Up to two robots push the box as it stands in the table. For more, its lengths and its mass
     grow in proportion to their number: each has the same room along the back and the same share
-    of the friction as one of two.
+    of the friction as one of two. A box that is described grows only if it says so.
 
     Raises
     ------
     ValueError
-        If no box has that name; the line lists those there are.
+        If no box has that name, or there can be none as described; one line.
 
     Examples
     --------
@@ -182,11 +204,20 @@ def box_for(name: str, robots: int) -> BoxSpec:
     >>> round(box.area, 12), box.mass
     (0.16, 0.8)
     """
-    if name not in BOXES:
-        raise ValueError(f"box = {name!r}, allowed {', '.join(sorted(BOXES))}")
-    if robots <= ROBOTS_PER_BOX:
-        return BOXES[name]
-    return BOXES[name].scaled(robots / ROBOTS_PER_BOX)
+    if isinstance(box, str) and box.startswith("{"):
+        box = BoxSettings.model_validate_json(box)
+    if isinstance(box, BoxSettings):
+        described = BoxSpec(
+            "own", box.vertices, box.holes,
+            mass=box.mass, friction=box.friction, contact_friction=box.contact_friction,
+        )  # fmt: skip
+        grows = box.grows
+    elif box in BOXES:
+        described, grows = BOXES[box], True
+    else:
+        raise ValueError(f"scenario.box = {box!r}, allowed {', '.join(sorted(BOXES))}")
+    crowded = grows and robots > ROBOTS_PER_BOX
+    return described.scaled(robots / ROBOTS_PER_BOX) if crowded else described
 
 
 def _rectangle(name: str, depth: float, width: float) -> BoxSpec:
@@ -201,6 +232,25 @@ def _regular(name: str, sides: int) -> BoxSpec:
     return BoxSpec(name, tuple((radius * cos(a), radius * sin(a)) for a in angles))
 
 
+def _shape(name: str, *vertices: tuple[float, float]) -> BoxSpec:
+    """Return a polygon scaled to `AREA`."""
+    unit = sqrt(AREA / Polygon(vertices).area)
+    return BoxSpec(name, tuple((unit * x, unit * y) for x, y in vertices))
+
+
+def _star(name: str, points: int, depth: float) -> BoxSpec:
+    """Return a star with a point ahead whose hollows reach `depth` of the way to the centre."""
+    corners = [(1.0, 2 * pi * i / points) for i in range(points)]
+    hollows = [(1.0 - depth, angle + pi / points) for _, angle in corners]
+    ring = [corner for pair in zip(corners, hollows, strict=True) for corner in pair]
+    return _shape(name, *((radius * cos(angle), radius * sin(angle)) for radius, angle in ring))
+
+
+PLUS = (
+    (-3, -1), (-1, -1), (-1, -3), (1, -3), (1, -1), (3, -1),
+    (3, 1), (1, 1), (1, 3), (-1, 3), (-1, 1), (-3, 1),
+)  # fmt: skip
+
 BOXES: dict[str, BoxSpec] = {
     box.name: box
     for box in (
@@ -211,6 +261,11 @@ BOXES: dict[str, BoxSpec] = {
         _regular("triangle", 3),
         _regular("pentagon", 5),
         _regular("hexagon", 6),
+        _shape("L", (0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)),
+        _shape("T", (0, -3), (2, -3), (2, -1), (5, -1), (5, 1), (2, 1), (2, 3), (0, 3)),
+        _shape("U", (0, -2), (3, -2), (3, -1), (1, -1), (1, 1), (3, 1), (3, 2), (0, 2)),
+        _shape("plus", *PLUS),
+        _star("star", 5, 0.5),
     )
 }
 """Boxes by the name that specs use; every one has the area of the square."""

@@ -132,16 +132,71 @@ Failure = Annotated[
 """Any failure's settings, told apart by `kind`."""
 
 
+Vertices = Annotated[tuple[tuple[float, float], ...], Field(min_length=3)]
+
+
+class BoxSettings(Settings):
+    """A box of one's own: ``box = { vertices = [[0, 0], [0.2, 0], [0.2, 0.1]] }``."""
+
+    vertices: Vertices
+    """Outline, counter-clockwise [m]; concave outlines are allowed."""
+    holes: tuple[Vertices, ...] = ()
+    """Outlines of holes [m]."""
+    mass: Positive = 0.4
+    """[kg]."""
+    friction: NonNegative = 0.2
+    """Coefficient of friction with the ground."""
+    contact_friction: NonNegative = 0.3
+    """Coefficient of friction with robots."""
+    grows: bool = False
+    """Whether it grows with the number of robots, as the boxes known by name do."""
+
+
+class WheelSettings(Settings):
+    """A wheel of a robot of one's own."""
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")]
+    x: float
+    """Ahead of the centre [m]."""
+    y: float
+    """To the left of the centre [m]."""
+
+
+class RobotSettings(Settings):
+    """A robot of one's own; what is not given is the e-Puck's."""
+
+    wheels: Annotated[tuple[WheelSettings, ...], Field(min_length=1)]
+    radius: Positive = 0.037
+    """Of the round body [m]."""
+    mass: Positive = 0.15
+    """[kg]."""
+    max_speed: Positive = 0.13
+    """Greatest wheel speed [m/s]; state spaces lay their memberships over 0.13 m/s."""
+    stiffness: Positive = 6.5
+    """Of one wheel's servo [N per m/s]."""
+    lateral_stiffness: Positive = 20.0
+    """Of one wheel's grip sideways [N per m/s]."""
+    traction: Positive = 0.8
+    """Coefficient of friction between wheels and ground."""
+    sensors: tuple[float, ...] | None = None
+    """Directions of the infrared sensors [rad]; none: those of the e-Puck."""
+
+
+def label(thing: str | BoxSettings | RobotSettings) -> str:
+    """Return the name of a box or robot, or what it consists of, as text that can be read back."""
+    return thing if isinstance(thing, str) else thing.model_dump_json()
+
+
 class ScenarioSettings(Settings):
     """The box-pushing scenario (Section IX)."""
 
     kind: Literal["box-pushing"] = "box-pushing"
     robots: Annotated[int, Field(ge=1, le=64)] = 2
     """Number of robots."""
-    robot: str = "e-puck"
-    """Robot by name."""
-    box: str = "square"
-    """Box by name."""
+    robot: str | RobotSettings = "e-puck"
+    """Robot by name, or a table that describes one."""
+    box: str | BoxSettings = "square"
+    """Box by name, or a table that describes one."""
     start: Literal["easy", "medium", "hard"] = "medium"
     """Start distribution."""
     failures: tuple[Failure, ...] = ()

@@ -24,7 +24,7 @@ from PIL import Image
 
 from ..core.arrays import FloatArray
 from .boxes import box_for
-from .robots import ROBOTS, RobotSpec
+from .robots import RobotSpec, robot_for
 
 Recording = Mapping[str, FloatArray]
 Pixels = NDArray[np.uint8]
@@ -55,7 +55,7 @@ class _Stage:
 
     def __init__(self, recording: Recording) -> None:
         self.recording = recording
-        self.robot: RobotSpec = ROBOTS[str(recording["robot"])]
+        self.robot: RobotSpec = robot_for(str(recording["robot"]))
         self.outline = _outline(recording)
         self.figure = Figure(figsize=(SIDES[0] / DPI, SIDES[1] / DPI), dpi=DPI)
         self.canvas = FigureCanvasAgg(self.figure)

@@ -16,6 +16,7 @@ from math import isfinite, radians
 import numpy as np
 
 from ..core.arrays import FloatArray
+from .config import RobotSettings
 
 GRAVITY = 9.81
 """Standard acceleration of free fall [m/s2], rounded."""
@@ -228,3 +229,31 @@ ROBOTS: dict[str, RobotSpec] = {
     ),
 }
 """Robots by the name that specs use."""
+
+
+def robot_for(robot: str | RobotSettings) -> RobotSpec:
+    """Return the robot that a spec names or describes, or that `label` has written.
+
+    Raises
+    ------
+    ValueError
+        If no robot has that name, or there can be none as described; one line.
+
+    Examples
+    --------
+    >>> wheels = ({"name": "a", "x": 0, "y": 0.02}, {"name": "b", "x": 0, "y": -0.02})
+    >>> robot_for(RobotSettings(wheels=wheels)).wheel_names
+    ('a', 'b')
+    """
+    if isinstance(robot, str) and robot.startswith("{"):
+        robot = RobotSettings.model_validate_json(robot)
+    if isinstance(robot, RobotSettings):
+        described = robot.model_dump() | {
+            "name": "own",
+            "wheels": tuple(Wheel(w.name, w.x, w.y) for w in robot.wheels),
+            "sensors": E_PUCK_SENSORS if robot.sensors is None else robot.sensors,
+        }
+        return RobotSpec(**described)
+    if robot not in ROBOTS:
+        raise ValueError(f"scenario.robot = {robot!r}, allowed {', '.join(sorted(ROBOTS))}")
+    return ROBOTS[robot]

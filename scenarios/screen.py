@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..core.protocols import Transition
-from .config import ScenarioSettings
+from .config import ScenarioSettings, label
 from .world import CONTROL_PERIOD
 
 SHOWN = ("robot_poses", "box_pose", "wheel_speeds", "contact", "failed")
@@ -29,8 +29,8 @@ class Screen:
         self.mode = mode
         self._constants = {
             "dt": np.array(settings.hold * CONTROL_PERIOD),
-            "robot": np.array(settings.robot),
-            "box": np.array(settings.box),
+            "robot": np.array(label(settings.robot)),
+            "box": np.array(label(settings.box)),
         }
         self._frames: dict[str, list[Any]] = {}
         self._rewards: list[float] = []

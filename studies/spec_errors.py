@@ -59,7 +59,10 @@ def explain(error: ValidationError, model: type[BaseModel], data: Mapping[str, A
         The table as the user gave it.
     """
     found = [(_place(e["loc"], data), e) for e in error.errors(include_url=False)]
-    (keys, first) = found[0]
+    # Where a name or a table may stand and a table does, what is wrong is in the table.
+    place = found[0][0]
+    inside = [f for f in found if len(f[0]) > len(place) and f[0][: len(place)] == place]
+    (keys, first) = (inside or found)[0]
     path = _dotted(keys)
     if first["type"] == "extra_forbidden":
         owner = _owner(keys[:-1], model, data)

@@ -13,6 +13,7 @@ from .. import scenarios, topologies
 from ..core.loop import control_loop, policy_seed, world_seed
 from ..core.protocols import Scenario
 from ..core.team import Team
+from ..scenarios.config import label
 from .conditions import ConditionSettings
 from .episodes import EpisodeMeter, EpisodeRecorder, EpisodeRow, Recording, Stopwatch
 from .spec import Spec
@@ -140,8 +141,8 @@ def run_trial(trial: Trial) -> TrialResult:
     watch = Stopwatch()
     constants: dict[str, float | str] = {
         "dt": settings.scenario.hold * CONTROL_PERIOD,
-        "robot": settings.scenario.robot,
-        "box": settings.scenario.box,
+        "robot": label(settings.scenario.robot),
+        "box": label(settings.scenario.box),
     }
     phases = (("training", trial.episodes, 0), ("evaluation", trial.evaluation, EVALUATION_WORLDS))
     for phase, episodes, first in phases:

@@ -6,17 +6,14 @@ from math import pi, sqrt
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from shapely.affinity import rotate, translate
 from shapely.geometry import Polygon
 
 from nested_agents.scenarios.boxes import AREA, BOXES, BoxSpec, box_for
-from nested_agents.scenarios.polygons import (
-    centred,
-    convex_pieces,
-    moments,
-    polygon_edges,
-)
+from nested_agents.scenarios.config import BoxSettings, label
+from nested_agents.scenarios.polygons import moments, polygon_edges
 from nested_agents.scenarios.robots import ROBOTS
 from nested_agents.scenarios.world import UNIT, World
 
@@ -70,29 +67,65 @@ def test_box2d_has_the_same_mass(name: str) -> None:
     assert of_fixtures == pytest.approx(box.area * UNIT**2, rel=1e-5)
 
 
-@given(seed=st.integers(0, 2**32 - 1), corners=st.integers(3, 12), window=st.booleans())
-def test_pieces_make_up_the_polygon(seed: int, corners: int, window: bool) -> None:
+@settings(max_examples=500, deadline=None)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    corners=st.integers(3, 12),
+    window=st.booleans(),
+    angle=st.floats(0, 2 * pi),
+)
+def test_pieces_make_up_the_polygon(seed: int, corners: int, window: bool, angle: float) -> None:
     rng = np.random.default_rng(seed)
     vertices = star(rng, corners)
-    if Polygon(vertices).area < 1e-4:
-        return
+    assume(Polygon(vertices).area >= 1e-4)
     hole = [(0.004, -0.004), (0.004, 0.004), (-0.004, 0.004), (-0.004, -0.004)]
-    holes = [hole] if window and Polygon(vertices).buffer(-1e-4).contains(Polygon(hole)) else []
-    polygon = centred("star", vertices, holes)
-    whole = moments(polygon_edges(polygon))
-    pieces = convex_pieces(polygon)
-    parts = [moments(polygon_edges(Polygon(piece))) for piece in pieces]
-    assert whole.area == pytest.approx(polygon.area, rel=1e-9)
-    assert sum(part.area for part in parts) == pytest.approx(whole.area, rel=1e-9)
-    total = sum((part.second for part in parts), np.zeros((2, 2)))
-    np.testing.assert_allclose(total, whole.second, rtol=1e-9, atol=1e-16)
-    for piece in pieces:
+    fits = window and Polygon(vertices).buffer(-1e-4).contains(Polygon(hole))
+    geometry = rotate(Polygon(vertices, [hole] if fits else []), angle, use_radians=True)
+    box = BoxSpec.of("random", translate(geometry, *rng.uniform(-1, 1, 2)))
+    assert box.area == pytest.approx(geometry.area, rel=1e-9)
+    # Without rounding errors of places far from the origin.
+    parts = [moments(polygon_edges(Polygon(piece))) for piece in box.fixtures]
+    area = sum(part.area for part in parts)
+    assert area == pytest.approx(geometry.area, rel=1e-9)
+    centre = sum((part.first for part in parts), np.zeros(2)) / area
+    np.testing.assert_allclose(centre, 0, atol=1e-9 * box.reach)
+    inertia = sum(float(np.trace(part.second)) for part in parts) * box.mass / area
+    assert inertia == pytest.approx(box.inertia, rel=1e-9)
+    assert inertia == pytest.approx(_inertia(geometry) * box.mass / area, rel=1e-9)
+    for piece in box.fixtures:
         assert 3 <= len(piece) <= 8
         assert Polygon(piece).exterior.is_ccw
         assert Polygon(piece).convex_hull.area == pytest.approx(Polygon(piece).area, rel=1e-9)
-    assert shapely.union_all([Polygon(piece) for piece in pieces]).area == pytest.approx(
-        whole.area, rel=1e-9
-    )
+    union = shapely.union_all([Polygon(piece) for piece in box.fixtures])
+    assert union.area == pytest.approx(geometry.area, rel=1e-9)
+
+
+def _inertia(polygon: Polygon) -> float:
+    """Return the second polar moment of area about the centre by triangles, another way [m4]."""
+    centre = np.array(polygon.centroid.coords[0])
+    total = 0.0
+    for triangle in shapely.constrained_delaunay_triangles(polygon).geoms:
+        corners = np.asarray(triangle.exterior.coords)[:3] - centre
+        # A triangle's second moment is that of three thirds of its area at the edge middles.
+        middles = (corners + np.roll(corners, 1, axis=0)) / 2
+        total += triangle.area / 3 * float((middles**2).sum())
+    return total
+
+
+def test_a_shapely_geometry_of_several_parts_is_refused() -> None:
+    two = Polygon(FRAME).union(translate(Polygon(FRAME), 1.0, 0.0))
+    with pytest.raises(ValueError, match="box 'two': a MultiPolygon, must be one Polygon"):
+        BoxSpec.of("two", two)
+
+
+def test_a_described_box_and_its_label() -> None:
+    table = BoxSettings(vertices=FRAME, holes=(WINDOW,), mass=0.3)
+    box = box_for(table, 2)
+    assert (box.area, box.mass) == (pytest.approx(0.03), 0.3)
+    assert box_for(label(table), 2) == box
+    assert box_for(table, 6) == box
+    assert box_for(table.model_copy(update={"grows": True}), 6) == box.scaled(3.0)
+    assert label("L") == "L"
 
 
 def test_concave_boxes_and_holes() -> None:
@@ -139,5 +172,5 @@ def test_size_grows_with_the_number_of_robots() -> None:
     # The same friction per robot as for two.
     assert four.friction_force / 4 == pytest.approx(BOXES["square"].friction_force / 2)
     assert box_for("circle", 3).radius == pytest.approx(1.5 * BOXES["circle"].radius)
-    with pytest.raises(ValueError, match=r"box = 'egg', allowed bar, circle"):
+    with pytest.raises(ValueError, match=r"box = .egg., allowed L, T, U, bar, circle"):
         box_for("egg", 2)
