@@ -153,6 +153,7 @@ def test_a_team_learns_to_push(line_world) -> None:
     settings = BatchTDSettings(
         rule_base=RuleBaseSettings(products=(("speed", "gap"),)),
         ridge=0.1,
+        mixing=1.0,
         discount=0.9,
         exploration=BurstExploration(rate=0.5, decay=0.7, floor=0.0),
         decision=Decision(rule="value"),
