@@ -21,12 +21,12 @@ from .config import ScenarioSettings
 from .failures import Failures
 from .infrared import strongest_reading
 from .prediction import BoxPrediction, Situation, mean_twists
-from .push import PushModel
+from .predictors import ExactPrediction, Future, push_model
 from .reward import reward
-from .robots import compliance, nominal_effect, robot_for
+from .robots import nominal_effect, robot_for
 from .starts import place
 from .state_spaces import STATE_SPACES, View
-from .world import CONTROL_PERIOD, World
+from .world import CONTROL_PERIOD, World, WorldState
 
 
 class BoxPushing:
@@ -73,22 +73,21 @@ class BoxPushing:
         self._space = STATE_SPACES[settings.state_space]
         self._limits: FloatArray = np.full(len(self.agents), self.robot.max_speed)
         self._effects = self.nominal_effects
-        self._model = PushModel(
-            edges=self.box.outline.edges,
-            rounding=self.box.outline.rounding,
-            reach=self.box.reach,
-            radii=np.full(settings.robots, self.robot.radius),
-            compliance=np.stack([compliance(self.robot)] * settings.robots),
-            friction_force=self.box.friction_force,
-            friction_radius=self.box.friction_radius,
-            contact_friction=self.box.contact_friction,
-        )
+        robots = [self.robot] * settings.robots
+        self._model = push_model(settings.predictor, robots, self.box)
+        self._playground = World(robots, self.box) if settings.predictor == "exact" else None
         self._failures = (
             Failures(settings.failures, self.agents, self._limits) if settings.failures else None
         )
         self._goal: FloatArray = np.zeros(3)
         self._speeds: FloatArray = np.zeros(len(self.agents))
         self._step = 0
+        self._saved: WorldState | None = None
+
+    @property
+    def superposes(self) -> bool:
+        """Whether predictions can be had to first order: all but exact ones."""
+        return self.settings.predictor != "exact"
 
     @property
     def state_space(self) -> StateSpace:
@@ -124,6 +123,7 @@ class BoxPushing:
         if self._failures is not None:
             self._failures.begin(seed, episode)
             self.world.set_grip(self._failures.grip)
+        self._save()
         return self._observe()
 
     def step(self, joint_action: IntArray) -> Transition:
@@ -152,6 +152,7 @@ class BoxPushing:
         if terminated:
             measured["stopped_at_goal"] = self._stays()
         self._step += 1
+        self._save()
         measured["seconds"] = {"physics": moved - begin, "sensors": sensed - moved}
         truncated = not terminated and measured["distance_m"] > self.settings.arena
         return Transition(states, float(gained[0]), terminated, truncated, measured, motions)
@@ -167,15 +168,24 @@ class BoxPushing:
 
     def predict_with(self, effects: Sequence[FloatArray]) -> BoxPrediction:
         """Predict from the present state, believing in these effects of the wheels."""
-        return BoxPrediction(
-            Situation(
-                self.world.robot_poses.copy(), self.world.box_pose.copy(), self._goal,
-                self._speeds, tuple(effects), self.groups,
-            ),
-            self._model, self._space, self.action_set, self.settings.reward,
-            self.settings.hold * CONTROL_PERIOD, self.settings.lookahead * CONTROL_PERIOD,
+        situation = Situation(
+            self.world.robot_poses.copy(), self.world.box_pose.copy(), self._goal,
+            self._speeds, tuple(effects), self.groups,
+        )  # fmt: skip
+        hold = self.settings.hold
+        believed = (
+            situation, self._model, self._space, self.action_set, self.settings.reward,
+            hold * CONTROL_PERIOD, self.settings.lookahead * CONTROL_PERIOD,
             self.settings.speed_increment, self._limits,
         )  # fmt: skip
+        if self._playground is None or self._saved is None:
+            return BoxPrediction(*believed)
+        future = Future(self._playground, self._saved, self._failures, self._step, hold)
+        return ExactPrediction(*believed, future)
+
+    def _save(self) -> None:
+        # After every step, asked for or not, as saving costs the world its order of contacts.
+        self._saved = None if self._playground is None else self.world.state()
 
     def measure(self) -> dict[str, Any]:
         """Return poses, speeds, contact and errors of the present state.
@@ -206,17 +216,10 @@ class BoxPushing:
 
     def _advance(self, commands: FloatArray) -> None:
         """Let the world go on for one decision period, the wheels being told `commands`."""
-        hold = self.settings.hold
         if self._failures is None:
-            self.world.advance(commands, hold)
-            return
-        if self._failures.strike(self._step):
-            self.world.set_grip(self._failures.grip)
-        touched = np.zeros(len(self.groups))
-        for speeds in self._failures.driven(commands, hold):
-            self.world.advance(speeds, 1)
-            touched += self.world.contact_time
-        self.world.contact_time = touched / hold
+            self.world.advance(commands, self.settings.hold)
+        else:
+            self._failures.advance(self.world, commands, self._step, self.settings.hold)
 
     def _distance(self) -> float:
         ahead = self._goal[:2] - self.world.box_pose[:2]

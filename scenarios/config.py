@@ -203,6 +203,8 @@ class ScenarioSettings(Settings):
     """Failures of wheels, as ``[[scenario.failures]]`` tables."""
     state_space: Literal["paper", "relational"] = "relational"
     """Eq. 1, or the relational variables."""
+    predictor: Literal["push", "rigid", "static", "exact"] = "push"
+    """What predictions take the world for, see `nested_agents.scenarios.predictors`."""
     reward: RewardSettings = RewardSettings()
     hold: Count = 8
     """Control periods of 64 ms for which a decision is held."""

@@ -34,6 +34,7 @@ from .config import (
     StuckSettings,
     WeakSettings,
 )
+from .world import World
 
 
 class Failures:
@@ -133,6 +134,16 @@ class Failures:
                 )
         self._commands = told[len(told) - self._memory :]
         return speeds
+
+    def advance(self, world: World, commands: FloatArray, step: int, periods: int) -> None:
+        """Let a world go on through (a part of) a step, its wheels being told `commands`."""
+        if self.strike(step):
+            world.set_grip(self.grip)
+        touched = np.zeros(len(world.robots))
+        for speeds in self.driven(commands, periods):
+            world.advance(speeds, 1)
+            touched += world.contact_time
+        world.contact_time = touched / periods
 
     def _gather(self) -> None:
         n = len(self._limits)
