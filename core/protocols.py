@@ -148,6 +148,61 @@ class Scenario(Protocol):
         ...
 
 
+class Superposition(Protocol):
+    """A prediction to first order: groups move what they share by contributions that add up.
+
+    ``G`` groups, ``L`` local codes of the largest, ``k`` components of what is shared.
+    """
+
+    @property
+    def contributions(self) -> FloatArray:
+        """``(G, L, k)`` what each local code of each group contributes to the sum."""
+        ...
+
+    @property
+    def alike(self) -> IntArray:
+        """``(G, L)`` the first local code of the group that comes to the same as this one."""
+        ...
+
+    def states(
+        self, agent: int, local: IntArray, sums: FloatArray, shares: FloatArray
+    ) -> FloatArray:
+        """Return the next states ``(m, d)`` of `agent`.
+
+        Parameters
+        ----------
+        agent
+            Whose states.
+        local
+            ``(m,)`` local code of its own group.
+        sums
+            ``(m, k)`` contributions of all groups, added up.
+        shares
+            ``(G, L)`` probabilities of the local codes of the other groups.
+        """
+        ...
+
+
+@runtime_checkable
+class SummedPrediction(Prediction, Protocol):
+    """A prediction that can also be had to first order, for any number of groups."""
+
+    @property
+    def superposition(self) -> Superposition:
+        """The prediction to first order."""
+        ...
+
+
+@runtime_checkable
+class SummedScenario(Scenario, Protocol):
+    """A scenario whose predictions can be had to first order."""
+
+    @property
+    def superposes(self) -> bool:
+        """Whether they can, with the present settings."""
+        ...
+
+
 class EmbodiedPrediction(Prediction, Protocol):
     """A prediction for bodies that are moved by wheels."""
 

@@ -11,14 +11,23 @@ import numpy as np
 from .arrays import FloatArray, IntArray
 from .config import Decision
 from .config import Learner as LearnerSettings
-from .evaluators import Evaluator, ExactEnumeration, Sampling
+from .evaluators import Evaluator, ExactEnumeration, Extremes, Moments, Sampling
 from .exploration import Explorer, Greedy, build_explorer
 from .hierarchy import Hierarchy
 from .learners import Learner, build_learner
-from .protocols import EmbodiedPrediction, EmbodiedScenario, Prediction, Scenario, Transition
+from .protocols import (
+    EmbodiedPrediction,
+    EmbodiedScenario,
+    Prediction,
+    Scenario,
+    SummedScenario,
+    Transition,
+)
 from .rules import RuleBase
 from .self_model import SelfModel
 from .spaces import ActionSet
+
+AnyEvaluator = ExactEnumeration | Sampling | Moments | Extremes
 
 
 class Team:
@@ -50,7 +59,7 @@ class Team:
         action_set: ActionSet,
         learner: Learner,
         explorer: Explorer,
-        evaluator: ExactEnumeration | Sampling | None,
+        evaluator: AnyEvaluator | None,
         seed: np.random.SeedSequence,
         self_model: SelfModel | None = None,
     ) -> None:
@@ -239,15 +248,29 @@ def _part(arrays: Mapping[str, FloatArray], prefix: str) -> dict[str, FloatArray
 
 def _build_evaluator(
     decision: Decision, rules: RuleBase, hierarchy: Hierarchy, scenario: Scenario, discount: float
-) -> ExactEnumeration | Sampling | None:
+) -> AnyEvaluator | None:
     if decision.rule == "random":
         return None
     common = (rules, hierarchy, len(scenario.action_set), decision.rule, decision.others, discount)
-    free = max(1 + len(hierarchy.below(i)) for i in range(len(hierarchy)))
-    small = free <= decision.exact_up_to
-    if decision.evaluator == "exact" or (decision.evaluator == "auto" and small):
+    kind = decision.evaluator
+    superposes = isinstance(scenario, SummedScenario) and scenario.superposes
+    if kind == "auto":
+        free = max(1 + len(hierarchy.below(i)) for i in range(len(hierarchy)))
+        summed = superposes and decision.rule == "value"
+        kind = "moments" if decision.others != "max" else "extremes"
+        if free <= decision.exact_up_to:
+            kind = "exact"
+        elif free <= decision.sampling_up_to or not summed:
+            kind = "sampling"
+    if kind == "exact":
         return ExactEnumeration(*common)
-    return Sampling(decision.samples, *common)
+    if kind == "sampling":
+        return Sampling(decision.samples, *common)
+    if not superposes:
+        raise ValueError(
+            f"decision.evaluator = {kind!r}: the scenario predicts no sums, use exact or sampling"
+        )
+    return (Moments if kind == "moments" else Extremes)(scenario.groups, *common)
 
 
 __all__ = ["Evaluator", "Team"]

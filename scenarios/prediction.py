@@ -20,6 +20,7 @@ from .infrared import expected_reading
 from .push import PushModel, push
 from .reward import reward
 from .state_spaces import BoxStateSpace, View, wrap
+from .superposition import PushSuperposition
 
 
 @dataclass(frozen=True)
@@ -145,6 +146,10 @@ class BoxPrediction:
     def _shared(self) -> dict[int, FloatArray]:
         return {}
 
+    def robot_of(self, agent: int) -> int:
+        """Return the robot of an agent."""
+        return self._robot_of(agent)[0]
+
     def _robot_of(self, agent: int) -> tuple[int, int]:
         for r, group in enumerate(self.situation.groups):
             if agent in group:
@@ -153,15 +158,25 @@ class BoxPrediction:
 
     def blocks(self, agent: int) -> Blocks:
         """Return the next states of `agent` for all joint actions, own block as if alone."""
-        r, wheel = self._robot_of(agent)
+        r, _ = self._robot_of(agent)
         view, row = self._table
         if r not in self._shared:
             self._shared[r] = self.space.shared(view, r)
-        drives, which = self._drives[r]
-        poses = self._alone[r] if self.space.own_needs_pose else np.zeros((len(drives), 3))
-        own = self.space.own(poses, drives[:, wheel], self.situation.goal)
+        own, which = self.own_block(agent)
         behind = sum(len(group) for group in self.situation.groups[r + 1 :])
         return Blocks(own, self._shared[r], len(self.action_set) ** behind, which, row)
+
+    def own_block(self, agent: int) -> tuple[FloatArray, IntArray]:
+        """Return the own variables by drive, as if alone, and the drive of every local code."""
+        r, wheel = self._robot_of(agent)
+        drives, which = self._drives[r]
+        poses = self._alone[r] if self.space.own_needs_pose else np.zeros((len(drives), 3))
+        return self.space.own(poses, drives[:, wheel], self.situation.goal), which
+
+    @cached_property
+    def superposition(self) -> PushSuperposition:
+        """The prediction to first order in what each robot does."""
+        return PushSuperposition(self, self._twists, [which for _, which in self._drives])
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""

@@ -9,5 +9,15 @@ often the agents below were seen to act so. Evaluators differ in which joint act
 from .evaluator import Counts, Evaluator, Rule
 from .exact import MOST_JOINT_ACTIONS, ExactEnumeration
 from .sampling import Sampling
+from .summed import Extremes, Moments
 
-__all__ = ["MOST_JOINT_ACTIONS", "Counts", "Evaluator", "ExactEnumeration", "Rule", "Sampling"]
+__all__ = [
+    "MOST_JOINT_ACTIONS",
+    "Counts",
+    "Evaluator",
+    "ExactEnumeration",
+    "Extremes",
+    "Moments",
+    "Rule",
+    "Sampling",
+]

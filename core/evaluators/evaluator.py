@@ -13,6 +13,7 @@ from ..protocols import Prediction
 from ..rules import RuleBase
 
 Rule = Literal["value", "reward", "reward-and-value"]
+Others = Literal["max", "mean", "observed"]
 
 
 @dataclass
@@ -84,7 +85,7 @@ class Gathering:
         hierarchy: Hierarchy,
         n_actions: int,
         rule: Rule,
-        others: Literal["max", "mean", "observed"],
+        others: Others,
         discount: float,
     ) -> None:
         self.rules, self.hierarchy, self.n_actions = rules, hierarchy, n_actions

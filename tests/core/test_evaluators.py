@@ -268,3 +268,11 @@ def test_too_many_joint_actions_are_refused() -> None:
     with pytest.raises(ValueError, match=r"'agent0' would try 4 \*\* 13 joint actions") as caught:
         ExactEnumeration(rules, Hierarchy(names, edges), A, "value", "max", DISCOUNT)
     assert "\n" not in str(caught.value)
+
+
+def test_weights_are_products_of_frequencies(rng: np.random.Generator) -> None:
+    frequencies = frequencies_of(rng)
+    tried = evaluators.evaluator.combinations((1, 3), A)
+    expected = frequencies[1, tried[:, 0]] * frequencies[3, tried[:, 1]]
+    found = evaluators.evaluator.weights_of(frequencies, (1, 3))
+    assert found == pytest.approx(expected / expected.sum(), rel=0, abs=1e-15)

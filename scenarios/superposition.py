@@ -1,0 +1,137 @@
+"""The push to first order: how far the box goes, as a sum of what each robot contributes.
+
+Robots that push together do not add up from nothing: two that push a box side by side move it
+hardly faster than one. So contributions are counted from a *reference* in which every robot moves
+at the mean of its possible twists: a robot's contribution is by how much the box goes further when
+it alone departs from the reference. Departures of several robots at once are taken to add up. That
+needs one push per robot and drive, in place of one for every combination of drives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numba import njit
+
+from ..core.arrays import BoolArray, FloatArray, IntArray
+from .geometry import surface
+from .push import MARGIN, push
+from .state_spaces import View
+
+if TYPE_CHECKING:
+    from .prediction import BoxPrediction
+
+
+TOUCH = 0.02
+"""Gap [m] now or in the reference below which a robot is among those that may move the box."""
+
+
+class PushSuperposition:
+    """A `nested_agents.core.protocols.Superposition` of box pushing.
+
+    The sum is the pose of the box relative to the reference; the robot of the deciding agent
+    stands where its drive takes it, the others where theirs do in the mean.
+
+    Parameters
+    ----------
+    prediction
+        What is approximated.
+    twists
+        ``(M, K, 3)`` twists of every drive.
+    which
+        Per robot the drive of every local code.
+    """
+
+    def __init__(
+        self, prediction: BoxPrediction, twists: FloatArray, which: Sequence[IntArray]
+    ) -> None:
+        self._prediction = prediction
+        n, n_drives = twists.shape[:2]
+        codes = max(len(w) for w in which)
+        self.contributions: FloatArray = np.zeros((n, codes, 3))
+        self.alike: IntArray = np.zeros((n, codes), dtype=np.int64)
+        self._poses: FloatArray = np.zeros((n, codes, 3))
+        self._gaps: FloatArray = np.zeros((n, codes))
+        for r, w in enumerate(which):
+            self.alike[r, : len(w)] = np.unique(w, return_index=True)[1][w]
+        mean = np.array([twists[r, w].mean(axis=0) for r, w in enumerate(which)])
+        near = self._near(twists)
+        far = np.flatnonzero(~near)
+        twists = np.concatenate([twists, mean[:, None]], axis=1)
+        every = np.arange(n)
+        robots, box, gaps = self._push(every, twists, np.full((1, n), n_drives))
+        self._box = box[0]
+        # A robot departs from the reference among those only that touch the box in it.
+        touching = np.minimum(self._present_gaps(), gaps[0]) < TOUCH
+        for r in np.flatnonzero(near).tolist():
+            crowd = np.flatnonzero(touching | (every == r))
+            column = int(np.searchsorted(crowd, r))
+            choices = np.full((which[r].max() + 1, len(crowd)), n_drives)
+            choices[:, column] = np.arange(len(choices))
+            robots, box, gaps = self._push(crowd, twists, choices)
+            rows = which[r]
+            self.contributions[r, : len(rows)] = box[rows] - self._box
+            self._poses[r, : len(rows)] = robots[rows, column]
+            self._gaps[r, : len(rows)] = gaps[rows, column]
+        # Robots that cannot reach the box do not depend on each other.
+        robots, _, gaps = self._push(far, twists, np.tile(np.arange(n_drives)[:, None], len(far)))
+        for column, r in enumerate(far.tolist()):
+            self._poses[r, : len(which[r])] = robots[which[r], column]
+            self._gaps[r, : len(which[r])] = gaps[which[r], column]
+
+    def _near(self, twists: FloatArray) -> BoolArray:
+        """Return which robots ``(M,)`` might touch the box, were it to come as fast as they."""
+        speeds = np.hypot(twists[:, :, 0], twists[:, :, 1]).max(axis=1)
+        travel = self._prediction.seconds * (speeds + speeds.max()) + 2.0 * MARGIN
+        return self._present_gaps() <= travel
+
+    def _present_gaps(self) -> FloatArray:
+        situation, model = self._prediction.situation, self._prediction.model
+        box = situation.box[None]
+        return _gaps(situation.robots, box, model.edges, model.rounding, model.radii)
+
+    def _push(
+        self, robots: IntArray, twists: FloatArray, choices: IntArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        situation, model = self._prediction.situation, self._prediction.model
+        found: tuple[FloatArray, FloatArray, FloatArray] = push(
+            situation.robots[robots], situation.box, twists[robots], choices,
+            self._prediction.seconds,
+            model._replace(radii=model.radii[robots], compliance=model.compliance[robots]),
+        )  # fmt: skip
+        return found
+
+    def states(
+        self, agent: int, local: IntArray, sums: FloatArray, shares: FloatArray
+    ) -> FloatArray:
+        """Return the next states ``(m, d)`` of `agent`, see the protocol."""
+        prediction, m = self._prediction, len(local)
+        r = prediction.robot_of(agent)
+        box = self._box + sums
+        robots = np.empty((m, *self._poses[:, 0].shape))
+        robots[:] = np.einsum("gl,glk->gk", shares, self._poses)
+        robots[:, r] = self._poses[r, local]
+        gaps = np.empty((m, len(robots[0])))
+        gaps[:] = np.einsum("gl,gl->g", shares, self._gaps)
+        model = prediction.model
+        gaps[:, r] = _gaps(
+            robots[:, r], box, model.edges, model.rounding, np.full(m, model.radii[r])
+        )
+        own, which = prediction.own_block(agent)
+        view = View(robots, box, gaps, prediction.situation.goal)
+        return np.concatenate([own[which[local]], prediction.space.shared(view, r)], axis=1)
+
+
+@njit(cache=True)
+def _gaps(robots, boxes, edges, rounding, radii):  # type: ignore[no-untyped-def]
+    """Return the gaps ``(m,)`` between poses of robots and of the box."""
+    gaps = np.empty(len(robots))
+    for c in range(len(robots)):
+        box = boxes[c % len(boxes)]
+        cos, sin = np.cos(box[2]), np.sin(box[2])
+        dx, dy = robots[c, 0] - box[0], robots[c, 1] - box[1]
+        near = surface(edges, rounding, cos * dx + sin * dy, cos * dy - sin * dx)
+        gaps[c] = near[0] - radii[c]
+    return gaps
