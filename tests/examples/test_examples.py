@@ -22,3 +22,11 @@ def test_ppo(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("stable_baselines3", reason="extra [peers]")
     monkeypatch.setattr("sys.argv", ["train_ppo.py", "1024"])
     runpy.run_path(str(path), run_name="__main__")
+
+
+def test_the_documented_prediction_errors_are_those_of_the_example() -> None:
+    example = runpy.run_path(str(EXAMPLES / "prediction_errors.py"), run_name="example")
+    count, means = example["errors"](box="square")
+    row = "| ".join(f"{mean:.1f} " for mean in means)
+    documented = (EXAMPLES.parent / "docs" / "predictors.md").read_text(encoding="utf-8")
+    assert f"| square | {count} | {row}|" in documented
