@@ -150,9 +150,7 @@ class BatchTD(Replay):
     ) -> FloatArray:
         """Return the lambda-returns ``(N,)`` of all after-states; arbitrary where cut off."""
         values = _row_values(theta, *self._rows[agent])
-        return _lambda_returns(
-            values, rewards, follower, self.settings.discount, self._decay
-        )
+        return _lambda_returns(values, rewards, follower, self.settings.discount, self._decay)
 
 
 class FittedValue(Replay):
