@@ -9,6 +9,7 @@ other one; p-values are adjusted by Holm's method over the two tests, and over a
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -96,17 +97,18 @@ class ChainOrders:
 def analyse(results: Results) -> ChainOrders:
     """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
     conditions = list(results.training)
+    names = shortened(conditions)
     table = []
-    for condition in conditions:
+    for condition, name in zip(conditions, names, strict=True):
         estimates = {
             m.title: rate(phase[condition]["success"])
             for m in MEASURES
             if condition in (phase := getattr(results, m.phase))
         }
         seeds = len(results.training[condition]["success"])
-        table.append(Summary(condition, seeds, estimates))
-    comparisons = _compared(results, conditions)
-    return ChainOrders(tuple(table), comparisons, tuple(_verdict(comparisons)))
+        table.append(Summary(name, seeds, estimates))
+    comparisons = _compared(results, conditions, names)
+    return ChainOrders(tuple(table), comparisons, (*_verdict(comparisons), *_legend(conditions)))
 
 
 def draw(analysis: ChainOrders, directory: Path) -> list[Path]:
@@ -116,7 +118,26 @@ def draw(analysis: ChainOrders, directory: Path) -> list[Path]:
     return chain_order_figure.draw(analysis, directory) if analysis.comparisons else []
 
 
-def _compared(results: Results, conditions: list[str]) -> tuple[Comparison, ...]:
+def shortened(orders: Sequence[str]) -> list[str]:
+    """Return labels of orders with agents by number, as in the first one that names them.
+
+    Examples
+    --------
+    >>> shortened(("chain:r1.a,r1.b", "chain:r1.b,r1.a"))
+    ['1 2', '2 1']
+    """
+    named = [order.removeprefix("chain:").split(",") for order in orders]
+    number = {name: str(k + 1) for k, name in enumerate(named[0])} if named else {}
+    return [" ".join(number.get(name, name) for name in names) for names in named]
+
+
+def _legend(orders: Sequence[str]) -> list[str]:
+    named = orders[0].removeprefix("chain:").split(",") if orders else []
+    numbered = (f"{k + 1} = {name}" for k, name in enumerate(named))
+    return [f"agents: {', '.join(numbered)}"] if len(named) > 1 else []
+
+
+def _compared(results: Results, conditions: list[str], names: list[str]) -> tuple[Comparison, ...]:
     found = []
     for m in MEASURES:
         phase = getattr(results, m.phase)
@@ -133,7 +154,7 @@ def _compared(results: Results, conditions: list[str]) -> tuple[Comparison, ...]
     omnibus = holm([test.p for _, _, test, _ in found])
     adjusted = holm(np.concatenate([against for *_, against in found])).reshape(len(found), -1)
     return tuple(
-        Comparison(title, tuple(conditions), values, test, float(p), ps)
+        Comparison(title, tuple(names), values, test, float(p), ps)
         for (title, values, test, _), p, ps in zip(found, omnibus, adjusted, strict=True)
     )
 

@@ -21,7 +21,7 @@ def draw(analysis: ChainOrders, directory: Path) -> list[Path]:
     the paper's order, is drawn in another colour and its mean as a line.
     """
     comparisons = analysis.comparisons
-    labels = shortened(comparisons[0].orders)
+    labels = comparisons[0].orders
     with mpl.rc_context(SETTINGS):  # type: ignore[arg-type]
         width = 2.2 + 0.07 * max(map(len, labels)) + 2.6 * len(comparisons)
         figure = Figure(figsize=(width, 1.3 + 0.2 * len(labels)), layout="constrained")
@@ -36,19 +36,6 @@ def draw(analysis: ChainOrders, directory: Path) -> list[Path]:
             metadata = {"Date": None} if path.suffix == ".svg" else {}
             figure.savefig(path, dpi=150, metadata=metadata)
     return paths
-
-
-def shortened(orders: tuple[str, ...]) -> list[str]:
-    """Return labels of orders with agents by number, as in the first one that names them.
-
-    Examples
-    --------
-    >>> shortened(("chain:r1.a,r1.b", "chain:r1.b,r1.a"))
-    ['1 2', '2 1']
-    """
-    named = [order.removeprefix("chain:").split(",") for order in orders]
-    number = {name: str(k + 1) for k, name in enumerate(named[0])}
-    return [" ".join(number.get(name, name) for name in names) for names in named]
 
 
 def _panel(axes: Axes, comparison: Comparison, rank: np.ndarray) -> None:

@@ -24,7 +24,8 @@ from ..topologies import arrange, parse
 from .cost import LEARNER, RULES
 from .statistics import Estimate, rate
 
-CONTENDERS = ("chain", "single-agent", "frozen chain")
+CONTENDERS = ("nested", "single", "frozen")
+"""The chain, the single agent, and a chain that never learns."""
 AGENTS = (1, 2, 3)
 STEP_SIZES = (0.1, 0.3, 1.0)
 """Tried for each contender; normalised by the squared length of the feature vector."""
@@ -104,7 +105,7 @@ def compare(
         tried = [
             (case, size, seed)
             for case in cases
-            for size in (STEP_SIZES if case[1] != "frozen chain" else STEP_SIZES[:1])
+            for size in (STEP_SIZES if case[1] != "frozen" else STEP_SIZES[:1])
             for seed in TUNING_SEEDS
         ]
         runs = parallel(
@@ -127,13 +128,13 @@ def compare(
 
 def run(n: int, contender: str, step_size: float, seed: int, episodes: int) -> Run:
     """Train one contender on one seed, then evaluate it greedily."""
-    topology = parse("single-agent" if contender == "single-agent" else "chain")
+    topology = parse("single-agent" if contender == "single" else "chain")
     scenario, hierarchy = arrange(topology, LineUp(n))
     base = LEARNER.rule_base.model_copy(update={"order": scenario.state_space.n_variables})
     learner: TDLambdaSettings | FrozenSettings = TDLambdaSettings(
         rule_base=base, decision=LEARNER.decision, step_size=step_size, normalised=True
     )
-    if contender == "frozen chain":
+    if contender == "frozen":
         learner = FrozenSettings(rule_base=base, decision=LEARNER.decision)
     team = Team.build(learner, scenario, hierarchy, policy_seed(seed))
     success, seconds = [], []
@@ -162,7 +163,7 @@ def run(n: int, contender: str, step_size: float, seed: int, episodes: int) -> R
 def _contest(n: int, contender: str, step_size: float, runs: Sequence[Run]) -> Contest:
     curves = np.stack([r.success for r in runs])
     problem = Problem(rules=RULES, iterations=1)
-    single = contender == "single-agent"
+    single = contender == "single"
     return Contest(
         n,
         contender,

@@ -14,6 +14,8 @@ from .cost_table import number
 from .figures import COLOURS, SETTINGS
 from .single_agent import BLOCK, CONTENDERS, Contest
 from .statistics import Estimate
+from .summary import interval
+from .summary import number as short
 from .topology_view import aligned
 
 
@@ -81,4 +83,4 @@ def draw(contests: Sequence[Contest], path: Path) -> None:
 
 
 def _rate(estimate: Estimate) -> str:
-    return f"{estimate.value:.2f} [{estimate.low:.2f}, {estimate.high:.2f}]"
+    return f"{short(float(estimate.value))} [{interval(estimate)}]"

@@ -196,7 +196,7 @@ def printed(shown: View, form: Form) -> str:
             "",
             *aligned(rows, "><>><"),
             "",
-            "In order of decision; below: agents it sees, tries: joint actions it tries a step.",
+            "In order of decision. below: agents seen; tries: joint actions tried a step.",
         ]
     )
 

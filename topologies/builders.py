@@ -15,7 +15,7 @@ from typing import Literal, TypeAlias
 import networkx as nx
 import numpy as np
 
-from .checks import check_names
+from .checks import check_names, with_edges
 
 Member: TypeAlias = "str | Sequence[Member]"
 """An agent, or a team of members."""
@@ -141,10 +141,7 @@ def from_edges(
     """
     graph = nx.DiGraph()
     graph.add_nodes_from(alone)
-    for superior, subordinate in edges:
-        if graph.has_edge(superior, subordinate):
-            raise ValueError(f"edge {superior} -> {subordinate} is given more than once")
-        graph.add_edge(superior, subordinate)
+    with_edges(graph, edges)
     check_names(list(graph), agents, "the edges (with `alone`)")
     return graph
 

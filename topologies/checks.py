@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Sequence
 
+import networkx as nx
+
 
 def check_names(
     names: Sequence[str], agents: Sequence[str], what: str, *, all_needed: bool = True
@@ -37,6 +39,15 @@ def check_names(
     if all_needed and missing:
         first = next(agent for agent in agents if agent in missing)
         raise ValueError(f"{what} lacks agent {first!r}")
+
+
+def with_edges(graph: nx.DiGraph, edges: Iterable[Sequence[str]]) -> nx.DiGraph:
+    """Add (superior, subordinate) pairs to a graph, which is modified; refuse one given twice."""
+    for superior, subordinate in edges:
+        if graph.has_edge(superior, subordinate):
+            raise ValueError(f"edge {superior} -> {subordinate} is given more than once")
+        graph.add_edge(superior, subordinate)
+    return graph
 
 
 def listed(names: Iterable[str], most: int = 12) -> str:

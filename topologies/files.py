@@ -17,6 +17,8 @@ from typing import Any
 
 import networkx as nx
 
+from .checks import with_edges
+
 ENTRY_POINTS = "nested_agents.topologies"
 """The entry-point group under which installed packages offer topologies."""
 
@@ -166,10 +168,9 @@ def called(
             f"{name} returned {type(result).__name__}, allowed: a networkx DiGraph or pairs "
             "(superior, subordinate)"
         ) from None
-    graph = nx.MultiDiGraph() if len(set(edges)) < len(edges) else nx.DiGraph()
+    graph = nx.DiGraph()
     graph.add_nodes_from(agents)
-    graph.add_edges_from(edges)
-    return graph
+    return with_edges(graph, edges)
 
 
 def _graph_of(content: Any) -> nx.DiGraph:
@@ -183,11 +184,7 @@ def _graph_of(content: Any) -> nx.DiGraph:
         raise ValueError(f"its keys must be edges and alone, not {', '.join(content) or 'none'}")
     graph = nx.DiGraph()
     graph.add_nodes_from(content.get("alone", []))
-    for superior, subordinate in content["edges"]:
-        if graph.has_edge(superior, subordinate):
-            raise ValueError(f"edge {superior} -> {subordinate} is given more than once")
-        graph.add_edge(superior, subordinate)
-    return graph
+    return with_edges(graph, content["edges"])
 
 
 def _read(path: str) -> bytes:

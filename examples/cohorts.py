@@ -1,0 +1,18 @@
+"""
+A topology of one's own
+=======================
+
+A topology is a function from the names of the agents, and the same names by robot, to pairs
+(superior, subordinate). Here the robots are cohorts, one above the other: the wheels of a robot do
+not see each other, but every wheel of the robots below.
+"""
+
+from itertools import pairwise, product
+
+
+def cohorts(agents, groups):
+    """Put every wheel of a robot above every wheel of the next one."""
+    pairs = []
+    for robot, following in pairwise(groups):
+        pairs.extend(product(robot, following))
+    return pairs

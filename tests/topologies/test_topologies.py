@@ -1,0 +1,220 @@
+"""Builders, spec strings, tables and every refusal."""
+
+import json
+import tomllib
+from pathlib import Path
+
+import networkx as nx
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import TypeAdapter, ValidationError
+
+from nested_agents.core.hierarchy import Hierarchy
+from nested_agents.core.single_agent import SingleAgent
+from nested_agents.topologies import (
+    BUILDERS,
+    KINDS,
+    Topology,
+    arrange,
+    build,
+    builders,
+    from_networkx,
+    parse,
+)
+
+AGENTS = ("a", "b", "c", "d")
+ROBOTS = ((0, 1), (2, 3))
+ADAPTER = TypeAdapter(Topology)
+
+
+def edges(text: str, agents=AGENTS, groups=ROBOTS) -> set[str]:
+    """The edges that a string makes, as ``{"ab", ...}``."""
+    hierarchy = build(parse(text), agents, groups)
+    return {hierarchy.agents[a] + hierarchy.agents[b] for a, b in hierarchy.edges}
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("chain", {"ab", "bc", "cd"}),
+        ("chain:reversed", {"dc", "cb", "ba"}),
+        ("chain:interleaved", {"ac", "cb", "bd"}),
+        ("chain:c,a,d,b", {"ca", "ad", "db"}),
+        ("tree", {"ab", "ac", "bd"}),
+        ("tree:3", {"ab", "ac", "ad"}),
+        ("tree:1", {"ab", "bc", "cd"}),
+        ("star", {"ab", "ac", "ad"}),
+        ("star:c", {"ca", "cb", "cd"}),
+        ("teams", {"ab", "ac", "cd"}),
+        ("teams:star", {"ab", "ac", "cd"}),
+        ("independent", set()),
+        ("edges:a>b,a>c,d", {"ab", "ac"}),
+    ],
+)
+def test_a_string_makes_these_edges(text: str, expected: set[str]) -> None:
+    assert edges(text) == expected
+
+
+def test_teams_nest_to_any_depth() -> None:
+    table = {"kind": "teams", "members": [[["a", "b"], ["c"]], [["d", "e"], "f"]]}
+    hierarchy = build(ADAPTER.validate_python(table), tuple("abcdef"))
+    named = {"".join(hierarchy.agents[i] for i in edge) for edge in hierarchy.edges}
+    # a leads everything, c follows a within the first team, d leads the second one.
+    assert named == {"ab", "ac", "ad", "de", "df"}
+    star = build(ADAPTER.validate_python({**table, "link": "star"}), tuple("abcdef"))
+    assert star.edges == hierarchy.edges
+
+
+def test_a_random_hierarchy_follows_from_its_seed() -> None:
+    assert edges("random:5") == edges("random:5")
+    assert any(edges("random:5") != edges(f"random:{seed}") for seed in range(5))
+    dense = ADAPTER.validate_python({"kind": "random", "density": 1.0})
+    assert build(dense, AGENTS).depth == 4
+
+
+@given(n=st.integers(1, 12), seed=st.integers(0, 1000), density=st.floats(0, 1))
+def test_every_random_graph_is_a_hierarchy(n: int, seed: int, density: float) -> None:
+    agents = [f"agent{i}" for i in range(n)]
+    hierarchy = Hierarchy(agents, builders.random_hierarchy(agents, seed, density).edges)
+    assert sorted(hierarchy.order) == list(range(n))
+
+
+REFUSED = {
+    "chain:a,b,c": "topology 'chain': order lacks agent 'd'",
+    "chain:a,b,c,c": "topology 'chain': order names agent 'c' more than once",
+    "chain:a,b,c,x": "topology 'chain': order names unknown agent 'x', known: a, b, c, d",
+    "tree:0": "topology 'tree:0': branching: Input should be greater than or equal to 1",
+    "tree:two": "topology 'tree:two': branching must be an integer, received 'two'",
+    "star:x": "topology 'star': leader names unknown agent 'x', known: a, b, c, d",
+    "teams:ring": "topology 'teams:ring': link: Input should be 'chain' or 'star'",
+    "independent:2": "topology 'independent:2': takes no argument, received '2'",
+    "edges": "topology 'edges': edges: Field required",
+    "edges:a>b": "topology 'edges': the edges (with `alone`) lacks agent 'c'",
+    "edges:a>x,b,c,d": "topology 'edges': the edges (with `alone`) names unknown agent 'x', known:",
+    "edges:a>b,a>b,c,d": "topology 'edges': edge a -> b is given more than once",
+    "edges:a>a,b,c,d": "topology 'edges': agent 'a' cannot be its own superior",
+    "edges:a>b,b>c,c>a,d": "topology 'edges': cycle a -> b -> c -> a",
+    "edges:a>b>c,d": "topology 'edges:a>b>c,d': an edge must be written a>b, received 'a>b>c'",
+    "random:-1": "topology 'random:-1': seed: Input should be greater than or equal to 0",
+    "nothing.json": "topology 'nothing.json': nothing.json: No such file or directory",
+    "file:x.csv": "topology 'file:x.csv': x.csv: No such file or directory",
+    "nothing.py:f": "topology 'nothing.py:f': nothing.py: No such file or directory",
+    "package:ring": "topology 'package': no installed package offers 'ring', they offer: none",
+    "chian": "topology 'chian': did you mean 'chain'? known: chain, tree, star,",
+    "": "topology '': known: chain,",
+    "single-agent": "topology 'single-agent' is no hierarchy of 4 agents; use topologies.arrange",
+}
+
+
+@pytest.mark.parametrize(("text", "message"), REFUSED.items())
+def test_a_refusal_is_one_line_that_names_the_culprit(text: str, message: str) -> None:
+    with pytest.raises(ValueError, match=r".") as refusal:
+        build(parse(text), AGENTS, ROBOTS)
+    assert str(refusal.value).startswith(message)
+    assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ({"kind": "teams", "members": [["a", "b"], ["c"]]}, "members lacks agent 'd'"),
+        ({"kind": "teams", "members": [["a", "b"], ["c", "d", "a"]]}, "names agent 'a' more than"),
+        ({"kind": "teams", "members": [["a", "b"], [], ["c", "d"]]}, "a team has no members"),
+    ],
+)
+def test_a_table_that_does_not_fit_is_refused(table: dict, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        build(ADAPTER.validate_python(table), AGENTS)
+
+
+@pytest.mark.parametrize("table", [{"kind": "ring"}, {"kind": "tree", "depth": 2}, {}, 3])
+def test_a_table_of_another_shape_is_refused(table: object) -> None:
+    with pytest.raises(ValidationError):
+        ADAPTER.validate_python(table)
+
+
+def test_settings_survive_json_and_strict_tables() -> None:
+    for text in ("chain:b,a,c,d", "tree:3", "teams:star", "edges:a>b,c,d", "random:7", "star:c"):
+        settings = parse(text)
+        assert ADAPTER.validate_json(settings.model_dump_json()) == settings
+        assert ADAPTER.validate_python(settings.model_dump(), strict=True) == settings
+        assert ADAPTER.validate_python(text) == settings
+
+
+def test_every_kind_has_settings_and_a_builder() -> None:
+    assert set(KINDS) == {*BUILDERS, "single-agent"}
+
+
+def test_toml() -> None:
+    table = tomllib.loads('kind = "edges"\nedges = [["a", "b"]]\nalone = ["c", "d"]')
+    assert build(ADAPTER.validate_python(table), AGENTS).edges == ((0, 1),)
+
+
+def test_from_networkx() -> None:
+    graph = nx.DiGraph([(0, 1), (0, 2)])
+    assert set(from_networkx(graph, ("0", "1", "2")).edges) == {("0", "1"), ("0", "2")}
+    with pytest.raises(ValueError, match="the graph lacks agent '3'"):
+        from_networkx(graph, ("0", "1", "2", "3"))
+    with pytest.raises(ValueError, match="undirected"):
+        from_networkx(nx.Graph(graph), ("0", "1", "2"))
+    with pytest.raises(ValueError, match="multigraph"):
+        from_networkx(nx.MultiDiGraph(graph), ("0", "1", "2"))
+    with pytest.raises(ValueError, match="names agent '0' more than once"):
+        from_networkx(nx.DiGraph([(0, "0")]), ("0",))
+
+
+def test_the_single_agent_sees_a_scenario_of_its_own(line_world) -> None:
+    world = line_world(2, 1)
+    scenario, hierarchy = arrange(parse("single-agent"), world)
+    assert isinstance(scenario, SingleAgent)
+    assert hierarchy.agents == scenario.agents
+    assert arrange(parse("chain"), world)[0] is world
+
+
+def graph_files(folder: Path) -> dict[str, Path]:
+    graph = nx.DiGraph([("a", "b"), ("a", "c")])
+    graph.add_node("d")
+    paths = {name: folder / name for name in ("g.graphml", "pairs.json", "links.json")}
+    nx.write_graphml(graph, paths["g.graphml"])
+    paths["pairs.json"].write_text('{"edges": [["a", "b"], ["a", "c"]], "alone": ["d"]}')
+    paths["links.json"].write_text(json.dumps(nx.node_link_data(graph, edges="links")))
+    return paths
+
+
+@pytest.mark.parametrize("name", ["g.graphml", "pairs.json", "links.json"])
+def test_graph_files(tmp_path: Path, name: str) -> None:
+    path = graph_files(tmp_path)[name]
+    assert edges(str(path)) == edges(f"file:{path}") == {"ab", "ac"}
+
+
+def test_a_graph_file_that_changed_is_refused(tmp_path: Path) -> None:
+    path = graph_files(tmp_path)["pairs.json"]
+    settings = parse(str(path))
+    path.write_text('{"edges": [["a", "b"], ["b", "c"]], "alone": ["d"]}')
+    with pytest.raises(ValueError, match="has changed: its digest is"):
+        build(settings, AGENTS)
+    path.unlink()  # settings that are on record can still be read
+    assert ADAPTER.validate_json(settings.model_dump_json()) == settings
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("x.json", "{", "holds no graph: Expecting"),
+        ("x.json", "[]", "holds no graph: it must be an object"),
+        ("x.json", '{"edges": [], "names": []}', "holds no graph: its keys must be"),
+        ("x.json", '{"edges": [["a", "b"], ["a", "b"]]}', "edge a -> b is given more than once"),
+        ("x.json", '{"edges": [["a"]]}', "holds no graph: not enough values"),
+        ("x.graphml", "nothing", "holds no graph: syntax error"),
+        ("x.csv", "a,b", "suffix must be .graphml or .json"),
+    ],
+)
+def test_a_file_without_a_graph_is_refused(
+    tmp_path: Path, name: str, content: str, message: str
+) -> None:
+    path = tmp_path / name
+    path.write_text(content)
+    with pytest.raises(ValueError, match=message) as refusal:
+        build(parse(f"file:{path}"), AGENTS)
+    assert "\n" not in str(refusal.value)

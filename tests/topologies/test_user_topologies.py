@@ -1,0 +1,125 @@
+"""Topologies of users: Python files and entry points."""
+
+from importlib.metadata import EntryPoint
+from pathlib import Path
+
+import networkx as nx
+import pytest
+
+from nested_agents.topologies import build, files, parse
+
+AGENTS = ("a", "b", "c", "d")
+ROBOTS = ((0, 1), (2, 3))
+EXAMPLE = Path(__file__).parents[2] / "examples" / "cohorts.py"
+
+
+def test_the_example_of_the_documentation() -> None:
+    hierarchy = build(parse(f"{EXAMPLE}:cohorts"), AGENTS, ROBOTS)
+    assert hierarchy.edges == ((0, 2), (0, 3), (1, 2), (1, 3))
+    assert hierarchy.unseen(0) == (1,)
+    lines = EXAMPLE.read_text().partition("def ")[2].splitlines()
+    assert len(lines) <= 10
+    documented = (EXAMPLE.parents[1] / "docs" / "topologies.md").read_text()
+    assert "def " + EXAMPLE.read_text().partition("def ")[2].strip() in documented
+
+
+@pytest.fixture
+def written(tmp_path: Path):
+    """A function that writes a Python file and returns the topology ``file:f``."""
+
+    def write(source: str) -> str:
+        path = tmp_path / "mine.py"
+        path.write_text(source)
+        return f"{path}:f"
+
+    return write
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        "return [(a, b) for a, b in zip(agents, agents[1:])]",
+        "import networkx as nx\n    return nx.path_graph(agents, create_using=nx.DiGraph)",
+        "yield from zip(agents, agents[1:])",
+    ],
+)
+def test_pairs_or_a_graph(written, body: str) -> None:
+    settings = parse(written(f"def f(agents, groups):\n    {body}\n"))
+    assert build(settings, AGENTS).edges == ((0, 1), (1, 2), (2, 3))
+
+
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        ("def g(agents, groups): pass", "has no function 'f', it has: g"),
+        ("import os\n1 / 0", "cannot be run: ZeroDivisionError"),
+        ("def f(:", "cannot be run: SyntaxError"),
+        ("def f(agents): return []", "f raised TypeError"),
+        ("def f(agents, groups): return groups[9]", "f raised IndexError"),
+        ("def f(agents, groups): return 3", "f returned int, allowed: a networkx DiGraph"),
+        ("def f(agents, groups): return [('a', 'b', 'c')]", "f returned list, allowed:"),
+        ("def f(agents, groups): return [('a', 'b')] * 2", "edge a -> b is given more than once"),
+        ("def f(agents, groups): return [('a', 'x')]", "the graph names unknown agent 'x'"),
+        ("def f(agents, groups): return [('a', 'b'), ('b', 'a')]", "cycle a -> b -> a"),
+        (
+            "import networkx as nx\ndef f(agents, groups): return nx.DiGraph([('a', 'b')])",
+            "the graph lacks agent 'c'",
+        ),
+    ],
+)
+def test_a_bad_function_is_refused_in_one_line(written, source: str, message: str) -> None:
+    text = written(source)
+    with pytest.raises(ValueError, match=r".") as refusal:
+        build(parse(text), AGENTS, ROBOTS)
+    assert message in str(refusal.value)
+    assert str(refusal.value).startswith("topology 'python': ")
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_file_that_changed_is_refused(written) -> None:
+    settings = parse(written("def f(agents, groups): return []"))
+    written("def f(agents, groups): return [('a', 'b')]")
+    with pytest.raises(ValueError, match=r"mine\.py has changed"):
+        build(settings, AGENTS)
+
+
+@pytest.mark.parametrize("text", ["python:mine.py", "python:mine:f", "python:mine.py:2f"])
+def test_a_source_must_name_file_and_function(text: str) -> None:
+    with pytest.raises(ValueError, match=r"must be written path/to/file\.py:function"):
+        parse(text)
+
+
+def path_of(agents, groups):
+    """What the made-up package offers."""
+    return nx.path_graph(agents, create_using=nx.DiGraph)
+
+
+def points(*pairs: tuple[str, str]):
+    """A stand-in for `importlib.metadata.entry_points`."""
+    found = [EntryPoint(name, value, files.ENTRY_POINTS) for name, value in pairs]
+
+    def entry_points(group: str, name: str | None = None):
+        return [p for p in found if name in (None, p.name)]
+
+    return entry_points
+
+
+def test_entry_points(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(files, "entry_points", points(("line", "mine:f")))
+    monkeypatch.setattr(EntryPoint, "load", lambda self: path_of)
+    assert parse("line") == parse("package:line")
+    assert build(parse("line"), AGENTS).edges == ((0, 1), (1, 2), (2, 3))
+    with pytest.raises(ValueError, match=r"known: chain, .*, line, or a file"):
+        parse("lime")
+
+
+def test_bad_entry_points(monkeypatch: pytest.MonkeyPatch) -> None:
+    offered = points(("line", "absent_package:f"), ("pi", "math:pi"))
+    monkeypatch.setattr(files, "entry_points", offered)
+    with pytest.raises(ValueError, match="'line' cannot be loaded: ModuleNotFoundError"):
+        build(parse("line"), AGENTS)
+    with pytest.raises(ValueError, match=r"'pi' \(math:pi\) is no function"):
+        build(parse("pi"), AGENTS)
+    monkeypatch.setattr(files, "entry_points", points(("line", "a:f"), ("line", "b:f")))
+    with pytest.raises(ValueError, match="entry point 'line' is offered twice: a:f, b:f"):
+        parse("line")
