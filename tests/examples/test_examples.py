@@ -30,3 +30,15 @@ def test_the_documented_prediction_errors_are_those_of_the_example() -> None:
     row = "| ".join(f"{mean:.1f} " for mean in means)
     documented = (EXAMPLES.parent / "docs" / "predictors.md").read_text(encoding="utf-8")
     assert f"| square | {count} | {row}|" in documented
+
+
+@pytest.mark.slow
+def test_contact_sheet(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "boxes.png"
+    monkeypatch.setattr("sys.argv", ["contact_sheet.py", str(path)])
+    runpy.run_path(str(EXAMPLES / "contact_sheet.py"), run_name="__main__")
+    assert path.stat().st_size > 100_000
+    documented = (EXAMPLES.parent / "docs" / "worlds.md").read_text(encoding="utf-8")
+    assert capsys.readouterr().out.strip() in documented

@@ -1,0 +1,42 @@
+"""
+All boxes, with two, four and eight robots
+==========================================
+
+Writes the picture ``boxes.png``, or the one named as argument, and prints the boxes' mass
+properties. Boxes grow with the number of robots.
+"""
+
+import sys
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+
+from nested_agents.scenarios import BoxPushing, ScenarioSettings
+from nested_agents.scenarios.boxes import BOXES
+from nested_agents.scenarios.screen import Screen
+
+ROBOTS = (2, 4, 8)
+
+print("| box | area [m2] | mass [kg] | inertia [g m2] | friction radius [m] | fixtures |")
+print("|---|---|---|---|---|---|")
+for name, box in BOXES.items():
+    print(
+        f"| {name} | {box.area:.4f} | {box.mass} | {1000 * box.inertia:.3f} | "
+        f"{box.friction_radius:.4f} | {len(box.fixtures) or 'a disc'} |"
+    )
+
+figure, grid = plt.subplots(len(BOXES), len(ROBOTS), figsize=(9, 1.9 * len(BOXES)))
+for row, name in zip(grid, BOXES, strict=True):
+    for axes, robots in zip(row, ROBOTS, strict=True):
+        settings = ScenarioSettings(box=name, robots=robots, start="hard")
+        scenario, screen = BoxPushing(settings), Screen(settings, "rgb_array")
+        scenario.reset(1)
+        screen.begin(scenario.measure())
+        axes.imshow(screen.render())
+        axes.set_title(f"{name}, {robots} robots", fontsize=8)
+        axes.set_axis_off()
+figure.tight_layout(pad=0.3)
+figure.savefig(Path(sys.argv[1] if len(sys.argv) > 1 else "boxes.png"), dpi=90)
