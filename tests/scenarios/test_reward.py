@@ -1,0 +1,59 @@
+"""The reward by hand, condition by condition (Eq. 15-17)."""
+
+from math import exp
+
+import numpy as np
+import pytest
+
+from nested_agents.scenarios.config import RewardSettings
+from nested_agents.scenarios.reward import reward
+
+SETTINGS = RewardSettings()
+
+
+def one(distance=0.5, approach=-0.02, turn=0.2, contact=(True, True), readings=(1.0, 0.9)) -> float:
+    value = reward(
+        SETTINGS,
+        np.array([distance]),
+        np.array([approach]),
+        np.array([turn]),
+        np.array([contact]),
+        np.array([readings]),
+    )
+    return float(value[0])
+
+
+def penalties(*readings: float) -> float:
+    return sum(0.0007 * exp(-5.0 * reading) for reading in readings)
+
+
+def test_condition_1_pays_nearness_less_penalties() -> None:
+    expected = 0.01 * exp(-1.5 * 0.5) - penalties(1.0, 0.9) - 0.0003 * 0.2
+    assert one() == pytest.approx(expected, rel=1e-12)
+    assert one(turn=-0.2) == one(turn=0.2)
+
+
+@pytest.mark.parametrize("approach", [0.0, 0.03, -0.0009])
+def test_condition_2_a_box_that_does_not_come_nearer(approach: float) -> None:
+    assert one(approach=approach) == 0.000001
+
+
+def test_condition_3_all_within_range() -> None:
+    readings = (0.4, 0.02)
+    assert one(contact=(True, False), readings=readings) == pytest.approx(-penalties(*readings))
+
+
+def test_condition_3_as_printed_adds_the_attraction() -> None:
+    printed = RewardSettings(attraction_without_contact=True)
+    half = np.array([0.5])
+    value = reward(printed, half, half, half, np.zeros((1, 2), bool), np.full((1, 2), 0.1))
+    assert value[0] == pytest.approx(0.01 * exp(-0.75) - penalties(0.1, 0.1))
+
+
+def test_conditions_4_and_5_out_of_range() -> None:
+    assert one(contact=(False, False), readings=(0.3, 0.0)) == -0.0015
+    assert one(contact=(False, False), readings=(0.0, 0.0)) == -0.002
+
+
+def test_any_number_of_robots() -> None:
+    assert one(contact=(True,), readings=(1.0,)) > one(contact=(True,) * 4, readings=(1.0,) * 4)

@@ -1,0 +1,66 @@
+"""State variables worked out by hand, and their mirror images."""
+
+from math import pi
+
+import numpy as np
+import pytest
+
+from nested_agents.scenarios.state_spaces import STATE_SPACES, View, wrap
+
+GOAL = np.array([1.0, 0.0, 0.0])
+
+
+def view(robots, box, gaps) -> View:
+    return View(np.array([robots], float), np.array([box], float), np.array([gaps], float), GOAL)
+
+
+@pytest.mark.parametrize("name", STATE_SPACES)
+def test_functions_fill_the_space_they_describe(name: str) -> None:
+    spec = STATE_SPACES[name]
+    poses = np.random.default_rng(0).uniform(-1, 1, (5, 2, 3))
+    seen = View(poses, poses[:, 0], np.abs(poses[:, :, 0]), GOAL)
+    assert spec.own(poses[:, 0], poses[:, 0, 0], GOAL).shape == (5, spec.space.n_own)
+    assert spec.shared(seen, 1).shape == (5, spec.space.n_variables - spec.space.n_own)
+
+
+def test_relational_variables_by_hand() -> None:
+    # The box 1 m before the goal, robot 1 straight behind it, robot 2 on its left, facing it.
+    situation = view([[-0.2, 0.0, 0.1], [0.0, 0.2, -pi / 2]], [0.0, 0.0, 0.3], [0.06, 0.08])
+    first = STATE_SPACES["relational"].shared(situation, 0)[0]
+    gap, bearing, side, others, push, turn, distance = first
+    assert (gap, others, distance) == (0.06, 0.08, 1.0)
+    assert bearing == pytest.approx(-0.1)
+    assert side == pytest.approx(0.0)
+    assert push == pytest.approx(-pi / 4)  # their middle is behind on the left, pushes to the right
+    assert turn == pytest.approx(0.3)
+    second = STATE_SPACES["relational"].shared(situation, 1)[0]
+    assert second[1] == pytest.approx(0.0)
+    assert second[2] == pytest.approx(-pi / 2)
+
+
+def test_a_single_robot_has_no_others() -> None:
+    shared = STATE_SPACES["relational"].shared(view([[-0.2, 0, 0]], [0, 0, 0], [0.06]), 0)[0]
+    assert shared[3] == shared[0] == 0.06
+
+
+def test_equation_1_by_hand() -> None:
+    own = STATE_SPACES["paper"].own(np.array([[1.0, -2.0, pi]]), np.array([0.05]), GOAL)[0]
+    np.testing.assert_allclose(own, [-pi, -pi / 2, 2.0, 0.05], atol=1e-12)
+    shared = STATE_SPACES["paper"].shared(view([[0, 0, 0]], [1.0, 1.0, 0.2], [0.1]), 0)[0]
+    np.testing.assert_allclose(shared, [0.2, -pi / 2 - 0.2, 1.0], atol=1e-12)
+
+
+def test_mirrored_worlds_have_mirrored_angles() -> None:
+    rng = np.random.default_rng(2)
+    robots, box = rng.uniform(-1, 1, (2, 3)), rng.uniform(-0.5, 0.5, 3)
+    flip = np.array([1.0, -1.0, -1.0])
+    for robot in (0, 1):
+        seen = STATE_SPACES["relational"].shared(view(robots, box, [0.1, 0.2]), robot)[0]
+        mirrored = STATE_SPACES["relational"].shared(
+            view(robots * flip, box * flip, [0.1, 0.2]), robot
+        )[0]
+        np.testing.assert_allclose(mirrored, seen * [1, -1, -1, 1, -1, -1, 1], atol=1e-12)
+
+
+def test_angles_wrap() -> None:
+    np.testing.assert_allclose(wrap(np.array([0.0, 3 * pi, -1.5 * pi])), [0.0, -pi, 0.5 * pi])
