@@ -22,10 +22,11 @@ def main() -> None:
     size.add_argument("--smoke", action="store_true", help="one tiny case, to see that it runs")
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write everything here")
     options = parser.parse_args()
-    exact = {"dense": (2, 4, 6), "compact": (2, 4, 6), "order 1": (4,)}
+    exact = {"dense": (2, 4, 6), "dense32": (4,), "compact": (2, 4, 6), "order 1": (4,)}
     beyond, budget = {"order 1": (16, 64, 128)}, 1.0
     if options.full:
-        exact = {"dense": (2, 4, 6, 8, 10), "compact": (2, 4, 6, 8, 10), "order 1": (2, 4, 8)}
+        exact = {name: (2, 4, 6, 8, 10) for name in ("dense", "compact", "order 1")}
+        exact["dense32"] = (4,)
         beyond = {"order 1": (8, 16, 32, 64, 128), "compact": (128,)}
         budget = 5.0
     if options.smoke:

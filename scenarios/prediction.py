@@ -148,17 +148,21 @@ class BoxPrediction:
 
     def robot_of(self, agent: int) -> int:
         """Return the robot of an agent."""
-        return self._robot_of(agent)[0]
+        return self._places[agent][0]
 
-    def _robot_of(self, agent: int) -> tuple[int, int]:
-        for r, group in enumerate(self.situation.groups):
-            if agent in group:
-                return r, group.index(agent)
-        raise IndexError(agent)
+    @cached_property
+    def _places(self) -> list[tuple[int, int]]:
+        """Robot of every agent, and which of its wheels the agent drives."""
+        groups = self.situation.groups
+        return [(r, wheel) for r, group in enumerate(groups) for wheel in range(len(group))]
+
+    @cached_property
+    def _own(self) -> dict[int, tuple[FloatArray, IntArray]]:
+        return {}
 
     def blocks(self, agent: int) -> Blocks:
         """Return the next states of `agent` for all joint actions, own block as if alone."""
-        r, _ = self._robot_of(agent)
+        r, _ = self._places[agent]
         view, row = self._table
         if r not in self._shared:
             self._shared[r] = self.space.shared(view, r)
@@ -168,10 +172,13 @@ class BoxPrediction:
 
     def own_block(self, agent: int) -> tuple[FloatArray, IntArray]:
         """Return the own variables by drive, as if alone, and the drive of every local code."""
-        r, wheel = self._robot_of(agent)
-        drives, which = self._drives[r]
-        poses = self._alone[r] if self.space.own_needs_pose else np.zeros((len(drives), 3))
-        return self.space.own(poses, drives[:, wheel], self.situation.goal), which
+        if agent not in self._own:
+            r, wheel = self._places[agent]
+            drives, which = self._drives[r]
+            poses = self._alone[r] if self.space.own_needs_pose else np.zeros((len(drives), 3))
+            own = self.space.own(poses, drives[:, wheel], self.situation.goal)
+            self._own[agent] = own, which
+        return self._own[agent]
 
     @cached_property
     def superposition(self) -> PushSuperposition:
@@ -180,7 +187,7 @@ class BoxPrediction:
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
-        r, wheel = self._robot_of(agent)
+        r, wheel = self._places[agent]
         choices = self._choices(joint_actions)
         view = self._view(choices)
         speeds = self._drives[r][0][choices[:, r], wheel]

@@ -39,6 +39,9 @@ class ExactEnumeration(Gathering):
         if not self._tabulated:
             return
         self._places = a ** np.arange(n - 1, -1, -1, dtype=np.int64)
+        self._fixed_places = np.tile(self._places, (n, 1))  # of the actions that are given
+        for i in range(n):
+            self._fixed_places[i, [i, *self.hierarchy.below(i)]] = 0
         # Code offsets (A, A ** k): own action by joint action of the agents below.
         self._offsets = [
             np.arange(a)[:, None] * self._places[i]
@@ -67,9 +70,7 @@ class ExactEnumeration(Gathering):
     def _by_codes(
         self, agent: int, joint_action: IntArray, theta: FloatArray, prediction: Prediction
     ) -> FloatArray:
-        fixed = joint_action.copy()
-        fixed[[agent, *self.hierarchy.below(agent)]] = 0
-        codes = (self._offsets[agent] + int(fixed @ self._places)).ravel()
+        codes = (self._offsets[agent] + int(joint_action @ self._fixed_places[agent])).ravel()
         self.count(len(codes))
         rewards = values = None
         if self.rule != "value":

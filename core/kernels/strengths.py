@@ -82,13 +82,17 @@ def strengths_of(j: int, x: float, lay: Layout, out: FloatArray) -> None:
 @njit(cache=True)
 def product_of(term: int, first: int, last: int, lay: Layout, strengths, out, start: int) -> None:  # type: ignore[no-untyped-def]
     """Write the products of the strengths of variables first..last-1 of a term, in C order."""
-    out[start] = 1.0
+    room = out[start:]
+    room[0] = 1.0
     size = 1
     for v in range(first, last):
         j = lay.terms[term, v]
         m = lay.counts[j]
+        row = strengths[j, :m]
+        # From the end, so that no product is overwritten before it is used.
         for r in range(size - 1, -1, -1):
-            base = out[start + r]
+            base = room[r]
+            part = room[r * m : r * m + m]
             for k in range(m):
-                out[start + r * m + k] = base * strengths[j, k]
+                part[k] = base * row[k]
         size *= m

@@ -74,6 +74,9 @@ def test_exact_where_values_are_linear(
     exact = ExactEnumeration(*common)
     exact._tabulated = True
     exact._places = A ** np.arange(N - 1, -1, -1)
+    exact._fixed_places = np.tile(exact._places, (N, 1))
+    for i in range(N):
+        exact._fixed_places[i, [i, *hierarchy.below(i)]] = 0
     exact._offsets = [
         np.arange(A)[:, None] * exact._places[i]
         + (exact._tried[i] @ exact._places[list(hierarchy.below(i))])[None, :]
