@@ -7,7 +7,6 @@ import pytest
 from nested_agents.studies.single_agent import CONTENDERS, compare
 from nested_agents.studies.single_agent_report import draw, table
 
-
 pytestmark = pytest.mark.slow
 
 
