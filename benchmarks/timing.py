@@ -41,20 +41,22 @@ def paired(
 ) -> Paired:
     """Time candidates in turns until `budget` seconds are spent; at least three rounds.
 
-    A fast candidate is repeated within its turn until the turn takes a millisecond. All are called
-    once beforehand, so that nothing is compiled while the clock runs.
+    A fast candidate is repeated within its turn until the turn takes a few milliseconds. Every turn
+    begins with a call that is not timed, so that nothing is compiled while the clock runs and no
+    candidate finds the caches filled by its predecessor.
     """
     repeats = {}
     for name, call in candidates.items():
         call()
         begin = perf_counter()
         call()
-        repeats[name] = max(1, min(1000, int(1.0e-3 / (perf_counter() - begin + 1e-9))))
+        repeats[name] = max(1, min(1000, int(4.0e-3 / (perf_counter() - begin + 1e-9))))
     seconds: dict[str, list[float]] = {name: [] for name in candidates}
     start = perf_counter()
     rounds = 0
     while rounds < 3 or (perf_counter() - start < budget and rounds < most_rounds):
         for name, call in candidates.items():
+            call()
             begin = perf_counter()
             for _ in range(repeats[name]):
                 call()
