@@ -13,6 +13,7 @@ enumerated; for the other groups
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from functools import cache
 from itertools import product
 from typing import cast
@@ -26,7 +27,7 @@ from ..rules import RuleBase
 from .evaluator import Gathering, Others, Rule
 
 
-class _Summed(Gathering):
+class _Summed(Gathering, ABC):
     """What the two share: probabilities of local codes, and the own group enumerated.
 
     Raises
@@ -114,13 +115,13 @@ class _Summed(Gathering):
             shares[which, : joint.shape[1]] = joint
         return shares
 
+    @abstractmethod
     def _sums(self, contributions: FloatArray, shares: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return sums ``(s, k)`` over the other groups, and their chances ``(s,)``."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _over_sums(self, values: FloatArray, chance: FloatArray) -> FloatArray:
         """Gather values ``(local codes, s)`` over the sums."""
-        raise NotImplementedError
 
 
 class Moments(_Summed):

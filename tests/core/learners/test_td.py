@@ -41,7 +41,7 @@ def frozen_increments(
         total += learner.theta - held
         learner.theta[:] = held
     if terminal:  # on entering it `observe` would update twice without a chance to hold theta
-        learner._update(states[-1:], np.array([rewards[-1] / (1 - learner.settings.discount)]))
+        learner._update(states[-1:], float(rewards[-1]) / (1 - learner.settings.discount), None)
         total += learner.theta - held
         learner.theta[:] = held
     return total[0]
