@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nested_agents.core.config import BatchTDSettings
+from nested_agents.core.config import BatchTDSettings, Decision, SelfModelSettings
 from nested_agents.core.loop import control_loop, policy_seed
 from nested_agents.core.team import Team
 from nested_agents.scenarios import BoxPushing, ScenarioSettings
@@ -69,3 +69,18 @@ def test_wheel_speeds_follow_the_actions() -> None:
     ):
         info = scenario.step(np.array(joint)).info
         np.testing.assert_allclose(info["wheel_speeds"], np.array(expected) * top)
+
+
+def test_a_team_finds_out_that_a_wheel_has_seized() -> None:
+    failure = {"kind": "seized", "wheels": ["robot1.front-left"]}
+    scenario = BoxPushing(ScenarioSettings(robot="four-wheel", robots=1, failures=[failure]))
+    hierarchy = build(parse("chain"), scenario.agents)
+    settings = BatchTDSettings(
+        self_model=SelfModelSettings(enabled=True), decision=Decision(rule="random")
+    )
+    team = Team.build(settings, scenario, hierarchy, policy_seed(0))
+    for _ in control_loop(scenario, team, episodes=2, steps=40, seed=0):
+        pass
+    found, nominal = team.self_model.effects[0][0, :4], scenario.nominal_effects[0][0, :4]
+    assert abs(found[0]) < 0.3 * nominal[0]
+    assert (found[1:] > 0.5 * nominal[1:]).all()
