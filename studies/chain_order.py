@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from .paired_tests import Friedman, friedman, holm, paired_permutation
 from .results import Results
-from .statistics import Estimate, bootstrap, rate
+from .statistics import bootstrap, rate
 from .summary import Summary
 from .trial import run_trial as measure
 
@@ -70,9 +70,10 @@ class Comparison:
     against_first: NDArray[np.float64]
 
     @property
-    def differences(self) -> list[Estimate]:
-        """Every other order less the first, with its interval, unadjusted."""
-        return [bootstrap(column - self.values[:, 0]) for column in self.values[:, 1:].T]
+    def resolution(self) -> float:
+        """Half the median width of the 95 % intervals of the differences, unadjusted."""
+        found = bootstrap(self.values[:, 1:] - self.values[:, :1])
+        return float(np.median(found.high - found.low)) / 2.0
 
 
 @dataclass(frozen=True)
@@ -168,13 +169,17 @@ def _verdict(comparisons: tuple[Comparison, ...]) -> list[str]:
         differ = "differ" if c.p < LEVEL else "are not told apart"
         named = int((c.against_first < LEVEL).sum())
         lines.append(
-            f"{c.title}: {k} orders {differ} (Friedman {c.test.statistic:.1f}, p = {c.p:.3g}, "
-            f"W = {c.test.concordance:.3f}, {n} seeds); means {means[worst]:.3f} to "
-            f"{means[best]:.3f}, of the first {means[0]:.3f}; {named} of {k - 1} differ from the "
-            f"first (least p = {c.against_first.min():.3g})"
+            f"{c.title}: {k} orders {differ} (Friedman {c.test.statistic:.1f}, p = {c.test.p:.2g}, "
+            f"adjusted {c.p:.2g}; W = {c.test.concordance:.3f}; {n} seeds)"
         )
-        lines.append(f"  best: {c.orders[best]}")
-        lines.append(f"  worst: {c.orders[worst]}")
+        lines.append(
+            f"  {named} of {k - 1} differ from the first (least p {c.against_first.min():.2g}, "
+            f"adjusted); intervals of the differences reach {c.resolution:.2f} to either side"
+        )
+        lines.append(
+            f"  best {c.orders[best]}: {means[best]:.3f}; worst {c.orders[worst]}: "
+            f"{means[worst]:.3f}; first: {means[0]:.3f}"
+        )
     return lines
 
 

@@ -50,6 +50,6 @@ def _panel(axes: Axes, comparison: Comparison, rank: np.ndarray) -> None:
         axes.plot([low, high], [row, row], color=colour, linewidth=1.5, zorder=2)
         axes.plot(estimates.value[i], row, "o", color=colour, markersize=4, zorder=3)
     axes.axvline(estimates.value[0], color=COLOURS[1], linewidth=0.8, linestyle=":")
-    axes.set_title(f"{comparison.title}\nFriedman p = {comparison.p:.2g}", loc="left")
+    axes.set_title(f"{comparison.title}\nFriedman p = {comparison.test.p:.2g}", loc="left")
     axes.set_xlabel("rate")
     axes.grid(axis="x", alpha=0.25)

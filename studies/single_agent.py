@@ -31,7 +31,7 @@ STEP_SIZES = (0.1, 0.3, 1.0)
 """Tried for each contender; normalised by the squared length of the feature vector."""
 EPISODES, STEPS, EVALUATION = 100, 40, 20
 SEEDS = tuple(range(10))
-TUNING_SEEDS = (100, 101, 102)
+TUNING_SEEDS = tuple(range(100, 106))
 BLOCK = 20
 """Episodes at the end of training that the table averages over."""
 

@@ -41,7 +41,7 @@ def test_one_bad_order_is_found_and_named() -> None:
         assert comparison.p < 0.001
         assert (comparison.against_first < 0.05).tolist() == [False, False, True, False, False]
     assert "6 orders differ" in analysis.notes[0]
-    assert any("worst: 2 3 1" in note for note in analysis.notes)
+    assert any("worst 2 3 1:" in note for note in analysis.notes)
 
 
 def test_agents_are_numbered_in_the_first_order() -> None:
@@ -68,7 +68,7 @@ def test_the_figure_is_drawn(tmp_path: Path) -> None:
     assert draw(analyse(Results({}, {})), tmp_path) == []
 
 
-@pytest.mark.parametrize(("name", "orders"), [("chain_order", 24), ("chain_order_8", 10)])
+@pytest.mark.parametrize(("name", "orders"), [("chain_order", 24), ("chain_order_8", 8)])
 def test_the_specs_hold_distinct_orders_of_at_least_twenty_seeds(name: str, orders: int) -> None:
     spec = Spec.load(STUDIES / f"{name}.toml")
     assert len(spec.conditions()) == orders
