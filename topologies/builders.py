@@ -142,7 +142,7 @@ def from_edges(
     graph = nx.DiGraph()
     graph.add_nodes_from(alone)
     with_edges(graph, edges)
-    check_names(list(graph), agents, "the edges (with `alone`)")
+    check_names(list(graph), agents, "edges and alone")
     return graph
 
 

@@ -32,13 +32,13 @@ def check_names(
     known = set(agents)
     for name, times in Counter(names).items():
         if name not in known:
-            raise ValueError(f"{what} names unknown agent {name!r}, known: {listed(agents)}")
+            raise ValueError(f"unknown agent {name!r} in {what}, known: {listed(agents)}")
         if times > 1:
-            raise ValueError(f"{what} names agent {name!r} more than once")
+            raise ValueError(f"agent {name!r} occurs more than once in {what}")
     missing = known.difference(names)
     if all_needed and missing:
         first = next(agent for agent in agents if agent in missing)
-        raise ValueError(f"{what} lacks agent {first!r}")
+        raise ValueError(f"agent {first!r} is missing from {what}")
 
 
 def with_edges(graph: nx.DiGraph, edges: Iterable[Sequence[str]]) -> nx.DiGraph:

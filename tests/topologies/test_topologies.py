@@ -81,17 +81,17 @@ def test_every_random_graph_is_a_hierarchy(n: int, seed: int, density: float) ->
 
 
 REFUSED = {
-    "chain:a,b,c": "topology 'chain': order lacks agent 'd'",
-    "chain:a,b,c,c": "topology 'chain': order names agent 'c' more than once",
-    "chain:a,b,c,x": "topology 'chain': order names unknown agent 'x', known: a, b, c, d",
+    "chain:a,b,c": "topology 'chain': agent 'd' is missing from order",
+    "chain:a,b,c,c": "topology 'chain': agent 'c' occurs more than once in order",
+    "chain:a,b,c,x": "topology 'chain': unknown agent 'x' in order, known: a, b, c, d",
     "tree:0": "topology 'tree:0': branching: Input should be greater than or equal to 1",
     "tree:two": "topology 'tree:two': branching must be an integer, received 'two'",
-    "star:x": "topology 'star': leader names unknown agent 'x', known: a, b, c, d",
+    "star:x": "topology 'star': unknown agent 'x' in leader, known: a, b, c, d",
     "teams:ring": "topology 'teams:ring': link: Input should be 'chain' or 'star'",
     "independent:2": "topology 'independent:2': takes no argument, received '2'",
     "edges": "topology 'edges': edges: Field required",
-    "edges:a>b": "topology 'edges': the edges (with `alone`) lacks agent 'c'",
-    "edges:a>x,b,c,d": "topology 'edges': the edges (with `alone`) names unknown agent 'x', known:",
+    "edges:a>b": "topology 'edges': agent 'c' is missing from edges and alone",
+    "edges:a>x,b,c,d": "topology 'edges': unknown agent 'x' in edges and alone, known: a",
     "edges:a>b,a>b,c,d": "topology 'edges': edge a -> b is given more than once",
     "edges:a>a,b,c,d": "topology 'edges': agent 'a' cannot be its own superior",
     "edges:a>b,b>c,c>a,d": "topology 'edges': cycle a -> b -> c -> a",
@@ -118,7 +118,7 @@ def test_a_refusal_is_one_line_that_names_the_culprit(text: str, message: str) -
 @pytest.mark.parametrize(
     ("table", "message"),
     [
-        ({"kind": "teams", "members": [["a", "b"], ["c"]]}, "members lacks agent 'd'"),
+        ({"kind": "teams", "members": [["a", "b"], ["c"]]}, "agent 'd' is missing from members"),
         ({"kind": "teams", "members": [["a", "b"], ["c", "d", "a"]]}, "names agent 'a' more than"),
         ({"kind": "teams", "members": [["a", "b"], [], ["c", "d"]]}, "a team has no members"),
     ],
@@ -154,13 +154,13 @@ def test_toml() -> None:
 def test_from_networkx() -> None:
     graph = nx.DiGraph([(0, 1), (0, 2)])
     assert set(from_networkx(graph, ("0", "1", "2")).edges) == {("0", "1"), ("0", "2")}
-    with pytest.raises(ValueError, match="the graph lacks agent '3'"):
+    with pytest.raises(ValueError, match="agent '3' is missing from the graph"):
         from_networkx(graph, ("0", "1", "2", "3"))
     with pytest.raises(ValueError, match="undirected"):
         from_networkx(nx.Graph(graph), ("0", "1", "2"))
     with pytest.raises(ValueError, match="multigraph"):
         from_networkx(nx.MultiDiGraph(graph), ("0", "1", "2"))
-    with pytest.raises(ValueError, match="names agent '0' more than once"):
+    with pytest.raises(ValueError, match="agent '0' occurs more than once"):
         from_networkx(nx.DiGraph([(0, "0")]), ("0",))
 
 

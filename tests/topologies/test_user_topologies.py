@@ -59,11 +59,11 @@ def test_pairs_or_a_graph(written, body: str) -> None:
         ("def f(agents, groups): return 3", "f returned int, allowed: a networkx DiGraph"),
         ("def f(agents, groups): return [('a', 'b', 'c')]", "f returned list, allowed:"),
         ("def f(agents, groups): return [('a', 'b')] * 2", "edge a -> b is given more than once"),
-        ("def f(agents, groups): return [('a', 'x')]", "the graph names unknown agent 'x'"),
+        ("def f(agents, groups): return [('a', 'x')]", "unknown agent 'x' in the graph"),
         ("def f(agents, groups): return [('a', 'b'), ('b', 'a')]", "cycle a -> b -> a"),
         (
             "import networkx as nx\ndef f(agents, groups): return nx.DiGraph([('a', 'b')])",
-            "the graph lacks agent 'c'",
+            "agent 'c' is missing from the graph",
         ),
     ],
 )
