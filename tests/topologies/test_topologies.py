@@ -119,7 +119,7 @@ def test_a_refusal_is_one_line_that_names_the_culprit(text: str, message: str) -
     ("table", "message"),
     [
         ({"kind": "teams", "members": [["a", "b"], ["c"]]}, "agent 'd' is missing from members"),
-        ({"kind": "teams", "members": [["a", "b"], ["c", "d", "a"]]}, "names agent 'a' more than"),
+        ({"kind": "teams", "members": [["a", "b"], ["c", "d", "a"]]}, "agent 'a' occurs more than"),
         ({"kind": "teams", "members": [["a", "b"], [], ["c", "d"]]}, "a team has no members"),
     ],
 )
