@@ -12,17 +12,19 @@ from . import display
 from .results import read
 from .runner import run_trials
 from .spec import Spec
-from .spec_errors import SpecError
 from .store import Store
 from .study import load_study
 from .trial import Trial, check, trials_of
+from .workers import Backend, hire
 
 
 def conduct(
     spec: Spec,
     directory: Path,
-    jobs: int,
+    jobs: int | None = None,
     *,
+    backend: Backend = "loky",
+    address: str | None = None,
     replay: bool = False,
     retry_failed: bool = False,
 ) -> int:
@@ -34,8 +36,8 @@ def conduct(
         The study.
     directory
         Where it is kept.
-    jobs
-        Worker processes.
+    jobs, backend, address
+        Who runs the trials, see `hire`.
     replay
         Whether to draw a replay of the first condition's first seed.
     retry_failed
@@ -46,18 +48,16 @@ def conduct(
     int
         1 if any trial failed, else 0.
     """
-    if jobs < 1:
-        raise SpecError(f"--jobs {jobs}: must be at least 1")
     check(spec)
     study, trials = load_study(spec.study), trials_of(spec)
-    with Store.create(directory, spec) as store:
+    with hire(backend, jobs, address) as workers, Store.create(directory, spec) as store:
         if retry_failed:
             store.forget_failed()
         pending = store.pending(trials)
         if pending:
-            display.announce(spec, directory, jobs)
+            display.announce(spec, directory, workers.processes)
         try:
-            with closing(run_trials(pending, store, study.measure, jobs)) as outcomes:
+            with closing(run_trials(pending, store, study.measure, workers)) as outcomes:
                 display.follow(outcomes, len(trials), len(trials) - len(pending))
         except KeyboardInterrupt:
             display.say(

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import tyro
+
+from ..worker import CORES as CORES
 
 Directory = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR")]
 """An existing study, as argument."""
@@ -14,8 +15,14 @@ Directory = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR")]
 Jobs = Annotated[int, tyro.conf.arg(metavar="N")]
 """Number of worker processes."""
 
+MostJobs = Annotated[int | None, tyro.conf.arg(metavar="N", help_behavior_hint="")]
+"""The same where their number may be left to the backend."""
+
+Backend = Literal["loky", "dask"]
+"""Kind of workers, see `nested_agents.studies.workers`, whose import the help does not wait for."""
+
+Address = Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT", help_behavior_hint="")]
+"""Of a Dask scheduler."""
+
 Changes = Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="KEY=VALUE")]
 """Assignments laid over a spec, see `nested_agents.studies.overlay.assignment`."""
-
-CORES = len(os.sched_getaffinity(0))
-"""Cores that this process may use."""

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from .options import CORES, Directory, Jobs
+from .options import Address, Backend, Directory, MostJobs
 
 
-def command(directory: Directory, jobs: Jobs = CORES) -> int:
+def command(
+    directory: Directory,
+    jobs: MostJobs = None,
+    backend: Backend = "loky",
+    address: Address = None,
+) -> int:
     """Run the failed trials of a study again, and whatever is left of it.
 
     Parameters
@@ -13,11 +18,16 @@ def command(directory: Directory, jobs: Jobs = CORES) -> int:
     directory
         Where the study is kept.
     jobs
-        Worker processes; one for every core unless said otherwise.
+        Trials at a time; one for every core, or for every worker at the address.
+    backend
+        Who runs them: loky, processes of this machine, or dask, workers of a Dask cluster (extra
+        nested-agents[dask]). The results are the same.
+    address
+        Of the scheduler of a running Dask cluster; if missing, one is started here.
     """
     from ..conduct import conduct
     from ..store import Store
 
     with Store.open(directory) as store:
         spec = store.spec()
-    return conduct(spec, directory, jobs, retry_failed=True)
+    return conduct(spec, directory, jobs, backend=backend, address=address, retry_failed=True)

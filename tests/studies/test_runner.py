@@ -9,6 +9,7 @@ import made_up
 import pytest
 from joblib.externals.loky import get_reusable_executor
 
+from nested_agents.studies.loky_workers import LokyWorkers
 from nested_agents.studies.runner import ATTEMPTS, run_trials
 from nested_agents.studies.store import Store
 
@@ -19,7 +20,8 @@ def content(store):
 
 def run(directory, measure, jobs=2):
     with Store.create(directory, made_up.SPEC) as store:
-        outcomes = list(run_trials(store.pending(made_up.TRIALS), store, measure, jobs))
+        pending = store.pending(made_up.TRIALS)
+        outcomes = list(run_trials(pending, store, measure, LokyWorkers(jobs)))
         return outcomes, content(store), store.failed()
 
 
@@ -41,7 +43,7 @@ def test_one_and_two_jobs_give_the_same_rows_and_recordings(tmp_path, uninterrup
 
 def test_results_are_kept_one_by_one_and_the_rest_runs_later(tmp_path, uninterrupted):
     with Store.create(tmp_path, made_up.SPEC) as store:
-        running = run_trials(store.pending(made_up.TRIALS), store, made_up.slow, 2)
+        running = run_trials(store.pending(made_up.TRIALS), store, made_up.slow, LokyWorkers(2))
         first = next(running)
         assert store.counts()["done"] >= 1
         running.close()
@@ -95,27 +97,26 @@ def test_a_trial_that_kills_every_worker_fails_alone(tmp_path):
 def test_workers_compute_with_one_thread(tmp_path):
     for jobs in (1, 2):
         with Store.create(tmp_path / str(jobs), made_up.SPEC) as store:
-            outcomes = list(run_trials(made_up.TRIALS[:2], store, made_up.threads, jobs))
+            workers = LokyWorkers(jobs)
+            outcomes = list(run_trials(made_up.TRIALS[:2], store, made_up.threads, workers))
             assert [o.error for o in outcomes] == [None, None]
 
 
-def test_no_jobs_is_refused(tmp_path):
-    with (
-        Store.create(tmp_path, made_up.SPEC) as store,
-        pytest.raises(ValueError, match="jobs = 0: must be at least 1"),
-    ):
-        next(run_trials(made_up.TRIALS, store, made_up.measure, 0))
+def test_no_jobs_is_refused():
+    with pytest.raises(ValueError, match="jobs = 0: must be at least 1"):
+        LokyWorkers(0)
 
 
 def test_workers_do_not_outlive_a_killed_parent(tmp_path):
     program = """
         import sys
         import made_up
+        from nested_agents.studies.loky_workers import LokyWorkers
         from nested_agents.studies.runner import run_trials
         from nested_agents.studies.store import Store
         from pathlib import Path
         with Store.create(Path(sys.argv[1]), made_up.SPEC) as store:
-            for _ in run_trials(made_up.TRIALS, store, made_up.pids, 2):
+            for _ in run_trials(made_up.TRIALS, store, made_up.pids, LokyWorkers(2)):
                 pass
     """
     environment = {**os.environ, "PYTHONPATH": str(Path(made_up.__file__).parent),
