@@ -14,7 +14,6 @@ Importing this module registers ``NestedAgents/BoxPushing-v0`` with Gymnasium::
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from copy import deepcopy
 from typing import Any, ClassVar
 
 import gymnasium
@@ -127,7 +126,11 @@ class Game:
 
     def info(self, measured: Mapping[str, Any]) -> dict[str, Any]:
         """Return a copy of measurements, without the times, which differ from run to run."""
-        return deepcopy({name: value for name, value in measured.items() if name != "seconds"})
+        return {
+            name: value.copy() if isinstance(value, np.ndarray) else value
+            for name, value in measured.items()
+            if name != "seconds"
+        }
 
     def render(self) -> Any:
         """Return a picture, or show it."""

@@ -19,3 +19,14 @@ def test_the_smallest_benchmark_runs(tmp_path: Path) -> None:
     assert [row["agents"] for row in result["exact"]] == [2, 2]
     assert result["exact"][0]["literal_ratio"] > 0
     assert result["beyond"][0]["total_ms"] > 0
+
+
+@pytest.mark.slow
+def test_the_smallest_benchmark_of_worlds_runs(tmp_path: Path) -> None:
+    path = tmp_path / "w.json"
+    command = [sys.executable, "-m", "benchmarks.worlds", "--smoke", "--json", str(path)]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert all(len(line) <= 80 for line in run.stdout.splitlines())
+    result = json.loads(path.read_text(encoding="utf-8"))
+    assert [row["robots"] for row in result["by_size"]] == [2]
+    assert len(result["others"]) + len(result["missing"]) == 6
