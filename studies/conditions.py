@@ -1,14 +1,19 @@
-"""Conditions: what a study compares, as the grid that a preset, tables and a sweep span."""
+"""Conditions: what a study compares, as a preset, tables, overrides and sweeps span it.
+
+Every override by name is crossed with its own sweep and with the spec's; without overrides the
+spec's tables alone are. Layers, each over the one before: the defaults of the settings, the preset,
+the spec's tables, the override's tables, the point of the sweeps.
+"""
 
 from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import ValidationError
+from pydantic import Field, ValidationError
 
 from ..core.config import BatchTDSettings, Learner, Settings
 from ..scenarios.config import ScenarioSettings
@@ -34,38 +39,69 @@ class ConditionSettings(Settings):
         )
 
 
+class Override(Settings):
+    """A named set of tables laid over those of a spec."""
+
+    name: Annotated[str, Field(min_length=1)]
+    """How its conditions are called."""
+    preset: str | None = None
+    """The preset under its tables; none: the spec's."""
+    scenario: Mapping[str, Any] = Field(default_factory=dict)
+    topology: Mapping[str, Any] = Field(default_factory=dict)
+    learner: Mapping[str, Any] = Field(default_factory=dict)
+    sweep: Mapping[str, tuple[Any, ...]] = Field(default_factory=dict)
+    """Lists of values by dotted key, for this override alone."""
+
+    @property
+    def tables(self) -> Mapping[str, Table]:
+        """The tables by section."""
+        return {name: dict(getattr(self, name)) for name in SECTIONS}
+
+
 @dataclass(frozen=True)
 class Condition:
-    """One point of the grid.
+    """What one part of a study's trials have in common.
 
     Attributes
     ----------
     label
         Short name, unique within its study.
     columns
-        The swept keys and their values, as the columns of a result; `preset` if nothing is swept.
+        What tells it from the others, as the columns of a result: `name` if there are overrides,
+        the swept keys (empty where an override does not sweep), `preset` if there is neither.
     settings
         The resolved settings.
+    evaluations
+        Names and scenarios in which its trained teams are evaluated beside its own.
     """
 
     label: str
     columns: Mapping[str, Any]
     settings: ConditionSettings
+    evaluations: tuple[tuple[str, ScenarioSettings], ...] = ()
 
 
 def grid(
-    preset: str, tables: Mapping[str, Table], sweep: Mapping[str, Sequence[Any]]
+    preset: str,
+    tables: Mapping[str, Table],
+    sweep: Mapping[str, Sequence[Any]],
+    overrides: Sequence[Override] = (),
+    evaluations: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> tuple[Condition, ...]:
-    """Return the conditions in the order of the sweep, its last key varying fastest.
+    """Return the conditions: override by override, the last key of the sweeps varying fastest.
 
     Parameters
     ----------
     preset
-        Name of the preset under conditions whose sweep names none.
+        Name of the preset under conditions that name none.
     tables
         The spec's own `scenario`, `topology` and `learner` tables.
     sweep
         Lists of values by dotted key.
+    overrides
+        Crossed with `sweep`; none: the tables as they are.
+    evaluations
+        By name, what is laid over each condition's scenario.
 
     Raises
     ------
@@ -74,31 +110,65 @@ def grid(
     """
     conditions: list[Condition] = []
     seen: dict[str, str] = {}
-    for values in itertools.product(*sweep.values()):
-        point = dict(zip(sweep, values, strict=True))
-        name = label(point) if point else preset
-        settings = resolve(preset, tables, point, f" (condition {name!r})" if point else "")
+    keys = list(dict.fromkeys([*(key for o in overrides for key in o.sweep), *sweep]))
+    source = "overrides" if overrides else "sweep"
+    for override, point in _points(overrides, sweep):
+        name = label(point, override.name if override else "") or preset
+        where = f" (condition {name!r})" if point or override else ""
+        settings = resolve(preset, tables, point, where, override)
         twin = seen.setdefault(settings.canonical(), name)
         if twin != name or any(c.label == name for c in conditions):
-            raise SpecError(f"sweep: conditions {twin!r} and {name!r} are the same")
-        columns = {key: _scalar(value) for key, value in point.items()} or {"preset": preset}
-        conditions.append(Condition(name, columns, settings))
+            raise SpecError(f"{source}: conditions {twin!r} and {name!r} are the same")
+        columns: dict[str, Any] = {"name": override.name} if override else {}
+        columns |= {key: _scalar(point[key]) if key in point else "" for key in keys}
+        elsewhere = _elsewhere(settings, evaluations or {}, where)
+        conditions.append(Condition(name, columns or {"preset": preset}, settings, elsewhere))
     return tuple(conditions)
 
 
+def _points(
+    overrides: Sequence[Override], sweep: Mapping[str, Sequence[Any]]
+) -> Iterator[tuple[Override | None, dict[str, Any]]]:
+    for override in overrides or (None,):
+        crossed = {**(override.sweep if override else {}), **sweep}
+        for values in itertools.product(*crossed.values()):
+            yield override, dict(zip(crossed, values, strict=True))
+
+
 def resolve(
-    preset: str, tables: Mapping[str, Table], point: Mapping[str, Any], where: str = ""
+    preset: str,
+    tables: Mapping[str, Table],
+    point: Mapping[str, Any],
+    where: str = "",
+    override: Override | None = None,
 ) -> ConditionSettings:
-    """Return the settings of one condition: defaults, preset, tables, point of the sweep."""
-    name = point.get("preset", preset)
+    """Return the settings of one condition, layer by layer."""
+    own = override.preset if override else None
+    name = point.get("preset", preset if own is None else own)
     if name not in PRESETS:
-        raise SpecError(f"preset = {show(name)}: {closest(name, PRESETS)}")
-    layers = [PRESETS[name].table, tables]
+        raise SpecError(f"preset = {show(name)}: {closest(name, PRESETS)}{where}")
+    layers = [PRESETS[name].table, tables, override.tables if override else {}]
     layers += [nested(key, value) for key, value in point.items() if key != "preset"]
     table = ConditionSettings().model_dump()
     for layer in layers:
         expanded = {key: section(key, value) for key, value in layer.items()}
         table = overlay(table, expanded, ConditionSettings)
+    return _validated(table, where)
+
+
+def _elsewhere(
+    settings: ConditionSettings, evaluations: Mapping[str, Mapping[str, Any]], where: str
+) -> tuple[tuple[str, ScenarioSettings], ...]:
+    table = settings.model_dump()
+    found = []
+    for name, changes in evaluations.items():
+        changed = overlay(table, {"scenario": section(name, changes)}, ConditionSettings)
+        resolved = _validated(changed, f" (evaluation {name!r}){where}")
+        found.append((name, resolved.scenario))
+    return tuple(found)
+
+
+def _validated(table: Table, where: str) -> ConditionSettings:
     try:
         return ConditionSettings.model_validate(tuples(table), strict=True)
     except ValidationError as error:
@@ -106,7 +176,9 @@ def resolve(
 
 
 def section(name: str, value: object) -> Table:
-    """Return the table of a section; a topology may be written as ``"kind"`` or ``"kind:option"``.
+    """Return the table of a section: from a table, a settings model, or for a topology a string.
+
+    What is None in a model leaves what lies below as it is, as TOML has no word for it.
 
     Examples
     --------
@@ -115,31 +187,36 @@ def section(name: str, value: object) -> Table:
     """
     if isinstance(value, Mapping):
         return dict(value)
-    if name != "topology" or not isinstance(value, str):
-        allowed = "a name or a table" if name == "topology" else "a table"
+    if isinstance(value, Settings):
+        return value.model_dump(exclude_none=True)
+    is_topology = name.rpartition(".")[2] == "topology"
+    if not is_topology or not isinstance(value, str):
+        allowed = "a name or a table" if is_topology else "a table"
         raise SpecError(f"{name} = {show(value)}: must be {allowed}")
     try:
         return parse(value).model_dump()
     except ValueError as error:
-        raise SpecError(str(error)) from None
+        raise SpecError(f"{name.removesuffix('topology')}{error}") from None
 
 
-def label(point: Mapping[str, Any]) -> str:
-    """Return a short name for a point of the sweep.
+def label(point: Mapping[str, Any], name: str = "") -> str:
+    """Return a short name for a point of the sweeps of an override.
 
     Examples
     --------
     >>> label({"preset": "frozen"}), label({"preset": "default", "learner.rule_base.order": 2})
     ('frozen', 'default, order=2')
+    >>> label({"scenario.robots": 3}, "no replay")
+    'no replay, robots=3'
     """
-    if len(point) == 1:
+    if len(point) == 1 and not name:
         return str(_scalar(next(iter(point.values()))))
     last = [key.rpartition(".")[2] for key in point]
-    parts = []
+    parts = [name] if name else []
     for key, short in zip(point, last, strict=True):
-        name = short if last.count(short) == 1 else key
+        shown = short if last.count(short) == 1 else key
         value = _scalar(point[key])
-        parts.append(str(value) if key == "preset" else f"{name}={value}")
+        parts.append(str(value) if key == "preset" else f"{shown}={value}")
     return ", ".join(parts)
 
 

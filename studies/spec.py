@@ -1,8 +1,9 @@
 """The spec of a study, as it stands in a TOML file.
 
 ``study``, ``preset``, ``seeds``, ``episodes``, ``steps``, ``evaluation``, then the tables
-``[scenario]``, ``[topology]``, ``[learner]``, laid over the preset, and ``[sweep]``: lists of
-values by dotted key, which span the grid of conditions.
+``[scenario]``, ``[topology]``, ``[learner]``, laid over the preset. What is compared:
+``[[overrides]]``, further tables by name, and ``[sweep]``, lists of values by dotted key; the
+conditions are their combinations. ``[evaluations]`` are further scenarios for the trained teams.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from pydantic import Field, ValidationError, field_validator
 
 from ..core.config import Settings
 from . import STUDIES
-from .conditions import SECTIONS, Condition, grid, section, tuples
+from .conditions import SECTIONS, Condition, Override, grid, section, tuples
 from .overlay import Table, assignment, flat, overlay
 from .presets import PRESETS
 from .spec_errors import SpecError, closest, explain, show
@@ -37,6 +38,14 @@ class Spec(Settings):
     >>> spec = Spec.of({"seeds": 3, "sweep": {"preset": ["default", "frozen"]}})
     >>> spec.seeds, [condition.label for condition in spec.conditions()]
     ((0, 1, 2), ['default', 'frozen'])
+
+    Tables may be made by any Python, and hold settings models:
+
+    >>> from nested_agents.core.config import TDLambdaSettings
+    >>> ridges = [{"name": f"ridge {r}", "learner": {"ridge": r}} for r in (1.0, 100.0)]
+    >>> online = {"name": "online", "learner": TDLambdaSettings(step_size=0.1, normalised=True)}
+    >>> [c.label for c in Spec.of({"overrides": [*ridges, online]}).conditions()]
+    ['ridge 1.0', 'ridge 100.0', 'online']
     """
 
     study: str = "learning-curve"
@@ -59,6 +68,10 @@ class Spec(Settings):
     """Laid over the preset's learner."""
     sweep: Mapping[str, tuple[Any, ...]] = Field(default_factory=dict)
     """Lists of values by dotted key; the conditions are all their combinations."""
+    overrides: tuple[Override, ...] = ()
+    """Tables by name, each laid over those above and crossed with the sweep."""
+    evaluations: Mapping[str, Mapping[str, Any]] = Field(default_factory=dict)
+    """By name, changes of the scenario in which the trained teams are evaluated too."""
 
     @field_validator("study", "preset")
     @classmethod
@@ -92,17 +105,17 @@ class Spec(Settings):
         SpecError
             If anything in it, the conditions included, is wrong.
         """
-        table = dict(table)
-        for name in SECTIONS:
-            if name in table:
-                table[name] = section(name, table[name])
-        if isinstance(table.get("sweep"), Mapping):
-            table["sweep"] = dict(_sweep(table["sweep"]))
+        table = _read(table, "")
+        if isinstance(table.get("overrides"), list | tuple):
+            table["overrides"] = tuple(
+                _read(override, f"overrides[{i}].") if isinstance(override, Mapping) else override
+                for i, override in enumerate(table["overrides"])
+            )
         try:
             spec = cls.model_validate(tuples(table), strict=True)
         except ValidationError as error:
             raise SpecError(explain(error, cls, table)) from None
-        points = math.prod(len(values) for values in spec.sweep.values())
+        points = spec.n_conditions
         if points * len(spec.seeds) > MOST_TRIALS:
             grid_size = f"{points} conditions x {len(spec.seeds)} seeds"
             raise SpecError(f"sweep: {grid_size}, at most {MOST_TRIALS} trials")
@@ -142,16 +155,25 @@ class Spec(Settings):
                 raise SpecError(f"--set {change}: {error}") from None
         return cls.of(table)
 
+    @property
+    def n_conditions(self) -> int:
+        """How many conditions there are."""
+        own = [override.sweep for override in self.overrides] or [{}]
+        sizes = [math.prod(map(len, {**swept, **self.sweep}.values())) for swept in own]
+        return sum(sizes)
+
     def conditions(self) -> tuple[Condition, ...]:
-        """Return the conditions in the order of the sweep."""
-        return grid(self.preset, {name: getattr(self, name) for name in SECTIONS}, self.sweep)
+        """Return the conditions in the order of the overrides and sweeps."""
+        tables = {name: getattr(self, name) for name in SECTIONS}
+        return grid(self.preset, tables, self.sweep, self.overrides, self.evaluations)
 
     def table(self) -> Table:
         """Return the spec as a table that `of` reads back."""
-        table = self.model_dump()
+        table = _filled(self.model_dump())
+        table["overrides"] = [_filled(override) for override in table.get("overrides", ())]
         if self.seeds == tuple(range(len(self.seeds))):
             table["seeds"] = len(self.seeds)
-        return {key: value for key, value in table.items() if value != {}}
+        return {key: value for key, value in table.items() if value != []}
 
 
 def _changed(table: Table, change: Table) -> Table:
@@ -162,12 +184,27 @@ def _changed(table: Table, change: Table) -> Table:
     return overlay(table, change)
 
 
-def _sweep(table: Mapping[str, Any]) -> Iterable[tuple[str, Any]]:
+def _filled(table: Table) -> Table:
+    return {key: value for key, value in table.items() if value not in ({}, (), None)}
+
+
+def _read(table: Mapping[str, Any], where: str) -> Table:
+    """Return a spec's or an override's table with its sections and sweep spelled out."""
+    table = dict(table)
+    for name in SECTIONS:
+        if name in table:
+            table[name] = section(f"{where}{name}", table[name])
+    if isinstance(table.get("sweep"), Mapping):
+        table["sweep"] = dict(_sweep(table["sweep"], f"{where}sweep"))
+    return table
+
+
+def _sweep(table: Mapping[str, Any], where: str) -> Iterable[tuple[str, Any]]:
     for key, values in flat(table):
         head, _, tail = key.partition(".")
         if key not in ("preset", "topology") and not (head in SECTIONS and tail):
             known = [*(f"{name}.*" for name in SECTIONS), "preset", "topology"]
-            raise SpecError(f"sweep.{key}: unknown key; {closest(key, known)}")
+            raise SpecError(f"{where}.{key}: unknown key; {closest(key, known)}")
         if not isinstance(values, list | tuple) or not values:
-            raise SpecError(f"sweep.{key} = {show(values)}: must be a list of at least one value")
+            raise SpecError(f"{where}.{key} = {show(values)}: must be a list of at least one value")
         yield key, values

@@ -39,6 +39,9 @@ def _differences(
         before, after = getattr(old, name), getattr(new, name)
         if before != after:
             yield f"{name} = {show(before)} there, {show(after)} here"
+    if old.evaluations != new.evaluations:
+        then, now = (show(list(spec.evaluations)) for spec in (old, new))
+        yield f"evaluations = {then} there, {now} here"
     if not set(old.seeds) <= set(new.seeds):
         yield f"seeds = {show(old.seeds)} there, {show(new.seeds)} here"
     settings = {c.label: c.settings.model_dump(mode="json") for c in new.conditions()}
@@ -46,7 +49,7 @@ def _differences(
         yield f"conditions = {show(list(old_settings))} there, {show(list(settings))} here"
     before_keys, after_keys = _columns(old), _columns(new)
     if before_keys != after_keys:
-        yield f"sweep keys = {show(before_keys)} there, {show(after_keys)} here"
+        yield f"columns = {show(before_keys)} there, {show(after_keys)} here"
     for label in [label for label in settings if label in old_settings]:
         before, after = dict(flat(old_settings[label])), dict(flat(settings[label]))
         for key in sorted(before.keys() | after.keys()):
@@ -56,4 +59,4 @@ def _differences(
 
 
 def _columns(spec: Spec) -> list[str]:
-    return list(spec.sweep) or ["preset"]
+    return list(spec.conditions()[0].columns)

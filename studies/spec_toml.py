@@ -23,21 +23,37 @@ def dumps(table: Mapping[str, Any]) -> str:
     <BLANKLINE>
     [sweep]
     "scenario.box" = ["square", "circle"]
+    >>> print(dumps({"overrides": [{"name": "a", "learner": {"ridge": 1.0}}]}), end="")
+    <BLANKLINE>
+    [[overrides]]
+    name = "a"
+    <BLANKLINE>
+    [overrides.learner]
+    ridge = 1.0
     """
     return "\n".join(_section(table, ())) + "\n"
 
 
-def _section(table: Mapping[str, Any], path: tuple[str, ...]) -> list[str]:
+def _section(table: Mapping[str, Any], path: tuple[str, ...], opening: str = "[{}]") -> list[str]:
     present = {key: value for key, value in table.items() if value is not None}
     tables = {key: value for key, value in present.items() if isinstance(value, Mapping)}
-    plain = {key: value for key, value in present.items() if key not in tables}
+    lists = {key: value for key, value in present.items() if _is_list_of_tables(value)}
+    plain = {key: value for key, value in present.items() if key not in {**tables, **lists}}
     lines = []
-    if path and (plain or not tables):
-        lines = ["", f"[{'.'.join(map(_key, path))}]"]
+    if path and (plain or opening == "[[{}]]" or not {**tables, **lists}):
+        lines = ["", opening.format(".".join(map(_key, path)))]
     lines += [f"{_key(key)} = {_value(value)}" for key, value in plain.items()]
     for key, inner in tables.items():
         lines += _section(inner, (*path, key))
+    for key, items in lists.items():
+        for item in items:
+            lines += _section(item, (*path, key), "[[{}]]")
     return lines
+
+
+def _is_list_of_tables(value: object) -> bool:
+    is_list = isinstance(value, Sequence) and not isinstance(value, str) and len(value) > 0
+    return is_list and all(isinstance(item, Mapping) for item in value)  # type: ignore[attr-defined]
 
 
 def _key(key: str) -> str:

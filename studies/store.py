@@ -18,7 +18,7 @@ import sqlite3
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from . import durable
 from .episodes import COLUMNS, Recording
@@ -46,9 +46,11 @@ SCHEMA = (
     f"""CREATE TABLE IF NOT EXISTS seconds (
         identity TEXT PRIMARY KEY REFERENCES trials ON DELETE CASCADE,
         {", ".join(f"{part} REAL NOT NULL" for part in SECONDS)})""",
+    """CREATE TABLE IF NOT EXISTS numbers (
+        identity TEXT NOT NULL REFERENCES trials ON DELETE CASCADE, name TEXT NOT NULL,
+        value REAL NOT NULL, repeatable INTEGER NOT NULL, PRIMARY KEY (identity, name))
+        WITHOUT ROWID""",
 )
-
-Phase = Literal["training", "evaluation"]
 
 
 class Store:
@@ -137,6 +139,9 @@ class Store:
             self._note(trial, "done", None, digest)
             self._insert("episodes", [(trial.identity, *row) for row in result.rows])
             self._insert("seconds", [(trial.identity, *(seconds[part] for part in SECONDS))])
+            numbers = [(n, v, 1) for n, v in result.numbers.items()]
+            numbers += [(n, v, 0) for n, v in result.usage.items()]
+            self._insert("numbers", [(trial.identity, *number) for number in numbers])
 
     def fail(self, trial: Trial, error: str) -> None:
         """Keep the traceback of a trial that failed."""
@@ -160,7 +165,13 @@ class Store:
         query = "SELECT state, count(*) FROM trials GROUP BY state"
         return {"done": 0, "failed": 0} | dict(self._db.execute(query).fetchall())
 
-    def rows(self, phase: Phase = "training") -> tuple[list[str], list[tuple[Any, ...]]]:
+    def phases(self) -> list[str]:
+        """Return the phases that episodes were run in, training and evaluation first."""
+        query = "SELECT DISTINCT phase FROM episodes"
+        found = {phase for (phase,) in self._db.execute(query)}
+        return sorted(found, key=lambda phase: (phase != "training", phase != "evaluation", phase))
+
+    def rows(self, phase: str = "training") -> tuple[list[str], list[tuple[Any, ...]]]:
         """Return the column names and the rows of a phase, by condition, seed and episode."""
         cursor = self._db.execute("SELECT * FROM results WHERE phase = ?", (phase,))
         return [column[0] for column in cursor.description], cursor.fetchall()
@@ -172,6 +183,15 @@ class Store:
             "JOIN trials USING (identity) JOIN conditions USING (condition) ORDER BY position, seed"
         )
         return [column[0] for column in cursor.description], cursor.fetchall()
+
+    def numbers(self) -> list[tuple[str, int, str, float, bool]]:
+        """Return condition, seed, name, value and whether it is a function of the trial."""
+        cursor = self._db.execute(
+            "SELECT condition, seed, name, value, repeatable FROM numbers "
+            "JOIN trials USING (identity) JOIN conditions USING (condition) "
+            "ORDER BY position, seed, name"
+        )
+        return [(*row[:4], bool(row[4])) for row in cursor]
 
     def recording(self, trial: Trial, name: str) -> Recording:
         """Return a recorded episode of a trial, ``first`` or ``last``; see `durable`."""

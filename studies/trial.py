@@ -13,7 +13,7 @@ from .. import scenarios, topologies
 from ..core.loop import control_loop, policy_seed, world_seed
 from ..core.protocols import Scenario
 from ..core.team import Team
-from ..scenarios.config import label
+from ..scenarios.config import ScenarioSettings, label
 from .conditions import ConditionSettings
 from .episodes import EpisodeMeter, EpisodeRecorder, EpisodeRow, Recording, Stopwatch
 from .spec import Spec
@@ -43,6 +43,8 @@ class Trial:
         What the condition consists of.
     seed, episodes, steps, evaluation
         As in `Spec`.
+    evaluations
+        Names and scenarios in which the trained team is evaluated beside its own.
     """
 
     study: str
@@ -52,6 +54,7 @@ class Trial:
     episodes: int
     steps: int
     evaluation: int
+    evaluations: tuple[tuple[str, ScenarioSettings], ...] = ()
 
     @cached_property
     def identity(self) -> str:
@@ -65,6 +68,10 @@ class Trial:
             "steps": self.steps,
             "evaluation": self.evaluation,
         }
+        if self.evaluations:
+            content["evaluations"] = [
+                [name, scenario.model_dump(mode="json")] for name, scenario in self.evaluations
+            ]
         text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
         return hashlib.sha256(text.encode()).hexdigest()[:32]
 
@@ -82,11 +89,17 @@ class TrialResult:
         function of the trial, too.
     seconds
         Time spent in each part of the control loop; differs from run to run.
+    numbers
+        Further measurements of the trial as a whole by name; a function of the trial.
+    usage
+        What it took beside time, by name; differs from run to run.
     """
 
     rows: tuple[EpisodeRow, ...]
     recordings: dict[str, Recording]
     seconds: dict[str, float]
+    numbers: Mapping[str, float] = field(default_factory=dict)
+    usage: Mapping[str, float] = field(default_factory=dict)
 
 
 def trials_of(spec: Spec) -> tuple[Trial, ...]:
@@ -100,6 +113,7 @@ def trials_of(spec: Spec) -> tuple[Trial, ...]:
             episodes=spec.episodes,
             steps=spec.steps,
             evaluation=spec.evaluation,
+            evaluations=condition.evaluations,
         )
         for seed in spec.seeds
         for condition in spec.conditions()
@@ -123,10 +137,105 @@ def check(spec: Spec) -> None:
     conditions = spec.conditions()
     for condition in conditions:
         try:
-            build(condition.settings, 0)
+            scenario, _ = build(condition.settings, 0)
+            for name, elsewhere in condition.evaluations:
+                other, _ = build(condition.settings.model_copy(update={"scenario": elsewhere}), 0)
+                _check_alike(name, scenario, other)
         except ValueError as error:
             where = f" (condition {condition.label!r})" if len(conditions) > 1 else ""
             raise SpecError(f"{error}{where}") from None
+
+
+def _check_alike(name: str, scenario: Scenario, other: Scenario) -> None:
+    if (other.agents, other.state_space) != (scenario.agents, scenario.state_space):
+        raise ValueError(
+            f"evaluations.{name}: a team trained with {len(scenario.agents)} agents over "
+            f"{scenario.state_space.name!r} cannot act with {len(other.agents)} over "
+            f"{other.state_space.name!r}"
+        )
+
+
+class Session:
+    """A trial under way: its scenario, its team, and what has been measured so far.
+
+    Parameters
+    ----------
+    trial
+        The trial; its team is untrained to begin with.
+    """
+
+    def __init__(self, trial: Trial) -> None:
+        self.trial = trial
+        self.scenario, self.team = build(trial.settings, trial.seed)
+        self.steps = 0
+        """Steps trained so far."""
+        self._rows: list[EpisodeRow] = []
+        self._recordings: dict[str, Recording] = {}
+        self._watch = Stopwatch()
+
+    def train(
+        self, episodes: int, first: int = 0, *, phase: str = "training", team: Team | None = None
+    ) -> None:
+        """Let the team (or another one, whose time is not counted) explore, learn, be measured.
+
+        Recorded are the first and the last episode of the trial's training.
+        """
+        last = {self.trial.episodes - 1: "last"}
+        kept = {0: "first"} | last if team is None else {}
+        trained = self.team if team is None else team
+        for record in control_loop(
+            self.scenario, trained, episodes=episodes, steps=self.trial.steps,
+            seed=self.trial.seed, first_episode=first,
+        ):  # fmt: skip
+            if record.step == 0:
+                meter = EpisodeMeter(phase, record.episode)
+                if record.episode in kept:
+                    recorder = EpisodeRecorder(_opening(self.trial, record.episode))
+            meter.add(record.transition)
+            if record.episode in kept:
+                recorder.add(record.transition)
+            if team is None:
+                self._watch.add(record)
+                self.steps += 1
+            if record.last:
+                self._rows.append(meter.row(record.transition))
+                if record.episode in kept:
+                    scenario = self.trial.settings.scenario
+                    self._recordings[kept[record.episode]] = recorder.recording(
+                        dt=scenario.hold * CONTROL_PERIOD,
+                        robot=label(scenario.robot),
+                        box=label(scenario.box),
+                    )
+
+    def evaluate(self, scenario: Scenario | None = None, *, phase: str = "evaluation") -> None:
+        """Let the team act greedily, in another scenario perhaps, on worlds of no training."""
+        for record in control_loop(
+            scenario or self.scenario, self.team, episodes=self.trial.evaluation,
+            steps=self.trial.steps, seed=self.trial.seed, first_episode=EVALUATION_WORLDS,
+            learn=False,
+        ):  # fmt: skip
+            if record.step == 0:
+                meter = EpisodeMeter(phase, record.episode - EVALUATION_WORLDS)
+            meter.add(record.transition)
+            if record.last:
+                self._rows.append(meter.row(record.transition))
+
+    def evaluate_elsewhere(self) -> None:
+        """Evaluate in each of the trial's `evaluations`, whatever the others are."""
+        state = self.team.rng.bit_generator.state
+        for name, settings in self.trial.evaluations:
+            self.team.rng.bit_generator.state = state
+            elsewhere = self.trial.settings.model_copy(update={"scenario": settings})
+            self.evaluate(build(elsewhere, self.trial.seed)[0], phase=f"evaluation:{name}")
+
+    def result(
+        self,
+        numbers: Mapping[str, float] | None = None,
+        usage: Mapping[str, float] | None = None,
+    ) -> TrialResult:
+        """Return what has been measured, and what the measure adds to it."""
+        rows, seconds = tuple(self._rows), self._watch.seconds
+        return TrialResult(rows, self._recordings, seconds, numbers or {}, usage or {})
 
 
 def run_trial(trial: Trial) -> TrialResult:
@@ -134,38 +243,11 @@ def run_trial(trial: Trial) -> TrialResult:
 
     World and policy draw from separate streams, so conditions of equal seed meet equal worlds.
     """
-    settings = trial.settings
-    scenario, team = build(settings, trial.seed)
-    rows: list[EpisodeRow] = []
-    recordings: dict[str, Recording] = {}
-    watch = Stopwatch()
-    constants: dict[str, float | str] = {
-        "dt": settings.scenario.hold * CONTROL_PERIOD,
-        "robot": label(settings.scenario.robot),
-        "box": label(settings.scenario.box),
-    }
-    phases = (("training", trial.episodes, 0), ("evaluation", trial.evaluation, EVALUATION_WORLDS))
-    for phase, episodes, first in phases:
-        learn = phase == "training"
-        kept = {0: "first", episodes - 1: "last"} if learn else {}
-        for record in control_loop(
-            scenario, team, episodes=episodes, steps=trial.steps, seed=trial.seed,
-            first_episode=first, learn=learn,
-        ):  # fmt: skip
-            if record.step == 0:
-                meter = EpisodeMeter(phase, record.episode - first)
-            if record.step == 0 and record.episode in kept:
-                recorder = EpisodeRecorder(_opening(trial, record.episode))
-            meter.add(record.transition)
-            if record.episode in kept:
-                recorder.add(record.transition)
-            if learn:
-                watch.add(record)
-            if record.last:
-                rows.append(meter.row(record.transition))
-                if record.episode in kept:
-                    recordings[kept[record.episode]] = recorder.recording(**constants)
-    return TrialResult(tuple(rows), recordings, watch.seconds)
+    session = Session(trial)
+    session.train(trial.episodes)
+    session.evaluate()
+    session.evaluate_elsewhere()
+    return session.result()
 
 
 def _opening(trial: Trial, episode: int) -> Mapping[str, Any]:

@@ -58,6 +58,21 @@ BAD = {
     "sweep.topology = ['chain', 'chain:listed']": ["'chain' and 'chain:listed' are the same"],
     "sweep.learner.ridge = [1, -1]": ["learner.ridge = -1", "condition '-1'"],
     "seeds = 50000\nsweep.scenario.robots = [1, 2, 3]": ["3 conditions x 50000 seeds"],
+    "overrides = 3": ["overrides = 3", "list"],
+    "overrides = [3]": ["overrides[0] = 3", "table"],
+    "[[overrides]]\npreset = 'paper'": ["overrides[0].name: missing"],
+    "overrides = [{name = ''}]": ["overrides[0].name = ''", "at least 1 character"],
+    "overrides = [{name = 'a', larner = {}}]": ["overrides[0].larner", "did you mean 'learner'"],
+    "overrides = [{name = 'a', learner = 3}]": ["overrides[0].learner = 3", "table"],
+    "overrides = [{name = 'a', topology = 'chan'}]": ["'chan'", "overrides[0]", "'chain'"],
+    "overrides = [{name = 'a', preset = 'papr'}]": ["preset = 'papr'", "'paper'", "'a'"],
+    "overrides = [{name = 'a', learner = {ridge = -1}}]": ["learner.ridge = -1", "condition 'a'"],
+    "overrides = [{name = 'a', sweep = {steps = [1]}}]": ["overrides[0].sweep.steps", "unknown"],
+    "overrides = [{name = 'a'}, {name = 'b'}]": ["overrides", "'a' and 'b' are the same"],
+    "overrides = [{name = 'a'}, {name = 'a', learner = {ridge = 1}}]": ["overrides", "the same"],
+    "evaluations = 3": ["evaluations = 3", "table"],
+    "evaluations.a = 3": ["evaluations.a = 3", "table"],
+    "evaluations.a.boxx = 'circle'": ["scenario.boxx = 'circle'", "unknown", "evaluation 'a'"],
     "seeds =": ["not valid TOML"],
     "episodes = 1979-05-27": ["episodes = 1979-05-27"],
 }  # fmt: skip
@@ -172,8 +187,90 @@ def test_equal_content_is_an_equal_spec_however_it_is_written():
     assert one.conditions()[0].settings.canonical() == two.conditions()[0].settings.canonical()
 
 
+OVERRIDES = """
+learner.discount = 0.9
+[[overrides]]
+name = "default"
+[[overrides]]
+name = "no replay"
+learner = {kind = "td-lambda", step_size = 0.1}
+topology = "chain:reversed"
+[overrides.sweep]
+"learner.trace_decay" = [0.0, 0.9]
+[[overrides]]
+name = "paper"
+preset = "paper"
+learner.ridge = 1.0
+[sweep]
+"scenario.robots" = [1, 2]
+"""
+
+
+def test_overrides_are_laid_over_the_spec_and_crossed_with_both_sweeps():
+    text = OVERRIDES.replace("learner.ridge = 1.0", "")
+    found = {c.label: c for c in Spec.parse(text).conditions()}
+    assert list(found) == [
+        "default, robots=1",
+        "default, robots=2",
+        "no replay, trace_decay=0.0, robots=1",
+        "no replay, trace_decay=0.0, robots=2",
+        "no replay, trace_decay=0.9, robots=1",
+        "no replay, trace_decay=0.9, robots=2",
+        "paper, robots=1",
+        "paper, robots=2",
+    ]
+    online = found["no replay, trace_decay=0.9, robots=2"]
+    assert online.settings.learner.trace_decay == 0.9
+    assert online.settings.topology.order == "reversed"
+    assert online.settings.learner.discount == 0.9
+    assert found["paper, robots=1"].settings.learner.rule_base.order == 7
+    assert found["paper, robots=1"].settings.learner.discount == 0.9
+    assert found["default, robots=1"].columns == {
+        "name": "default", "learner.trace_decay": "", "scenario.robots": 1,
+    }  # fmt: skip
+
+
+def test_an_override_of_another_kind_may_not_bring_the_keys_of_the_old_one():
+    with pytest.raises(SpecError, match=r"learner.ridge = 1.0: unknown key for kind 'td-lambda'"):
+        Spec.parse(OVERRIDES)
+
+
+def test_the_trials_of_all_overrides_are_counted_before_they_are_made():
+    overrides = [{"name": "a", "sweep": {"scenario.robots": [1, 2]}}, {"name": "b"}]
+    table = {"seeds": 50_000, "overrides": overrides}
+    with pytest.raises(SpecError, match="3 conditions x 50000 seeds"):
+        Spec.of(table)
+
+
+def test_evaluations_are_laid_over_the_scenario_of_every_condition():
+    spec = Spec.parse(
+        "evaluations.circle.box = 'circle'\nevaluations.hard.start = 'hard'\n"
+        "sweep.scenario.hold = [8, 4]"
+    )
+    found = [
+        (name, scenario.box, scenario.start, scenario.hold)
+        for condition in spec.conditions()
+        for name, scenario in condition.evaluations
+    ]
+    assert found == [
+        ("circle", "circle", "medium", 8), ("hard", "square", "hard", 8),
+        ("circle", "circle", "medium", 4), ("hard", "square", "hard", 4),
+    ]  # fmt: skip
+
+
+def test_a_section_may_be_a_settings_model():
+    from nested_agents.core.config import TDLambdaSettings
+
+    spec = Spec.of({"overrides": [{"name": "online", "learner": TDLambdaSettings(step_size=0.1)}]})
+    assert spec.conditions()[0].settings.learner == TDLambdaSettings(step_size=0.1)
+    assert Spec.parse(dumps(spec.table())) == spec
+
+
 SPECS = [
     "",
+    OVERRIDES.replace("learner.ridge = 1.0", ""),
+    "overrides = [{name = 'ä \"b\"', scenario = {failures = [{kind = 'seized', wheels = '*'}]}}]",
+    "evaluations.a = {}\nevaluations.'b c' = {box = 'circle', reward = {c1 = 1.0}}",
     "seeds = [3, 5]\ntopology = 'chain:reversed'\nlearner.ridge = 1",
     "sweep.preset = ['default', 'frozen']\nsweep.scenario.box = ['square', 'circle']",
     "sweep.topology = ['chain', {kind = 'chain', order = ['a \\\\ \"b', 'c']}]",
@@ -193,7 +290,7 @@ KEYS = st.sampled_from(
     ["study", "preset", "seeds", "episodes", "steps", "evaluation", "scenario", "topology",
      "learner", "sweep", "kind", "robots", "box", "reward", "c1", "rule_base", "order", "ridge",
      "exploration", "decision", "rule", "products", "members", "edges", "a", "", "x.y", "'\n",
-     "learner.kind", "scenario.robots", "topology.order"]
+     "learner.kind", "scenario.robots", "topology.order", "overrides", "evaluations", "name"]
 )  # fmt: skip
 WORDS = st.sampled_from(
     ["default", "paper", "frozen", "chain", "chain:reversed", "teams", "edges", "random", "file",

@@ -158,3 +158,28 @@ def test_which_condition_does_not_fit_is_named():
     spec = Spec.of(SHORT | {"sweep": {"learner.rule_base.order": [1, 9]}})
     with pytest.raises(SpecError, match=r"\(condition '9'\)"):
         check(spec)
+
+
+def test_further_evaluations_leave_the_rest_of_a_trial_as_it_is(result):
+    elsewhere = {"circle": {"box": "circle"}, "square": {}}
+    other = run_trial(only(evaluations=elsewhere))
+    assert other.rows[: len(result.rows)] == result.rows
+    further = other.rows[len(result.rows) :]
+    assert [row.phase for row in further] == ["evaluation:circle", "evaluation:square"]
+    assert further[1]._replace(phase="evaluation") == result.rows[-1]
+    alone = run_trial(only(evaluations={"square": {}}))
+    assert alone.rows[-1] == further[1]
+
+
+def test_evaluations_are_part_of_what_a_trial_is():
+    one, two = only(), only(evaluations={"circle": {"box": "circle"}})
+    assert one.identity != two.identity
+    assert one.identity == only(evaluations={}).identity
+
+
+@pytest.mark.parametrize(
+    "change", [{"robots": 3}, {"robot": "four-wheel"}, {"state_space": "paper"}]
+)
+def test_a_team_is_not_evaluated_where_it_cannot_act(change):
+    with pytest.raises(SpecError, match=r"evaluations\.other: a team trained with 4 agents"):
+        check(Spec.of(SHORT | {"evaluations": {"other": change}}))
