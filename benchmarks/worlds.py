@@ -43,7 +43,8 @@ RUN = 300
 
 SIZES = {
     "robots": "robots", "rays": "rays", "ours_us": "step\n\\[us]", "best_us": "best\n\\[us]",
-    "steps_per_s": "steps/s", "us_per_robot": "robot\n\\[us]", "naive_us": "naive\n\\[us]", "naive_ratio": "naive/\nours",
+    "steps_per_s": "steps/s", "us_per_robot": "robot\n\\[us]",
+    "naive_us": "naive\n\\[us]", "naive_ratio": "naive/\nours",
 }  # fmt: skip
 OTHERS = {
     "world": "world", "us": "step\n\\[us]", "best_us": "best\n\\[us]",

@@ -19,7 +19,7 @@ from ..core.spaces import ActionSet, StateSpace
 from .boxes import box_for
 from .config import ScenarioSettings
 from .failures import Failures
-from .infrared import strongest_reading
+from .infrared import InfraredSpec, strongest_reading
 from .prediction import BoxPrediction, Situation, mean_twists
 from .predictors import ExactPrediction, Future, push_model
 from .reward import reward
@@ -27,6 +27,9 @@ from .robots import nominal_effect, robot_for
 from .starts import place
 from .state_spaces import STATE_SPACES, View
 from .world import CONTROL_PERIOD, World, WorldState
+
+SENSING = 2**32 - 1
+"""Key of the stream of sensor noise under the seed of an episode; failures have 0, 1, ..."""
 
 
 class BoxPushing:
@@ -69,7 +72,8 @@ class BoxPushing:
             for name in self.robot.wheel_names
         )
         self.action_set = ActionSet()
-        self.world = World([self.robot] * settings.robots, self.box)
+        self.infrared = InfraredSpec(**settings.infrared.model_dump())
+        self.world = World([self.robot] * settings.robots, self.box, infrared=self.infrared)
         self._space = STATE_SPACES[settings.state_space]
         self._limits: FloatArray = np.full(len(self.agents), self.robot.max_speed)
         self._effects = self.nominal_effects
@@ -80,6 +84,7 @@ class BoxPushing:
             Failures(settings.failures, self.agents, self._limits) if settings.failures else None
         )
         self._goal: FloatArray = np.zeros(3)
+        self._sensing = np.random.default_rng(0)  # until reset
         self._speeds: FloatArray = np.zeros(len(self.agents))
         self._step = 0
         self._saved: WorldState | None = None
@@ -113,6 +118,10 @@ class BoxPushing:
 
         Failures are scheduled by the number of the `episode`.
         """
+        root = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
+        self._sensing = np.random.default_rng(
+            np.random.SeedSequence(root.entropy, spawn_key=(*root.spawn_key, SENSING))
+        )
         rng = np.random.default_rng(seed)
         robots, box, self._goal = place(
             self.settings.start, rng, [self.robot] * self.settings.robots, self.box
@@ -138,7 +147,7 @@ class BoxPushing:
         period = self.settings.hold * CONTROL_PERIOD
         motions = mean_twists(poses, self.world.robot_poses, period)
         measured = self.measure()
-        readings = strongest_reading(self.world)
+        readings = strongest_reading(self.world, self._sensing)
         terminated = self._reached()
         gained = reward(
             self.settings.reward,

@@ -182,8 +182,33 @@ class RobotSettings(Settings):
     """Directions of the infrared sensors [rad]; none: those of the e-Puck."""
 
 
-def label(thing: str | BoxSettings | RobotSettings) -> str:
-    """Return the name of a box or robot, or what it consists of, as text that can be read back."""
+class InfraredSettings(Settings):
+    """How the infrared sensors of all robots read; the default is the e-Puck's."""
+
+    reach: Positive = 0.06
+    """Distance beyond which they read 0 [m]; the e-Puck's are useful up to about 6 cm."""
+    normalisation: Literal["exponential", "linear", "binary"] = "exponential"
+    """How a distance within reach becomes a reading in [0, 1], 1 when touching: exp(-distance /
+    decay), 1 - distance / reach, or 1."""
+    decay: Positive = 0.015
+    """Distance over which an exponential reading falls to 1/e [m]."""
+    noise: Annotated[float, Field(ge=0, le=1)] = 0.0
+    """Standard deviation of a normal error, as a fraction of the reading (as in lookup tables of
+    Webots); drawn anew for every sensor and decision, the result cut to [0, 1]."""
+
+    @model_validator(mode="after")
+    def _decays(self) -> Self:
+        default = type(self).model_fields["decay"].default
+        if self.normalisation != "exponential" and self.decay != default:
+            raise ValueError(
+                f"decay = {self.decay} is for normalisation = 'exponential', "
+                f"received {self.normalisation!r}"
+            )
+        return self
+
+
+def label(thing: str | Settings) -> str:
+    """Return the name of a thing, or what it consists of, as text that can be read back."""
     return thing if isinstance(thing, str) else thing.model_dump_json()
 
 
@@ -197,6 +222,7 @@ class ScenarioSettings(Settings):
     """Robot by name, or a table that describes one."""
     box: str | BoxSettings = "square"
     """Box by name, or a table that describes one."""
+    infrared: InfraredSettings = InfraredSettings()
     start: Literal["easy", "medium", "hard"] = "medium"
     """Start distribution."""
     failures: tuple[Failure, ...] = ()

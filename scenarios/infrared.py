@@ -1,11 +1,14 @@
 """Infrared proximity sensors.
 
-Every sensor looks along one ray from the rim of its robot and reads
+Every sensor looks along one ray from the rim of its robot and reads a number in [0, 1]: 1 when
+touching, 0 when nothing is within its reach, and between them, by its normalisation,
 
-    exp(-distance / decay) within its reach, 0 beyond,
+    exponential  exp(-distance / decay)
+    linear       1 - distance / reach
+    binary       1.
 
-a number in [0, 1] that grows steeply with proximity: 1 when touching, 0 when nothing is within
-reach. A further sensor is one `InfraredSpec` and one line in `INFRARED`.
+The default, exponential, grows steeply with proximity as the e-Puck's does. Noise is a normal error
+in proportion to the reading, drawn from a generator that the caller passes in.
 """
 
 from __future__ import annotations
@@ -22,6 +25,9 @@ from ..core.arrays import FloatArray
 from .geometry import Outline, disc_hit, ray, ray_numpy, surface
 from .robots import RobotSpec
 
+NORMALISATIONS = ("exponential", "linear", "binary")
+"""Kinds of `InfraredSpec.normalisation`; kernels know them by their index."""
+
 
 @dataclass(frozen=True)
 class InfraredSpec:
@@ -29,42 +35,71 @@ class InfraredSpec:
 
     Attributes
     ----------
-    name
-        The name under which it is known.
     reach
         Distance beyond which it reads 0 [m].
     decay
-        Distance over which the reading falls to 1/e [m].
+        Distance over which an exponential reading falls to 1/e [m].
+    normalisation
+        One of `NORMALISATIONS`.
+    noise
+        Standard deviation of the error as a fraction of the reading.
+
+    Raises
+    ------
+    ValueError
+        If one of them is out of range.
 
     Examples
     --------
-    >>> INFRARED["e-puck"].reading(np.array([0.0, 0.015, 0.07])).round(3).tolist()
+    >>> InfraredSpec().reading(np.array([0.0, 0.015, 0.07])).round(3).tolist()
     [1.0, 0.368, 0.0]
     """
 
-    name: str
-    reach: float
-    decay: float
+    reach: float = 0.06  # Mondada et al. 2009: useful up to about 6 cm
+    decay: float = 0.015
+    normalisation: str = "exponential"
+    noise: float = 0.0
 
     def __post_init__(self) -> None:
         for field in ("reach", "decay"):
             value = getattr(self, field)
             if not (isfinite(value) and value > 0):
-                raise ValueError(
-                    f"infrared {self.name!r}: {field} = {value}, must be positive and finite"
-                )
+                raise ValueError(f"infrared: {field} = {value}, must be positive and finite")
+        if self.normalisation not in NORMALISATIONS:
+            raise ValueError(
+                f"infrared: normalisation = {self.normalisation!r}, "
+                f"allowed {', '.join(NORMALISATIONS)}"
+            )
+        if not 0 <= self.noise <= 1:
+            raise ValueError(f"infrared: noise = {self.noise}, must be in [0, 1]")
+
+    @property
+    def kind(self) -> int:
+        """Index of the normalisation."""
+        return NORMALISATIONS.index(self.normalisation)
 
     def reading(self, distance: FloatArray) -> FloatArray:
         """Return the readings at distances [m] straight ahead; negative distances touch."""
-        near = np.exp(-np.maximum(distance, 0.0) / self.decay)
+        distance = np.maximum(distance, 0.0)
+        if self.normalisation == "exponential":
+            near = np.exp(-distance / self.decay)
+        else:
+            near = 1.0 - distance / self.reach if self.normalisation == "linear" else 1.0
         return np.where(distance < self.reach, near, 0.0)
 
+    def noisy(self, readings: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Return readings with their error; without noise nothing is drawn."""
+        if not self.noise:
+            return readings
+        return np.clip(readings * (1.0 + self.noise * rng.standard_normal(readings.shape)), 0, 1)
 
-INFRARED: dict[str, InfraredSpec] = {
-    # The real sensor is useful up to about 6 cm (Mondada et al. 2009).
-    "e-puck": InfraredSpec("e-puck", reach=0.06, decay=0.015),
-}
-"""Infrared sensors by the name that specs use."""
+
+@njit(cache=True)
+def response(distance: float, reach: float, decay: float, kind: int) -> float:
+    """Return what `InfraredSpec.reading` returns at a distance below `reach`."""
+    if kind == 0:
+        return exp(-distance / decay)
+    return 1.0 - distance / reach if kind == 1 else 1.0
 
 
 @njit(cache=True)
@@ -77,6 +112,7 @@ def infrared_readings(
     rounding: float,
     reach: float,
     decay: float,
+    kind: int,
 ) -> FloatArray:
     """Return what the sensors of all robots read.
 
@@ -90,7 +126,7 @@ def infrared_readings(
         ``(3,)`` pose.
     edges, rounding
         Outline of the box.
-    reach, decay
+    reach, decay, kind
         See `InfraredSpec`.
 
     Returns
@@ -114,7 +150,7 @@ def infrared_readings(
                     edges, rounding, bx + radii[r] * lx, by + radii[r] * ly, lx, ly, reach
                 )
                 if distance < reach:
-                    out[0, r, k] = exp(-distance / decay)
+                    out[0, r, k] = response(distance, reach, decay, kind)
             nearest = reach
             for o in range(n):
                 if o == r:
@@ -126,7 +162,7 @@ def infrared_readings(
                         ox - radii[r] * ux, oy - radii[r] * uy, radii[o], ux, uy, nearest
                     )
             if nearest < reach:
-                out[1, r, k] = exp(-nearest / decay)
+                out[1, r, k] = response(nearest, reach, decay, kind)
     return out
 
 
@@ -175,17 +211,18 @@ def sensor_directions(robots: Sequence[RobotSpec]) -> FloatArray:
 class SeesBox(Protocol):
     """Anything that reads the box by infrared, such as a `World`."""
 
+    sensor: InfraredSpec
+
     def infrared_of_box(self) -> FloatArray:
-        """Return the readings ``(M, S)`` of the box alone."""
+        """Return the readings ``(M, S)`` of the box alone, free of noise."""
         ...
 
 
-def strongest_reading(world: SeesBox) -> FloatArray:
+def strongest_reading(world: SeesBox, rng: np.random.Generator) -> FloatArray:
     """Return the strongest reading ``(M,)`` that each robot has of the box, 0 out of reach."""
-    readings = world.infrared_of_box()
-    return readings.max(axis=1)
+    return world.sensor.noisy(world.infrared_of_box(), rng).max(axis=1)
 
 
-def expected_reading(gaps: FloatArray, spec: InfraredSpec = INFRARED["e-puck"]) -> FloatArray:
+def expected_reading(gaps: FloatArray, spec: InfraredSpec = InfraredSpec()) -> FloatArray:
     """Return the reading of a sensor that looks straight at the box across gaps [m]."""
     return spec.reading(gaps)

@@ -30,7 +30,7 @@ from numba import njit
 from ..core.arrays import FloatArray
 from .boxes import BoxSpec
 from .geometry import surface
-from .infrared import INFRARED, InfraredSpec, infrared_readings, sensor_directions
+from .infrared import InfraredSpec, infrared_readings, sensor_directions
 from .robots import RobotSpec
 from .wheels import wheel_model, wheel_wrenches
 
@@ -85,7 +85,7 @@ class World:
     substeps
         Physics steps per control period.
     infrared
-        Response of the infrared sensors.
+        Response of the infrared sensors; none: the e-Puck's. The world adds no noise to it.
 
     Attributes
     ----------
@@ -117,7 +117,7 @@ class World:
         box: BoxSpec,
         *,
         substeps: int = 4,
-        infrared: InfraredSpec = INFRARED["e-puck"],
+        infrared: InfraredSpec | None = None,
     ) -> None:
         if not robots:
             raise ValueError("robots: none, must be at least one")
@@ -126,7 +126,7 @@ class World:
         self.robots = tuple(robots)
         self.box = box
         self.substeps = substeps
-        self.sensor = infrared
+        self.sensor = infrared or InfraredSpec()
         self.n_wheels = sum(len(robot.wheels) for robot in robots)
         self.dt = CONTROL_PERIOD / substeps
         self._radii: FloatArray = np.array([robot.radius for robot in robots])
@@ -227,7 +227,10 @@ class World:
         return np.array(_twist(self._handles[0]))
 
     def infrared(self) -> FloatArray:
-        """Return what the infrared sensors read, ``(M, S)`` in [0, 1], of box and robots."""
+        """Return what the infrared sensors read, ``(M, S)`` in [0, 1], of box and robots.
+
+        Free of noise.
+        """
         return self._readings().max(axis=0)
 
     def infrared_of_box(self) -> FloatArray:
@@ -240,6 +243,7 @@ class World:
         return infrared_readings(
             self.robot_poses, self._radii, self._sensors, self.box_pose,
             outline.edges, outline.rounding, self.sensor.reach, self.sensor.decay,
+            self.sensor.kind,
         )  # fmt: skip
 
     def _step(self, speeds: FloatArray) -> None:
