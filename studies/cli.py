@@ -24,6 +24,7 @@ COMMANDS: dict[str, str] = {
     "results": "results",
     "status": "status",
     "retry": "retry",
+    "report": "report",
     "presets": "presets",
     "topology": "topology",
     "check": "check",

@@ -73,6 +73,12 @@ class LearningCurves:
     table: tuple[Summary, ...]
     curves: dict[str, dict[str, Estimate]]
 
+    @property
+    def headline(self) -> str:
+        """The estimate to begin with: success after training, or if not measured at its end."""
+        titles = {title for line in self.table for title in line.estimates}
+        return "success greedy" if "success greedy" in titles else f"success last {BLOCK}"
+
 
 def analyse(results: Results) -> LearningCurves:
     """Estimate the table and the curves; 95 % intervals, seeds as the unit of sampling."""

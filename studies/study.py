@@ -24,7 +24,8 @@ class Study(Protocol):
     def analyse(self, results: Results) -> Any:
         """Turn results into estimates; its attribute `table` holds the `Summary` lines.
 
-        An attribute `notes`, if there is one, holds lines that are printed below the table.
+        An attribute `notes`, if there is one, holds lines that are printed below the table; an
+        attribute `headline` the title of the estimate that a report speaks of first.
         """
         ...
 

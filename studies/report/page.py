@@ -1,0 +1,81 @@
+"""The page: what a study's directory holds, gathered and put into the template."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import jinja2
+from markupsafe import Markup
+
+from ..results import read
+from ..spec_toml import dumps
+from ..store import Store
+from ..study import load_study
+from ..trial import RESULTS_VERSION, trials_of
+from . import words
+from .pictures import pictures
+from .replays import replays
+from .tables import tabulate
+
+FOLDER = Path(__file__).parent
+
+
+def page(directory: Path) -> str:
+    """Return the report of the study in a directory as HTML.
+
+    Raises
+    ------
+    SpecError
+        If the directory holds no readable study.
+    """
+    with Store.open(directory) as store:
+        spec, results, counts = store.spec(), read(store), store.counts()
+        failed = [
+            (condition, seed, words.without_places(error.rstrip()))
+            for condition, seed, error in store.failed()
+        ]
+        trials = trials_of(spec)
+        packed = replays(store, trials)
+        version = store.meta("results_version")
+    study = load_study(spec.study)
+    analysis = study.analyse(results)
+    return _template().render(
+        study=spec.study,
+        extent=words.extent(spec),
+        compared=", ".join(spec.conditions()[0].columns),
+        standing=words.standing(len(trials), counts["done"], counts["failed"]),
+        complete=counts["done"] == len(trials),
+        verdict=words.contest(analysis.table, getattr(analysis, "headline", None)),
+        notes=list(getattr(analysis, "notes", ())),
+        table=tabulate(analysis.table),
+        pictures=pictures(study, analysis) if analysis.table else [],
+        replays=packed,
+        failed=failed,
+        seeds=words.runs(spec.seeds),
+        spec=dumps(spec.table()),
+        versions=words.versions(),
+        results_version=version,
+        outdated=version != str(RESULTS_VERSION),
+        css=_own("page.css"),
+        js=_own("page.js"),
+        replay_js=_own("replay.js"),
+    )
+
+
+@cache
+def _template() -> jinja2.Template:
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(FOLDER),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["count"] = words.count
+    return environment.get_template("page.html.jinja")
+
+
+def _own(name: str) -> Markup:
+    """Return a file of this package, which is HTML already."""
+    return Markup((FOLDER / name).read_text(encoding="utf-8"))
