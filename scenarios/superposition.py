@@ -17,7 +17,8 @@ from numba import njit
 
 from ..core.arrays import BoolArray, FloatArray, IntArray
 from .geometry import surface
-from .push import MARGIN, push
+from .push import push
+from .push_lanes import MARGIN
 from .state_spaces import View
 
 if TYPE_CHECKING:

@@ -2,10 +2,14 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from nested_agents.scenarios import BoxPushing, ScenarioSettings
 from nested_agents.scenarios.boxes import BOXES
 from nested_agents.scenarios.push import PushModel, push
+from nested_agents.scenarios.push_lanes import BOX_ROWS, COS, LANES, PSI, SIN, head
+from nested_agents.scenarios.push_twin import push_one
 from nested_agents.scenarios.robots import ROBOTS, compliance
 
 BOX, ROBOT = BOXES["square"], ROBOTS["e-puck"]
@@ -78,15 +82,36 @@ def test_a_push_off_the_centre_turns_the_box_away() -> None:
     np.testing.assert_allclose(right, left * [1, -1, -1], atol=1e-9)
 
 
-def test_the_compiled_kernel_computes_what_is_written() -> None:
+@pytest.mark.parametrize("name", ["square", "L", "circle", "star"])
+@pytest.mark.parametrize("rigid", [False, True])
+def test_the_lanes_compute_what_is_written(name: str, rigid: bool) -> None:
     rng = np.random.default_rng(0)
-    robots = np.array([[BEHIND - 0.01, 0.05, 0.2], [BEHIND, -0.04, -0.1]])
-    twists = rng.uniform(-0.1, 0.13, (2, 5, 3))
-    choices = rng.integers(5, size=(20, 2))
-    compiled = push(robots, np.zeros(3), twists, choices, 0.5, model(2))
-    written = push.py_func(robots, np.zeros(3), twists, choices, 0.5, model(2))
-    for a, b in zip(compiled, written, strict=True):
-        np.testing.assert_allclose(a, b, rtol=0, atol=1e-9)
+    outline = BOXES[name].outline
+    believed = model(3, rigid=rigid)._replace(
+        edges=outline.edges, rounding=outline.rounding, reach=outline.radius
+    )
+    for count in (1, 37):
+        angles = rng.uniform(-np.pi, np.pi, 3)
+        distances = rng.uniform(0.8, 1.2, 3) * (outline.radius + ROBOT.radius)
+        robots = np.stack([distances * np.cos(angles), distances * np.sin(angles), angles + 3], 1)
+        box = np.array([0.0, 0.0, rng.uniform(-9, 9)])
+        twists = rng.uniform(-0.1, 0.13, (3, 5, 3)) * [1, 0.2, 9]
+        choices = rng.integers(5, size=(count, 3))
+        found = push(robots, box, twists, choices, 0.512, believed)
+        for c in range(count):
+            written = push_one(robots, box, twists, choices[c], 0.512, believed)
+            for a, b in zip(found, written, strict=True):
+                np.testing.assert_allclose(a[c], b, rtol=0, atol=1e-11)
+
+
+@given(st.lists(st.floats(-1e4, 1e4), min_size=1, max_size=LANES))
+def test_headings_are_exact_to_the_last_bit_but_one(angles: list[float]) -> None:
+    rows = np.zeros(BOX_ROWS * LANES)
+    rows[PSI * LANES : PSI * LANES + len(angles)] = angles
+    head(rows, len(angles))
+    for row, function in ((COS, np.cos), (SIN, np.sin)):
+        found = rows[row * LANES : row * LANES + len(angles)]
+        np.testing.assert_allclose(found, function(angles), rtol=0, atol=3e-16)
 
 
 def test_it_predicts_the_world_within_millimetres() -> None:
