@@ -24,6 +24,7 @@ COMMANDS: dict[str, str] = {
     "results": "results",
     "status": "status",
     "retry": "retry",
+    "export": "export",
     "report": "report",
     "presets": "presets",
     "topology": "topology",

@@ -54,6 +54,8 @@ def conduct(
         if retry_failed:
             store.forget_failed()
         pending = store.pending(trials)
+        for note in store.notes:
+            display.say(note)
         if pending:
             display.announce(spec, directory, workers.processes)
         try:

@@ -3,7 +3,8 @@
 ``results.sqlite`` holds the spec, the conditions, one row per trial and one per episode;
 ``recordings/IDENTITY.npz`` the recorded episodes of a trial; ``study.toml`` the spec, to read and
 to run again. The database is written through (WAL, synchronous=FULL), and a recording is complete
-before its trial is noted as done: a crash at any moment costs the running trials only.
+before its trial is noted as done: a crash at any moment costs the running trials only. Rows and
+recordings have checksums: what is not as it was written is named, and its trial run again.
 
 The view `results` is made for other tools::
 
@@ -15,49 +16,40 @@ from __future__ import annotations
 import fcntl
 import json
 import sqlite3
+import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
-from . import durable
-from .episodes import COLUMNS, Recording
+from . import database, durable, integrity
+from .episodes import Recording
+from .running import LOCK
 from .spec import Spec
 from .spec_difference import difference
 from .spec_errors import SpecError
 from .spec_toml import dumps
+from .tables import SECONDS, prepare, trial_checksum
 from .trial import RESULTS_VERSION, Trial, TrialResult
 
 DATABASE = "results.sqlite"
 SPEC_FILE = "study.toml"
-SECONDS = ("decision", "physics", "sensors", "learning", "total")
-SCHEMA = (
-    "CREATE TABLE IF NOT EXISTS meta (key TEXT PRIMARY KEY, value TEXT NOT NULL)",
-    """CREATE TABLE IF NOT EXISTS trials (
-        identity TEXT PRIMARY KEY, condition TEXT NOT NULL, seed INTEGER NOT NULL,
-        state TEXT NOT NULL CHECK (state IN ('done', 'failed')), error TEXT,
-        recording_sha256 TEXT)""",
-    """CREATE TABLE IF NOT EXISTS episodes (
-        identity TEXT NOT NULL REFERENCES trials ON DELETE CASCADE, phase TEXT NOT NULL,
-        episode INTEGER NOT NULL, steps INTEGER NOT NULL, success INTEGER NOT NULL,
-        stopped_at_goal INTEGER NOT NULL, final_distance_m REAL NOT NULL,
-        final_orientation_rad REAL NOT NULL, contact_fraction REAL NOT NULL,
-        "return" REAL NOT NULL, PRIMARY KEY (identity, phase, episode)) WITHOUT ROWID""",
-    f"""CREATE TABLE IF NOT EXISTS seconds (
-        identity TEXT PRIMARY KEY REFERENCES trials ON DELETE CASCADE,
-        {", ".join(f"{part} REAL NOT NULL" for part in SECONDS)})""",
-    """CREATE TABLE IF NOT EXISTS numbers (
-        identity TEXT NOT NULL REFERENCES trials ON DELETE CASCADE, name TEXT NOT NULL,
-        value REAL NOT NULL, repeatable INTEGER NOT NULL, PRIMARY KEY (identity, name))
-        WITHOUT ROWID""",
-)
 
 
 class Store:
-    """An open study directory. Use `Store.create` to write and `Store.open` to read."""
+    """An open study directory. Use `Store.create` to write and `Store.open` to read.
+
+    Attributes
+    ----------
+    directory
+        Where it is.
+    notes
+        What was found damaged, and what was done about it; one line each.
+    """
 
     def __init__(self, directory: Path, connection: sqlite3.Connection) -> None:
         self.directory = directory
+        self.notes: list[str] = []
         self._db = connection
 
     @classmethod
@@ -65,29 +57,40 @@ class Store:
     def create(cls, directory: Path, spec: Spec) -> Iterator[Store]:
         """Open a directory to run `spec` in; make it if it does not exist.
 
+        A damaged database is set aside under another name, and what can be trusted of it copied.
+
         Raises
         ------
         SpecError
             If it cannot be written, holds a study that differs by more than additional seeds, or
             another process is writing to it. Nothing has been changed then.
         """
-        _refuse_other(directory, spec)
+        path = directory / DATABASE
+        damage = integrity.damage(path) if path.exists() else None
+        refusal = _refusal(directory, spec, damaged=damage is not None)
+        if refusal is not None:
+            raise SpecError(refusal)
         try:
             (directory / "recordings").mkdir(parents=True, exist_ok=True)
-            lock = open(directory / ".lock", "w")  # noqa: SIM115 - held until the store is closed
+            lock = open(directory / LOCK, "w")  # noqa: SIM115 - held until the store is closed
         except OSError as error:
             raise SpecError(f"{directory}: {error.strerror or error}") from None
         with lock:
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError:
-                raise SpecError(f"{directory}: another process is writing there") from None
-            with _connected(directory / DATABASE) as connection:
-                connection.execute("PRAGMA journal_mode = WAL")
-                connection.execute("PRAGMA synchronous = FULL")
-                connection.execute("PRAGMA foreign_keys = ON")
+            _take(lock, directory)
+            aside = integrity.set_aside(path) if damage is not None else None
+            with database.writing(path) as connection:
                 store = cls(directory, connection)
-                store._prepare(spec)
+                with database.transaction(connection):
+                    prepare(connection, spec)
+                    recovered = 0 if aside is None else integrity.recover(aside, connection)
+                if aside is not None:
+                    store.notes.append(
+                        f"{path}: is damaged: {damage}; kept as {aside.name}, "
+                        f"{recovered} trials taken over, the others run again"
+                    )
+                spec_file = directory / SPEC_FILE
+                if not (spec_file.exists() and Spec.load(spec_file) == spec):
+                    durable.write(spec_file, dumps(spec.table()).encode())
                 yield store
 
     @classmethod
@@ -102,14 +105,23 @@ class Store:
         """
         if not (directory / DATABASE).is_file():
             raise SpecError(f"{directory}: holds no study (no {DATABASE})")
-        # Not mode=ro: such a connection leaves SQLite's -wal and -shm files behind.
-        with _connected(directory / DATABASE, "?mode=rw") as connection:
-            connection.execute("PRAGMA query_only = ON")
+        with database.reading(directory / DATABASE) as connection:
             yield cls(directory, connection)
 
     def spec(self) -> Spec:
         """Return the spec that the study runs."""
-        return Spec.of(json.loads(self.meta("spec")))
+        return Spec.of(self._table("spec"))
+
+    def refusal(self, spec: Spec) -> str | None:
+        """Return why `spec` may not be run here by this version, in one line; None if it may."""
+        if (version := self.meta("results_version")) != str(RESULTS_VERSION):
+            return (
+                f"{self.directory}: holds results of version {version}, this is version "
+                f"{RESULTS_VERSION}; use another directory"
+            )
+        if found := difference(self.spec(), self._table("conditions"), spec):
+            return f"{self.directory}: holds another study: {found}"
+        return None
 
     def meta(self, key: str) -> str:
         """Return what is noted under `key`: ``spec``, ``conditions`` or ``results_version``."""
@@ -118,39 +130,84 @@ class Store:
             raise SpecError(f"{self.directory / DATABASE}: is no study: it has no {key}")
         return str(found[0])
 
+    def _table(self, key: str) -> dict[str, Any]:
+        try:
+            table = json.loads(self.meta(key))
+        except ValueError:
+            table = None
+        if not isinstance(table, dict):
+            raise SpecError(f"{self.directory / DATABASE}: is damaged: {key} cannot be read")
+        return table
+
     def pending(self, trials: Iterable[Trial]) -> list[Trial]:
-        """Return the trials that have neither failed nor finished with an undamaged recording."""
-        query = "SELECT identity, state, recording_sha256 FROM trials"
-        known = {identity: (state, digest) for identity, state, digest in self._db.execute(query)}
+        """Return the trials that have neither failed nor finished with undamaged results.
 
-        def settled(identity: str) -> bool:
-            state, digest = known.get(identity, ("", None))
-            if state == "done":
-                return durable.sha256(self._recordings(identity)) == digest
-            return state == "failed"
+        What is damaged is added to the `notes`.
+        """
+        states = dict(self._db.execute("SELECT identity, state FROM trials").fetchall())
+        damage = self.damage(trials)
+        for identity, line in damage.items():
+            states.pop(identity)
+            self.notes.append(f"{line}; run again")
+        return [trial for trial in trials if trial.identity not in states]
 
-        return [trial for trial in trials if not settled(trial.identity)]
+    def damage(self, trials: Iterable[Trial]) -> dict[str, str]:
+        """Return by identity which finished trials are not as they were written, one line each."""
+        found = {}
+        for trial in trials:
+            query = "SELECT recording_sha256 FROM trials WHERE identity = ? AND state = 'done'"
+            row = self._db.execute(query, (trial.identity,)).fetchone()
+            if row is None:
+                continue
+            where = f"{trial.condition}, seed {trial.seed}"
+            path = self._recordings(trial.identity)
+            if not self._is_sound(trial.identity):
+                found[trial.identity] = f"{self.directory / DATABASE}: {where}: rows are damaged"
+            elif (digest := durable.sha256(path)) != row[0]:
+                what = "is missing" if digest is None else "is damaged"
+                found[trial.identity] = f"{path}: {what} ({where})"
+        return found
+
+    def verify(self) -> None:
+        """Raise `SpecError` if the rows of a finished trial are not what was written."""
+        query = "SELECT identity, condition, seed FROM trials WHERE state = 'done'"
+        for identity, condition, seed in self._db.execute(query).fetchall():
+            if not self._is_sound(identity):
+                raise SpecError(
+                    f"{self.directory / DATABASE}: {condition}, seed {seed}: rows are damaged; "
+                    "nested-agents run runs it again"
+                )
+
+    def _is_sound(self, identity: str) -> bool:
+        """Tell whether the rows of a trial are what was written, as far as that is known."""
+        if not self._db.execute("PRAGMA table_info(checksums)").fetchall():
+            return True  # begun before there were checksums
+        query = "SELECT sha256 FROM checksums WHERE identity = ?"
+        noted = self._db.execute(query, (identity,)).fetchone()
+        return noted is None or noted[0] == trial_checksum(self._db, identity)
 
     def save(self, trial: Trial, result: TrialResult, total: float) -> None:
         """Keep the result of a trial that took `total` seconds; durable on return."""
-        digest = durable.write_recordings(self._recordings(trial.identity), result.recordings)
+        identity = trial.identity
+        digest = durable.write_recordings(self._recordings(identity), result.recordings)
         seconds = {**result.seconds, "total": total}
-        with self._transaction():
+        numbers = [(n, v, 1) for n, v in result.numbers.items()]
+        numbers += [(n, v, 0) for n, v in result.usage.items()]
+        with database.transaction(self._db):
             self._note(trial, "done", None, digest)
-            self._insert("episodes", [(trial.identity, *row) for row in result.rows])
-            self._insert("seconds", [(trial.identity, *(seconds[part] for part in SECONDS))])
-            numbers = [(n, v, 1) for n, v in result.numbers.items()]
-            numbers += [(n, v, 0) for n, v in result.usage.items()]
-            self._insert("numbers", [(trial.identity, *number) for number in numbers])
+            self._insert("episodes", [(identity, *row) for row in result.rows])
+            self._insert("seconds", [(identity, *(seconds[part] for part in SECONDS))])
+            self._insert("numbers", [(identity, *number) for number in numbers])
+            self._insert("checksums", [(identity, trial_checksum(self._db, identity))])
 
     def fail(self, trial: Trial, error: str) -> None:
         """Keep the traceback of a trial that failed."""
-        with self._transaction():
+        with database.transaction(self._db):
             self._note(trial, "failed", error, None)
 
     def forget_failed(self) -> int:
         """Make the failed trials pending again; return how many."""
-        with self._transaction():
+        with database.transaction(self._db):
             return self._db.execute("DELETE FROM trials WHERE state = 'failed'").rowcount
 
     def failed(self) -> list[tuple[str, int, str]]:
@@ -176,6 +233,37 @@ class Store:
         cursor = self._db.execute("SELECT * FROM results WHERE phase = ?", (phase,))
         return [column[0] for column in cursor.description], cursor.fetchall()
 
+    def episodes(self) -> tuple[list[str], list[tuple[Any, ...]]]:
+        """Return the column names and the rows of all phases, by condition, seed and episode."""
+        cursor = self._db.execute("SELECT * FROM results")
+        return [column[0] for column in cursor.description], cursor.fetchall()
+
+    def trials(self) -> tuple[list[str], list[tuple[Any, ...]]]:
+        """Return the column names and one row per trial, by condition and seed.
+
+        After the swept keys and the seed: its state, its identity, the last line of its traceback
+        if it failed, the seconds of each part, and its `numbers`; None where there is no such.
+        """
+        swept = [r[1] for r in self._db.execute("PRAGMA table_info(conditions)").fetchall()][2:]
+        names = [n for (n,) in self._db.execute("SELECT DISTINCT name FROM numbers ORDER BY name")]
+        values = {
+            (i, n): v for i, n, v in self._db.execute("SELECT identity, name, value FROM numbers")
+        }
+        cursor = self._db.execute(
+            f"SELECT c.condition, {''.join(f'c.{database.quoted(key)}, ' for key in swept)}seed, "
+            f"state, identity, error, {', '.join(SECONDS)} FROM trials "
+            "JOIN conditions c USING (condition) LEFT JOIN seconds USING (identity) "
+            "ORDER BY position, seed"
+        )
+        columns = [column[0] for column in cursor.description]
+        identity, error = columns.index("identity"), columns.index("error")
+        rows = []
+        for row in cursor:
+            last = (row[error] or "").rstrip().rpartition("\n")[2] or None
+            measured = (values.get((row[identity], name)) for name in names)
+            rows.append((*row[:error], last, *row[error + 1 :], *measured))
+        return [*columns[: -len(SECONDS)], *(f"seconds.{part}" for part in SECONDS), *names], rows
+
     def seconds(self) -> tuple[list[str], list[tuple[Any, ...]]]:
         """Return the column names and the seconds of every part of every trial."""
         cursor = self._db.execute(
@@ -200,98 +288,45 @@ class Store:
     def _recordings(self, identity: str) -> Path:
         return self.directory / "recordings" / f"{identity}.npz"
 
-    @contextmanager
-    def _transaction(self) -> Iterator[None]:
-        self._db.execute("BEGIN IMMEDIATE")
-        try:
-            yield
-        except BaseException:
-            self._db.execute("ROLLBACK")
-            raise
-        self._db.execute("COMMIT")
-
     def _insert(self, table: str, rows: list[tuple[Any, ...]]) -> None:
-        if rows:
-            places = ", ".join("?" * len(rows[0]))
-            self._db.executemany(f"INSERT INTO {table} VALUES ({places})", rows)
+        database.insert(self._db, table, rows)
 
     def _note(self, trial: Trial, state: str, error: str | None, digest: str | None) -> None:
         self._db.execute("DELETE FROM trials WHERE identity = ?", (trial.identity,))
         row = (trial.identity, trial.condition, trial.seed, state, error, digest)
         self._insert("trials", [row])
 
-    def _prepare(self, spec: Spec) -> None:
-        conditions = spec.conditions()
-        settings = {c.label: c.settings.model_dump(mode="json") for c in conditions}
-        swept = [_quoted(key) for key in conditions[0].columns]
-        columns = ", ".join(["position INTEGER", "condition TEXT PRIMARY KEY", *swept])
-        rows = [(i, c.label, *c.columns.values()) for i, c in enumerate(conditions)]
-        with self._transaction():
-            for statement in SCHEMA:
-                self._db.execute(statement)
-            self._db.execute(f"CREATE TABLE IF NOT EXISTS conditions ({columns})")
-            self._db.execute("DELETE FROM conditions")
-            self._insert("conditions", rows)
-            self._db.execute(
-                f"""CREATE VIEW IF NOT EXISTS results AS
-                SELECT c.condition, {"".join(f"c.{key}, " for key in swept)}t.seed,
-                    {", ".join(f"e.{_quoted(name)}" for name in COLUMNS)}
-                FROM episodes e JOIN trials t USING (identity) JOIN conditions c USING (condition)
-                WHERE t.state = 'done' ORDER BY c.position, t.seed, e.phase DESC, e.episode"""
-            )
-            self._db.execute("DELETE FROM meta")
-            meta = {"results_version": str(RESULTS_VERSION), "spec": json.dumps(spec.table())}
-            self._insert("meta", [*meta.items(), ("conditions", json.dumps(settings))])
-        path = self.directory / SPEC_FILE
-        if not (path.exists() and Spec.load(path) == spec):
-            durable.write(path, dumps(spec.table()).encode())
 
-
-def _refuse_other(directory: Path, spec: Spec) -> None:
-    """Raise `SpecError` if a directory holds something that `spec` may not be added to."""
-    if not _holds_tables(directory):
-        if (directory / SPEC_FILE).exists() and Spec.load(directory / SPEC_FILE) != spec:
-            raise SpecError(f"{directory / SPEC_FILE}: is in the way of this study's own copy")
-        return
-    with Store.open(directory) as store:
-        if (version := store.meta("results_version")) != str(RESULTS_VERSION):
-            raise SpecError(
-                f"{directory}: holds results of version {version}, this is version "
-                f"{RESULTS_VERSION}; use another directory"
-            )
-        if found := difference(store.spec(), json.loads(store.meta("conditions")), spec):
-            raise SpecError(f"{directory}: holds another study: {found}")
+def _refusal(directory: Path, spec: Spec, *, damaged: bool) -> str | None:
+    """Return why `spec` may not be added to what a directory holds, in one line."""
+    if not damaged and _holds_tables(directory):
+        with Store.open(directory) as store:
+            return store.refusal(spec)
+    path = directory / SPEC_FILE
+    if not path.exists() or (old := Spec.load(path)) == spec:
+        return None
+    if not damaged:
+        return f"{path}: is in the way of this study's own copy"
+    settings = {c.label: c.settings.model_dump(mode="json") for c in old.conditions()}
+    found = difference(old, settings, spec)
+    return f"{directory}: holds another study: {found}" if found else None
 
 
 def _holds_tables(directory: Path) -> bool:
     """Tell a study from nothing, and from a run that was killed before it had noted its spec."""
-    if not (directory / DATABASE).exists():
+    path = directory / DATABASE
+    if not path.exists():
         return False
-    with Store.open(directory) as store:
-        return store._db.execute("SELECT 1 FROM sqlite_master").fetchone() is not None
+    with database.reading(path) as db:
+        return db.execute("SELECT 1 FROM sqlite_master").fetchone() is not None
 
 
-@contextmanager
-def _connected(path: Path, options: str = "") -> Iterator[sqlite3.Connection]:
-    uri = path.absolute().as_uri()
-    try:
-        connection = sqlite3.connect(uri + options, uri=True, isolation_level=None)
+def _take(lock: TextIO, directory: Path) -> None:
+    """Take the lock of a directory; it is not waited for, but for a look at it."""
+    for wait in (0.05, 0.1, 0.0):
         try:
-            connection.execute("SELECT 1 FROM sqlite_master").fetchone()
-        except sqlite3.OperationalError:
-            if not options:
-                raise
-            # A finished study on a medium where SQLite cannot make its shared-memory file.
-            connection.close()
-            connection = sqlite3.connect(f"{uri}?immutable=1", uri=True, isolation_level=None)
-            connection.execute("SELECT 1 FROM sqlite_master").fetchone()
-        try:
-            yield connection
-        finally:
-            connection.close()
-    except sqlite3.DatabaseError as error:
-        raise SpecError(f"{path}: {error}") from None
-
-
-def _quoted(name: str) -> str:
-    return '"' + name.replace('"', '""') + '"'
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return
+        except OSError:
+            time.sleep(wait)
+    raise SpecError(f"{directory}: another process is writing there")

@@ -29,6 +29,7 @@ def command(
     from ..store import Store
 
     with Store.open(directory) as store:
+        store.verify()
         names, rows = store.rows(phase)
     write_rows(names, rows, format, sys.stdout)
     return 0
