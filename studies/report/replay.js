@@ -304,6 +304,8 @@
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
   addEventListener("beforeprint", draw);
 
+  if (!("DecompressionStream" in window)) return;
+  at("unplayed").hidden = true;
   at("player").hidden = false;
   options(at("condition"), distinct(recorded.episodes, "condition"));
   options(at("seed"), distinct(chosen("condition"), "seed"));

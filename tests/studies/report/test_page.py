@@ -1,0 +1,85 @@
+import re
+import shutil
+
+import pytest
+
+from nested_agents.studies.cli import main
+from nested_agents.studies.report.page import page
+from nested_agents.studies.store import DATABASE
+
+
+@pytest.fixture(scope="module")
+def finished(kept, tmp_path_factory):
+    return kept(tmp_path_factory.mktemp("study") / "here")
+
+
+def sections(html):
+    return re.findall(r'<section id="(\w+)"', html)
+
+
+def test_a_finished_study_has_everything(finished):
+    html = page(finished)
+    assert sections(html) == ["summary", "table", "figures", "replay", "spec", "versions"]
+    assert "All 6 trials are done." in html
+    assert "success greedy: highest is" in html
+    assert "preset = [&#34;default&#34;, &#34;frozen&#34;]" in html
+    assert len(html) < 500_000
+
+
+def test_equal_results_give_equal_bytes_wherever_they_are(finished, tmp_path):
+    copy = shutil.copytree(finished, tmp_path / "elsewhere")
+    html = page(finished)
+    assert page(copy) == html
+    assert str(finished.parent) not in html
+
+
+def test_it_asks_for_nothing_outside(finished):
+    html = re.sub(r'xmlns(:\w+)?="[^"]*"', "", page(finished))
+    assert re.findall(r"(?:https?:)?//[a-z][\w.]+\.[a-z]+", html) == []
+    assert not re.search(r"<(link|iframe|object)\b|\bsrc=\"(?!data:)|@import", html)
+
+
+def test_an_empty_study(kept, tmp_path):
+    html = page(kept(tmp_path, done=0))
+    assert sections(html) == ["summary", "spec", "versions"]
+    assert "There is nothing to show yet." in html
+
+
+def test_an_unfinished_study_with_failures(kept, tmp_path):
+    html = page(kept(tmp_path, done=3, failed=2))
+    assert "Unfinished: 3 of 6 trials are done, 2 failed, 1 left." in html
+    assert html.count("<details>") == 2
+    assert "RuntimeError: &lt;off &amp; away&gt;" in html
+    assert "…/core/team.py" in html
+    assert "someone" not in html
+
+
+def test_the_command_writes_it_whole(finished, tmp_path, capsys):
+    assert main(["report", str(finished)]) == 0
+    assert capsys.readouterr().out.startswith(f"{finished / 'report.html'}: 0.")
+    assert main(["report", str(finished), "--out", str(tmp_path / "a.html")]) == 0
+    assert (tmp_path / "a.html").read_bytes() == (finished / "report.html").read_bytes()
+    assert [path.name for path in tmp_path.iterdir()] == ["a.html"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["nowhere"], f"nowhere: holds no study (no {DATABASE})"),
+        (["STUDY", "--out", "OUT"], "--out OUT: is a directory"),
+        (["STUDY", "--out", "OUT/deep/a.html"], "--out OUT/deep/a.html: there is no directory"),
+    ],
+)
+def test_what_the_user_can_mend(arguments, complaint, finished, tmp_path, capsys):
+    places = {"STUDY": str(finished), "OUT": str(tmp_path)}
+
+    def placed(text):
+        for name, place in places.items():
+            text = text.replace(name, place)
+        return text
+
+    assert main(["report", *map(placed, arguments)]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith(f"nested-agents: error: {placed(complaint)}")
+    assert err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
