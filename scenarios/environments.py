@@ -81,6 +81,8 @@ class Game:
         Most steps of an episode.
     render_mode
         ``None``, ``"rgb_array"`` or ``"human"``.
+    sensors
+        Whether pictures show the rays of the infrared sensors.
 
     Raises
     ------
@@ -88,7 +90,9 @@ class Game:
         If one of them is out of range.
     """
 
-    def __init__(self, settings: SettingsLike, steps: int, render_mode: str | None) -> None:
+    def __init__(
+        self, settings: SettingsLike, steps: int, render_mode: str | None, *, sensors: bool
+    ) -> None:
         if steps < 1:
             raise ValueError(f"steps = {steps}, must be at least 1")
         if render_mode not in (None, *RENDER_MODES):
@@ -97,7 +101,7 @@ class Game:
             settings = ScenarioSettings.model_validate(settings or {})
         self.scenario = BoxPushing(settings)
         self.steps = steps
-        self.screen = None if render_mode is None else Screen(settings, render_mode)
+        self.screen = Screen(settings, render_mode, sensors=sensors) if render_mode else None
         self._seeds = np.random.default_rng()
         self._episode, self._step = -1, 0
 
@@ -147,7 +151,7 @@ class WheelsEnv(ParallelEnv):
 
     Parameters
     ----------
-    settings, steps, render_mode
+    settings, steps, render_mode, sensors
         As in `Game`.
 
     Examples
@@ -166,9 +170,14 @@ class WheelsEnv(ParallelEnv):
     }
 
     def __init__(
-        self, settings: SettingsLike = None, *, steps: int = 450, render_mode: str | None = None
+        self,
+        settings: SettingsLike = None,
+        *,
+        steps: int = 450,
+        render_mode: str | None = None,
+        sensors: bool = False,
     ) -> None:
-        self.game = Game(settings, steps, render_mode)
+        self.game = Game(settings, steps, render_mode, sensors=sensors)
         self.render_mode = render_mode
         self.seats = self._seats(self.game.scenario)
         self.possible_agents = list(self.seats)
@@ -254,7 +263,7 @@ class BoxPushingEnv(gymnasium.Env):
 
     Parameters
     ----------
-    settings, steps, render_mode
+    settings, steps, render_mode, sensors
         As in `Game`.
 
     Examples
@@ -267,9 +276,14 @@ class BoxPushingEnv(gymnasium.Env):
     metadata: dict[str, Any] = {"render_modes": RENDER_MODES, "render_fps": 2}  # noqa: RUF012
 
     def __init__(
-        self, settings: SettingsLike = None, *, steps: int = 450, render_mode: str | None = None
+        self,
+        settings: SettingsLike = None,
+        *,
+        steps: int = 450,
+        render_mode: str | None = None,
+        sensors: bool = False,
     ) -> None:
-        self.game = Game(settings, steps, render_mode)
+        self.game = Game(settings, steps, render_mode, sensors=sensors)
         self.render_mode = render_mode
         self.seat = Seat(self.game.scenario, range(len(self.game.scenario.agents)))
         self.observation_space = self.seat.observation_space

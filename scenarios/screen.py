@@ -23,14 +23,17 @@ class Screen:
         Of the scenario.
     mode
         ``"rgb_array"``: `render` returns a picture. ``"human"``: a window is kept up to date.
+    sensors
+        Whether rays of infrared sensors are drawn.
     """
 
-    def __init__(self, settings: ScenarioSettings, mode: str) -> None:
-        self.mode = mode
+    def __init__(self, settings: ScenarioSettings, mode: str, *, sensors: bool = False) -> None:
+        self.mode, self.sensors = mode, sensors
         self._constants = {
             "dt": np.array(settings.hold * CONTROL_PERIOD),
             "robot": np.array(label(settings.robot)),
             "box": np.array(label(settings.box)),
+            "infrared": np.array(label(settings.infrared)),
         }
         self._frames: dict[str, list[Any]] = {}
         self._rewards: list[float] = []
@@ -78,7 +81,7 @@ class Screen:
         recording = {name: np.stack(frames) for name, frames in self._frames.items()}
         recording |= self._constants
         recording["reward"] = np.array(self._rewards)
-        return picture(recording, len(self._rewards))
+        return picture(recording, len(self._rewards), sensors=self.sensors)
 
     def _show(self) -> None:
         try:

@@ -1,0 +1,56 @@
+"""How often the scripted controller solves box pushing: ``python -m benchmarks.scripted``.
+
+Episodes of at most 200 decisions with two e-Pucks, unless said otherwise, on the worlds of seeds
+0, 1, 2, ...; the table gives how many of them end at the goal, and the median number of decisions
+of those.
+"""
+
+from __future__ import annotations
+
+import argparse
+from statistics import median
+
+from rich.console import Console
+from rich.table import Table
+
+from nested_agents.scenarios import BoxPushing, ScenarioSettings, build
+from nested_agents.scenarios.boxes import BOXES
+from nested_agents.scenarios.scripted import ScriptedController
+
+STARTS = ("easy", "medium", "hard")
+STEPS = 200
+
+
+def decisions(scenario: BoxPushing, seed: int, steps: int = STEPS) -> int | None:
+    """Return after how many decisions the box is at the goal; none: it is not."""
+    controller = ScriptedController(scenario.world.robots, scenario.box)
+    scenario.reset(seed)
+    for step in range(1, steps + 1):
+        transition = scenario.step(controller.act(scenario.measure()))
+        if transition.terminated or transition.truncated:
+            return step if transition.terminated else None
+    return None
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.scripted", description=__doc__)
+    parser.add_argument("--seeds", type=int, default=20)
+    parser.add_argument("--boxes", nargs="+", default=list(BOXES), choices=BOXES, metavar="BOX")
+    parser.add_argument("--starts", nargs="+", default=list(STARTS), choices=STARTS)
+    parser.add_argument("--robots", type=int, default=2)
+    options = parser.parse_args()
+    table = Table("box", *options.starts, title=f"solved of {options.seeds} (decisions)")
+    for box in options.boxes:
+        cells = []
+        for start in options.starts:
+            scenario = build(ScenarioSettings(box=box, start=start, robots=options.robots))
+            taken = [decisions(scenario, seed) for seed in range(options.seeds)]
+            solved = [steps for steps in taken if steps is not None]
+            cells.append(f"{len(solved)} ({median(solved):.0f})" if solved else "0")
+        table.add_row(box, *cells)
+    Console(width=80).print(table)
+
+
+if __name__ == "__main__":
+    main()
