@@ -98,6 +98,22 @@ class BoxPrediction:
             twists[r, : len(drives)] = drives @ effect[:, :-1].T + effect[:, -1]
         return twists
 
+    @cached_property
+    def _motions(self) -> list[tuple[IntArray, IntArray]]:
+        """Per robot drives of distinct twists, and which of these twists each drive has.
+
+        The wheels on one side of a skid-steer do the same to its motion: whichever of them is the
+        faster, the robot moves alike.
+        """
+        per_robot = []
+        for r, (drives, _) in enumerate(self._drives):
+            found: dict[tuple[float, ...], int] = {}
+            keys = np.rint(self._twists[r, : len(drives)] / SAME_TWIST).tolist()
+            which = [found.setdefault(tuple(key), len(found)) for key in keys]
+            first = np.array([which.index(motion) for motion in range(len(found))])
+            per_robot.append((first, np.array(which)))
+        return per_robot
+
     def _view(self, choices: IntArray) -> View:
         """Return where the robots' drives ``(m, M)`` lead."""
         return self._after(choices, self.seconds)
@@ -119,13 +135,15 @@ class BoxPrediction:
 
     @cached_property
     def _table(self) -> tuple[View, IntArray]:
-        """Where all combinations of drives lead, and the row of every joint-action code."""
-        shape = tuple(len(drives) for drives, _ in self._drives)
-        choices = np.indices(shape).reshape(len(shape), -1).T
+        """Where all combinations of motions lead, and the row of every joint-action code."""
+        shape = tuple(len(first) for first, _ in self._motions)
+        motions = np.indices(shape).reshape(len(shape), -1)
+        choices = np.empty((motions.shape[1], len(shape)), dtype=np.int64)
         row = np.zeros(1, dtype=np.int64)
-        for (_, which), size in zip(self._drives, shape, strict=True):
-            row = (row[:, None] * size + which).ravel()
-        return self._view(np.ascontiguousarray(choices, dtype=np.int64)), row
+        for r, (first, motion) in enumerate(self._motions):
+            choices[:, r] = first[motions[r]]
+            row = (row[:, None] * shape[r] + motion[self._drives[r][1]]).ravel()
+        return self._view(choices), row
 
     @cached_property
     def _alone(self) -> list[FloatArray]:
@@ -253,6 +271,9 @@ def mean_twists(before: FloatArray, after: FloatArray, seconds: float) -> FloatA
     left = cos * chord[:, 1] - sin * chord[:, 0]
     return np.stack([ahead, left, turn], axis=1) / seconds
 
+
+SAME_TWIST = 1e-11
+"""Twists [m/s, rad/s] that differ by less lead to the same place."""
 
 CONTACT_GAP = 0.002
 """Predicted gap [m] below which a robot counts as touching."""

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from copy import deepcopy
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -89,6 +90,12 @@ class ExactPrediction(BoxPrediction):
     """Predicts by playing; but for the own block, which is that of a robot pushing alone."""
 
     future: Future
+
+    @cached_property
+    def _motions(self) -> list[tuple[IntArray, IntArray]]:
+        """Per robot all drives: wheels that command one twist may yet slip differently."""
+        every = [np.arange(len(drives)) for drives, _ in self._drives]
+        return [(drives, drives) for drives in every]
 
     def _after(self, choices: IntArray, seconds: float) -> View:
         periods = round(seconds / CONTROL_PERIOD)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from math import pi
 
 import numpy as np
@@ -39,6 +40,26 @@ class View:
     gaps: FloatArray
     goal: FloatArray
 
+    # What all robots share is computed once.
+
+    @cached_property
+    def distance(self) -> FloatArray:
+        """Distance ``(m,)`` of the box from the goal [m]."""
+        ahead = self.goal[:2] - self.box[:, :2]
+        return np.hypot(ahead[:, 0], ahead[:, 1])
+
+    @cached_property
+    def course(self) -> FloatArray:
+        """Direction ``(m,)`` from the box to the goal [rad]."""
+        return np.arctan2(self.goal[1] - self.box[:, 1], self.goal[0] - self.box[:, 0])
+
+    @cached_property
+    def bearings(self) -> FloatArray:
+        """Where the robots' middle would push the box, off the course, and its turn ``(m, 2)``."""
+        middle = self.robots[:, :, :2].mean(axis=1)
+        push = np.arctan2(self.box[:, 1] - middle[:, 1], self.box[:, 0] - middle[:, 0])
+        return wrap(np.stack([push - self.course, self.box[:, 2] - self.goal[2]], axis=1))
+
 
 @dataclass(frozen=True)
 class BoxStateSpace:
@@ -62,9 +83,17 @@ class BoxStateSpace:
     own_needs_pose: bool
 
 
+_TURN = 2.0 * pi
+_TURN_HIGH = 6.283185243606567
+"""The leading 26 bits of a turn: products with a few thousand turns are exact."""
+_TURN_LOW = _TURN - _TURN_HIGH
+
+
 def wrap(angle: FloatArray) -> FloatArray:
-    """Map angles to [-pi, pi)."""
-    return (angle + pi) % (2.0 * pi) - pi
+    """Map angles to [-pi, pi): ``(angle + pi) % (2 pi) - pi`` to the last bit, but faster."""
+    shifted = angle + pi
+    turns = np.floor(shifted / _TURN)
+    return shifted - turns * _TURN_HIGH - turns * _TURN_LOW - pi
 
 
 def _paper_own(poses: FloatArray, speeds: FloatArray, goal: FloatArray) -> FloatArray:
@@ -75,10 +104,8 @@ def _paper_own(poses: FloatArray, speeds: FloatArray, goal: FloatArray) -> Float
 
 
 def _paper_shared(view: View, robot: int) -> FloatArray:
-    ahead = view.goal[:2] - view.box[:, :2]
-    bearing = np.arctan2(ahead[:, 1], ahead[:, 0])
-    distance = np.hypot(ahead[:, 0], ahead[:, 1])
-    return np.stack([wrap(view.box[:, 2]), wrap(bearing - view.box[:, 2]), distance], axis=1)
+    turned = view.box[:, 2]
+    return np.stack([wrap(turned), wrap(view.course - turned), view.distance], axis=1)
 
 
 def _relational_own(poses: FloatArray, speeds: FloatArray, goal: FloatArray) -> FloatArray:
@@ -86,25 +113,18 @@ def _relational_own(poses: FloatArray, speeds: FloatArray, goal: FloatArray) -> 
 
 
 def _relational_shared(view: View, robot: int) -> FloatArray:
-    pose, box, goal = view.robots[:, robot], view.box, view.goal
-    to_box = box[:, :2] - pose[:, :2]
-    to_goal = goal[:2] - box[:, :2]
-    azimuth = np.arctan2(to_box[:, 1], to_box[:, 0])
-    course = np.arctan2(to_goal[:, 1], to_goal[:, 0])
-    others = np.delete(view.gaps, robot, axis=1)
-    pushed = box[:, :2] - view.robots[:, :, :2].mean(axis=1)
-    return np.stack(
-        [
-            view.gaps[:, robot],
-            wrap(azimuth - pose[:, 2]),
-            wrap(azimuth - course),
-            others.max(axis=1) if others.shape[1] else view.gaps[:, robot],
-            wrap(np.arctan2(pushed[:, 1], pushed[:, 0]) - course),
-            wrap(box[:, 2] - goal[2]),
-            np.hypot(to_goal[:, 0], to_goal[:, 1]),
-        ],
-        axis=1,
-    )
+    pose, box = view.robots[:, robot], view.box
+    azimuth = np.arctan2(box[:, 1] - pose[:, 1], box[:, 0] - pose[:, 0])
+    others = [r for r in range(view.gaps.shape[1]) if r != robot] or [robot]
+    block = np.empty((len(pose), 7))
+    block[:, 0] = view.gaps[:, robot]
+    block[:, 1] = azimuth - pose[:, 2]
+    block[:, 2] = azimuth - view.course
+    block[:, 1:3] = wrap(block[:, 1:3])
+    block[:, 3] = view.gaps[:, others].max(axis=1)
+    block[:, 4:6] = view.bearings
+    block[:, 6] = view.distance
+    return block
 
 
 def _angle(name: str, centres: tuple[float, ...], labels: tuple[str, ...]) -> Variable:

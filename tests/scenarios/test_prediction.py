@@ -27,6 +27,23 @@ def test_relational_blocks_are_the_states_of_every_joint_action(robots: int) -> 
         np.testing.assert_array_equal(tables, prediction.states(agent, joint))
 
 
+def test_drives_of_one_twist_are_pushed_once() -> None:
+    scenario = moving(robot="four-wheel", robots=1)
+    prediction, joint = scenario.predict(), all_joint_actions(4)
+    for agent in range(4):
+        blocks = prediction.blocks(agent)
+        # Three speeds of each wheel, so six sums at most on each side; two are at rest.
+        assert len(blocks.shared) <= 36 < len(blocks.own)
+        tables = blocks.states(np.arange(len(joint)))
+        np.testing.assert_allclose(tables, prediction.states(agent, joint), rtol=0, atol=1e-12)
+
+
+def test_played_predictions_keep_drives_of_one_twist_apart() -> None:
+    scenario = moving(robot="four-wheel", robots=1, predictor="exact")
+    blocks = scenario.predict().blocks(0)
+    assert len(blocks.shared) == len(blocks.own)
+
+
 def test_the_own_block_of_the_paper_is_that_of_the_robot_alone() -> None:
     scenario = moving(state_space="paper")
     prediction, joint = scenario.predict(), all_joint_actions(4)

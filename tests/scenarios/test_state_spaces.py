@@ -64,3 +64,8 @@ def test_mirrored_worlds_have_mirrored_angles() -> None:
 
 def test_angles_wrap() -> None:
     np.testing.assert_allclose(wrap(np.array([0.0, 3 * pi, -1.5 * pi])), [0.0, -pi, 0.5 * pi])
+
+
+def test_wrap_is_the_remainder_to_the_last_bit() -> None:
+    angles = np.random.default_rng(0).uniform(-300, 300, 100_000)
+    np.testing.assert_array_equal(wrap(angles), (angles + pi) % (2 * pi) - pi)
