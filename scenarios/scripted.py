@@ -1,10 +1,10 @@
 """A scripted controller: the proof that box pushing can be solved with the agents' own actions.
 
-It picks the side of the box that faces away from the goal, gives every robot a slot along that
-side, drives the robots that are not at their slot there (a short search over sequences of actions
-of one robot, around the box and clear of the others), and once all are, pushes: it tries the joint
-actions on the push predictor and takes the one after which the box is nearest to the goal and best
-aligned, with the robots still at their slots. It knows the whole situation and remembers nothing.
+It picks a side at which to push the box towards the goal, gives every robot a slot along it, drives
+the robots that are not at their slot there (a short search over sequences of actions of one robot,
+around the box and clear of the others), and once all are, pushes: it tries the joint actions on the
+push predictor and takes the one after which the box is nearest to the goal and best aligned, with
+the robots still at their slots. It knows the whole situation and remembers nothing.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from itertools import pairwise, product
 from math import atan2, cos, pi, sin
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -23,6 +23,7 @@ from .boxes import BoxSpec
 from .push import PushModel, push
 from .robots import RobotSpec, compliance, nominal_effect
 from .routes import moved, paths
+from .sides import SPREAD, Side, behind, is_concave, sides_of
 
 CLEARANCE = 0.006
 """Least gap [m] to box and other robots on the way to a slot."""
@@ -32,25 +33,6 @@ LONGEST_SEARCH = 5000
 """Action sequences tried per robot and decision."""
 WIDEST_JOINT = 300
 """Joint actions tried at once; above, robots choose in turn."""
-
-
-class Side(NamedTuple):
-    """A side of the box to push at, in the frame of the box.
-
-    Attributes
-    ----------
-    direction
-        Of pushing [rad].
-    depth
-        Distance of the side from the centre, against `direction` [m].
-    middle, half
-        Middle and half the length of the usable side, to the left of `direction` [m].
-    """
-
-    direction: float
-    depth: float
-    middle: float
-    half: float
 
 
 class ScriptedController:
@@ -106,7 +88,9 @@ class ScriptedController:
             friction_radius=box.friction_radius,
             contact_friction=box.contact_friction,
         )
-        self._sides = _sides(box)
+        self._sides = sides_of(box, len(robots), float(self._radii.max()) + CLEARANCE)
+        self._hollow = is_concave(box)
+        self._backs: dict[tuple[float, float, float], float] = {}
 
     def act(self, measurements: Mapping[str, Any]) -> IntArray:
         """Return the joint action ``(n,)`` in a situation.
@@ -167,7 +151,7 @@ class ScriptedController:
     def _spread(self, side: Side) -> float:
         """Return how far from the middle of a side the outermost slots are [m]."""
         least = (len(self.robots) - 1) * (float(self._radii.max()) + CLEARANCE)
-        return max(0.55 * side.half, least)
+        return max(SPREAD * side.half, least)
 
     def _slots(self, side: Side, box: FloatArray, error: float) -> FloatArray:
         """Return the slots ``(M, 2)`` along a side, evenly spread, in the world.
@@ -182,11 +166,20 @@ class ScriptedController:
         ahead, left = np.array([cos(angle), sin(angle)]), np.array([-sin(angle), cos(angle)])
         slots = []
         for offset, radius in zip(offsets, self._radii, strict=True):
-            back = side.depth + radius + SLOT_GAP
+            back = self._back(side, float(side.middle + offset), float(radius))
             if not self._sides:
                 back = np.sqrt((self.box.reach + radius + SLOT_GAP) ** 2 - offset**2)
             slots.append(box[:2] - back * ahead + (side.middle + offset) * left)
         return np.array(slots)
+
+    def _back(self, side: Side, aside: float, radius: float) -> float:
+        """Return how far behind the box's centre a robot waits [m]."""
+        if not self._hollow:
+            return side.depth + radius + SLOT_GAP
+        key = side.direction, aside, radius + SLOT_GAP
+        if key not in self._backs:
+            self._backs[key] = behind(self.box, *key)[0]
+        return self._backs[key]
 
     def _at_slot(self, pose: FloatArray, slot: FloatArray, heading: float) -> bool:
         dx, dy = pose[:2] - slot
@@ -315,25 +308,6 @@ def _local_actions(robot: RobotSpec, n_actions: int) -> IntArray:
     groups = sorted(set(sides))
     rows = product(range(n_actions), repeat=len(groups))
     return np.array([[row[groups.index(side)] for side in sides] for row in rows])
-
-
-def _sides(box: BoxSpec) -> list[Side]:
-    """Return the sides of a polygon's convex hull; none for a disc, pushed anywhere."""
-    if box.polygon is None:
-        return []
-    ring = np.asarray(box.polygon.convex_hull.exterior.coords)
-    if not box.polygon.convex_hull.exterior.is_ccw:
-        ring = ring[::-1]
-    sides = []
-    for a, b in pairwise(ring):
-        along = b - a
-        direction = atan2(along[0], -along[1])  # inwards, left of the edge
-        left = np.array([-sin(direction), cos(direction)])
-        ends = sorted((a @ left, b @ left))
-        depth = -float(a @ np.array([cos(direction), sin(direction)]))
-        sides.append(Side(direction, depth, sum(ends) / 2, (ends[1] - ends[0]) / 2))
-    longest = max(side.half for side in sides)
-    return [side for side in sides if side.half > 0.5 * longest]
 
 
 def _wrap(angle: Any) -> Any:

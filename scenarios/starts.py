@@ -112,7 +112,7 @@ def place(
     return poses, box_pose, goal
 
 
-def _approach(
+def approach(
     box: BoxSpec, origin: tuple[float, float], azimuth: float, gap: float
 ) -> tuple[float, float]:
     """Return the point of a ray out of the box that is `gap` from its surface.
@@ -152,7 +152,7 @@ def _behind(
     poses = np.empty((len(robots), 3))
     for r, robot in enumerate(robots):
         gap = robot.radius + rng.uniform(*spec.gaps)
-        x, y = _approach(box, (0.0, float(offsets[r])), pi, gap)
+        x, y = approach(box, (0.0, float(offsets[r])), pi, gap)
         poses[r] = x, y, rng.uniform(-spec.heading, spec.heading)
     return poses
 
@@ -165,7 +165,7 @@ def _around(
     for r, robot in enumerate(robots):
         for _ in range(ATTEMPTS):
             gap = robot.radius + rng.uniform(*spec.gaps)
-            x, y = _approach(box, (0.0, 0.0), rng.uniform(-pi, pi), gap)
+            x, y = approach(box, (0.0, 0.0), rng.uniform(-pi, pi), gap)
             radii = np.array([other.radius for other in robots[:r]])
             apart = np.hypot(poses[:r, 0] - x, poses[:r, 1] - y)
             if (apart > radii + robot.radius + CLEARANCE).all():
