@@ -25,7 +25,7 @@ from .predictors import ExactPrediction, Future, push_model
 from .reward import reward
 from .robots import nominal_effect, robot_for
 from .starts import place
-from .state_spaces import STATE_SPACES, View
+from .state_spaces import View, state_space_for
 from .world import CONTROL_PERIOD, World, WorldState
 
 SENSING = 2**32 - 1
@@ -74,7 +74,7 @@ class BoxPushing:
         self.action_set = ActionSet()
         self.infrared = InfraredSpec(**settings.infrared.model_dump())
         self.world = World([self.robot] * settings.robots, self.box, infrared=self.infrared)
-        self._space = STATE_SPACES[settings.state_space]
+        self._space = state_space_for(settings.state_space, self.robot.max_speed)
         self._limits: FloatArray = np.full(len(self.agents), self.robot.max_speed)
         self._effects = self.nominal_effects
         robots = [self.robot] * settings.robots

@@ -171,7 +171,7 @@ class RobotSettings(Settings):
     mass: Positive = 0.15
     """[kg]."""
     max_speed: Positive = 0.13
-    """Greatest wheel speed [m/s]; state spaces lay their memberships over 0.13 m/s."""
+    """Greatest wheel speed [m/s]; state spaces lay the memberships of wheel speeds over it."""
     stiffness: Positive = 6.5
     """Of one wheel's servo [N per m/s]."""
     lateral_stiffness: Positive = 20.0

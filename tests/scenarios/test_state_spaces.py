@@ -5,7 +5,8 @@ from math import pi
 import numpy as np
 import pytest
 
-from nested_agents.scenarios.state_spaces import STATE_SPACES, View, wrap
+from nested_agents.scenarios import BoxPushing, ScenarioSettings
+from nested_agents.scenarios.state_spaces import STATE_SPACES, View, state_space_for, wrap
 
 GOAL = np.array([1.0, 0.0, 0.0])
 
@@ -69,3 +70,29 @@ def test_angles_wrap() -> None:
 def test_wrap_is_the_remainder_to_the_last_bit() -> None:
     angles = np.random.default_rng(0).uniform(-300, 300, 100_000)
     np.testing.assert_array_equal(wrap(angles), (angles + pi) % (2 * pi) - pi)
+
+
+@pytest.mark.parametrize("name", STATE_SPACES)
+def test_memberships_of_wheel_speeds_span_those_of_the_robot(name: str) -> None:
+    assert state_space_for(name, 0.13) is STATE_SPACES[name]
+    fast, plain = state_space_for(name, 0.39).space, STATE_SPACES[name].space
+    for variable, like in zip(fast.variables, plain.variables, strict=True):
+        if variable.name != "wheel_speed":
+            assert variable == like
+        else:
+            assert (variable.low, variable.high) == pytest.approx((-0.39, 0.39))
+            assert variable.centres == pytest.approx(np.multiply(3, like.centres))
+            assert variable.labels == like.labels
+
+
+def test_a_fast_robot_gets_them() -> None:
+    wheels = [{"name": "a", "x": 0, "y": 0.02}, {"name": "b", "x": 0, "y": -0.02}]
+    settings = ScenarioSettings.model_validate({"robot": {"wheels": wheels, "max_speed": 0.26}})
+    scenario = BoxPushing(settings)
+    assert scenario.state_space.own[0].high == pytest.approx(0.26)
+    scenario.reset(0)
+    ahead = np.zeros(4, dtype=int)
+    states = [scenario.step(ahead).states for _ in range(3)][-1]
+    assert states[:, 0].max() == 0.26
+    assert (states >= scenario.bounds[:, 0]).all()
+    assert (states <= scenario.bounds[:, 1]).all()
