@@ -1,6 +1,7 @@
 """What a study is: a measure of one trial, an analysis of all, and figures of the analysis.
 
-A study is one module that offers these, and one line in `nested_agents.studies.STUDIES`.
+A study is one module that offers these, and one line in `nested_agents.studies.STUDIES`. It may
+also offer ``check(spec)``, which raises `SpecError` if the spec has not what it needs.
 """
 
 from __future__ import annotations

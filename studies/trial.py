@@ -9,6 +9,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from .. import scenarios, topologies
 from ..core.loop import control_loop, policy_seed, world_seed
 from ..core.protocols import Scenario
@@ -134,6 +137,8 @@ def build(settings: ConditionSettings, seed: int) -> tuple[Scenario, Team]:
 
 def check(spec: Spec) -> None:
     """Raise `SpecError` if a condition cannot be built, before anything is run or written."""
+    from .study import load_study  # studies import this module
+
     conditions = spec.conditions()
     for condition in conditions:
         try:
@@ -144,6 +149,9 @@ def check(spec: Spec) -> None:
         except ValueError as error:
             where = f" (condition {condition.label!r})" if len(conditions) > 1 else ""
             raise SpecError(f"{error}{where}") from None
+    own = getattr(load_study(spec.study), "check", None)
+    if own is not None:
+        own(spec)
 
 
 def _check_alike(name: str, scenario: Scenario, other: Scenario) -> None:
@@ -167,8 +175,8 @@ class Session:
     def __init__(self, trial: Trial) -> None:
         self.trial = trial
         self.scenario, self.team = build(trial.settings, trial.seed)
-        self.steps = 0
-        """Steps trained so far."""
+        self.deciding: list[float] = []
+        """Seconds of every decision in training."""
         self._rows: list[EpisodeRow] = []
         self._recordings: dict[str, Recording] = {}
         self._watch = Stopwatch()
@@ -196,7 +204,7 @@ class Session:
                 recorder.add(record.transition)
             if team is None:
                 self._watch.add(record)
-                self.steps += 1
+                self.deciding.append(record.deciding)
             if record.last:
                 self._rows.append(meter.row(record.transition))
                 if record.episode in kept:
@@ -207,8 +215,18 @@ class Session:
                         box=label(scenario.box),
                     )
 
-    def evaluate(self, scenario: Scenario | None = None, *, phase: str = "evaluation") -> None:
-        """Let the team act greedily, in another scenario perhaps, on worlds of no training."""
+    def evaluate(
+        self, scenario: Scenario | None = None, *, phase: str = "evaluation"
+    ) -> NDArray[np.float64]:
+        """Let the team act greedily, in another scenario perhaps, on worlds of no training.
+
+        Returns
+        -------
+        NDArray[np.float64]
+            ``(n_episodes, M)`` for how much of the time in which any robot touches the box each of
+            them does.
+        """
+        shares = []
         for record in control_loop(
             scenario or self.scenario, self.team, episodes=self.trial.evaluation,
             steps=self.trial.steps, seed=self.trial.seed, first_episode=EVALUATION_WORLDS,
@@ -216,17 +234,28 @@ class Session:
         ):  # fmt: skip
             if record.step == 0:
                 meter = EpisodeMeter(phase, record.episode - EVALUATION_WORLDS)
+                touching = []
             meter.add(record.transition)
+            touching.append(record.transition.info["contact_time"])
             if record.last:
                 self._rows.append(meter.row(record.transition))
+                pushing = max(float(np.max(touching, axis=1).sum()), 1e-12)
+                shares.append(np.sum(touching, axis=0) / pushing)
+        return np.array(shares)
 
-    def evaluate_elsewhere(self) -> None:
-        """Evaluate in each of the trial's `evaluations`, whatever the others are."""
+    def evaluate_elsewhere(self) -> dict[str, NDArray[np.float64]]:
+        """Evaluate in each of the trial's `evaluations`, whatever the others are.
+
+        Returns what `evaluate` does, by name.
+        """
+        shares = {}
         state = self.team.rng.bit_generator.state
         for name, settings in self.trial.evaluations:
             self.team.rng.bit_generator.state = state
             elsewhere = self.trial.settings.model_copy(update={"scenario": settings})
-            self.evaluate(build(elsewhere, self.trial.seed)[0], phase=f"evaluation:{name}")
+            scenario, _ = build(elsewhere, self.trial.seed)
+            shares[name] = self.evaluate(scenario, phase=f"evaluation:{name}")
+        return shares
 
     def result(
         self,

@@ -1,0 +1,197 @@
+"""The scaling study: how the number of robots bears on success, time, memory and messages.
+
+Conditions differ in the number of robots and in how joint actions are evaluated. Of every trial it
+keeps, besides the episodes: numbers that are a function of it, and what it took, which is not.
+
+Messages of a step are counted as Section V has agents talk: every agent passes the action it has
+decided to each agent below it, so there is one message for every edge of the hierarchy's transitive
+closure; n (n - 1) / 2 in a chain of n agents.
+"""
+
+from __future__ import annotations
+
+import re
+import tracemalloc
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from .results import Results
+from .statistics import Estimate, bootstrap, rate
+from .summary import Summary
+from .trial import Session, Trial, TrialResult
+
+DECISION_PERIOD = 0.512
+"""What a decision of the default may take to keep up with the robots: 8 control periods [s]."""
+MEMORY = Path("/proc/self/status")
+CLEAR = Path("/proc/self/clear_refs")
+
+
+def measure(trial: Trial) -> TrialResult:
+    """Train and evaluate a team, and note what it takes; imported by name in workers."""
+    Session(replace(trial, episodes=1, steps=2)).train(1)  # compiles, once a process
+    session = Session(trial)
+    _forget_peak()
+    session.train(trial.episodes)
+    peak = _peak()
+    hierarchy, team = session.team.hierarchy, session.team
+    tried = team.evaluator.counts.joint_actions if team.evaluator is not None else 0
+    numbers = {
+        "robots": float(trial.settings.scenario.robots),
+        "agents": float(len(hierarchy)),
+        "messages": float(messages(hierarchy.below(i) for i in range(len(hierarchy)))),
+        "joint_actions": tried / len(session.deciding),
+        "team_bytes": float(sum(array.nbytes for array in team.arrays().values())),
+        "weight_bytes": float(team.learner.theta.nbytes),
+    }
+    shares = session.evaluate()
+    if len(shares):
+        numbers["least_touching"] = float(shares.min(axis=1).mean())
+        numbers["all_touching"] = float((shares.min(axis=1) >= 0.5).mean())
+    usage = {
+        "decision_median": float(np.median(session.deciding)),
+        "decision_99": float(np.quantile(session.deciding, 0.99)),
+        "step_bytes": float(_of_a_step(session)),
+    }
+    if peak is not None:
+        usage["process_bytes"] = float(peak)
+    return session.result(numbers, usage)
+
+
+def messages(below: Iterable[tuple[int, ...]]) -> int:
+    """Return how many decided actions are passed down in a step, given whom each agent sees.
+
+    Examples
+    --------
+    A chain of four agents, and a leader with three subordinates:
+
+    >>> messages([(1, 2, 3), (2, 3), (3,), ()]), messages([(1, 2, 3), (), (), ()])
+    (6, 3)
+    """
+    return sum(map(len, below))
+
+
+def _of_a_step(session: Session) -> int:
+    """Return the most memory that one decision holds beside what is held already [bytes]."""
+    prediction = session.team.predict(session.scenario)
+    tracemalloc.start()
+    try:
+        session.team.act(prediction, explore=False)
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def _forget_peak() -> None:
+    """Let the peak of this process's memory be counted from now on, where Linux allows."""
+    if CLEAR.exists():
+        CLEAR.write_text("5")
+
+
+def _peak() -> int | None:
+    """Return the peak of this process's resident memory [bytes], where Linux tells it."""
+    found = re.search(r"VmHWM:\s+(\d+) kB", MEMORY.read_text()) if MEMORY.exists() else None
+    return None if found is None else 1024 * int(found[1])
+
+
+@dataclass(frozen=True)
+class Point:
+    """One condition.
+
+    Attributes
+    ----------
+    evaluator
+        Its label without the number of robots.
+    robots, agents, messages
+        Sizes.
+    values
+        Estimates by name, see `analyse`.
+    """
+
+    evaluator: str
+    robots: int
+    agents: int
+    messages: int
+    values: dict[str, Estimate]
+
+
+@dataclass(frozen=True)
+class Scaling:
+    """The analysis.
+
+    Attributes
+    ----------
+    table
+        One line per condition.
+    points
+        The same for figures.
+    exponents
+        By evaluator, how decision and learning time grow with the number of agents: the slope of
+        their logarithms over all sizes.
+    notes
+        Those, for printing.
+    """
+
+    table: tuple[Summary, ...]
+    points: tuple[Point, ...]
+    exponents: dict[str, dict[str, float]]
+    notes: tuple[str, ...]
+
+
+def analyse(results: Results) -> Scaling:
+    """Estimate; 95 % intervals, seeds as the unit of sampling. Times are per step."""
+    points, table = [], []
+    for condition, training in results.training.items():
+        numbers, usage = results.numbers[condition], results.usage[condition]
+        steps = training["steps"].sum(axis=1)
+        values = {
+            "success": rate(training["success"][:, -5:]),
+            "decide [ms]": bootstrap(1e3 * usage["decision_median"]),
+            "learn [ms]": bootstrap(1e3 * usage["learning"] / steps),
+            "world [ms]": bootstrap(1e3 * (usage["physics"] + usage["sensors"]) / steps),
+            "team [MB]": bootstrap(1e-6 * numbers["team_bytes"]),
+            "step [MB]": bootstrap(1e-6 * usage["step_bytes"]),
+        }
+        if "process_bytes" in usage:
+            values["process [MB]"] = bootstrap(1e-6 * usage["process_bytes"])
+        if condition in results.evaluation:
+            greedy = rate(results.evaluation[condition]["success"])
+            values = {"success": values.pop("success"), "greedy": greedy} | values
+            values["all touch"] = bootstrap(numbers["all_touching"])
+        robots, agents, passed = (int(numbers[n][0]) for n in ("robots", "agents", "messages"))
+        evaluator = condition.removesuffix(f", robots={robots}")
+        points.append(Point(evaluator, robots, agents, passed, values))
+        table.append(Summary(condition, len(steps), values))
+    exponents = _exponents(points)
+    notes = [
+        f"\n{evaluator}: " + ", ".join(f"{what} ~ n^{power:.2f}" for what, power in by_what.items())
+        for evaluator, by_what in exponents.items()
+    ]
+    notes += [
+        f"{p.robots} robots: {p.agents} agents, {p.messages} messages a step"
+        for p in {p.agents: p for p in points}.values()
+    ]
+    return Scaling(tuple(table), tuple(points), exponents, tuple(notes))
+
+
+def _exponents(points: list[Point]) -> dict[str, dict[str, float]]:
+    found: dict[str, dict[str, float]] = {}
+    for evaluator in dict.fromkeys(p.evaluator for p in points):
+        own = [p for p in points if p.evaluator == evaluator]
+        if len({p.agents for p in own}) < 2:
+            continue
+        sizes = np.log([p.agents for p in own])
+        found[evaluator] = {
+            what: float(np.polyfit(sizes, np.log([p.values[title].value for p in own]), 1)[0])
+            for what, title in (("deciding", "decide [ms]"), ("learning", "learn [ms]"))
+        }
+    return found
+
+
+def draw(analysis: Scaling, directory: Path) -> list[Path]:
+    """Write the figure into an existing directory; return its paths."""
+    from . import scaling_figure
+
+    return scaling_figure.draw(analysis, directory) if analysis.points else []

@@ -1,0 +1,87 @@
+"""The figure of the scaling study: success, times, memory and messages by number of robots."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import NullLocator
+
+from .figures import COLOURS, SETTINGS
+from .scaling import DECISION_PERIOD, Scaling
+
+MARKERS = "osD^vP"
+PANELS = (
+    ("greedy", "success, greedy", False),
+    ("decide [ms]", "deciding, per step [ms]", True),
+    ("learn [ms]", "learning, per step [ms]", True),
+    ("team [MB]", "arrays of the team [MB]", True),
+    ("process [MB]", "process, peak [MB]", True),
+)
+
+
+def draw(analysis: Scaling, directory: Path) -> list[Path]:
+    """Write ``scaling`` as PNG and SVG into an existing directory; return the paths.
+
+    Points are means over seeds, bars their 95 % intervals; evaluators differ by colour and marker.
+    """
+    evaluators = list(dict.fromkeys(p.evaluator for p in analysis.points))
+    with mpl.rc_context(SETTINGS):  # type: ignore[arg-type]
+        figure = Figure(figsize=(8.4, 5.2), layout="constrained")
+        panels = figure.subplots(2, 3, sharex=True)
+        sizes = sorted({p.robots for p in analysis.points})
+        for axes, (name, title, logarithmic) in zip(panels.flat, PANELS, strict=False):
+            for index, evaluator in enumerate(evaluators):
+                _line(axes, analysis, evaluator, index, name)
+            axes.set_title(title, loc="left")
+            if logarithmic:
+                axes.set_yscale("log")
+            else:
+                axes.set_ylim(-0.03, 1.03)
+        panels[0][1].axhline(1e3 * DECISION_PERIOD, color="#888888", linewidth=0.8, ls=":")
+        counts = {p.robots: p.messages for p in analysis.points}
+        axes = panels[1][2]
+        axes.plot(sizes, [counts[size] for size in sizes], "k.-", linewidth=1.2)
+        axes.set_yscale("log")
+        axes.set_title("messages passed down, per step", loc="left")
+        for axes in panels.flat:
+            axes.set_xscale("log", base=2)
+            axes.set_xticks(sizes, [str(size) for size in sizes])
+            axes.xaxis.set_minor_locator(NullLocator())
+            axes.grid(alpha=0.25)
+        for axes in panels[-1]:
+            axes.set_xlabel("robots")
+        handles = [
+            Line2D(
+                [], [], color=COLOURS[i % len(COLOURS)], marker=MARKERS[i % len(MARKERS)], label=e
+            )
+            for i, e in enumerate(evaluators)
+        ]
+        title = "means over seeds, bars: 95 % intervals; dotted: the decision period"
+        figure.legend(
+            handles=handles, title=title, loc="outside upper center", ncols=4, frameon=False
+        )
+        paths = [directory / f"scaling.{suffix}" for suffix in ("png", "svg")]
+        for path in paths:
+            metadata = {"Date": None} if path.suffix == ".svg" else {}
+            figure.savefig(path, dpi=150, metadata=metadata)
+    return paths
+
+
+def _line(axes: Axes, analysis: Scaling, evaluator: str, index: int, name: str) -> None:
+    own = [p for p in analysis.points if p.evaluator == evaluator and name in p.values]
+    if not own:
+        return
+    robots = [p.robots for p in own]
+    value, low, high = np.array(
+        [[float(getattr(p.values[name], end)) for p in own] for end in ("value", "low", "high")]
+    )
+    colour = COLOURS[index % len(COLOURS)]
+    axes.vlines(robots, low, high, color=colour, linewidth=1.2)
+    axes.plot(
+        robots, value, marker=MARKERS[index % len(MARKERS)], color=colour, markersize=4, lw=1.2
+    )

@@ -1,0 +1,142 @@
+"""The shapes study: whether the shape of the box is indifferent, as the paper has it.
+
+A team is trained with one box, and then acts greedily, without any further learning, with every box
+that the spec lists under ``[evaluations]``, on the same worlds. What is reported of each box is its
+success rate, the ratio to the rate with the box of training, and how much of the time in which any
+robot pushes each of them does. The agents' state holds nothing of the shape; the predictor by which
+they look ahead is given it (see docs/predictors.md).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from .comparison import Array, Difference, ratio
+from .paired_tests import holm, paired_permutation
+from .results import Arrays, Results
+from .statistics import bootstrap, rate
+from .summary import Summary
+from .trial import Session, Trial, TrialResult
+
+TRAINED = "trained on"
+"""How the box of training is called among the others."""
+PREFIX = "evaluation:"
+INDIFFERENT = 0.8
+"""The least ratio of success that still counts as indifferent."""
+
+
+def measure(trial: Trial) -> TrialResult:
+    """Train a team with its own box, evaluate it with all; imported by name in workers."""
+    session = Session(trial)
+    session.train(trial.episodes)
+    shares = {TRAINED: session.evaluate()}
+    shares |= session.evaluate_elsewhere()
+    numbers = {
+        f"touching.{name}.robot{r + 1}": float(share)
+        for name, by_episode in shares.items()
+        if len(by_episode)
+        for r, share in enumerate(by_episode.mean(axis=0))
+    }
+    return session.result(numbers)
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """The analysis.
+
+    Attributes
+    ----------
+    table
+        One line per condition and box, the box of training first.
+    ratios
+        By condition, success with each other box over that with the box of training, with p of no
+        difference, adjusted over all boxes of the condition.
+    notes
+        Verdicts, for printing.
+    """
+
+    table: tuple[Summary, ...]
+    ratios: dict[str, tuple[Difference, ...]]
+    notes: tuple[str, ...]
+
+
+def analyse(results: Results) -> Shapes:
+    """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
+    table: list[Summary] = []
+    ratios: dict[str, tuple[Difference, ...]] = {}
+    for condition, trained in results.evaluation.items():
+        boxes = {TRAINED: trained} | {
+            phase.removeprefix(PREFIX): arrays[condition]
+            for phase, arrays in results.phases.items()
+            if phase.startswith(PREFIX) and condition in arrays
+        }
+        rates = {box: arrays["success"].mean(axis=1) for box, arrays in boxes.items()}
+        found = ratios[condition] = _ratios(rates)
+        by_box = {d.condition: d for d in found}
+        for box, arrays in boxes.items():
+            label = box if len(results.evaluation) == 1 else f"{condition}: {box}"
+            estimates = {"success": rate(arrays["success"])}
+            estimates["ratio"] = by_box[box].estimate if box in by_box else bootstrap([1.0])
+            estimates |= _further(arrays, results.numbers.get(condition, {}), box)
+            table.append(Summary(label, len(arrays["success"]), estimates))
+    notes = [line for condition, found in ratios.items() for line in _verdict(condition, found)]
+    return Shapes(tuple(table), ratios, tuple(notes))
+
+
+def _ratios(rates: dict[str, Array]) -> tuple[Difference, ...]:
+    base = rates[TRAINED]
+    others = {box: rate for box, rate in rates.items() if box != TRAINED}
+    adjusted = holm([paired_permutation(values, base) for values in others.values()])
+    return tuple(
+        Difference(box, "ratio", len(base), ratio(values, base), float(p))
+        for (box, values), p in zip(others.items(), adjusted, strict=True)
+    )
+
+
+def _further(arrays: Arrays, numbers: Arrays, box: str) -> dict:
+    start = f"touching.{box}.robot"
+    robots = {
+        f"touches {n.removeprefix(start)}": v for n, v in numbers.items() if n.startswith(start)
+    }
+    return {
+        "stopped": rate(arrays["stopped_at_goal"]),
+        "contact": bootstrap(arrays["contact_fraction"].mean(axis=1)),
+        **{title: bootstrap(values) for title, values in robots.items()},
+    }
+
+
+def least_ratio(found: tuple[Difference, ...]) -> Difference:
+    """Return the ratio of the box that comes off worst.
+
+    Raises
+    ------
+    ValueError
+        If there is none.
+    """
+    if not found:
+        raise ValueError("shapes: no further box has been evaluated")
+    return min(found, key=lambda d: float(np.nan_to_num(d.estimate.value)))
+
+
+def _verdict(condition: str, found: tuple[Difference, ...]) -> list[str]:
+    if not found:
+        return []
+    lines = [f"\n{condition}, ratio to the box of training:"]
+    for d in found:
+        e = d.estimate
+        lines.append(
+            f"  {d.condition}: {e.value:.2f} [{e.low:.2f}, {e.high:.2f}], p = {d.p:.2g} (adjusted)"
+        )
+    return lines
+
+
+def draw(analysis: Shapes, directory: Path) -> list[Path]:
+    """Write the figure into an existing directory; return its paths."""
+    from .forest_figure import Panel
+    from .forest_figure import draw as forest
+
+    panels = [Panel(condition, found, null=1.0) for condition, found in analysis.ratios.items()]
+    return forest(panels, directory / "shapes", "success over that with the box of training")

@@ -1,0 +1,102 @@
+"""Results of studies whose answer is known, made without a simulation."""
+
+import numpy as np
+
+from nested_agents.studies.results import Results
+
+SEEDS = 20
+
+
+def arrays(chances: np.ndarray, rng: np.random.Generator, seeds: int = SEEDS) -> dict:
+    """Measures of episodes that succeed with these chances ``(n_episodes,)``."""
+    shape = (seeds, len(chances))
+    success = rng.random(shape) < chances
+    return {
+        "success": success.astype(int),
+        "stopped_at_goal": (success & (rng.random(shape) < 0.9)).astype(int),
+        "steps": np.where(success, rng.integers(30, 90, shape), 450),
+        "final_distance_m": np.where(success, 0.05, rng.uniform(0.2, 1.2, shape)),
+        "final_orientation_rad": rng.uniform(0, 0.5, shape),
+        "contact_fraction": rng.uniform(0.4, 0.8, shape),
+        "return": rng.normal(size=shape),
+    }
+
+
+def ablation(chances: dict[str, float], seeds: int = SEEDS) -> Results:
+    """Every condition succeeds with its chance, in training and greedy."""
+    rng = np.random.default_rng(1)
+    training = {c: arrays(np.full(20, p), rng, seeds) for c, p in chances.items()}
+    evaluation = {c: arrays(np.full(10, p), rng, seeds) for c, p in chances.items()}
+    phases = {"training": training, "evaluation": evaluation}
+    return Results(training, evaluation, phases, dict.fromkeys(chances, tuple(range(seeds))))
+
+
+def shapes(chances: dict[str, float], trained: float = 0.95, seeds: int = SEEDS) -> Results:
+    """A team trained with success `trained`, and its success with other boxes."""
+    base = ablation({"default": trained}, seeds)
+    rng = np.random.default_rng(2)
+    for box, chance in chances.items():
+        base.phases[f"evaluation:{box}"] = {"default": arrays(np.full(10, chance), rng, seeds)}
+    base.numbers["default"] = {
+        f"touching.{box}.robot{r}": rng.uniform(0.5, 0.9, seeds)
+        for box in ("trained on", *chances)
+        for r in (1, 2)
+    }
+    return base
+
+
+def wheel_failure(
+    ends: dict[str, dict[str, float]], onset: int = 20, episodes: int = 40, seeds: int = SEEDS
+) -> Results:
+    """By fault and what adapts, the level that is reached ten episodes after the failure."""
+    rng = np.random.default_rng(3)
+    base = Results({}, {}, {"training": {}, "weights kept": {}})
+    before = np.minimum(0.95, np.linspace(0.0, 2.0, onset))
+    for fault, by_case in ends.items():
+        for enabled, cases in (
+            ("false", ("weights", "nothing")),
+            ("true", ("both", "self-model")),
+        ):
+            condition = f"{fault}, enabled={enabled}"
+            for phase, case in zip(("training", "weights kept"), cases, strict=True):
+                after = np.minimum(np.linspace(0.1, 2.0, episodes - onset), by_case[case])
+                whole = arrays(np.concatenate([before, after]), rng, seeds)
+                if phase == "weights kept":
+                    whole = {name: values[:, onset:] for name, values in whole.items()}
+                base.phases[phase][condition] = whole
+            base.seeds[condition] = tuple(range(seeds))
+            base.numbers[condition] = {"onset": np.full(seeds, float(onset))}
+    base.training.update(base.phases["training"])
+    return base
+
+
+def scaling(success: dict[int, float], seconds_per_agent: float = 1e-4) -> Results:
+    """Two evaluators: one whose decisions take time in proportion to agents, one to agents^2."""
+    rng = np.random.default_rng(4)
+    chances = {
+        f"{name}, robots={robots}": chance
+        for name in ("sums", "sampling")
+        for robots, chance in success.items()
+    }
+    base = ablation(chances)
+    for condition in chances:
+        agents = 2 * int(condition.rpartition("=")[2])
+        steps = base.training[condition]["steps"].sum(axis=1)
+        power = 1 if condition.startswith("sums") else 2
+        spread = rng.uniform(0.9, 1.1, SEEDS)
+        base.numbers[condition] = {
+            "robots": np.full(SEEDS, agents / 2),
+            "agents": np.full(SEEDS, float(agents)),
+            "messages": np.full(SEEDS, agents * (agents - 1) / 2),
+            "team_bytes": np.full(SEEDS, 1e5 * agents),
+            "all_touching": rng.uniform(0.0, 1.0, SEEDS),
+        }
+        base.usage[condition] = {
+            "decision_median": seconds_per_agent * agents**power * spread,
+            "learning": 1e-5 * agents * steps,
+            "physics": 1e-5 * agents * steps,
+            "sensors": 1e-5 * agents * steps,
+            "step_bytes": 1e4 * agents * spread,
+            "process_bytes": 2e8 * spread,
+        }
+    return base
