@@ -17,7 +17,6 @@ CIRCUMSTANCES = (
     sqlite3.SQLITE_LOCKED,
     sqlite3.SQLITE_NOMEM,
     sqlite3.SQLITE_READONLY,
-    sqlite3.SQLITE_IOERR,
     sqlite3.SQLITE_FULL,
     sqlite3.SQLITE_CANTOPEN,
 )
@@ -137,6 +136,10 @@ def _one_line(path: Path) -> Iterator[None]:
     try:
         yield
     except sqlite3.DatabaseError as error:
-        if getattr(error, "sqlite_errorcode", 0) & 0xFF in CIRCUMSTANCES:
+        code = getattr(error, "sqlite_errorcode", 0) & 0xFF
+        if code == sqlite3.SQLITE_IOERR:  # all it says when the disk is full at some places
+            free = shutil.disk_usage(path.parent).free
+            raise SpecError(f"{path}: {error}, {free // 1000} kB free on this disk") from None
+        if code in CIRCUMSTANCES:
             raise SpecError(f"{path}: {error}") from None
         raise DamageError(path, str(error)) from None

@@ -46,6 +46,25 @@ def _count(number: int, what: str, plural: str = "s") -> str:
     return f"{number} {what}{'' if number == 1 else plural}"
 
 
+def duration(seconds: float) -> str:
+    """Return a time in its two largest units.
+
+    Examples
+    --------
+    >>> duration(8.4), duration(600), duration(8000), duration(200_000)
+    ('8 s', '10 min', '2 h 13 min', '2 d 7 h')
+    """
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    minutes = round(seconds / 60)
+    if minutes < 60:
+        return f"{minutes} min"
+    hours, minutes = divmod(minutes, 60)
+    if hours < 24:
+        return f"{hours} h {minutes} min"
+    return f"{hours // 24} d {hours % 24} h"
+
+
 def follow(outcomes: Iterable[Outcome], total: int, done: int) -> None:
     """Consume outcomes while showing how many of `total` trials are done and how long is left."""
     if done:
@@ -85,8 +104,8 @@ def _follow_lines(outcomes: Iterable[Outcome], total: int, done: int) -> None:
         now = time.monotonic()
         if now - said >= PLAIN_SECONDS or done + here == total:
             said = now
-            left = (now - begin) / here * (total - done - here)
-            say(f"{done + here} of {total} trials, {now - begin:.0f} s, about {left:.0f} s left")
+            left = duration((now - begin) / here * (total - done - here))
+            say(f"{done + here} of {total} trials, {duration(now - begin)}, about {left} left")
 
 
 def _failure(outcome: Outcome) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 import warnings
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import closing
@@ -46,30 +47,24 @@ class LokyWorkers:
         """See `Workers.arrivals`."""
         queue = list(trials)
         while queue:
-            running: dict[str, Trial] = {}
-            settled: set[str] = set()
-
-            def note(trial: Trial, running: dict[str, Trial] = running) -> None:
-                running[trial.identity] = trial
-                started(trial)
-
+            handed = _Handed(self.processes, started)
             try:
-                with closing(self._parallel(queue, measure, note)) as arriving:
+                with closing(self._parallel(queue, measure, handed.take)) as arriving:
                     for arrival in arriving:
-                        settled.add(arrival.trial.identity)
+                        handed.settle(arrival.trial)
                         yield arrival
             except TerminatedWorkerError as death:
-                for identity in running.keys() - settled:
-                    settled.add(identity)
-                    yield Arrival(running[identity], None, str(death), 0.0, lost=True)
-            queue = [trial for trial in queue if trial.identity not in settled]
+                for trial in handed.running():
+                    handed.settle(trial)
+                    yield Arrival(trial, None, str(death), 0.0, lost=True)
+            queue = [trial for trial in queue if trial.identity not in handed.settled]
 
     def _parallel(
-        self, trials: Sequence[Trial], measure: Measure, started: Callable[[Trial], None]
+        self, trials: Sequence[Trial], measure: Measure, take: Callable[[Trial], None]
     ) -> Generator[Arrival]:
         def tasks() -> Iterator[Any]:
             for trial in trials:
-                started(trial)
+                take(trial)
                 yield joblib.delayed(attempt)(measure, trial)
 
         worker = {"initializer": begin, "initargs": (os.getpid(),)}
@@ -92,3 +87,35 @@ class LokyWorkers:
                 arriving.close()
             get_reusable_executor().shutdown(wait=True, kill_workers=True)
             raise
+
+
+class _Handed:
+    """Tells what is running: joblib takes some trials from us before a worker is free."""
+
+    def __init__(self, processes: int, started: Callable[[Trial], None]) -> None:
+        self.settled: set[str] = set()
+        self._processes, self._started = processes, started
+        self._left: list[Trial] = []
+        self._told: set[str] = set()
+        self._changing = threading.Lock()
+
+    def take(self, trial: Trial) -> None:
+        with self._changing:
+            self._left.append(trial)
+            self._tell()
+
+    def settle(self, trial: Trial) -> None:
+        with self._changing:
+            self.settled.add(trial.identity)
+            self._left = [other for other in self._left if other.identity != trial.identity]
+            self._tell()
+
+    def running(self) -> list[Trial]:
+        """Return the trials that workers have: they get them in the order of taking."""
+        return self._left[: self._processes]
+
+    def _tell(self) -> None:
+        for trial in self.running():
+            if trial.identity not in self._told:
+                self._told.add(trial.identity)
+                self._started(trial)

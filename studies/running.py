@@ -97,7 +97,7 @@ def look(directory: Path) -> Mark | None:
         now = time.time()
         seconds = {identity: max(now - begun, 0.0) for identity, begun in found["begun"].items()}
         return Mark(found["processes"], seconds)
-    except (OSError, ValueError, KeyError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return Mark(1, {})  # begins or ends just now
 
 

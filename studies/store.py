@@ -148,7 +148,7 @@ class Store:
         damage = self.damage(trials)
         for identity, line in damage.items():
             states.pop(identity)
-            self.notes.append(f"{line}; run again")
+            self.notes.append(f"{line}; must run again")
         return [trial for trial in trials if trial.identity not in states]
 
     def damage(self, trials: Iterable[Trial]) -> dict[str, str]:
@@ -271,6 +271,11 @@ class Store:
             "JOIN trials USING (identity) JOIN conditions USING (condition) ORDER BY position, seed"
         )
         return [column[0] for column in cursor.description], cursor.fetchall()
+
+    def mean_seconds(self) -> dict[str, float]:
+        """Return by condition how long its finished trials took on average [s]."""
+        query = "SELECT condition, avg(total) FROM seconds JOIN trials USING (identity) GROUP BY 1"
+        return dict(self._db.execute(query).fetchall())
 
     def numbers(self) -> list[tuple[str, int, str, float, bool]]:
         """Return condition, seed, name, value and whether it is a function of the trial."""

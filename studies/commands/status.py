@@ -6,27 +6,34 @@ from .options import Directory
 
 
 def command(directory: Directory) -> int:
-    """Tell how many trials are done, failed (with the reason) and left.
+    """Tell how many trials are done, running, failed (with the reason) and left, and for how long.
 
     Parameters
     ----------
     directory
         Where the study is kept.
     """
+    from ..display import duration
+    from ..progress import progress
     from ..store import Store
-    from ..trial import trials_of
 
     with Store.open(directory) as store:
-        spec = store.spec()
-        trials = trials_of(spec)
-        counts = store.counts()
-        left = len(store.pending(trials))
-        failed = store.failed()
-    conditions = len(trials) // len(spec.seeds)
-    print(f"study   {spec.study}: {conditions} conditions x {len(spec.seeds)} seeds")
-    print(f"done    {counts['done']} of {len(trials)} trials")
-    print(f"failed  {counts['failed']}")
-    print(f"left    {left}")
+        spec, now, failed = store.spec(), progress(store), store.failed()
+    conditions = now.total // len(spec.seeds)
+    print(f"study    {spec.study}: {conditions} conditions x {len(spec.seeds)} seeds")
+    print(f"done     {now.done} of {now.total} trials")
+    print(f"running  {len(now.running)}")
+    for condition, seed, seconds in now.running:
+        print(f"         {condition}, seed {seed}, for {duration(seconds)}")
+    print(f"failed   {now.failed}")
+    print(f"left     {now.left}")
+    if now.seconds:
+        count = f"{now.processes} process{'' if now.processes == 1 else 'es'}"
+        print(f"time     about {duration(now.seconds)} with {count}")
+    if now.refusal:
+        print(f"\nnothing can be added: {now.refusal}")
+    for line in now.damaged:
+        print(f"\n{line}")
     for condition, seed, error in failed:
         print(f"\n{condition}, seed {seed} failed:\n{error.rstrip()}")
     if failed:

@@ -181,11 +181,11 @@ def test_failed_trials_are_told_kept_and_retried(spec_file, tmp_path, capsys):
     assert "failed: frozen, seed 1: RuntimeError: a wheel came off" in err
     assert main(["status", str(out)]) == 1
     said = capsys.readouterr().out
-    assert "done    5 of 6 trials" in said
+    assert "done     5 of 6 trials" in said
     assert "in failing" in said
     assert run_here(made_up.measure, "retry", out)[0] == 0
     assert main(["status", str(out)]) == 0
-    assert "done    6 of 6 trials" in capsys.readouterr().out
+    assert "done     6 of 6 trials" in capsys.readouterr().out
 
 
 def test_presets(capsys):

@@ -74,7 +74,7 @@ def test_a_changed_row_is_named_and_its_trial_alone_runs_again(study, sound, sta
         assert where in err
         assert "rows are damaged" in err
     (note,), ran = finish(study)
-    assert (note, ran) == (f"{where}{trial.seed}: rows are damaged; run again", 1)
+    assert (note, ran) == (f"{where}{trial.seed}: rows are damaged; must run again", 1)
     assert content(study) == content(sound)
 
 
@@ -88,7 +88,7 @@ def test_a_recording_is_named_and_its_trial_alone_runs_again(study, sound, damag
         path.write_bytes(path.read_bytes()[:-9])
     (note,), ran = finish(study)
     assert ran == 1
-    assert note == f"{path}: is {damage} ({trial.condition}, seed {trial.seed}); run again"
+    assert note == f"{path}: is {damage} ({trial.condition}, seed {trial.seed}); must run again"
     assert content(study) == content(sound)
 
 

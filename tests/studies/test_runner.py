@@ -133,3 +133,12 @@ def test_workers_do_not_outlive_a_killed_parent(tmp_path):
     while any(Path(f"/proc/{pid}").exists() for pid in workers) and time.monotonic() < deadline:
         time.sleep(0.1)
     assert [pid for pid in workers if Path(f"/proc/{pid}").exists()] == []
+
+
+def test_never_more_trials_are_said_to_run_than_there_are_processes():
+    started, left = [], set(made_up.TRIALS)
+    for arrival in LokyWorkers(2).arrivals(made_up.TRIALS, made_up.slow, started.append):
+        left.remove(arrival.trial)
+        running = [trial for trial in started if trial in left]
+        assert len(running) == min(2, len(left))
+    assert len(started) == len(set(started)) == len(made_up.TRIALS)
