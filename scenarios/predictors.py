@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from copy import deepcopy
 from dataclasses import dataclass
-from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -91,19 +91,15 @@ class ExactPrediction(BoxPrediction):
 
     future: Future
 
-    @cached_property
-    def _motions(self) -> list[tuple[IntArray, IntArray]]:
-        """Per robot all drives: wheels that command one twist may yet slip differently."""
-        every = [np.arange(len(drives)) for drives, _ in self._drives]
-        return [(drives, drives) for drives in every]
+    merges: ClassVar[bool] = False  # wheels that command one twist may yet slip differently
 
     def _after(self, choices: IntArray, seconds: float) -> View:
         periods = round(seconds / CONTROL_PERIOD)
         rows, which = np.unique(choices, axis=0, return_inverse=True)
         poses, gaps = [], []
         for row in rows:
-            drives = [self._drives[r][0][c] for r, c in enumerate(row)]
-            pose, gap = self.future.after(np.concatenate(drives), periods)
+            commands = self.drives.speeds[np.arange(len(row)), row].ravel()
+            pose, gap = self.future.after(commands, periods)
             poses.append(pose)
             gaps.append(gap)
         pose, gap = np.array(poses)[which], np.array(gaps)[which]

@@ -88,8 +88,7 @@ class BoxStateSpace:
     compiled: Callable[..., FloatArray] | None = None
 
     def shared_of(self, view: View, robots: Sequence[int]) -> FloatArray:
-        """Return the shared blocks ``(k, m, d - n_own)`` of `k` robots, fast for many situations.
-        """
+        """Return the shared blocks ``(k, m, d - n_own)`` of k robots, fast for many situations."""
         if self.compiled is None:
             return np.array([self.shared(view, r) for r in robots])
         return self.compiled(

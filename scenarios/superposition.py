@@ -9,7 +9,6 @@ needs one push per robot and drive, in place of one for every combination of dri
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,29 +38,24 @@ class PushSuperposition:
     ----------
     prediction
         What is approximated.
-    twists
-        ``(M, K, 3)`` twists of every drive.
-    which
-        Per robot the drive of every local code.
     """
 
-    def __init__(
-        self, prediction: BoxPrediction, twists: FloatArray, which: Sequence[IntArray]
-    ) -> None:
+    def __init__(self, prediction: BoxPrediction) -> None:
         self._prediction = prediction
+        drives = prediction.drives
+        twists, which = drives.twists, drives.which
         n, n_drives = twists.shape[:2]
-        codes = max(len(w) for w in which)
-        self.contributions: FloatArray = np.zeros((n, codes, 3))
-        self.alike: IntArray = np.zeros((n, codes), dtype=np.int64)
-        self._poses: FloatArray = np.zeros((n, codes, 3))
-        self._gaps: FloatArray = np.zeros((n, codes))
-        for r, w in enumerate(which):
-            self.alike[r, : len(w)] = np.unique(w, return_index=True)[1][w]
-        mean = np.array([twists[r, w].mean(axis=0) for r, w in enumerate(which)])
+        n_codes = which.shape[1]
+        self.contributions: FloatArray = np.zeros((n, n_codes, 3))
+        # The first local code of each drive, for every code that gives it.
+        self.alike: IntArray = (which[:, :, None] == which[:, None, :]).argmax(axis=2)
+        self._poses: FloatArray = np.zeros((n, n_codes, 3))
+        self._gaps: FloatArray = np.zeros((n, n_codes))
+        every = np.arange(n)
+        mean = twists[every[:, None], which].mean(axis=1)
         near = self._near(twists)
         far = np.flatnonzero(~near)
         twists = np.concatenate([twists, mean[:, None]], axis=1)
-        every = np.arange(n)
         robots, box, gaps = self._push(every, twists, np.full((1, n), n_drives))
         self._box = box[0]
         # A robot departs from the reference among those only that touch the box in it.
@@ -69,18 +63,17 @@ class PushSuperposition:
         for r in np.flatnonzero(near).tolist():
             crowd = np.flatnonzero(touching | (every == r))
             column = int(np.searchsorted(crowd, r))
-            choices = np.full((which[r].max() + 1, len(crowd)), n_drives)
+            choices = np.full((drives.counts[r], len(crowd)), n_drives)
             choices[:, column] = np.arange(len(choices))
             robots, box, gaps = self._push(crowd, twists, choices)
-            rows = which[r]
-            self.contributions[r, : len(rows)] = box[rows] - self._box
-            self._poses[r, : len(rows)] = robots[rows, column]
-            self._gaps[r, : len(rows)] = gaps[rows, column]
+            self.contributions[r] = box[which[r]] - self._box
+            self._poses[r] = robots[which[r], column]
+            self._gaps[r] = gaps[which[r], column]
         # Robots that cannot reach the box do not depend on each other.
         robots, _, gaps = self._push(far, twists, np.tile(np.arange(n_drives)[:, None], len(far)))
         for column, r in enumerate(far.tolist()):
-            self._poses[r, : len(which[r])] = robots[which[r], column]
-            self._gaps[r, : len(which[r])] = gaps[which[r], column]
+            self._poses[r] = robots[which[r], column]
+            self._gaps[r] = gaps[which[r], column]
 
     def _near(self, twists: FloatArray) -> BoolArray:
         """Return which robots ``(M,)`` might touch the box, were it to come as fast as they."""

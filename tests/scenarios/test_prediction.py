@@ -33,15 +33,16 @@ def test_drives_of_one_twist_are_pushed_once() -> None:
     for agent in range(4):
         blocks = prediction.blocks(agent)
         # Three speeds of each wheel, so six sums at most on each side; two are at rest.
-        assert len(blocks.shared) <= 36 < len(blocks.own)
+        assert len(blocks.shared) <= 36 < prediction.drives.counts[0]
+        assert len(blocks.own) <= 3
         tables = blocks.states(np.arange(len(joint)))
         np.testing.assert_allclose(tables, prediction.states(agent, joint), rtol=0, atol=1e-12)
 
 
 def test_played_predictions_keep_drives_of_one_twist_apart() -> None:
     scenario = moving(robot="four-wheel", robots=1, predictor="exact")
-    blocks = scenario.predict().blocks(0)
-    assert len(blocks.shared) == len(blocks.own)
+    prediction = scenario.predict()
+    assert len(prediction.blocks(0).shared) == prediction.drives.counts[0]
 
 
 def test_the_own_block_of_the_paper_is_that_of_the_robot_alone() -> None:

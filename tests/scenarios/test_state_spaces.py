@@ -4,8 +4,11 @@ from math import pi
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from nested_agents.scenarios import BoxPushing, ScenarioSettings
+from nested_agents.scenarios.shared_blocks import angle_of
 from nested_agents.scenarios.state_spaces import STATE_SPACES, View, state_space_for, wrap
 
 GOAL = np.array([1.0, 0.0, 0.0])
@@ -96,3 +99,21 @@ def test_a_fast_robot_gets_them() -> None:
     assert states[:, 0].max() == 0.26
     assert (states >= scenario.bounds[:, 0]).all()
     assert (states <= scenario.bounds[:, 1]).all()
+
+
+@pytest.mark.parametrize("robots", [1, 2, 5])
+@pytest.mark.parametrize("name", [name for name, s in STATE_SPACES.items() if s.compiled])
+def test_compiled_blocks_are_those_of_the_definition(name: str, robots: int) -> None:
+    rng = np.random.default_rng(robots)
+    seen = View(
+        rng.normal(size=(100, robots, 3)) * [1, 1, 9], rng.normal(size=(100, 3)) * [1, 1, 9],
+        rng.normal(size=(100, robots)), rng.normal(size=3),
+    )  # fmt: skip
+    space, wanted = STATE_SPACES[name], list(range(robots))[::-1]
+    expected = np.array([space.shared(seen, r) for r in wanted])
+    np.testing.assert_allclose(space.shared_of(seen, wanted), expected, rtol=0, atol=1e-12)
+
+
+@given(st.floats(-1e9, 1e9), st.floats(-1e9, 1e9))
+def test_angles_are_exact_to_the_last_bits(x: float, y: float) -> None:
+    assert angle_of(x, y) == pytest.approx(np.arctan2(y + 0.0, x), rel=0, abs=1e-15)
