@@ -280,9 +280,9 @@ class Store:
     def numbers(self) -> list[tuple[str, int, str, float, bool]]:
         """Return condition, seed, name, value and whether it is a function of the trial."""
         cursor = self._db.execute(
-            "SELECT condition, seed, name, value, repeatable FROM numbers "
+            "SELECT condition, seed, n.name, value, repeatable FROM numbers n "
             "JOIN trials USING (identity) JOIN conditions USING (condition) "
-            "ORDER BY position, seed, name"
+            "ORDER BY position, seed, n.name"
         )
         return [(*row[:4], bool(row[4])) for row in cursor]
 
