@@ -13,23 +13,12 @@ from statistics import median
 from rich.console import Console
 from rich.table import Table
 
-from nested_agents.scenarios import BoxPushing, ScenarioSettings, build
+from nested_agents.scenarios import ScenarioSettings, build
 from nested_agents.scenarios.boxes import BOXES
-from nested_agents.scenarios.scripted import ScriptedController
+from nested_agents.scenarios.scripted import decisions_to_goal
 
 STARTS = ("easy", "medium", "hard")
 STEPS = 200
-
-
-def decisions(scenario: BoxPushing, seed: int, steps: int = STEPS) -> int | None:
-    """Return after how many decisions the box is at the goal; none: it is not."""
-    controller = ScriptedController(scenario.world.robots, scenario.box)
-    scenario.reset(seed)
-    for step in range(1, steps + 1):
-        transition = scenario.step(controller.act(scenario.measure()))
-        if transition.terminated or transition.truncated:
-            return step if transition.terminated else None
-    return None
 
 
 def main() -> None:
@@ -40,16 +29,18 @@ def main() -> None:
     parser.add_argument("--starts", nargs="+", default=list(STARTS), choices=STARTS)
     parser.add_argument("--robots", type=int, default=2)
     options = parser.parse_args()
-    table = Table("box", *options.starts, title=f"solved of {options.seeds} (decisions)")
+    table = Table("box", *options.starts)
     for box in options.boxes:
         cells = []
         for start in options.starts:
             scenario = build(ScenarioSettings(box=box, start=start, robots=options.robots))
-            taken = [decisions(scenario, seed) for seed in range(options.seeds)]
+            taken = [decisions_to_goal(scenario, seed, STEPS) for seed in range(options.seeds)]
             solved = [steps for steps in taken if steps is not None]
             cells.append(f"{len(solved)} ({median(solved):.0f})" if solved else "0")
         table.add_row(box, *cells)
-    Console(width=80).print(table)
+    console = Console(width=80)
+    console.print(f"solved of {options.seeds}, in brackets the median number of decisions")
+    console.print(table)
 
 
 if __name__ == "__main__":

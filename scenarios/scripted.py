@@ -19,11 +19,13 @@ from scipy.optimize import linear_sum_assignment
 
 from ..core.arrays import FloatArray, IntArray
 from ..core.spaces import ActionSet
+from .box_pushing import BoxPushing
 from .boxes import BoxSpec
 from .push import PushModel, push
 from .robots import RobotSpec, compliance, nominal_effect
 from .routes import moved, paths
 from .sides import SPREAD, Side, behind, is_concave, sides_of
+from .world import CONTROL_PERIOD
 
 CLEARANCE = 0.006
 """Least gap [m] to box and other robots on the way to a slot."""
@@ -300,6 +302,35 @@ class ScriptedController:
             cost += 0.3 * np.maximum(gaps[:, r], 0.0) + 3.0 * off**2
             cost += 0.02 * _wrap(robots[:, r, 2] - heading) ** 2
         return cost
+
+
+def decisions_to_goal(scenario: BoxPushing, seed: int, steps: int) -> int | None:
+    """Return after how many decisions the controller has the box at the goal.
+
+    Parameters
+    ----------
+    scenario
+        What is played; modified.
+    seed
+        Of the world.
+    steps
+        Most decisions.
+
+    Returns
+    -------
+    int or None
+        None if the episode ends otherwise.
+    """
+    controller = ScriptedController(
+        scenario.world.robots, scenario.box, scenario.action_set,
+        scenario.settings.speed_increment, scenario.settings.hold * CONTROL_PERIOD,
+    )  # fmt: skip
+    scenario.reset(seed)
+    for step in range(1, steps + 1):
+        transition = scenario.step(controller.act(scenario.measure()))
+        if transition.terminated or transition.truncated:
+            return step if transition.terminated else None
+    return None
 
 
 def _local_actions(robot: RobotSpec, n_actions: int) -> IntArray:
