@@ -5,7 +5,8 @@ The one place where running, analysis and drawing meet; each of them knows nothi
 
 from __future__ import annotations
 
-from contextlib import closing
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 from . import display
@@ -48,6 +49,36 @@ def conduct(
     int
         1 if any trial failed, else 0.
     """
+    with carried_out(
+        spec, directory, jobs, backend=backend, address=address, retry_failed=retry_failed
+    ) as store:
+        failed, results = store.failed(), read(store)
+        replays = _replay(store, trials_of(spec)[0]) if replay and not failed else []
+    study = load_study(spec.study)
+    analysis = study.analyse(results)
+    display.print_table(analysis.table)
+    for note in getattr(analysis, "notes", ()):
+        print(note)
+    figures = directory / "figures"
+    figures.mkdir(exist_ok=True)
+    pictures = study.draw(analysis, figures) if analysis.table else []
+    display.print_places(directory, pictures, replays)
+    if failed:
+        display.say(f"{len(failed)} trials failed: nested-agents status {directory}")
+    return 1 if failed else 0
+
+
+@contextmanager
+def carried_out(
+    spec: Spec,
+    directory: Path,
+    jobs: int | None = None,
+    *,
+    backend: Backend = "loky",
+    address: str | None = None,
+    retry_failed: bool = False,
+) -> Iterator[Store]:
+    """Run what is left of a study, and open its store; parameters as those of `conduct`."""
     check(spec)
     study, trials = load_study(spec.study), trials_of(spec)
     with hire(backend, jobs, address) as workers, Store.create(directory, spec) as store:
@@ -67,19 +98,7 @@ def conduct(
                 f"{directory}; the same command continues"
             )
             raise
-        failed, results = store.failed(), read(store)
-        replays = _replay(store, trials[0]) if replay and not failed else []
-    analysis = study.analyse(results)
-    display.print_table(analysis.table)
-    for note in getattr(analysis, "notes", ()):
-        print(note)
-    figures = directory / "figures"
-    figures.mkdir(exist_ok=True)
-    pictures = study.draw(analysis, figures) if analysis.table else []
-    display.print_places(directory, pictures, replays)
-    if failed:
-        display.say(f"{len(failed)} trials failed: nested-agents status {directory}")
-    return 1 if failed else 0
+        yield store
 
 
 def _replay(store: Store, trial: Trial) -> list[Path]:
