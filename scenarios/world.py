@@ -198,6 +198,10 @@ class World:
             body.massData = Box2D.b2MassData(
                 mass=robot.mass, center=(0, 0), I=robot.inertia * UNIT**2
             )
+        for body in (self._box, *self._bodies):
+            # Box2D frees bodies with their world; touching one that is gone crashes Python. Whoever
+            # takes a body out of here keeps its world by it.
+            body.world_kept = self._world
         self._handles = [_handles(body) for body in (self._box, *self._bodies)]
         self._last, self._wrenches = state.last.copy(), state.wrenches.copy()
         self._motion: FloatArray = np.empty((len(self.robots), 4))

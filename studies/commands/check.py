@@ -1,57 +1,79 @@
-"""``nested-agents check``: whether the scenarios of a spec keep their promises."""
+"""``nested-agents check``: whether scenarios keep their promises, those of a spec or one's own."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import tyro
 
 from .options import Changes
 
+Case = tuple[str, Callable[[], Any], list[int]]
+"""What a scenario is called, a function that makes it, and the episodes to play."""
+
 
 def command(
-    spec: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="SPEC.toml")],
+    source: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SPEC.toml|FILE.py:NAME")],
     steps: int = 40,
     set: Changes = (),
 ) -> int:
-    """Check the scenarios of a spec: equal seeds, equal bits; nothing shared; finite numbers; ...
+    """Check scenarios: equal seeds, equal bits; nothing shared; finite numbers; ...
 
     Parameters
     ----------
-    spec
-        Whose conditions to check.
+    source
+        A spec, whose conditions are checked, or a function or class in a Python file that makes a
+        scenario of one's own.
     steps
         Most steps of the episodes that are played for it.
     set
         Lay a value over the spec, as for run.
     """
-    from functools import partial
-
-    from ... import scenarios
     from ...scenarios.checker import ScenarioError, check_scenario
-    from ..spec import Spec
     from ..spec_errors import SpecError
 
     faults = 0
-    seen: dict[str, str] = {}
-    for condition in Spec.load(spec, set).conditions():
-        settings = condition.settings.scenario
-        if settings.model_dump_json() in seen:
-            continue
-        seen[settings.model_dump_json()] = condition.label
-        # Played are the first episode and those in which failures begin.
-        episodes = sorted({0, *(failure.episode for failure in settings.failures)})
+    for label, factory, episodes in _cases(source, set):
         try:
-            scenarios.build(settings)
-            passed = check_scenario(
-                partial(scenarios.build, settings), steps=steps, episodes=episodes
-            )
+            passed = check_scenario(factory, steps=steps, episodes=episodes)
         except ScenarioError as error:
             faults += 1
-            print(f"FAULT   {condition.label}: {error}")
+            print(f"FAULT   {label}: {error}")
         except ValueError as error:
             raise SpecError(str(error)) from None
         else:
-            print(f"passed  {condition.label}: {', '.join(passed)}")
+            print(f"passed  {label}: {', '.join(passed)}")
     return 1 if faults else 0
+
+
+def _cases(source: str, changes: Changes) -> Iterator[Case]:
+    """Yield what is to be checked, each scenario of a spec once."""
+    from functools import partial
+
+    from ... import scenarios
+    from ...topologies.files import from_python
+    from ..spec import Spec
+    from ..spec_errors import SpecError
+
+    if ".py" in source:
+        if changes:
+            raise SpecError("set: lays values over a spec, not over a Python file")
+        try:
+            yield source.rpartition(":")[2], from_python(source), [0, 1]
+        except ValueError as error:
+            raise SpecError(str(error)) from None
+        return
+    seen: set[Any] = set()
+    for condition in Spec.load(Path(source), changes).conditions():
+        settings = condition.settings.scenario
+        if settings not in seen:
+            seen.add(settings)
+            # Played are the first episode and those in which failures begin.
+            episodes = sorted({0, *(failure.episode for failure in settings.failures)})
+            try:
+                scenarios.build(settings)
+            except ValueError as error:
+                raise SpecError(str(error)) from None
+            yield condition.label, partial(scenarios.build, settings), episodes

@@ -1,6 +1,7 @@
 """The checker passes sound scenarios and catches every planted fault in one line."""
 
 import random
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -15,6 +16,7 @@ from nested_agents.scenarios import BoxPushing, ScenarioSettings
 from nested_agents.scenarios.checker import CHECKS, ScenarioError, check_scenario
 from nested_agents.scenarios.config import DelayedSettings, NoisySettings, SeizedSettings
 from nested_agents.scenarios.line_up import LEAD, LineUp
+from nested_agents.studies.cli import main
 
 FAILURES = (
     NoisySettings(wheels=("*",), episode=1, end_episode=2),
@@ -211,6 +213,23 @@ def test_every_planted_fault_is_caught_in_one_line(name: str) -> None:
         check_scenario(factory)
     assert "\n" not in str(fault.value)
     assert len(str(fault.value)) < 200
+
+
+# Where the command line finds them: ``nested-agents check THIS_FILE:fault_late_noise``.
+globals().update(
+    {f"fault_{name.replace(' ', '_')}": factory for name, (factory, _) in FAULTS.items()}
+)
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_the_command_catches_every_planted_fault(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["check", f"{__file__}:fault_{name.replace(' ', '_')}"]) == 1
+    line = capsys.readouterr().out
+    assert line.startswith("FAULT   fault_")
+    assert re.search(FAULTS[name][1], line)
+    assert line.count("\n") == 1
 
 
 def test_a_full_saver_passes() -> None:

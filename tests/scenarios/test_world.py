@@ -1,5 +1,7 @@
 """The world: speeds and slip by hand, friction that couples force and torque, determinism."""
 
+import gc
+
 import numpy as np
 import pytest
 
@@ -146,6 +148,15 @@ def test_a_free_wheel_turns_the_robot() -> None:
     world.place(np.array([[-0.5, 0.0, 0.0]]), np.zeros(3))
     world.advance(np.full(2, 0.1), 20)
     np.testing.assert_allclose(world.robot_twists[0], [0.1, 0, 0], atol=1e-4)
+
+
+def test_bodies_keep_their_world() -> None:
+    box = World([E_PUCK], BOXES["square"])._box
+    gc.collect()
+    others = [World([E_PUCK], BOXES["bar"]) for _ in range(20)]  # would take freed memory
+    for other in others:
+        other.advance(np.full(2, FULL), 1)
+    assert (box.mass, tuple(box.position)) == (pytest.approx(0.4), (0.0, 0.0))
 
 
 def test_bad_arguments_are_refused() -> None:

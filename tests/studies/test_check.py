@@ -81,3 +81,49 @@ def test_what_the_user_can_mend(
     assert out == ""
     assert complaint in err
     assert err.count("\n") == 1
+
+
+OWN = """
+import random
+from nested_agents.scenarios.line_up import LineUp
+
+class Drifting(LineUp):
+    count = 0
+
+    def step(self, joint_action):
+        self.count += 1
+        if self.count > 1:
+            self._places = self._places + 1e-12 * random.SystemRandom().random()
+        return super().step(joint_action)
+
+def sound():
+    return LineUp(2)
+
+def drifting():
+    return Drifting(2)
+
+def failing():
+    raise ValueError("no cart")
+"""
+
+
+def test_a_scenario_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "own.py"
+    path.write_text(OWN)
+    assert main(["check", f"{path}:sound"]) == 0
+    assert capsys.readouterr().out.startswith("passed  sound: form, finite numbers, bounds")
+    assert main(["check", f"{path}:drifting"]) == 1
+    found = capsys.readouterr().out
+    assert found.startswith("FAULT   drifting: equal seeds: two runs with seed 0 differ at step 2")
+    assert found.count("\n") == 1
+    for name, complaint in (
+        ("failing", "no cart"),
+        ("missing", "has no function 'missing'"),
+        ("", "must be written path/to/file.py:function"),
+    ):
+        assert main(["check", f"{path}:{name}"]) == 2
+        out, err = capsys.readouterr()
+        assert (out, err.count("\n")) == ("", 1)
+        assert complaint in err
+    assert main(["check", f"{path}:sound", "--set", "seeds=2"]) == 2
+    assert "not over a Python file" in capsys.readouterr().err
