@@ -16,6 +16,7 @@ import matplotlib.pyplot as plt
 
 from nested_agents.scenarios import BoxPushing, ScenarioSettings
 from nested_agents.scenarios.boxes import BOXES
+from nested_agents.scenarios.rendering import AXES, SIDES
 from nested_agents.scenarios.screen import Screen
 
 ROBOTS = (2, 4, 8)
@@ -28,15 +29,19 @@ for name, box in BOXES.items():
         f"{box.friction_radius:.4f} | {len(box.fixtures) or 'a disc'} |"
     )
 
-figure, grid = plt.subplots(len(BOXES), len(ROBOTS), figsize=(9, 1.9 * len(BOXES)))
+# What is inside the axes: at this size their labels could not be read.
+left, bottom, width, height = AXES
+rows = slice(round((1 - bottom - height) * SIDES[1]) + 2, round((1 - bottom) * SIDES[1]))
+columns = slice(round(left * SIDES[0]) + 2, round((left + width) * SIDES[0]))
+figure, grid = plt.subplots(len(BOXES), len(ROBOTS), figsize=(9, 1.8 * len(BOXES)))
 for row, name in zip(grid, BOXES, strict=True):
     for axes, robots in zip(row, ROBOTS, strict=True):
         settings = ScenarioSettings(box=name, robots=robots, start="hard")
         scenario, screen = BoxPushing(settings), Screen(settings, "rgb_array")
         scenario.reset(1)
         screen.begin(scenario.measure())
-        axes.imshow(screen.render())
-        axes.set_title(f"{name}, {robots} robots", fontsize=8)
+        axes.imshow(screen.render()[rows, columns])
+        axes.set_title(f"{name}, {robots} robots", fontsize=9, loc="left", pad=3)
         axes.set_axis_off()
-figure.tight_layout(pad=0.3)
+figure.tight_layout(pad=0.3, h_pad=0.8)
 figure.savefig(Path(sys.argv[1] if len(sys.argv) > 1 else "boxes.png"), dpi=90)

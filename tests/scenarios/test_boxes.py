@@ -67,6 +67,7 @@ def test_box2d_has_the_same_mass(name: str) -> None:
     assert of_fixtures == pytest.approx(box.area * UNIT**2, rel=1e-5)
 
 
+@pytest.mark.slow
 @settings(max_examples=500, deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),
