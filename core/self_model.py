@@ -58,6 +58,14 @@ class SelfModel:
         spread[-1] = self.settings.prior_constant**2
         return np.diag(spread)
 
+    @property
+    def deviations(self) -> tuple[FloatArray, ...]:
+        """Per robot the ``(3, w + 1)`` standard deviations that its filters give its effect."""
+        return tuple(
+            unit[:, None] * np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
+            for unit, covariances in zip(self._units, self._covariances, strict=True)
+        )
+
     def observe(self, robot: int, speeds: FloatArray, twist: FloatArray) -> None:
         """Take in one twist ``(3,)`` measured under commanded wheel speeds ``(w,)``."""
         noise = self.settings.noise**2

@@ -60,3 +60,15 @@ def test_it_continues_from_what_was_saved() -> None:
     for one in (model, other):
         taught(one, NOMINAL, 5)
     np.testing.assert_array_equal(model.effects[0], other.effects[0])
+
+
+def test_its_deviations_shrink_to_what_is_known() -> None:
+    settings = SelfModelSettings(enabled=True, surprise=1e9)
+    model = SelfModel(settings, [NOMINAL])
+    unit = max(1.0, abs(NOMINAL[2]).max())
+    before = [[0.3, 0.3, 0.003]] * 2 + [[0.3 * unit, 0.3 * unit, 0.003 * unit]]
+    np.testing.assert_allclose(model.deviations[0], before, rtol=1e-12)
+    model.observe(0, np.array([0.1, 0.0]), NOMINAL @ [0.1, 0.0, 1.0])
+    # Of a wheel that has not moved nothing new is known.
+    variance = 0.09 - (0.09 * 0.1) ** 2 / (0.09 * 0.01 + 9e-6 + 1.6e-5)
+    np.testing.assert_allclose(model.deviations[0][0, :2], [variance**0.5, 0.3], rtol=1e-12)
