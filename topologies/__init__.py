@@ -9,11 +9,12 @@ import networkx as nx
 
 from ..core.hierarchy import Hierarchy
 from ..core.protocols import Scenario
+from ..core.robot_agents import per_robot
 from ..core.single_agent import SingleAgent
 from . import builders, files
 from .builders import from_networkx
 from .checks import check_names
-from .config import KINDS, SingleAgentSettings, Topology, TopologySettings, parse
+from .config import KINDS, PerRobotSettings, SingleAgentSettings, Topology, TopologySettings, parse
 
 Groups = Sequence[Sequence[str]]
 Build = Callable[[Any, Sequence[str], Groups], nx.DiGraph]
@@ -78,7 +79,7 @@ def build(
     Parameters
     ----------
     settings
-        Any topology's settings but the single agent's.
+        Any topology's settings but those of agents for several wheels.
     agents
         Distinct names, in agent order.
     groups
@@ -99,7 +100,8 @@ def build(
     """
     kind = str(getattr(settings, "kind", None))
     if kind not in BUILDERS:
-        hint = "; use topologies.arrange" if isinstance(settings, SingleAgentSettings) else ""
+        other = isinstance(settings, SingleAgentSettings | PerRobotSettings)
+        hint = "; use topologies.arrange" if other else ""
         raise ValueError(f"topology {kind!r} is no hierarchy of {len(agents)} agents{hint}")
     named = [(a,) for a in agents] if groups is None else [[agents[i] for i in g] for g in groups]
     try:
@@ -111,17 +113,20 @@ def build(
 def arrange(settings: TopologySettings, scenario: Scenario) -> tuple[Scenario, Hierarchy]:
     """Return a scenario and the hierarchy of its agents, as `settings` want them.
 
-    The scenario is the given one, except for the single agent, which sees it as a scenario of its
-    own.
+    The scenario is the given one, except for the single agent and for agents of whole robots, which
+    see it as a scenario of their own.
 
     Raises
     ------
     ValueError
-        As `build` does, or if there are too many joint actions for a single agent.
+        As `build` does, or if there are too many actions for one agent.
     """
     if isinstance(settings, SingleAgentSettings):
         scenario = SingleAgent(scenario)
         return scenario, Hierarchy(scenario.agents, [])
+    if isinstance(settings, PerRobotSettings):
+        scenario = per_robot(scenario)
+        return scenario, Hierarchy(scenario.agents, builders.chain(scenario.agents).edges)
     return scenario, build(settings, scenario.agents, scenario.groups)
 
 

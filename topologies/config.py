@@ -205,6 +205,12 @@ class SingleAgentSettings(TopologySettings):
     kind: Literal["single-agent"] = "single-agent"
 
 
+class PerRobotSettings(TopologySettings):
+    """One agent per robot, driving all its wheels; these agents form a chain."""
+
+    kind: Literal["per-robot"] = "per-robot"
+
+
 AnyTopology = Annotated[
     ChainSettings
     | TreeSettings
@@ -216,7 +222,8 @@ AnyTopology = Annotated[
     | FileSettings
     | PythonSettings
     | PackageSettings
-    | SingleAgentSettings,
+    | SingleAgentSettings
+    | PerRobotSettings,
     Field(discriminator="kind"),
 ]
 

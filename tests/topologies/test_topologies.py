@@ -104,6 +104,7 @@ REFUSED = {
     "chian": "topology 'chian': did you mean 'chain'? known: chain, tree, star,",
     "": "topology '': known: chain,",
     "single-agent": "topology 'single-agent' is no hierarchy of 4 agents; use topologies.arrange",
+    "per-robot": "topology 'per-robot' is no hierarchy of 4 agents; use topologies.arrange",
 }
 
 
@@ -143,7 +144,7 @@ def test_settings_survive_json_and_strict_tables() -> None:
 
 
 def test_every_kind_has_settings_and_a_builder() -> None:
-    assert set(KINDS) == {*BUILDERS, "single-agent"}
+    assert set(KINDS) == {*BUILDERS, "single-agent", "per-robot"}
 
 
 def test_toml() -> None:

@@ -1,0 +1,183 @@
+"""One agent per robot: the mapping that the paper's one agent per wheel stands against (X-B).
+
+`RobotAgents` shows a scenario as one whose agents drive whole robots. An agent's action is a local
+code: the actions of all its wheels at once. Its state is the own variables of all its wheels and
+the variables that they share; everything else of this package works on it unchanged. Joint actions
+keep their codes, as the digits of a robot's wheels read as one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import product
+from typing import Any, cast
+
+import numpy as np
+
+from .arrays import FloatArray, IntArray
+from .protocols import (
+    Blocks,
+    EmbodiedPrediction,
+    EmbodiedScenario,
+    Prediction,
+    Scenario,
+    Transition,
+)
+from .spaces import ActionSet, StateSpace
+
+MOST_ACTIONS = 4**4
+"""The most actions of a robot that are still told apart: those of four wheels."""
+
+
+class RobotAgents:
+    """A scenario seen as that of one agent per group.
+
+    Parameters
+    ----------
+    scenario
+        The scenario of one agent per wheel.
+
+    Raises
+    ------
+    ValueError
+        If groups differ in size, or have more than `MOST_ACTIONS` actions.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.scenario = scenario
+        sizes = {len(group) for group in scenario.groups}
+        single, w = scenario.action_set, max(sizes)
+        if len(sizes) > 1:
+            raise ValueError(f"robots: of {sorted(sizes)} wheels, allowed: equally many")
+        if len(single) ** w > MOST_ACTIONS:
+            raise ValueError(
+                f"robots: {len(single)} ** {w} actions each, allowed: {MOST_ACTIONS} or fewer"
+            )
+        # Row c holds the actions of a robot's wheels of local code c.
+        self._local = np.array(list(product(range(len(single)), repeat=w)), dtype=np.int64)
+        names = tuple("+".join(single.names[a] for a in row) for row in self._local)
+        neutral = int(np.flatnonzero((self._local == single.neutral).all(axis=1))[0])
+        zeros = (0.0,) * len(names)
+        self.action_set = ActionSet(names, zeros, zeros, neutral)
+        self.agents = tuple(_robot(scenario.agents[group[0]]) for group in scenario.groups)
+        self.groups = tuple((r,) for r in range(len(self.agents)))
+        space = scenario.state_space
+        own = tuple(
+            replace(v, name=f"{scenario.agents[wheel].rpartition('.')[2]}.{v.name}")
+            for wheel in scenario.groups[0]
+            for v in space.own
+        )
+        self.state_space = StateSpace(f"robots' {space.name}", (*own, *space.shared), len(own))
+
+    def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
+        """Start an episode; return the states of the robots."""
+        return self._joined(self.scenario.reset(seed, episode))
+
+    def step(self, joint_action: IntArray) -> Transition:
+        """Carry out a local code per robot."""
+        transition = self.scenario.step(self._local[joint_action].ravel())
+        return replace(transition, states=self._joined(transition.states))
+
+    def predict(self) -> RobotPrediction:
+        """Predict from the present state."""
+        return RobotPrediction(self.scenario.predict(), self)
+
+    def measure(self) -> Mapping[str, Any]:
+        """Return the measurements of the present state."""
+        return self.scenario.measure()
+
+    def wheels(self, joint_actions: IntArray) -> IntArray:
+        """Return the actions of all wheels ``(m, n)`` for local codes ``(m, M)``."""
+        return self._local[joint_actions].reshape(len(joint_actions), -1)
+
+    def _joined(self, states: FloatArray) -> FloatArray:
+        n_own = self.scenario.state_space.n_own
+        rows = [
+            np.concatenate([*(states[wheel, :n_own] for wheel in group), states[group[0], n_own:]])
+            for group in self.scenario.groups
+        ]
+        return np.array(rows)
+
+
+class EmbodiedRobotAgents(RobotAgents):
+    """The same of a scenario that is open to self-models."""
+
+    @property
+    def nominal_effects(self) -> tuple[FloatArray, ...]:
+        """Per body the effect of its wheel speeds on its twist."""
+        return cast(EmbodiedScenario, self.scenario).nominal_effects
+
+    def predict_with(self, effects: Sequence[FloatArray]) -> RobotPrediction:
+        """Predict from the present state, believing in these effects."""
+        return RobotPrediction(cast(EmbodiedScenario, self.scenario).predict_with(effects), self)
+
+
+def per_robot(scenario: Scenario) -> RobotAgents:
+    """Return a scenario as one of one agent per robot."""
+    embodied = isinstance(scenario, EmbodiedScenario)
+    return (EmbodiedRobotAgents if embodied else RobotAgents)(scenario)
+
+
+class RobotPrediction:
+    """The prediction of a scenario of wheels, for robots.
+
+    Parameters
+    ----------
+    prediction
+        The scenario's own.
+    robots
+        The scenario as robots see it.
+    """
+
+    def __init__(self, prediction: Prediction, robots: RobotAgents) -> None:
+        self._prediction, self._robots = prediction, robots
+        self._groups = robots.scenario.groups
+        self._n_own = robots.scenario.state_space.n_own
+
+    def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
+        """Return the next states of a robot for local codes ``(m, M)``."""
+        wheels = self._robots.wheels(joint_actions)
+        parts = [self._prediction.states(wheel, wheels) for wheel in self._groups[agent]]
+        own = [part[:, : self._n_own] for part in parts]
+        return np.concatenate([*own, parts[0][:, self._n_own :]], axis=1)
+
+    def rewards(self, joint_actions: IntArray) -> FloatArray:
+        """Return the predicted rewards of local codes ``(m, M)``."""
+        return self._prediction.rewards(self._robots.wheels(joint_actions))
+
+    def blocks(self, agent: int) -> Blocks:
+        """Return the next states of a robot for all joint actions."""
+        blocks = [self._prediction.blocks(wheel) for wheel in self._groups[agent]]
+        own = [b.own[b.own_rows] if len(b.own_rows) else b.own for b in blocks]
+        return replace(
+            blocks[0], own=np.concatenate(own, axis=1), own_rows=np.zeros(0, dtype=np.int64)
+        )
+
+    def reward_table(self) -> FloatArray:
+        """Return the predicted rewards of all joint actions by code."""
+        return self._prediction.reward_table()
+
+    @property
+    def groups(self) -> tuple[tuple[int, ...], ...]:
+        """Wheels by body."""
+        return cast(EmbodiedPrediction, self._prediction).groups
+
+    def commands(self, joint_action: IntArray) -> FloatArray:
+        """Return the wheel speeds that local codes ``(M,)`` would command."""
+        wheels = self._robots.wheels(joint_action[None])[0]
+        return cast(EmbodiedPrediction, self._prediction).commands(wheels)
+
+    def slips(self, joint_action: IntArray) -> FloatArray:
+        """Return by how much contact is predicted to change the bodies' twists, ``(M, 3)``."""
+        wheels = self._robots.wheels(joint_action[None])[0]
+        return cast(EmbodiedPrediction, self._prediction).slips(wheels)
+
+
+def _robot(agent: str) -> str:
+    """Return the robot's part of a wheel's name, or the name if it has none.
+
+    >>> _robot("robot1.front-left"), _robot("a")
+    ('robot1', 'a')
+    """
+    return agent.rpartition(".")[0] or agent
