@@ -5,7 +5,8 @@ robot. Robots push a square from a medium start, at wheel speeds drawn anew ever
 the same world driven through the Python classes of pybox2d, held against ours before it is timed.
 Multiwalker and BipedalWalker, too, are Box2D worlds, stepped with random actions; their resets fall
 into few rounds, which medians leave out. *WheelsEnv* is our own PettingZoo interface with states,
-rewards and infos, one control period a step as theirs, or eight as is the default.
+rewards and infos, one control period a step as theirs, or eight as is the default. Times are the
+processor's: all run in one thread, and other jobs on the machine would only be in the way.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import os
 from collections.abc import Callable
 from itertools import cycle
 from pathlib import Path
+from time import thread_time
 from typing import Any
 
 import numpy as np
@@ -91,7 +93,7 @@ def sizes(robots: int, budget: float, *, naive: bool) -> Row:
     if naive:
         _compare(robots)
         candidates["naive"] = Run(NaiveWorld, robots)
-    times = paired(candidates, budget=budget)
+    times = paired(candidates, budget=budget, clock=thread_time)
     ours = times.median("ours")
     return {
         "robots": robots,
@@ -141,7 +143,7 @@ def others(budget: float) -> tuple[list[Row], list[str]]:
             candidates[name] = make()
         except ImportError as error:
             missing.append(f"{name} is not timed: {error}; see the extra [human]")
-    times = paired(candidates, budget=budget, most_rounds=2000)
+    times = paired(candidates, budget=budget, most_rounds=2000, clock=thread_time)
     first = next(iter(candidates))
     rows = [
         {
