@@ -25,6 +25,10 @@ from .trial import Session, Trial, TrialResult
 
 DECISION_PERIOD = 0.512
 """What a decision of the default may take to keep up with the robots: 8 control periods [s]."""
+COLUMNS = (
+    "success", "greedy", "all touch", "decide [ms]", "learn [ms]", "team [MB]", "process [MB]",
+)  # fmt: skip
+"""What the table shows."""
 MEMORY = Path("/proc/self/status")
 CLEAR = Path("/proc/self/clear_refs")
 
@@ -163,7 +167,8 @@ def analyse(results: Results) -> Scaling:
         robots, agents, passed = (int(numbers[n][0]) for n in ("robots", "agents", "messages"))
         evaluator = condition.removesuffix(f", robots={robots}")
         points.append(Point(evaluator, robots, agents, passed, values))
-        table.append(Summary(condition, len(steps), values))
+        shown = {name: values[name] for name in COLUMNS if name in values}
+        table.append(Summary(condition, len(steps), shown))
     exponents = _exponents(points)
     notes = [
         f"\n{evaluator}: " + ", ".join(f"{what} ~ n^{power:.2f}" for what, power in by_what.items())

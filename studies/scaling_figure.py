@@ -20,7 +20,7 @@ PANELS = (
     ("decide [ms]", "deciding, per step [ms]", True),
     ("learn [ms]", "learning, per step [ms]", True),
     ("team [MB]", "arrays of the team [MB]", True),
-    ("process [MB]", "process, peak [MB]", True),
+    ("process [MB]", "process, peak [MB]", False),
 )
 
 
@@ -41,7 +41,7 @@ def draw(analysis: Scaling, directory: Path) -> list[Path]:
             if logarithmic:
                 axes.set_yscale("log")
             else:
-                axes.set_ylim(-0.03, 1.03)
+                axes.set_ylim(*((-0.03, 1.03) if name == "greedy" else (0.0, None)))
         panels[0][1].axhline(1e3 * DECISION_PERIOD, color="#888888", linewidth=0.8, ls=":")
         counts = {p.robots: p.messages for p in analysis.points}
         axes = panels[1][2]

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .comparison import Array, Difference, ratio
+from .comparison import Difference, ratio
 from .paired_tests import holm, paired_permutation
 from .results import Arrays, Results
 from .statistics import bootstrap, rate
@@ -68,13 +68,8 @@ def analyse(results: Results) -> Shapes:
     table: list[Summary] = []
     ratios: dict[str, tuple[Difference, ...]] = {}
     for condition, trained in results.evaluation.items():
-        boxes = {TRAINED: trained} | {
-            phase.removeprefix(PREFIX): arrays[condition]
-            for phase, arrays in results.phases.items()
-            if phase.startswith(PREFIX) and condition in arrays
-        }
-        rates = {box: arrays["success"].mean(axis=1) for box, arrays in boxes.items()}
-        found = ratios[condition] = _ratios(rates)
+        boxes = {TRAINED: trained} | _other_boxes(results, condition)
+        found = ratios[condition] = ratios_of(results, condition)
         by_box = {d.condition: d for d in found}
         for box, arrays in boxes.items():
             label = box if len(results.evaluation) == 1 else f"{condition}: {box}"
@@ -86,9 +81,23 @@ def analyse(results: Results) -> Shapes:
     return Shapes(tuple(table), ratios, tuple(notes))
 
 
-def _ratios(rates: dict[str, Array]) -> tuple[Difference, ...]:
-    base = rates[TRAINED]
-    others = {box: rate for box, rate in rates.items() if box != TRAINED}
+def _other_boxes(results: Results, condition: str) -> dict[str, Arrays]:
+    return {
+        phase.removeprefix(PREFIX): arrays[condition]
+        for phase, arrays in results.phases.items()
+        if phase.startswith(PREFIX) and condition in arrays
+    }
+
+
+def ratios_of(results: Results, condition: str) -> tuple[Difference, ...]:
+    """Return the ratios of a condition, box by box; none if it has not been evaluated."""
+    if condition not in results.evaluation:
+        return ()
+    base = results.evaluation[condition]["success"].mean(axis=1)
+    others = {
+        box: arrays["success"].mean(axis=1)
+        for box, arrays in _other_boxes(results, condition).items()
+    }
     adjusted = holm([paired_permutation(values, base) for values in others.values()])
     return tuple(
         Difference(box, "ratio", len(base), ratio(values, base), float(p))

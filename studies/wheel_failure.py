@@ -186,15 +186,17 @@ class WheelFailures:
 
 def analyse(results: Results) -> WheelFailures:
     """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
-    courses = tuple(_courses(results))
+    courses = tuple(courses_of(results))
     gains = _gains(courses)
-    notes = ["\nsuccess at the end against nothing adapting (p adjusted):"] if gains else []
+    notes = ["Named after the colon is what adapts to the failure."] if courses else []
+    notes += ["\nsuccess at the end against nothing adapting (p adjusted):"] if gains else []
     notes += [f"  {gain.condition}: {gain.shown}" for gain in gains]
     curves = tuple(rates(course.success) for course in courses)
     return WheelFailures(tuple(map(_summary, courses)), courses, curves, gains, tuple(notes))
 
 
-def _courses(results: Results) -> list[Course]:
+def courses_of(results: Results) -> list[Course]:
+    """Return the cases of all conditions, fault by fault."""
     kept: Mapping[str, Arrays] = results.phases.get(KEPT, {})
     found = []
     for condition, training in results.training.items():
@@ -234,7 +236,7 @@ def _summary(course: Course) -> Summary:
         "steps": bootstrap(steps),
         "area lost": bootstrap(course.lost),
     }
-    return Summary(f"{course.fault}; adapts: {course.adapts}", len(course.success), estimates)
+    return Summary(f"{course.fault}: {course.adapts}", len(course.success), estimates)
 
 
 def _gains(courses: tuple[Course, ...]) -> tuple[Difference, ...]:

@@ -41,8 +41,8 @@ def test_cases_are_told_apart_by_what_adapts() -> None:
         "nothing", "weights", "self-model", "both",
     ] * 2  # fmt: skip
     ends = {line.condition: float(line.estimates["end"].value) for line in analysis.table}
-    assert ends["4 wheels, seized; adapts: both"] > 0.85
-    assert ends["4 wheels, seized; adapts: nothing"] < 0.2
+    assert ends["4 wheels, seized: both"] > 0.85
+    assert ends["4 wheels, seized: nothing"] < 0.2
     gains = {gain.condition: gain for gain in analysis.gains}
     assert len(gains) == 6
     assert gains["4 wheels, seized, both"].p < 0.001

@@ -1,0 +1,216 @@
+"""What is measured of the paper's claims, from the results of a study.
+
+Each function returns an estimate with its 95 % interval over seeds, or None where the results have
+not what it takes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import radians
+
+import numpy as np
+
+from ..core.cost import Problem
+from .chain_order import analyse as analyse_orders
+from .comparison import paired, ratio
+from .results import Results
+from .scaling import DECISION_PERIOD
+from .shapes import least_ratio, ratios_of
+from .statistics import Estimate, bootstrap, rate
+from .wheel_failure import courses_of
+
+Measure = Callable[[Results], "Measured | None"]
+
+LAST = slice(-5, None)
+FIRST = slice(None, 5)
+CONTROLS = ("frozen", "random")
+"""What a learner is compared with; whichever fares better."""
+PAPER_NESTED, PAPER_SINGLE = 2.45e12, 1.1e27
+"""What the paper prints in Section VII."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """An estimate of what a claim is about.
+
+    Attributes
+    ----------
+    estimate
+        The value and its interval.
+    seeds
+        How many seeds it rests on; 0: it is computed.
+    p
+        Of a test, if there is one.
+    note
+        What the value is of, if that is part of the result.
+    """
+
+    estimate: Estimate
+    seeds: int
+    p: float | None = None
+    note: str = ""
+
+
+def learned(condition: str) -> Measure:
+    """Return what measures success at the end of training, less that of the better control."""
+
+    def compute(results: Results) -> Measured | None:
+        def values(r: Results, name: str) -> np.ndarray:
+            return np.asarray(r.training[name]["success"][:, LAST].mean(axis=1))
+
+        controls = [c for c in CONTROLS if c in results.training]
+        if condition not in results.training or not controls:
+            return None
+        best = max(controls, key=lambda c: float(values(results, c).mean()))
+        pairs = paired(results, best, condition, values)
+        if not len(pairs):
+            return None
+        return Measured(bootstrap(pairs[:, 1] - pairs[:, 0]), len(pairs), note=f"against {best}")
+
+    return compute
+
+
+def success(episodes: slice) -> Measure:
+    """Return what measures the default's success in some episodes of training."""
+
+    def compute(results: Results) -> Measured | None:
+        if "default" not in results.training:
+            return None
+        outcomes = results.training["default"]["success"][:, episodes]
+        return Measured(rate(outcomes), len(outcomes)) if outcomes.size else None
+
+    return compute
+
+
+def oriented(results: Results) -> Measured | None:
+    """Measure how often the default brings the box to the goal within 15 degrees."""
+    if "default" not in results.training:
+        return None
+    arrays = results.training["default"]
+    turned = arrays["final_orientation_rad"][:, LAST] <= radians(15.0)
+    outcomes = arrays["success"][:, LAST].astype(bool) & turned
+    return Measured(rate(outcomes), len(outcomes))
+
+
+def contact_gained(results: Results) -> Measured | None:
+    """Measure by how much the default's time in contact grows in training."""
+    if "default" not in results.training:
+        return None
+    contact = results.training["default"]["contact_fraction"]
+    gained = contact[:, LAST].mean(axis=1) - contact[:, FIRST].mean(axis=1)
+    return Measured(bootstrap(gained), len(gained))
+
+
+def cost_error(results: Results) -> Measured:
+    """Compute how far the paper's two costs are from its formulas."""
+    problem = Problem()
+    errors = [
+        problem.nested(range(4)) / PAPER_NESTED - 1.0,
+        problem.single_agent(4) / PAPER_SINGLE - 1.0,
+    ]
+    worst = np.asarray(max(errors, key=abs))
+    return Measured(Estimate(worst, worst, worst), 0)
+
+
+def order_matters(results: Results) -> Measured | None:
+    """Measure the order of the chain that differs most from the first, over all intervals.
+
+    Intervals of the differences are simultaneous (Bonferroni); p is that of Friedman's test.
+    """
+    found = [c for c in analyse_orders(results).comparisons if c.title.endswith("greedy")]
+    if not found:
+        return None
+    values = found[0].values
+    shift = values[:, 1:] - values[:, :1]
+    e = bootstrap(shift, level=1.0 - 0.05 / shift.shape[1])
+    most = e.value[np.abs(e.value).argmax()]
+    widest = Estimate(np.asarray(most), np.asarray(e.low.min()), np.asarray(e.high.max()))
+    return Measured(widest, len(values), found[0].p, f"{values.shape[1]} orders")
+
+
+def _sizes(results: Results) -> dict[int, list[str]]:
+    """Return the conditions by number of robots."""
+    found: dict[int, list[str]] = {}
+    for condition, numbers in results.numbers.items():
+        if "robots" in numbers:
+            found.setdefault(int(numbers["robots"][0]), []).append(condition)
+    return found
+
+
+def decision_share(results: Results) -> Measured | None:
+    """Measure what share of its period a decision takes with most robots, fastest evaluator."""
+    sizes = _sizes(results)
+    if not sizes:
+        return None
+    most = max(sizes)
+    times = [results.usage[condition]["decision_median"] for condition in sizes[most]]
+    fastest = min(times, key=lambda t: float(t.mean()))
+    estimate = bootstrap(fastest / DECISION_PERIOD)
+    return Measured(estimate, len(fastest), note=f"{most} robots")
+
+
+def success_by_size(results: Results) -> Measured | None:
+    """Measure the success of most robots relative to fewest, each by its best evaluator."""
+    sizes = {
+        robots: [c for c in conditions if c in results.evaluation]
+        for robots, conditions in _sizes(results).items()
+    }
+    if len(sizes) < 2 or not all(sizes.values()):
+        return None
+
+    def rates(r: Results, condition: str) -> np.ndarray:
+        return np.asarray(r.evaluation[condition]["success"].mean(axis=1))
+
+    fewest, most = (
+        max(sizes[robots], key=lambda c: float(rates(results, c).mean()))
+        for robots in (min(sizes), max(sizes))
+    )
+    pairs = paired(results, fewest, most, rates)
+    if not len(pairs):
+        return None
+    note = f"{max(sizes)} against {min(sizes)} robots"
+    return Measured(ratio(pairs[:, 1], pairs[:, 0]), len(pairs), note=note)
+
+
+FAULTS = ("4 wheels, seized", "4 wheels, reversed")
+"""The faults that count: feedback alone absorbs the milder ones, and two wheels leave no remedy."""
+
+
+def recovered(adapts: str) -> Measure:
+    """Return what measures success at the end relative to before the failure, worst fault."""
+
+    def compute(results: Results) -> Measured | None:
+        found = [c for c in courses_of(results) if c.fault in FAULTS and c.adapts == adapts]
+        ratios = {c.fault: ratio(c.end.mean(axis=1), c.before.mean(axis=1)) for c in found}
+        if not ratios:
+            return None
+        worst = min(ratios, key=lambda fault: float(np.nan_to_num(ratios[fault].value)))
+        return Measured(ratios[worst], len(found[0].success), note=worst)
+
+    return compute
+
+
+def worst_shape(results: Results) -> Measured | None:
+    """Measure the success with the worst shape relative to that with the box of training."""
+    ratios = ratios_of(results, "default")
+    if not ratios:
+        return None
+    worst = least_ratio(ratios)
+    return Measured(worst.estimate, worst.seeds, note=worst.condition)
+
+
+def without(condition: str) -> Measure:
+    """Return what measures the greedy success of a condition relative to the default's."""
+
+    def compute(results: Results) -> Measured | None:
+        def rates(r: Results, name: str) -> np.ndarray:
+            return np.asarray(r.evaluation[name]["success"].mean(axis=1))
+
+        if not {condition, "default"} <= results.evaluation.keys():
+            return None
+        pairs = paired(results, "default", condition, rates)
+        return Measured(ratio(pairs[:, 1], pairs[:, 0]), len(pairs)) if len(pairs) else None
+
+    return compute

@@ -1,0 +1,82 @@
+"""``nested-agents claims``: what the paper claims, and what was found of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+
+from .options import MostJobs
+
+if TYPE_CHECKING:
+    from ..results import Results
+    from ..spec import Spec
+
+
+def command(
+    out: Annotated[Path | None, tyro.conf.arg(metavar="DIR", help_behavior_hint="")] = None,
+    quick: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    jobs: MostJobs = None,
+    format: Literal["table", "json", "markdown"] = "table",
+    publish: Annotated[Path | None, tyro.conf.arg(metavar="DIR", help_behavior_hint="")] = None,
+) -> int:
+    """Print one table: each claim of the paper, its measure, the result, the verdict.
+
+    Without --out the table is made from the results that come with the program.
+
+    Parameters
+    ----------
+    out
+        Run the studies that the claims rest on, each in a directory of its own below this one;
+        what has been run before is read.
+    quick
+        Small versions of the studies: ten minutes on two cores, and wide intervals.
+    jobs
+        Trials at a time; one for every core unless said otherwise.
+    format
+        How to print the table.
+    publish
+        Also write the results that it rests on, as one small JSON file a study.
+    """
+    from .. import claims, published
+    from ..claims_table import print_claims
+    from ..spec_errors import SpecError
+
+    if out is None:
+        for option, given in (("--quick", quick), ("--publish", publish), ("--jobs", jobs)):
+            if given:
+                raise SpecError(f"{option}: needs --out, the directory of the studies")
+        found = published.read(published.FOLDER, claims.STUDIES_OF_CLAIMS)
+    else:
+        found = _run(out, quick=quick, jobs=jobs)
+    if publish is not None:
+        publish.mkdir(parents=True, exist_ok=True)
+        for study, (spec, results) in found.items():
+            text = published.dumps(spec, results)
+            (publish / f"{study}.json").write_text(text, encoding="utf-8")
+    print_claims(claims.judge({study: results for study, (_, results) in found.items()}), format)
+    return 0
+
+
+def _run(out: Path, *, quick: bool, jobs: int | None) -> dict[str, tuple[Spec, Results]]:
+    """Run the studies of the claims, or what is left of them; return what they found."""
+    from .. import STUDIES, published
+    from ..claims import STUDIES_OF_CLAIMS
+    from ..conduct import carried_out
+    from ..results import read
+    from ..spec import Spec
+    from ..spec_errors import SpecError
+
+    folder = Path(__file__).parent.parent / ("quick" if quick else ".")
+    found = {}
+    for study in STUDIES_OF_CLAIMS:
+        spec = Spec.load(folder / f"{STUDIES[study]}.toml")
+        with carried_out(spec, out / study, jobs) as store:
+            if failed := store.failed():
+                raise SpecError(
+                    f"{out / study}: {len(failed)} trials failed: nested-agents status "
+                    f"{out / study}"
+                )
+            found[study] = published.loads(published.dumps(spec, read(store)))
+    return found

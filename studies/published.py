@@ -1,0 +1,110 @@
+"""Results of a study as one small JSON file: what its claims rest on, with spec and seeds.
+
+Outcomes are kept as one character an episode, other measures in three decimals. Claims are always
+decided by results in this form, so the committed files give the table that the run gave.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .results import Arrays, Results
+from .spec import Spec
+from .spec_errors import SpecError
+from .trial import RESULTS_VERSION
+
+MEASURES: dict[str, tuple[str, ...]] = {
+    "learning-curve": ("success", "final_orientation_rad", "contact_fraction"),
+    "wheel-failure": ("success", "steps"),
+    "scaling": ("success", "steps"),
+}
+"""What is kept of each study beside the outcomes, which is all that is kept of others."""
+OUTCOMES = ("success", "stopped_at_goal")
+DECIMALS = 3
+FOLDER = Path(__file__).parent / "published"
+"""Where the committed files are."""
+
+
+def dumps(spec: Spec, results: Results) -> str:
+    """Return results and their spec as JSON text."""
+    names = MEASURES.get(spec.study, ("success",))
+    content = {
+        "results_version": RESULTS_VERSION,
+        "spec": spec.table(),
+        "seeds": results.seeds,
+        "phases": {
+            phase: {
+                condition: {name: _packed(name, arrays[name]) for name in names}
+                for condition, arrays in by_condition.items()
+            }
+            for phase, by_condition in results.phases.items()
+        },
+        "numbers": _rounded(results.numbers),
+        "usage": _rounded(results.usage),
+    }
+    lines = [f"{json.dumps(key)}: {json.dumps(value)}" for key, value in content.items()]
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def loads(text: str) -> tuple[Spec, Results]:
+    """Return the spec and the results that `dumps` has written."""
+    content = json.loads(text)
+    phases = {
+        phase: {
+            condition: {name: _unpacked(name, packed) for name, packed in arrays.items()}
+            for condition, arrays in by_condition.items()
+        }
+        for phase, by_condition in content["phases"].items()
+    }
+    seeds = {condition: tuple(found) for condition, found in content["seeds"].items()}
+    numbers, usage = (
+        {c: {n: np.array(v) for n, v in named.items()} for c, named in content[key].items()}
+        for key in ("numbers", "usage")
+    )
+    training, evaluation = phases.get("training", {}), phases.get("evaluation", {})
+    spec = Spec.of(content["spec"])
+    return spec, Results(training, evaluation, phases, seeds, numbers, usage)
+
+
+def read(folder: Path, studies: Iterable[str]) -> dict[str, tuple[Spec, Results]]:
+    """Read the files of studies; those that are missing are left out.
+
+    Raises
+    ------
+    SpecError
+        If a file is not what `dumps` writes.
+    """
+    found = {}
+    for study in studies:
+        path = folder / f"{study}.json"
+        if not path.exists():
+            continue
+        try:
+            found[study] = loads(path.read_text(encoding="utf-8"))
+        except (KeyError, TypeError, AttributeError, ValueError) as error:
+            raise SpecError(f"{path}: holds no published results: {error}") from None
+    return found
+
+
+def _packed(name: str, values: np.ndarray) -> list[Any]:
+    if name in OUTCOMES:
+        return ["".join("1" if v else "0" for v in row) for row in values]
+    return np.round(values, DECIMALS).tolist()
+
+
+def _unpacked(name: str, packed: list[Any]) -> np.ndarray:
+    if name in OUTCOMES:
+        return np.array([[int(character) for character in row] for row in packed])
+    return np.array(packed)
+
+
+def _rounded(named: Mapping[str, Arrays]) -> dict[str, dict[str, list[float]]]:
+    return {
+        condition: {name: [float(f"{v:.5g}") for v in values] for name, values in arrays.items()}
+        for condition, arrays in named.items()
+    }
