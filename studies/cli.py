@@ -26,10 +26,12 @@ COMMANDS: dict[str, str] = {
     "retry": "retry",
     "export": "export",
     "report": "report",
+    "explain": "explain",
     "presets": "presets",
     "topology": "topology",
     "check": "check",
     "cost": "cost",
+    "claims": "claims",
 }
 """The module of every command by name, in the order of the help."""
 
