@@ -7,6 +7,7 @@ the spec's tables, the override's tables, the point of the sweeps.
 
 from __future__ import annotations
 
+import hashlib
 import itertools
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -110,6 +111,7 @@ def grid(
     """
     conditions: list[Condition] = []
     seen: dict[str, str] = {}
+    labels: set[str] = set()
     keys = list(dict.fromkeys([*(key for o in overrides for key in o.sweep), *sweep]))
     source = "overrides" if overrides else "sweep"
     for override, point in _points(overrides, sweep):
@@ -117,8 +119,9 @@ def grid(
         where = f" (condition {name!r})" if point or override else ""
         settings = resolve(preset, tables, point, where, override)
         twin = seen.setdefault(settings.canonical(), name)
-        if twin != name or any(c.label == name for c in conditions):
+        if twin != name or name in labels:
             raise SpecError(f"{source}: conditions {twin!r} and {name!r} are the same")
+        labels.add(name)
         columns: dict[str, Any] = {"name": override.name} if override else {}
         columns |= {key: _scalar(point[key]) if key in point else "" for key in keys}
         elsewhere = _elsewhere(settings, evaluations or {}, where)
@@ -145,7 +148,7 @@ def resolve(
     """Return the settings of one condition, layer by layer."""
     own = override.preset if override else None
     name = point.get("preset", preset if own is None else own)
-    if name not in PRESETS:
+    if not isinstance(name, str) or name not in PRESETS:
         raise SpecError(f"preset = {show(name)}: {closest(name, PRESETS)}{where}")
     layers = [PRESETS[name].table, tables, override.tables if override else {}]
     layers += [nested(key, value) for key, value in point.items() if key != "preset"]
@@ -210,13 +213,13 @@ def label(point: Mapping[str, Any], name: str = "") -> str:
     'no replay, robots=3'
     """
     if len(point) == 1 and not name:
-        return str(_scalar(next(iter(point.values()))))
+        return _brief(next(iter(point.values())))
     last = [key.rpartition(".")[2] for key in point]
     parts = [name] if name else []
     for key, short in zip(point, last, strict=True):
         shown = short if last.count(short) == 1 else key
-        value = _scalar(point[key])
-        parts.append(str(value) if key == "preset" else f"{shown}={value}")
+        value = _brief(point[key])
+        parts.append(value if key == "preset" else f"{shown}={value}")
     return ", ".join(parts)
 
 
@@ -229,6 +232,14 @@ def tuples(value: Any) -> Any:
     return value
 
 
+def _brief(value: object) -> str:
+    """Return a value for a label: a long list is cut, and told from its like by a checksum."""
+    text = str(_scalar(value))
+    if isinstance(value, str) or len(text) <= 60:
+        return text
+    return f"{text[:50]}... {hashlib.sha256(text.encode(errors='replace')).hexdigest()[:6]}"
+
+
 def _scalar(value: object) -> object:
     is_scalar = isinstance(value, int | float | str) and not isinstance(value, bool)
-    return value if is_scalar else show(value)
+    return value if is_scalar else show(value, width=None)

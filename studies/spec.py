@@ -105,6 +105,13 @@ class Spec(Settings):
         SpecError
             If anything in it, the conditions included, is wrong.
         """
+        try:
+            return cls._of(table)
+        except RecursionError:
+            raise SpecError("spec: is nested too deeply") from None
+
+    @classmethod
+    def _of(cls, table: Mapping[str, Any]) -> Spec:
         table = _read(table, "")
         if isinstance(table.get("overrides"), list | tuple):
             table["overrides"] = tuple(

@@ -20,22 +20,25 @@ class SpecError(ValueError):
     """Something the user can mend: its message is one line that names what, and what is allowed."""
 
     def __init__(self, message: str) -> None:
-        super().__init__(" ".join(message.split()))
+        line = " ".join(message.split())
+        # A terminal obeys control characters, and cannot write half of a surrogate pair.
+        shown = (c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)
+        super().__init__("".join(shown))
 
 
-def show(value: object, width: int = 60) -> str:
-    """Return a value as TOML would write it, shortened to `width` characters."""
+def show(value: object, width: int | None = 60) -> str:
+    """Return a value as TOML would write it, shortened to `width` characters if that is given."""
     if isinstance(value, bool):
         text = str(value).lower()
     elif isinstance(value, str):
         text = repr(value)
     elif isinstance(value, Mapping):
-        text = "{" + ", ".join(f"{k} = {show(v)}" for k, v in value.items()) + "}"
+        text = "{" + ", ".join(f"{k} = {show(v, width)}" for k, v in value.items()) + "}"
     elif isinstance(value, Sequence):
-        text = "[" + ", ".join(show(v) for v in value) + "]"
+        text = "[" + ", ".join(show(v, width) for v in value) + "]"
     else:
         text = str(value)
-    return text if len(text) <= width else text[: width - 3] + "..."
+    return text if width is None or len(text) <= width else text[: width - 3] + "..."
 
 
 def closest(name: object, known: Iterable[str]) -> str:

@@ -337,3 +337,14 @@ def test_written_tables_are_read_back(table):
         return type(a) is type(b) and repr(a) == repr(b)
 
     assert same(tomllib.loads(dumps(table)), table)
+
+
+def test_long_values_that_begin_alike_are_told_apart():
+    members = [["robot1.left", "robot1.right"], ["robot2.left", "robot2.right"]]
+    alike = [{"kind": "teams", "members": m} for m in (members, [members[0], members[1][::-1]])]
+    first, second = Spec.of({"sweep": {"topology": alike}}).conditions()
+    assert first.label != second.label
+    assert first.label[:50] == second.label[:50]
+    assert max(len(first.label), len(second.label)) <= 60
+    assert "robot2.left" in str(first.columns["topology"])
+    assert first.columns != second.columns
