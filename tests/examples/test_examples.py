@@ -16,12 +16,14 @@ def test_random_policy(capsys: pytest.CaptureFixture[str]) -> None:
     assert lines[2] == "failed wheels: 1"
 
 
-def test_ppo(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ppo(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     path = EXAMPLES / "train_ppo.py"
     compile(path.read_text(encoding="utf-8"), str(path), "exec")
     pytest.importorskip("stable_baselines3", reason="extra [peers]")
     monkeypatch.setattr("sys.argv", ["train_ppo.py", "1024"])
     runpy.run_path(str(path), run_name="__main__")
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split(":")[0] for line in lines] == ["before training", "after 1024 steps"]
 
 
 def test_the_documented_prediction_errors_are_those_of_the_example() -> None:
@@ -30,6 +32,22 @@ def test_the_documented_prediction_errors_are_those_of_the_example() -> None:
     row = "| ".join(f"{mean:.1f} " for mean in means)
     documented = (EXAMPLES.parent / "docs" / "predictors.md").read_text(encoding="utf-8")
     assert f"| square | {count} | {row}|" in documented
+
+
+def test_the_documented_free_motion_is_that_of_the_example(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    runpy.run_path(str(EXAMPLES / "free_motion.py"), run_name="__main__")
+    documented = (EXAMPLES.parent / "docs" / "worlds.md").read_text(encoding="utf-8")
+    for line in capsys.readouterr().out.splitlines():
+        assert line in documented
+
+
+def test_picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "push.png"
+    monkeypatch.setattr("sys.argv", ["picture.py", str(path)])
+    runpy.run_path(str(EXAMPLES / "picture.py"), run_name="__main__")
+    assert path.stat().st_size > 20_000
 
 
 @pytest.mark.slow

@@ -150,6 +150,27 @@ def test_a_free_wheel_turns_the_robot() -> None:
     np.testing.assert_allclose(world.robot_twists[0], [0.1, 0, 0], atol=1e-4)
 
 
+@pytest.mark.parametrize(
+    ("name", "ahead", "oblique"),
+    [("square", 0.956, 1.0), ("circle", 0.956, 1.0), ("bar", 0.993, 1.0), ("L", 1.0, 0.954)],
+)
+def test_ground_friction_is_as_documented(name: str, ahead: float, oblique: float) -> None:
+    def lost(vx: float, vy: float, omega: float) -> tuple[float, float]:
+        """Return force and torque of the ground on a moving box in one physics step."""
+        world = World([E_PUCK], BOXES[name])
+        body = world._box
+        body.linearVelocity, body.angularVelocity = (10 * vx, 10 * vy), omega
+        world.advance(np.zeros(2), 1)
+        after = world.box_twist
+        slowed = np.hypot(vx - after[0], vy - after[1]) / CONTROL_PERIOD
+        return slowed * world.box.mass, (omega - after[2]) / CONTROL_PERIOD * world.box.inertia
+
+    greatest = BOXES[name].friction_force
+    assert lost(2.0, 0.0, 0.0)[0] / greatest == pytest.approx(ahead, abs=0.002)
+    assert lost(1.4, 1.4, 0.0)[0] / greatest == pytest.approx(oblique, abs=0.002)
+    assert lost(0.0, 0.0, 9.0)[1] / greatest == pytest.approx(BOXES[name].friction_radius, rel=2e-3)
+
+
 def test_bodies_keep_their_world() -> None:
     box = World([E_PUCK], BOXES["square"])._box
     gc.collect()

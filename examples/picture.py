@@ -1,0 +1,35 @@
+"""
+One moment of an episode as a picture
+=====================================
+
+Two robots push a box with holes to its goal; a wheel of the first has seized. Writes ``push.png``,
+or the picture named as argument.
+"""
+
+import sys
+
+import imageio.v3 as imageio
+
+from nested_agents.scenarios.environments import BoxPushingEnv
+from nested_agents.scenarios.scripted import ScriptedController
+
+BOX = {
+    "vertices": [[0, 0], [0.3, 0], [0.3, 0.24], [0, 0.24]],
+    "holes": [
+        [[0.05, 0.05], [0.13, 0.05], [0.13, 0.19], [0.05, 0.19]],
+        [[0.17, 0.05], [0.25, 0.05], [0.21, 0.19]],
+    ],
+}
+FAILURE = {"kind": "seized", "wheels": "robot1.front-left", "step": 6}
+
+env = BoxPushingEnv(
+    {"start": "easy", "robot": "four-wheel", "box": BOX, "failures": [FAILURE]},
+    render_mode="rgb_array",
+    sensors=True,
+)
+env.reset(seed=1)
+scenario = env.game.scenario
+controller = ScriptedController(scenario.world.robots, scenario.box)
+for _ in range(8):
+    env.step(controller.act(scenario.measure()))
+imageio.imwrite(sys.argv[1] if len(sys.argv) > 1 else "push.png", env.render())
