@@ -16,6 +16,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import track
 
+from .. import scenarios
 from ..core.protocols import Scenario
 from ..core.rules import RuleBase
 from ..core.spaces import Variable
@@ -39,8 +40,8 @@ class Explained:
     ----------
     trial
         The trial that it was trained in.
-    agents
-        Its agents by name.
+    agents, wheels
+        Its agents and the robots' wheels by name; mostly the same.
     rules, variables
         The rule base that all of them have, and its state variables.
     parts
@@ -53,6 +54,7 @@ class Explained:
 
     trial: Trial
     agents: tuple[str, ...]
+    wheels: tuple[str, ...]
     rules: RuleBase
     variables: tuple[Variable, ...]
     parts: tuple[Parts, ...]
@@ -100,7 +102,7 @@ def explained(store: Store, trial: Trial) -> Explained:
     parts = tuple(explain_rules.take_apart(rules, theta) for theta in team.learner.theta)
     fields: list[Field] | str
     if not isinstance(scenario, BoxPushing):
-        fields = "the agents are no wheels"
+        fields = "its agents are no wheels"
     elif team.evaluator is None:
         fields = "actions are drawn at random"
     else:
@@ -109,7 +111,8 @@ def explained(store: Store, trial: Trial) -> Explained:
         except ValueError as error:
             fields = str(error)
     variables = scenario.state_space.variables
-    return Explained(trial, scenario.agents, rules, variables, parts, fields, bodies)
+    wheels = scenarios.build(trial.settings.scenario).agents
+    return Explained(trial, scenario.agents, wheels, rules, variables, parts, fields, bodies)
 
 
 def _trained(store: Store, trial: Trial) -> tuple[Team, Scenario, Bodies | None]:
@@ -134,13 +137,15 @@ def _trained(store: Store, trial: Trial) -> tuple[Team, Scenario, Bodies | None]
         session.train(1, episode)
     if bodies and model:
         bodies.note("after", model)
-    for kept, row in zip(_kept(store, trial), session.result().rows, strict=True):
-        if kept != row[1:]:
-            raise SpecError(
-                f"{store.directory}: training {trial.condition}, seed {trial.seed} again gives "
-                f"another episode {row.episode} than the one that is kept; this is not the "
-                "software, or not the kind of machine, that ran the study"
-            )
+    kept, found = _kept(store, trial), [row[1:] for row in session.result().rows]
+    if kept != found:
+        same = [one == other for one, other in zip(kept, found, strict=False)]
+        episode = same.index(False) if False in same else len(same)
+        raise SpecError(
+            f"{store.directory}: training {trial.condition}, seed {trial.seed} again gives another "
+            f"episode {episode} than the one that is kept; this is not the software, or not the "
+            "kind of machine, that ran the study"
+        )
     return team, scenario, bodies
 
 

@@ -39,10 +39,10 @@ class Bodies:
         self.deviations = model.deviations
 
 
-def table(bodies: Bodies, agents: Sequence[str]) -> Iterator[str]:
+def table(bodies: Bodies, wheels: Sequence[str]) -> Iterator[str]:
     """Yield the effects of every robot's wheels, row by row and moment by moment."""
-    for r, wheels in enumerate(_wheels(bodies, agents)):
-        names = [agents[i].partition(".")[2].replace("-", "-\n") for i in wheels]
+    for r, own in enumerate(by_robot(bodies, wheels)):
+        names = [name.partition(".")[2].replace("-", "-\n") for name in own]
         wide, lines = headed([*names, "constant"], 8)
         for i, line in enumerate(lines):
             yield ((f"robot {r + 1}" if i == len(lines) - 1 else "").ljust(16) + line).rstrip()
@@ -62,17 +62,17 @@ def headed(names: Sequence[str], least: int) -> tuple[int, list[str]]:
     return wide, ["".join(head[i].rjust(wide) for head in padded) for i in range(depth)]
 
 
-def verdicts(bodies: Bodies, agents: Sequence[str]) -> Iterator[str]:
+def verdicts(bodies: Bodies, wheels: Sequence[str]) -> Iterator[str]:
     """Yield, for every wheel whose drive is not what it was built with, what it is taken for.
 
     Its drive is the part of its effect that is along the one it was built with; a change within
     two of its standard deviations is said to be uncertain.
     """
     built, last = bodies.moments["built"], bodies.moments["after"]
-    for r, wheels in enumerate(_wheels(bodies, agents)):
+    for r, names in enumerate(by_robot(bodies, wheels)):
         # A turning rate counts as the speed of a wheel that is built to turn most.
         unit = np.array([1.0, 1.0, 1.0 / max(1.0, float(np.abs(built[r][2]).max()))]) ** 2
-        for wheel, agent in enumerate(wheels):
+        for wheel, name in enumerate(names):
             own = unit * built[r][:, wheel]
             length = float(own @ built[r][:, wheel])
             left = float(own @ last[r][:, wheel]) / length
@@ -80,16 +80,15 @@ def verdicts(bodies: Bodies, agents: Sequence[str]) -> Iterator[str]:
             if abs(left - 1.0) > LEAST_CHANGE:
                 doubt = "" if abs(left - 1.0) > 2.0 * around else "; uncertain"
                 share = f"{left:+.2f} ± {around:.2f} of its drive"
-                yield f"{agents[agent]}: {share}, {_like(left)}{doubt}"
+                yield f"{name}: {share}, {_like(left)}{doubt}"
 
 
-def _wheels(bodies: Bodies, agents: Sequence[str]) -> Iterator[range]:
-    """Yield the agents of every robot."""
+def by_robot(bodies: Bodies, wheels: Sequence[str]) -> Iterator[Sequence[str]]:
+    """Yield the names of every robot's wheels."""
     first = 0
     for effect in bodies.moments["built"]:
-        yield range(first, first + effect.shape[1] - 1)
+        yield wheels[first : first + effect.shape[1] - 1]
         first += effect.shape[1] - 1
-    assert first == len(agents)
 
 
 def _like(left: float) -> str:

@@ -19,7 +19,7 @@ from ..core.arrays import FloatArray
 from ..scenarios.boxes import BoxSpec, box_for
 from ..scenarios.robots import robot_for
 from .explain import Explained
-from .explain_body import ROWS, Bodies
+from .explain_body import ROWS, Bodies, by_robot
 from .explain_policy import AROUND, MOVES, Field
 from .explain_rules import exponent, labels, percent, strongest_pairs
 from .figures import COLOURS, SETTINGS, STYLES
@@ -28,6 +28,8 @@ MOST_LINES = 8
 """Agents in one figure of functions."""
 MOST_MAPS = 4
 """Agents in the figure of pairs."""
+MOST_BODIES = 8
+"""Robots in the figure of the self-model."""
 MOVE_COLOURS = dict(zip(MOVES, ("#0072B2", "#D55E00", "#009E73", "#999999"), strict=True))
 
 
@@ -54,7 +56,7 @@ def _figures(found: Explained) -> Iterator[tuple[str, Figure]]:
     if not isinstance(found.fields, str):
         yield "policy", _policy(found, found.fields)
     if found.bodies is not None:
-        yield "self-model", _bodies(found.agents, found.bodies)
+        yield "self-model", _bodies(found.wheels, found.bodies)
 
 
 def _functions(found: Explained, block: slice) -> Figure:
@@ -190,22 +192,19 @@ def _outline(box: BoxSpec) -> Outline:
     return Outline.make_compound_path(*(Outline(ring, closed=True) for ring in rings))
 
 
-def _bodies(agents: tuple[str, ...], bodies: Bodies) -> Figure:
+def _bodies(wheels: tuple[str, ...], bodies: Bodies) -> Figure:
     moments = bodies.moments
-    robots = moments["built"]
-    figure = Figure(figsize=(8.0, 1.9 * min(len(robots), 8) + 0.6), layout="constrained")
-    panels = figure.subplots(min(len(robots), 8), len(ROWS), squeeze=False, sharex=False)
+    robots = min(len(moments["built"]), MOST_BODIES)
+    figure = Figure(figsize=(8.0, 1.9 * robots + 0.6), layout="constrained")
+    panels = figure.subplots(robots, len(ROWS), squeeze=False)
     # All robots on one scale, and ahead and left too, which have one unit.
     extent = {unit: [0.0] for _, unit in ROWS}
     for effect in (effect for effects in moments.values() for effect in effects):
         for row, (_, unit) in enumerate(ROWS):
             extent[unit] += effect[row, :-1].tolist()
     limits = {name: (1.08 * min(extent[unit]), 1.08 * max(extent[unit])) for name, unit in ROWS}
-    first = 0
-    for r, axes_row in enumerate(panels):
-        wheels = robots[r].shape[1] - 1
-        names = [name.rpartition(".")[2] for name in agents[first : first + wheels]]
-        first += wheels
+    for r, (axes_row, own) in enumerate(zip(panels, by_robot(bodies, wheels), strict=False)):
+        names = [name.rpartition(".")[2] for name in own]
         for row, (axes, (name, unit)) in enumerate(zip(axes_row, ROWS, strict=True)):
             _bars(axes, names, {m: effects[r][row, :-1] for m, effects in moments.items()})
             axes.set_ylim(limits[name])

@@ -113,7 +113,7 @@ def _bodies(found: Explained) -> Iterator[str]:
             "(learner.self_model.enabled = false)."
         )
         return
-    said = list(explain_body.verdicts(bodies, found.agents))
+    said = list(explain_body.verdicts(bodies, found.wheels))
     yield from said or ["No wheel is taken to drive otherwise than it was built to."]
     yield ""
     moments = {
@@ -129,7 +129,7 @@ def _bodies(found: Explained) -> Iterator[str]:
         )
     )
     yield ""
-    yield from explain_body.table(bodies, found.agents)
+    yield from explain_body.table(bodies, found.wheels)
 
 
 def _wrapped(sentence: str) -> Sequence[str]:

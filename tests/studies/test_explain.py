@@ -129,6 +129,19 @@ def test_another_team_than_the_one_that_was_measured_is_not_explained(study, mon
             explain.explained(store, trial)
 
 
+@pytest.mark.slow
+def test_an_agent_for_each_robot(tmp_path, capsys):
+    one = {"overrides": (), "topology": {"kind": "per-robot"}, "evaluation": 0, "episodes": 2}
+    spec = Spec.of({**SPEC.table(), **one})
+    (trial,) = trials_of(spec)
+    with Store.create(tmp_path, spec) as store:
+        store.save(trial, run_trial(trial), 1.0)
+    status, said = run(capsys, tmp_path)
+    assert status == 0
+    assert "Not drawn: its agents are no wheels." in said.out
+    assert "turning  built" in said.out
+
+
 def test_folders_of_conditions_differ(tmp_path):
     from types import SimpleNamespace
 
