@@ -137,3 +137,4 @@ def print_places(directory: Path, figures: Sequence[Path], replays: Sequence[Pat
         for path in paths:
             print(f"{what:<8}{path}")
     print(f"{'rows':<8}nested-agents results {directory} --format csv")
+    print(f"{'report':<8}nested-agents report {directory}")
