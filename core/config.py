@@ -17,7 +17,7 @@ Fraction = Annotated[float, Field(ge=0, le=1)]
 class Settings(BaseModel):
     """A frozen model that refuses unknown keys."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class RuleBaseSettings(Settings):
@@ -151,15 +151,17 @@ class GradientTDSettings(LearnerSettings):
 
 
 class ReplaySettings(LearnerSettings):
-    """What learners share that regress on all experience after every episode."""
+    """What learners share that regress on all experience, after every episode and during it."""
 
     ridge: Positive = 10.0
     """Weight of the squared consequents against squared errors of rewards scaled by 100."""
     sweeps: Annotated[int, Field(ge=1)] = 30
-    """Regressions on freshly discounted targets after every episode."""
+    """Regressions on freshly discounted targets each time."""
     mixing: Annotated[float, Field(gt=0, le=1)] = 0.5
     """Share of the way that the weights go towards the last regression's: below 1 the policy does
     not jump from episode to episode."""
+    interval: Annotated[int, Field(ge=1)] = 100
+    """Decisions of an episode after which is regressed without waiting for its end."""
 
 
 class BatchTDSettings(ReplaySettings):

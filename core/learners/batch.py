@@ -1,6 +1,6 @@
 """Learning by ridge regression on all experience (Ernst, Geurts and Wehenkel 2005).
 
-After every episode, several times over: give every after-state s in memory a target, and find the
+After every episode, and during long ones, several times over: give every after-state s in memory a target, and find the
 weights that minimise the squared errors of f plus ``ridge`` times the squared weights. Batch
 TD(lambda) aims at the lambda-return of what followed; fitted value iteration (the value iteration
 of Section VII) at ``R(s) + gamma max_a f(s_a)`` over predicted next states s_a, so that experience
@@ -51,12 +51,14 @@ class Replay(ABC):
         self._states: list[FloatArray] = []
         self._rewards: list[float] = []
         self._follower: list[int] = []
+        self._begun = 0  # the first after-state of the running episode
         # Active rules and strengths of the after-states so far regressed on, per agent.
         self._rows: list[tuple[IntArray, FloatArray]] = []
 
     def begin_episode(self) -> None:
         """Note that the first after-state follows none, even if the last episode was given up."""
         self._cut_off()
+        self._begun = len(self._states)
 
     def observe(
         self,
@@ -65,11 +67,12 @@ class Replay(ABC):
         terminated: bool,
         candidates: FloatArray | None = None,
     ) -> int:
-        """Remember an after-state."""
+        """Remember an after-state; regress if the episode has gone on for long enough."""
         self._states.append(states.copy())
         self._rewards.append(reward)
         self._follower.append(TERMINAL if terminated else len(self._states))
-        return 0
+        lasted = len(self._states) - self._begun
+        return 0 if terminated or lasted % self.settings.interval else self._regress()
 
     def end_episode(self) -> int:
         """Regress on all experience."""
@@ -84,6 +87,7 @@ class Replay(ABC):
         self._extend()
         rewards = REWARD_SCALE * np.array(self._rewards)
         follower = np.array(self._follower)
+        follower[follower == len(follower)] = CUT_OFF  # of a running episode: not known yet
         known = (follower != CUT_OFF).astype(float)
         gamma = self.settings.discount
         low, high = rewards.min() / (1.0 - gamma), rewards.max() / (1.0 - gamma)
@@ -135,6 +139,8 @@ class Replay(ABC):
         self._states = list(arrays["states"])
         self._rewards = [float(r) for r in arrays["rewards"]]
         self._follower = [int(f) for f in arrays["follower"]]
+        ended = [s for s, f in enumerate(self._follower) if f in (TERMINAL, CUT_OFF)]
+        self._begun = ended[-1] + 1 if ended else 0
         self._rows = []
 
 

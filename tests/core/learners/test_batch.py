@@ -159,6 +159,36 @@ def test_an_episode_given_up_is_not_linked_to_the_next() -> None:
     assert (learner.theta == expected.theta).all()
 
 
+def test_a_long_episode_is_regressed_on_while_it_runs() -> None:
+    rules = fuzzy("triangular")
+    states, rewards, _, nexts = episodes_of(np.random.default_rng(4), 1)[0]
+    learner = BatchTD(BatchTDSettings(sweeps=3, ridge=0.1, interval=2), rules, 1)
+    feed(learner, (states, rewards, True, nexts))
+    theta = np.zeros_like(learner.theta)
+    for seen in [*range(2, len(states), 2), len(states)]:
+        whole = BatchTD(BatchTDSettings(sweeps=3, ridge=0.1), rules, 1)
+        whole.theta[:] = theta
+        feed(whole, (states[:seen], rewards[:seen], seen == len(states), nexts[:seen]))
+        theta = whole.theta
+    assert len(states) > 3
+    assert (learner.theta == theta).all()
+
+
+def test_a_restored_learner_regresses_at_the_same_decisions() -> None:
+    rules = fuzzy("triangular")
+    settings = BatchTDSettings(sweeps=3, ridge=0.1, interval=3)
+    first, _, second, _ = episodes_of(np.random.default_rng(5), 1)
+    learner, restored = BatchTD(settings, rules, 1), BatchTD(settings, rules, 1)
+    feed(learner, first)
+    learner.begin_episode()
+    learner.observe(second[0][0], float(second[1][0]), False)
+    restored.restore(learner.arrays())
+    for state, reward in zip(second[0][1:], second[1][1:], strict=True):
+        changed = [each.observe(state, float(reward), False) for each in (learner, restored)]
+        assert changed[0] == changed[1]
+    assert (learner.theta == restored.theta).all()
+
+
 def test_no_experience_teaches_nothing() -> None:
     learner = BatchTD(BatchTDSettings(), TABLE, 2)
     learner.begin_episode()
