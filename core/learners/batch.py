@@ -1,11 +1,11 @@
 """Learning by ridge regression on all experience (Ernst, Geurts and Wehenkel 2005).
 
-After every episode, and during long ones, several times over: give every after-state s in memory a target, and find the
-weights that minimise the squared errors of f plus ``ridge`` times the squared weights. Batch
-TD(lambda) aims at the lambda-return of what followed; fitted value iteration (the value iteration
-of Section VII) at ``R(s) + gamma max_a f(s_a)`` over predicted next states s_a, so that experience
-under exploration teaches the value of acting well. Targets are clipped to the range that
-discounted sums of the rewards seen so far can reach: no extrapolation can run away.
+After every episode, and during long ones, several times over: give every after-state s in memory a
+target, and find the weights that minimise the squared errors of f plus ``ridge`` times the squared
+weights. Batch TD(lambda) aims at the lambda-return of what followed; fitted value iteration (the
+value iteration of Section VII) at ``R(s) + gamma max_a f(s_a)`` over predicted next states s_a, so
+that experience under exploration teaches the value of acting well. Targets are clipped to the range
+that discounted sums of the rewards seen so far can reach: no extrapolation can run away.
 """
 
 from __future__ import annotations
