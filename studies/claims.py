@@ -2,13 +2,14 @@
 
 Measures and criteria stand here, before any result: no verdict is given by hand. A criterion looks
 at an estimate with its 95 % interval. A claim *holds* if the whole interval meets the criterion,
-*does not hold* if none of it does, and is *not decided* in between.
+*does not hold* if none of it does, and is *not decided* in between, or by fewer than `LEAST_SEEDS`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal, Protocol
 
 import numpy as np
@@ -18,6 +19,10 @@ from .claims_measures import Measured
 from .results import Results
 
 Verdict = Literal["holds", "does not hold", "not decided"]
+
+
+LEAST_SEEDS = 5
+"""Seeds below which no interval is trusted with a verdict."""
 
 
 class Criterion(Protocol):
@@ -181,6 +186,8 @@ CLAIMS: tuple[Claim, ...] = (
 
 STUDIES_OF_CLAIMS = tuple(dict.fromkeys(claim.study for claim in CLAIMS if claim.study != "cost"))
 """The studies that have to be run; costs are computed."""
+SPECS = Path(__file__).parent
+"""Where their specs are; the small versions are in `quick` below it."""
 
 
 @dataclass(frozen=True)
@@ -197,7 +204,10 @@ def judge(results: Mapping[str, Results]) -> tuple[Finding, ...]:
     findings = []
     for claim in CLAIMS:
         found = claim.compute(results.get(claim.study, Results({}, {})))
-        known = found is not None and bool(np.isfinite(found.estimate.value))
-        verdict = claim.criterion.decide(found) if found is not None and known else "not decided"
-        findings.append(Finding(claim, found if known else None, verdict))
+        if found is None or not np.isfinite(found.estimate.value):
+            findings.append(Finding(claim, None, "not decided"))
+            continue
+        enough = found.seeds == 0 or found.seeds >= LEAST_SEEDS
+        verdict = claim.criterion.decide(found) if enough else "not decided"
+        findings.append(Finding(claim, found, verdict))
     return tuple(findings)

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..core.cost import Problem
 from .chain_order import analyse as analyse_orders
-from .comparison import paired, ratio
+from .comparison import difference, paired, ratio
 from .results import Results
 from .scaling import DECISION_PERIOD
 from .shapes import least_ratio, ratios_of
@@ -56,18 +56,18 @@ class Measured:
 def learned(condition: str) -> Measure:
     """Return what measures success at the end of training, less that of the better control."""
 
-    def compute(results: Results) -> Measured | None:
-        def values(r: Results, name: str) -> np.ndarray:
-            return np.asarray(r.training[name]["success"][:, LAST].mean(axis=1))
+    def outcomes(r: Results, name: str) -> np.ndarray:
+        return np.asarray(r.training[name]["success"][:, LAST])
 
+    def compute(results: Results) -> Measured | None:
         controls = [c for c in CONTROLS if c in results.training]
         if condition not in results.training or not controls:
             return None
-        best = max(controls, key=lambda c: float(values(results, c).mean()))
-        pairs = paired(results, best, condition, values)
-        if not len(pairs):
-            return None
-        return Measured(bootstrap(pairs[:, 1] - pairs[:, 0]), len(pairs), note=f"against {best}")
+        best = max(controls, key=lambda c: float(outcomes(results, c).mean()))
+        base, own = paired(results, best, condition, outcomes)
+        return (
+            Measured(difference(own, base), len(own), note=f"against {best}") if len(own) else None
+        )
 
     return compute
 
@@ -122,12 +122,13 @@ def order_matters(results: Results) -> Measured | None:
     found = [c for c in analyse_orders(results).comparisons if c.title.endswith("greedy")]
     if not found:
         return None
-    values = found[0].values
-    shift = values[:, 1:] - values[:, :1]
-    e = bootstrap(shift, level=1.0 - 0.05 / shift.shape[1])
-    most = e.value[np.abs(e.value).argmax()]
-    widest = Estimate(np.asarray(most), np.asarray(e.low.min()), np.asarray(e.high.max()))
-    return Measured(widest, len(values), found[0].p, f"{values.shape[1]} orders")
+    first, *others = (arrays["success"] for arrays in results.evaluation.values())
+    level = 1.0 - 0.05 / len(others)
+    shifts = [difference(other, first, level) for other in others]
+    most = max(shifts, key=lambda e: abs(float(e.value)))
+    low, high = min(float(e.low) for e in shifts), max(float(e.high) for e in shifts)
+    widest = Estimate(most.value, np.asarray(low), np.asarray(high))
+    return Measured(widest, len(first), found[0].p, f"{1 + len(others)} orders")
 
 
 def _sizes(results: Results) -> dict[int, list[str]]:
@@ -160,18 +161,17 @@ def success_by_size(results: Results) -> Measured | None:
     if len(sizes) < 2 or not all(sizes.values()):
         return None
 
-    def rates(r: Results, condition: str) -> np.ndarray:
-        return np.asarray(r.evaluation[condition]["success"].mean(axis=1))
-
     fewest, most = (
-        max(sizes[robots], key=lambda c: float(rates(results, c).mean()))
+        max(sizes[robots], key=lambda c: float(_greedy(results, c).mean()))
         for robots in (min(sizes), max(sizes))
     )
-    pairs = paired(results, fewest, most, rates)
-    if not len(pairs):
-        return None
+    base, own = paired(results, fewest, most, _greedy)
     note = f"{max(sizes)} against {min(sizes)} robots"
-    return Measured(ratio(pairs[:, 1], pairs[:, 0]), len(pairs), note=note)
+    return Measured(ratio(own, base), len(own), note=note) if len(own) else None
+
+
+def _greedy(results: Results, condition: str) -> np.ndarray:
+    return np.asarray(results.evaluation[condition]["success"])
 
 
 FAULTS = ("4 wheels, seized", "4 wheels, reversed")
@@ -183,7 +183,7 @@ def recovered(adapts: str) -> Measure:
 
     def compute(results: Results) -> Measured | None:
         found = [c for c in courses_of(results) if c.fault in FAULTS and c.adapts == adapts]
-        ratios = {c.fault: ratio(c.end.mean(axis=1), c.before.mean(axis=1)) for c in found}
+        ratios = {c.fault: ratio(c.end, c.before) for c in found}
         if not ratios:
             return None
         worst = min(ratios, key=lambda fault: float(np.nan_to_num(ratios[fault].value)))
@@ -205,12 +205,9 @@ def without(condition: str) -> Measure:
     """Return what measures the greedy success of a condition relative to the default's."""
 
     def compute(results: Results) -> Measured | None:
-        def rates(r: Results, name: str) -> np.ndarray:
-            return np.asarray(r.evaluation[name]["success"].mean(axis=1))
-
         if not {condition, "default"} <= results.evaluation.keys():
             return None
-        pairs = paired(results, "default", condition, rates)
-        return Measured(ratio(pairs[:, 1], pairs[:, 0]), len(pairs)) if len(pairs) else None
+        base, own = paired(results, "default", condition, _greedy)
+        return Measured(ratio(own, base), len(own)) if len(own) else None
 
     return compute

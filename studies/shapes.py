@@ -93,16 +93,17 @@ def ratios_of(results: Results, condition: str) -> tuple[Difference, ...]:
     """Return the ratios of a condition, box by box; none if it has not been evaluated."""
     if condition not in results.evaluation:
         return ()
-    base = results.evaluation[condition]["success"].mean(axis=1)
-    others = {
-        box: arrays["success"].mean(axis=1)
-        for box, arrays in _other_boxes(results, condition).items()
-    }
-    adjusted = holm([paired_permutation(values, base) for values in others.values()])
+    base = results.evaluation[condition]["success"]
+    others = {box: arrays["success"] for box, arrays in _other_boxes(results, condition).items()}
+    adjusted = holm([_p(outcomes, base) for outcomes in others.values()])
     return tuple(
-        Difference(box, "ratio", len(base), ratio(values, base), float(p))
-        for (box, values), p in zip(others.items(), adjusted, strict=True)
+        Difference(box, "ratio", len(base), ratio(outcomes, base), float(p))
+        for (box, outcomes), p in zip(others.items(), adjusted, strict=True)
     )
+
+
+def _p(outcomes: np.ndarray, base: np.ndarray) -> float:
+    return paired_permutation(outcomes.mean(axis=1), base.mean(axis=1))
 
 
 def _further(arrays: Arrays, numbers: Arrays, box: str) -> dict:

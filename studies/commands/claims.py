@@ -61,16 +61,15 @@ def command(
 
 def _run(out: Path, *, quick: bool, jobs: int | None) -> dict[str, tuple[Spec, Results]]:
     """Run the studies of the claims, or what is left of them; return what they found."""
-    from .. import STUDIES, published
-    from ..claims import STUDIES_OF_CLAIMS
+    from .. import STUDIES, claims, published
     from ..conduct import carried_out
     from ..results import read
     from ..spec import Spec
     from ..spec_errors import SpecError
 
-    folder = Path(__file__).parent.parent / ("quick" if quick else ".")
+    folder = claims.SPECS / "quick" if quick else claims.SPECS
     found = {}
-    for study in STUDIES_OF_CLAIMS:
+    for study in claims.STUDIES_OF_CLAIMS:
         spec = Spec.load(folder / f"{STUDIES[study]}.toml")
         with carried_out(spec, out / study, jobs) as store:
             if failed := store.failed():

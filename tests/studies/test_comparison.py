@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from made_up_results import ablation
 
-from nested_agents.studies.comparison import differences, paired, ratio
+from nested_agents.studies.comparison import difference, differences, paired, ratio
 
 MEASURES = {"greedy": lambda r, c: r.evaluation[c]["success"].mean(axis=1)}
 
@@ -22,25 +22,48 @@ def test_only_seeds_that_both_have_are_compared() -> None:
     results = ablation({"a": 0.5, "b": 0.5})
     results.seeds["a"] = tuple(range(20))
     results.seeds["b"] = tuple(range(15, 35))
-    pairs = paired(results, "a", "b", MEASURES["greedy"])
-    assert pairs.shape == (5, 2)
-    assert (pairs[:, 1] == MEASURES["greedy"](results, "b")[:5]).all()
+    one, other = paired(results, "a", "b", MEASURES["greedy"])
+    assert (one == MEASURES["greedy"](results, "a")[15:]).all()
+    assert (other == MEASURES["greedy"](results, "b")[:5]).all()
     results.seeds["b"] = tuple(range(100, 120))
     assert differences(results, "a", ["b"], MEASURES) == ()
 
 
-def test_a_ratio_by_hand_and_its_interval_by_brute_force() -> None:
+def outcomes(rng: np.random.Generator, chance: float) -> np.ndarray:
+    return rng.random((20, 10)) < chance
+
+
+@pytest.mark.parametrize(("above", "below"), [(0.9, 0.95), (0.5, 0.9), (0.3, 0.6)])
+def test_intervals_of_differences_and_ratios_cover(above: float, below: float) -> None:
     rng = np.random.default_rng(0)
-    below, above = rng.uniform(0.5, 1.0, 30), rng.uniform(0.3, 0.6, 30)
-    found = ratio(above, below)
-    assert found.value == pytest.approx(above.sum() / below.sum())
-    again = np.random.default_rng(9)
-    draws = [again.integers(30, size=30) for _ in range(4000)]
-    brute = np.quantile([above[d].sum() / below[d].sum() for d in draws], [0.025, 0.975])
-    assert [found.low, found.high] == pytest.approx(brute, abs=0.01)
+    hit = np.zeros(2)
+    for _ in range(300):
+        one, other = outcomes(rng, above), outcomes(rng, below)
+        for i, (found, truth) in enumerate(
+            [(difference(one, other), above - below), (ratio(one, other), above / below)]
+        ):
+            assert found.low <= found.value <= found.high
+            hit[i] += found.low <= truth <= found.high
+    assert (hit / 300 > 0.93).all()
 
 
-def test_a_ratio_to_nothing_is_not_a_number() -> None:
-    assert np.isnan(ratio([1.0, 1.0], [0.0, 0.0]).value)
-    assert np.isnan(ratio([1.0], [1.0]).low)
-    assert ratio([1.0, 1.0, 1.0], [0.0, 0.0, 1.0]).high == np.inf
+def test_newcombe_by_hand() -> None:
+    # Newcombe 1998, table II, method 10, case (a): 56/70 - 48/80.
+    one = np.repeat([1, 0], [56, 14])[:, None]
+    other = np.repeat([1, 0], [48, 32])[:, None]
+    found = difference(one, other)
+    assert [round(float(v), 4) for v in (found.value, found.low, found.high)] == [
+        0.2, 0.0524, 0.3339,
+    ]  # fmt: skip
+
+
+def test_runs_that_all_ended_alike_still_leave_doubt() -> None:
+    all_, none = np.ones((6, 5)), np.zeros((6, 5))
+    found = ratio(all_, all_)
+    assert found.low < 0.7
+    assert found.high > 1.4
+    assert np.isnan(ratio(all_, none).value)
+    assert ratio(np.eye(6)[:, :5], np.eye(6)[:, :5]).high < np.inf
+    once = none.copy()
+    once[0, 0] = 1.0
+    assert ratio(all_, once).high > 100.0
