@@ -1,0 +1,39 @@
+"""docs/studies.md says what is so."""
+
+import re
+from pathlib import Path
+
+from nested_agents import studies
+from nested_agents.studies.spec import Spec
+from nested_agents.studies.trial import check
+
+ROOT = Path(__file__).resolve().parents[2]
+TEXT = (ROOT / "docs" / "studies.md").read_text(encoding="utf-8")
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", TEXT, flags=re.DOTALL)
+
+
+def test_every_study_is_told_with_its_spec() -> None:
+    told = dict(re.findall(r"\| `([a-z-]+)` \| .* \| `(\w+\.toml)` \|", TEXT))
+    assert told.keys() == studies.STUDIES.keys()
+    for study, name in told.items():
+        assert Spec.load(ROOT / "studies" / name).study == study
+    for command in blocks("sh")[0].splitlines():
+        assert (ROOT / command.split()[2]).exists()
+
+
+def test_the_toml_is_as_it_says() -> None:
+    conditions, evaluations = blocks("toml")[:2]
+    labels = [condition.label for condition in Spec.parse(conditions).conditions()]
+    assert len(labels) == 10
+    assert (labels[0], labels[-1]) == ("default, robots=2", "as printed, robots=3")
+    check(Spec.parse(evaluations))
+
+
+def test_the_python_builds_a_spec() -> None:
+    names: dict = {"__name__": "example"}
+    exec(blocks("python")[0], names)
+    labels = [condition.label for condition in names["spec"].conditions()]
+    assert labels == ["ridge 1", "ridge 10", "ridge 100", "online"]
