@@ -35,6 +35,8 @@ BAD = {
     "scenario.start = 'medum'": ["scenario.start = 'medum'", "'easy', 'medium' or 'hard'"],
     "scenario.reward = 3": ["scenario.reward = 3", "table"],
     "scenario.reward.c1 = nan": ["scenario.reward.c1 = nan", "finite"],
+    "scenario.reward.receding = inf": ["scenario.reward.receding = inf", "finite"],
+    "scenario.box.vertices = [[0, 0], [inf, 0], [1, 1]]": ["vertices[1][0] = inf", "finite"],
     "scenario.reward.c9 = 1": ["scenario.reward.c9 = 1", "unknown key"],
     "topology = 'chan'": ["'chan'", "chain"],
     "topology = 3": ["topology = 3", "table"],
