@@ -267,6 +267,7 @@
     options(at("episode"), numbers, (n) => (numbers.length < 2 ? String(n) : n === numbers[0] ? `${n} (first)` : `${n} (last)`));
     shown = await unpack(chosen("condition", "seed", "number")[0]);
     scrub.max = shown.steps;
+    at("which").textContent = `${shown.condition}, seed ${shown.seed}, training episode ${shown.number}`;
     legend();
     go(0);
   }
@@ -302,7 +303,10 @@
   }
   new ResizeObserver(draw).observe(stage);
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
-  addEventListener("beforeprint", draw);
+  // On paper the whole episode is worth more than its start.
+  let kept = 0;
+  addEventListener("beforeprint", () => { kept = moment; if (shown && !moment) go(shown.steps); else draw(); });
+  addEventListener("afterprint", () => { if (shown) go(kept); });
 
   if (!("DecompressionStream" in window)) return;
   at("unplayed").hidden = true;

@@ -41,7 +41,7 @@ def recording(steps: int = STEPS) -> dict[str, np.ndarray]:
         "contact": np.stack([t > 0.2, t > 0.4], axis=1),
         "failed": failed,
         "reward": np.zeros(steps),
-        "dt": np.array(0.512),
+        "dt": np.array(5.12),
         "robot": np.array("four-wheel"),
         "box": np.array(label(RING)),
     }

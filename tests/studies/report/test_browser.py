@@ -28,6 +28,7 @@ ACTIVE = """() => {
     const active = document.activeElement;
     return active.id || active.textContent.trim().slice(0, 20);
 }"""
+SCRUB = "(slider, to) => { slider.value = to; slider.dispatchEvent(new Event('input')); }"
 OVERFLOW = "() => document.documentElement.scrollWidth - innerWidth"
 READY = "() => document.getElementById('moment').textContent.startsWith('step 0 of')"
 
@@ -87,14 +88,16 @@ def test_it_plays_and_pauses_and_plays_again(page):
     start = page.evaluate(PIXELS)
     drawn = Image.open(io.BytesIO(base64.b64decode(start.partition(",")[2])))
     assert len(drawn.getcolors(10**6)) > 20
-    page.select_option("#speed", "16")
+    page.select_option("#speed", "1")  # two and a half minutes to the end, on any machine
     page.click("#play")
-    page.wait_for_function("() => Number(document.getElementById('scrub').value) > 2")
+    page.wait_for_function("() => Number(document.getElementById('scrub').value) > 0.02")
     assert page.evaluate(PIXELS) != start
     page.click("#play")
     paused = page.evaluate(PIXELS)
     page.wait_for_timeout(200)
     assert page.evaluate(PIXELS) == paused
+    page.select_option("#speed", "16")
+    page.locator("#scrub").evaluate(SCRUB, 29.5)
     page.click("#play")
     page.wait_for_function("() => document.getElementById('play').textContent === 'Play'")
     assert "step 30 of 30" in page.inner_text("#moment")
@@ -103,8 +106,8 @@ def test_it_plays_and_pauses_and_plays_again(page):
 
 def test_scrub_and_keys_move_it(page):
     start = page.evaluate(PIXELS)
-    page.locator("#scrub").evaluate("(s) => { s.value = 20; s.dispatchEvent(new Event('input')); }")
-    assert page.inner_text("#moment").startswith("step 20 of 30, 10.2 s: box")
+    page.locator("#scrub").evaluate(SCRUB, 20)
+    assert page.inner_text("#moment").startswith("step 20 of 30, 102.4 s: box")
     assert "failed: robot1.rear-right" in page.inner_text("#moment")
     assert page.evaluate(PIXELS) != start
     page.focus("#stage")
@@ -164,11 +167,13 @@ def test_everything_is_reached_by_keyboard(page):
 
 
 @pytest.mark.parametrize("page", [1280], indirect=True)
-def test_in_print_controls_are_gone_and_failures_unfolded(page):
+def test_in_print_are_the_whole_episode_and_all_failures_but_no_controls(page):
     page.emulate_media(media="print")
     page.evaluate("() => dispatchEvent(new Event('beforeprint'))")
     assert not page.locator("#play").is_visible()
     assert page.locator("#stage").is_visible()
+    assert page.inner_text("#which") == "default, seed 0, training episode 4"
+    assert page.inner_text("#moment").startswith("step 30 of 30")
     assert page.get_by_text("RuntimeError: <off & away>").last.is_visible()
 
 
