@@ -101,7 +101,8 @@ def situation(
         taken = scenario.step(rng.integers(len(scenario.action_set), size=n_agents))
         history.append((taken.states, taken.reward))
     theta = team.learner.theta
-    theta[:] = rng.normal(scale=0.01, size=theta.shape)
+    for row in theta:
+        row[:] = rng.normal(scale=0.01, size=row.shape)
     states = np.array([states for states, _ in history[-2:]])
     rewards = np.array([reward for _, reward in history[-2:]])
     return Situation(scenario, hierarchy, team, scenario.predict(), states, rewards)

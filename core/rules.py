@@ -75,7 +75,7 @@ class RuleBase:
         )
         self.n_rules = sum(self.sizes)
         self.layout = kernels.layout(self.partitions, self.terms, n_own)
-        self.n_rows = int(self.layout.own_sizes.sum())
+        self.n_rows = int(self.layout.row_sizes.sum())
         self.dtype = np.dtype(dtype)
         self.compact = self.partitions[0].membership == "triangular"
         # Looking up 2 ** order corners is cheaper than contracting theta for small orders only.
@@ -130,7 +130,7 @@ class RuleBase:
         return kernels.values_dense(theta, states, self.layout)
 
     def each(self, theta: FloatArray, states: FloatArray) -> FloatArray:
-        """Return f ``(n,)`` of states ``(n, d)``, each by its own row of theta ``(n, n_rules)``."""
+        """Return f ``(n, s)`` of states ``(n, s, d)``, by the rows of theta ``(n, n_rules)``."""
         states = np.ascontiguousarray(states, dtype=float)
         if self.compact:
             return kernels.each_compact(theta, states, self.layout)
@@ -158,14 +158,33 @@ class RuleBase:
         strengths = self.features(states)
         return np.broadcast_to(np.arange(self.n_rules), strengths.shape), strengths
 
-    def block_values(self, theta: FloatArray, blocks: Blocks, codes: IntArray) -> FloatArray:
+    def shared_strengths(self, shared: FloatArray) -> FloatArray:
+        """Return what `block_values` can be given of shared blocks ``(R, d - n_own)``."""
+        if self._looks_up:
+            return np.zeros((0, 0, 0))
+        return kernels.shared_strengths(np.ascontiguousarray(shared, dtype=float), self.layout)
+
+    def block_values(
+        self,
+        theta: FloatArray,
+        blocks: Blocks,
+        codes: IntArray,
+        strengths: FloatArray | None = None,
+    ) -> FloatArray:
         """Return f ``(len(codes),)`` of the next states that joint-action `codes` lead to.
 
         The own part of theta is contracted once per distinct own block, or the few active rules
-        are looked up; the feature vector of a joint action is never built.
+        are looked up; the feature vector of a joint action is never built. Who values for several
+        agents with one shared block may hand in its `shared_strengths`.
         """
-        kernel = kernels.block_values_compact if self._looks_up else kernels.block_values_dense
-        return kernel(
-            theta, blocks.own, blocks.own_rows, blocks.shared, blocks.shared_rows, blocks.divisor,
+        if self._looks_up:
+            return kernels.block_values_compact(
+                theta, blocks.own, blocks.own_rows, blocks.shared, blocks.shared_rows,
+                blocks.divisor, codes, self.layout,
+            )  # fmt: skip
+        if strengths is None:
+            strengths = self.shared_strengths(blocks.shared)
+        return kernels.block_values_dense(
+            theta, blocks.own, blocks.own_rows, strengths, blocks.shared_rows, blocks.divisor,
             codes, self.layout,
         )  # fmt: skip

@@ -120,8 +120,8 @@ class BoxPrediction:
         return poses
 
     @cached_property
-    def _shared(self) -> FloatArray:
-        """``(M, m, d - n_own)`` the shared block of every robot in the situations of the table."""
+    def _shared(self) -> list[FloatArray]:
+        """The shared block ``(m, d - n_own)`` of every robot in the situations of the table."""
         return self.space.shared_of(self._table[0], range(len(self.situation.groups)))
 
     def robot_of(self, agent: int) -> int:

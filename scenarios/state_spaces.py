@@ -76,6 +76,8 @@ class BoxStateSpace:
         ``shared(view, robot) -> (m, d - n_own)`` for the agents of one robot.
     own_needs_pose
         Whether `own` reads the poses; if not, none need be predicted for it.
+    alike
+        Whether the shared block is the same for all robots.
     compiled
         ``compiled(robots (M, 3, m), box (3, m), gaps (M, m), goal, robots wanted (k,)) ->
         (k, m, d - n_own)``: what `shared` returns, for predictions; none: `shared` serves.
@@ -85,17 +87,21 @@ class BoxStateSpace:
     own: Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
     shared: Callable[[View, int], FloatArray]
     own_needs_pose: bool
+    alike: bool = False
     compiled: Callable[..., FloatArray] | None = None
 
-    def shared_of(self, view: View, robots: Sequence[int]) -> FloatArray:
-        """Return the shared blocks ``(k, m, d - n_own)`` of k robots, fast for many situations."""
+    def shared_of(self, view: View, robots: Sequence[int]) -> list[FloatArray]:
+        """Return the shared block ``(m, d - n_own)`` of each robot, fast for many situations."""
+        if self.alike:
+            return [self.shared(view, robots[0])] * len(robots)
         if self.compiled is None:
-            return np.array([self.shared(view, r) for r in robots])
-        return self.compiled(
+            return [self.shared(view, r) for r in robots]
+        blocks = self.compiled(
             np.ascontiguousarray(view.robots.transpose(1, 2, 0)),
             np.ascontiguousarray(view.box.T), np.ascontiguousarray(view.gaps.T),
             view.goal, np.array(robots),
         )  # fmt: skip
+        return list(blocks)
 
 
 _TURN = 2.0 * pi
@@ -188,6 +194,7 @@ STATE_SPACES: dict[str, BoxStateSpace] = {
         _paper_own,
         _paper_shared,
         own_needs_pose=True,
+        alike=True,
     ),
     # What matters for pushing, seen from one robot: where it stands (gap, bearing of the box,
     # side of the box as seen along the course to the goal), how far off the others are, where the

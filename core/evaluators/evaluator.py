@@ -98,6 +98,10 @@ class Gathering:
         if self.rule != "reward":
             self.counts.rule_evaluations += joint_actions * self.rules.n_rules
 
+    def indifferent(self, theta: FloatArray) -> bool:
+        """Return whether every action must come to zero: nothing is learned yet, or ever."""
+        return self.rule == "value" and not theta[:64].any() and not theta.any()
+
     def by_states(
         self,
         agent: int,

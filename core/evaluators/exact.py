@@ -34,6 +34,8 @@ class ExactEnumeration(Gathering):
                     f"decision.evaluator: agent {name!r} would try {a} ** {free} joint actions, "
                     f"exact enumeration allows {MOST_JOINT_ACTIONS}; use sampling"
                 )
+        self._prediction: Prediction | None = None
+        self._strengths: dict[int, tuple[FloatArray, FloatArray]] = {}
         self._tried = [combinations(self.hierarchy.below(i), a) for i in range(n)]
         self._tabulated = self.hierarchy.joint_actions(a) >= a**n
         if not self._tabulated:
@@ -60,6 +62,9 @@ class ExactEnumeration(Gathering):
     ) -> FloatArray:
         """Return the value ``(A,)`` of each action of `agent`, see `Evaluator.values`."""
         below, tried = self.hierarchy.below(agent), self._tried[agent]
+        if self.indifferent(theta):
+            self.count(self.n_actions * len(tried))
+            return np.zeros(self.n_actions)
         weights = weights_of(frequencies, below) if self.others == "observed" else None
         if self._tabulated:
             table = self._by_codes(agent, joint_action, theta, prediction)
@@ -76,5 +81,16 @@ class ExactEnumeration(Gathering):
         if self.rule != "value":
             rewards = prediction.reward_table()[codes]
         if self.rule != "reward":
-            values = self.rules.block_values(theta, prediction.blocks(agent), codes)
+            blocks = prediction.blocks(agent)
+            strengths = self._strengths_of(prediction, blocks.shared)
+            values = self.rules.block_values(theta, blocks, codes, strengths)
         return self.combine(rewards, values).reshape(self.n_actions, -1)
+
+    def _strengths_of(self, prediction: Prediction, shared: FloatArray) -> FloatArray:
+        """Return the strengths of a shared block, found once for all agents that have it."""
+        if prediction is not self._prediction:
+            self._prediction = prediction
+            self._strengths.clear()
+        if id(shared) not in self._strengths:
+            self._strengths[id(shared)] = shared, self.rules.shared_strengths(shared)
+        return self._strengths[id(shared)][1]

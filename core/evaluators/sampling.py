@@ -42,5 +42,8 @@ class Sampling(Gathering):
             tried = (draws >= ladder).sum(axis=2)
         else:
             tried = rng.integers(a, size=(self.samples, len(below)))
+        if self.indifferent(theta):
+            self.count(a * len(tried))
+            return np.zeros(a)
         table = self.by_states(agent, joint_action, tried, theta, prediction)
         return self.gather(table, weights)

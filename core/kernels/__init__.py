@@ -4,14 +4,14 @@ Every kernel has a plain-NumPy twin: firing strengths in `nested_agents.core.fuz
 `RuleBase.features`, values and temporal differences in `nested_agents.core.twins`. Nothing is
 compiled on import; each kernel is compiled at its first call and cached on disk.
 
-The dense kernels leave out rows of rules whose own firing strength is below `NEGLIGIBLE`: firing
-strengths sum to one, so that a value changes by less than 1e-13 of the largest weight.
+The dense kernels leave out rows of rules whose firing strength is below `NEGLIGIBLE`: firing
+strengths sum to one, so that a value changes by less than 1e-12 of the largest weight.
 """
 
 from .compact import active_compact, block_values_compact, each_compact, values_compact
-from .dense import block_values_dense, each_dense, values_dense
+from .dense import block_values_dense, each_dense, shared_strengths, values_dense
 from .layout import Layout, layout
-from .strengths import NEGLIGIBLE, strengths_of
+from .strengths import NEGLIGIBLE, exponential, many_strengths, strengths_of
 from .updates import add_features, td_update
 
 __all__ = [
@@ -23,7 +23,10 @@ __all__ = [
     "block_values_dense",
     "each_compact",
     "each_dense",
+    "exponential",
     "layout",
+    "many_strengths",
+    "shared_strengths",
     "strengths_of",
     "td_update",
     "values_compact",

@@ -47,10 +47,10 @@ def values_compact(theta: FloatArray, states: FloatArray, lay: Layout) -> FloatA
 
 @njit(cache=True)
 def each_compact(theta: FloatArray, states: FloatArray, lay: Layout) -> FloatArray:
-    """Return f ``(n,)`` of states ``(n, d)``, each by its own row of theta ``(n, n_rules)``."""
-    out = np.empty(len(states))
+    """Return f ``(n, s)`` of states ``(n, s, d)``, each by its row of theta ``(n, n_rules)``."""
+    out = np.empty(states.shape[:2])
     for i in range(len(states)):
-        out[i] = values_compact(theta[i], states[i : i + 1], lay)[0]
+        out[i] = values_compact(theta[i], states[i], lay)
     return out
 
 

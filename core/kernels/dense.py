@@ -6,120 +6,121 @@ import numpy as np
 from numba import njit
 
 from ..arrays import FloatArray, IntArray
+from .contraction import LANES, contract, fold, total_width
 from .layout import Layout
-from .strengths import NEGLIGIBLE, product_of, strengths_of
+from .strengths import many_strengths
+
+CHUNK = 64
+"""States whose own blocks are compared with each other."""
+ROWS = 256
+"""Shared blocks whose strengths are found together."""
 
 
-@njit(cache=True, fastmath={"reassoc", "contract"})
-def _inner(one, other) -> float:  # type: ignore[no-untyped-def]
-    """Return the inner product of two arrays of one length, in their precision."""
-    total = one.dtype.type(0.0)
-    for k in range(len(one)):
-        total += one[k] * other[k]
-    return float(total)
+@njit(cache=True)
+def shared_strengths(shared: FloatArray, lay: Layout) -> FloatArray:
+    """Return the strengths ``(d - n_own, most memberships, R)`` of shared blocks."""
+    out = np.zeros((shared.shape[1], lay.counts.max(), len(shared)))
+    for j in range(shared.shape[1]):
+        for first in range(0, len(shared), ROWS):
+            last = min(first + ROWS, len(shared))
+            many_strengths(lay.n_own + j, shared[first:last, j], lay, out[j, :, first:last])
+    return out
+
+
+@njit(cache=True)
+def _scratch(theta, lay: Layout):  # type: ignore[no-untyped-def]
+    """Return room for lanes of strengths, two folds, and values."""
+    n_shared, most = len(lay.counts) - lay.n_own, lay.counts.max()
+    room = np.empty((n_shared, most * LANES), theta.dtype)
+    one = np.empty(lay.shared_sizes.max() * LANES, theta.dtype)
+    return room, one, np.empty_like(one), np.empty(LANES, theta.dtype)
+
+
+@njit(cache=True)
+def _fill(strengths, row, lane, lay: Layout, room) -> None:  # type: ignore[no-untyped-def]
+    """Put the strengths of one shared block into a lane."""
+    for j in range(len(room)):
+        for s in range(lay.counts[lay.n_own + j]):
+            room[j, s * LANES + lane] = strengths[j, s, row]
 
 
 @njit(cache=True)
 def values_dense(theta: FloatArray, states: FloatArray, lay: Layout) -> FloatArray:
     """Return f ``(m,)`` of states ``(m, d)``, all membership functions active."""
     out = np.empty(len(states))
-    strengths = np.empty((len(lay.counts), lay.counts.max()))
-    own = np.empty(lay.own_sizes.max())
-    shared = np.empty(lay.shared_sizes.max(), theta.dtype)
-    for s in range(len(states)):
-        out[s] = _value(theta, states[s], lay, strengths, own, shared)
+    room, one, two, found = _scratch(theta, lay)
+    which = np.empty(CHUNK, np.int64)
+    own = np.empty((CHUNK, lay.n_own))
+    rows = np.empty(LANES, np.int64)
+    partial = np.empty((min(CHUNK, len(states)), total_width(lay)), theta.dtype)
+    for begin in range(0, len(states), CHUNK):
+        chunk = states[begin : begin + CHUNK]
+        # States of one own block share its contraction.
+        count = 0
+        for s in range(len(chunk)):
+            which[s] = -1
+            for b in range(count):
+                if (own[b] == chunk[s, : lay.n_own]).all():
+                    which[s] = b
+                    break
+            if which[s] < 0:
+                which[s] = count
+                own[count] = chunk[s, : lay.n_own]
+                count += 1
+        contract(theta, own[:count], lay, partial[:count])
+        strengths = shared_strengths(chunk[:, lay.n_own :], lay)
+        for b in range(count):
+            lane = 0
+            for s in range(len(chunk)):
+                if which[s] == b:
+                    rows[lane] = s
+                    _fill(strengths, s, lane, lay, room)
+                    lane += 1
+                if lane and (lane == LANES or s == len(chunk) - 1):
+                    fold(partial[b], room, lay, one, two, found, lane)
+                    for k in range(lane):
+                        out[begin + rows[k]] = found[k]
+                    lane = 0
     return out
 
 
 @njit(cache=True)
 def each_dense(theta: FloatArray, states: FloatArray, lay: Layout) -> FloatArray:
-    """Return f ``(n,)`` of states ``(n, d)``, each by its own row of theta ``(n, n_rules)``."""
-    out = np.empty(len(states))
-    strengths = np.empty((len(lay.counts), lay.counts.max()))
-    own = np.empty(lay.own_sizes.max())
-    shared = np.empty(lay.shared_sizes.max(), theta.dtype)
-    for i in range(len(states)):
-        out[i] = _value(theta[i], states[i], lay, strengths, own, shared)
+    """Return f ``(n, s)`` of states ``(n, s, d)``, each by its own row of theta ``(n, n_rules)``.
+
+    Theta is read once, whatever s.
+    """
+    n, s, _ = states.shape
+    out = np.empty((n, s))
+    room, one, two, found = _scratch(theta, lay)
+    partial = np.empty((s, total_width(lay)), theta.dtype)
+    for i in range(n):
+        contract(theta[i], states[i, :, : lay.n_own], lay, partial)
+        strengths = shared_strengths(states[i, :, lay.n_own :], lay)
+        for k in range(s):
+            _fill(strengths, k, 0, lay, room)
+            fold(partial[k], room, lay, one, two, found, 1)
+            out[i, k] = found[0]
     return out
 
 
 @njit(cache=True)
-def _value(theta, state, lay: Layout, strengths, own, shared) -> float:  # type: ignore[no-untyped-def]
-    """Return f of one state; the last three arguments are scratch."""
-    for j in range(len(lay.counts)):
-        strengths_of(j, state[j], lay, strengths[j])
-    value = 0.0
-    for t in range(len(lay.lengths)):
-        product_of(t, 0, lay.own_lengths[t], lay, strengths, own, 0)
-        product_of(t, lay.own_lengths[t], lay.lengths[t], lay, strengths, shared, 0)
-        columns = lay.shared_sizes[t]
-        for r in range(lay.own_sizes[t]):
-            if own[r] > NEGLIGIBLE:
-                at = lay.offsets[t] + r * columns
-                value += own[r] * _inner(theta[at : at + columns], shared[:columns])
-    return value
-
-
-@njit(cache=True, fastmath={"reassoc", "contract"})
-def _add_four(part, rows, weights):  # type: ignore[no-untyped-def]
-    """Add four weighted rows of theta to `part`."""
-    n = len(part)
-    one, two, three, four = rows[:n], rows[n : 2 * n], rows[2 * n : 3 * n], rows[3 * n :]
-    a, b, c, d = weights[0], weights[1], weights[2], weights[3]
-    for k in range(n):
-        part[k] += (a * one[k] + b * two[k]) + (c * three[k] + d * four[k])
-
-
-@njit(cache=True, fastmath={"reassoc", "contract"})
-def _contract(theta, own, lay: Layout, partial) -> None:  # type: ignore[no-untyped-def]
-    """Contract theta with the own features of every own block ``(K, n_own)``.
-
-    Writes the weights ``(K, all shared features)`` that remain for the shared features. Rows of
-    theta are taken four at a time, so that each is read once however many own blocks there are.
-    """
-    strengths = np.empty((len(lay.counts), lay.counts.max()))
-    widest = lay.own_sizes.max()
-    features = np.empty((len(own), (widest + 3) // 4 * 4), theta.dtype)
-    partial[:] = 0.0
-    for t in range(len(lay.lengths)):
-        rows, columns = lay.own_sizes[t], lay.shared_sizes[t]
-        first, last = lay.shared_offsets[t], lay.shared_offsets[t + 1]
-        for b in range(len(own)):
-            for v in range(lay.own_lengths[t]):
-                j = lay.terms[t, v]
-                strengths_of(j, own[b, j], lay, strengths[j])
-            product_of(t, 0, lay.own_lengths[t], lay, strengths, features[b], 0)
-        whole = rows // 4 * 4
-        for r in range(0, whole, 4):
-            at = lay.offsets[t] + r * columns
-            for b in range(len(own)):
-                four = features[b, r : r + 4]
-                if max(max(four[0], four[1]), max(four[2], four[3])) > NEGLIGIBLE:
-                    _add_four(partial[b, first:last], theta[at : at + 4 * columns], four)
-        for r in range(whole, rows):
-            at = lay.offsets[t] + r * columns
-            for b in range(len(own)):
-                weight = features[b, r]
-                if weight > NEGLIGIBLE:
-                    for k in range(columns):
-                        partial[b, first + k] += weight * theta[at + k]
-
-
-@njit(cache=True)
 def block_values_dense(  # type: ignore[no-untyped-def]
-    theta, own, own_rows, shared, shared_rows, divisor: int, codes: IntArray, lay: Layout
+    theta, own, own_rows, strengths, shared_rows, divisor: int, codes: IntArray, lay: Layout
 ) -> FloatArray:
     """Return f of joint-action codes from block tables, all membership functions active.
 
-    Contracts theta with the own features of each own block that occurs, once, to the weights of
-    the shared features; each distinct pair of own and shared block then costs one inner product.
+    Contracts theta with each own block that occurs, once; each distinct pair of own and shared
+    block is then folded, once, whatever the number of codes that lead to it. `strengths` are the
+    shared blocks', by `shared_strengths`.
     """
-    d = len(lay.counts)
-    n_shared = lay.shared_offsets[-1]
     n_local = len(own_rows) if len(own_rows) else len(own)
     slots = np.full(len(own), -1)
     used = np.empty_like(own)
     count = 0
+    slot_of, row_of = np.empty(len(codes), np.int32), np.empty(len(codes), np.int32)
+    n_rows = strengths.shape[2]
+    wanted = np.zeros((len(own), n_rows), np.bool_)
     for c in range(len(codes)):
         local = codes[c] // divisor % n_local
         at = own_rows[local] if len(own_rows) else local
@@ -127,29 +128,27 @@ def block_values_dense(  # type: ignore[no-untyped-def]
             slots[at] = count
             used[count] = own[at]
             count += 1
-    partial = np.empty((count, n_shared), theta.dtype)
-    _contract(theta, used[:count], lay, partial)
-    strengths = np.empty((d, lay.counts.max()))
-    features = np.empty(n_shared, theta.dtype)
-    # The own block with which a shared one was last valued, and the value.
-    known = np.full(len(shared) if len(shared_rows) else 0, -1)
-    memory = np.empty(len(known))
+        slot_of[c] = slots[at]
+        row_of[c] = shared_rows[codes[c]] if len(shared_rows) else codes[c]
+        wanted[slot_of[c], row_of[c]] = True
+    partial = np.empty((count, total_width(lay)), theta.dtype)
+    contract(theta, used[:count], lay, partial)
+    room, one, two, found = _scratch(theta, lay)
+    rows = np.empty(LANES, np.int64)
+    values = np.empty((count, n_rows))
+    for slot in range(count):
+        lane = 0
+        for row in range(n_rows):
+            if wanted[slot, row]:
+                rows[lane] = row
+                _fill(strengths, row, lane, lay, room)
+                lane += 1
+            if lane and (lane == LANES or row == n_rows - 1):
+                fold(partial[slot], room, lay, one, two, found, lane)
+                for k in range(lane):
+                    values[slot, rows[k]] = found[k]
+                lane = 0
     out = np.empty(len(codes))
     for c in range(len(codes)):
-        local = codes[c] // divisor % n_local
-        slot = slots[own_rows[local] if len(own_rows) else local]
-        row = shared_rows[codes[c]] if len(shared_rows) else codes[c]
-        if len(known) and known[row] == slot:
-            out[c] = memory[row]
-            continue
-        for j in range(lay.n_own, d):
-            strengths_of(j, shared[row, j - lay.n_own], lay, strengths[j])
-        for t in range(len(lay.lengths)):
-            product_of(
-                t, lay.own_lengths[t], lay.lengths[t], lay, strengths, features,
-                lay.shared_offsets[t],
-            )  # fmt: skip
-        out[c] = _inner(partial[slot], features)
-        if len(known):
-            known[row], memory[row] = slot, out[c]
+        out[c] = values[slot_of[c], row_of[c]]
     return out

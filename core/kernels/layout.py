@@ -34,6 +34,8 @@ class Layout(NamedTuple):
     own_lengths: IntArray  # (t,) own variables in each term
     own_sizes: IntArray  # (t,) own rules: rows of the term's matrix
     shared_sizes: IntArray  # (t,) shared rules: columns of the term's matrix
+    row_lengths: IntArray  # (t,) leading variables that tell the rows of traces apart
+    row_sizes: IntArray  # (t,) rows of traces
     offsets: IntArray  # (t + 1,) start of each term in theta
     shared_offsets: IntArray  # (t + 1,) start of each term among shared features
     n_active: int  # active rules under compact support
@@ -58,8 +60,11 @@ def layout(partitions: Sequence[Partition], terms: Sequence[tuple[int, ...]], n_
     own_sizes = np.array([int(np.prod(counts[o])) for o in own])
     sizes = np.array([int(np.prod(counts[list(term)])) for term in terms])
     shared_sizes = sizes // own_sizes
+    # Rows of traces: long ones where all rules are active, else those of the own variables.
+    sigmoid = partitions[0].membership == "sigmoid"
+    rows = [o[:-1] if sigmoid else o for o in own]
     return Layout(
-        sigmoid=partitions[0].membership == "sigmoid",
+        sigmoid=sigmoid,
         counts=counts,
         knots=knots,
         n_knots=np.array([len(p.knots) for p in partitions]),
@@ -73,6 +78,8 @@ def layout(partitions: Sequence[Partition], terms: Sequence[tuple[int, ...]], n_
         own_lengths=np.array([len(o) for o in own]),
         own_sizes=own_sizes,
         shared_sizes=shared_sizes,
+        row_lengths=np.array([len(row) for row in rows]),
+        row_sizes=np.array([int(np.prod(counts[row])) for row in rows]),
         offsets=np.concatenate([[0], np.cumsum(sizes)]),
         shared_offsets=np.concatenate([[0], np.cumsum(shared_sizes)]),
         n_active=int(sum(2 ** len(term) for term in terms)),

@@ -8,11 +8,18 @@ from numba import njit
 from ..arrays import FloatArray
 from .layout import Layout
 
-NEGLIGIBLE = 1e-17
-"""Firing strengths below this are left out of sums in which all strengths add up to one."""
+NEGLIGIBLE, NEGLIGIBLE_SINGLE = 1e-15, 1e-9
+"""Firing strengths below this are left out of sums in which all strengths add up to one; the other
+is for weights in single precision."""
 
-FLAT = 37.0
-"""Beyond this exponent a sigmoid is zero or one to the last bit of a strength."""
+FLAT, LARGE = 37.0, 1.17191423728026e16
+"""Beyond this exponent, or this exponential, a sigmoid is zero or one to the last bit."""
+
+
+@njit(cache=True)
+def negligible(theta) -> float:  # type: ignore[no-untyped-def]
+    """Return the strength that may be left out at the precision of `theta`."""
+    return NEGLIGIBLE if theta.itemsize == 8 else NEGLIGIBLE_SINGLE
 
 
 @njit(cache=True)
@@ -96,3 +103,83 @@ def product_of(term: int, first: int, last: int, lay: Layout, strengths, out, st
             for k in range(m):
                 part[k] = base * row[k]
         size *= m
+
+
+_POWERS = 2.0 ** np.arange(-1000, 1001)
+_FAST = {"contract", "nsz"}
+
+
+@njit(cache=True, error_model="numpy", fastmath=_FAST)
+def exponential(x: float) -> float:
+    """Return exp(x) to its last bits for -690 <= x <= 690, without a branch or a call."""
+    k = np.floor(x * 1.4426950408889634074 + 0.5)
+    r = x - k * 6.93147180369123816490e-01 - k * 1.90821492927058770002e-10
+    # The Taylor series: its thirteenth term is below 1e-16 where |r| <= ln(2) / 2.
+    p = 1.0 / 6227020800.0
+    p = 1.0 / 479001600.0 + r * p
+    p = 1.0 / 39916800.0 + r * p
+    p = 1.0 / 3628800.0 + r * p
+    p = 1.0 / 362880.0 + r * p
+    p = 1.0 / 40320.0 + r * p
+    p = 1.0 / 5040.0 + r * p
+    p = 1.0 / 720.0 + r * p
+    p = 1.0 / 120.0 + r * p
+    p = 1.0 / 24.0 + r * p
+    p = 1.0 / 6.0 + r * p
+    p = 0.5 + r * p
+    p = 1.0 + r * (1.0 + r * p)
+    return p * _POWERS[int(k) + 1000]
+
+
+@njit(cache=True, error_model="numpy", fastmath=_FAST)
+def _rise(x, k, sigmoid, even, slope, bound, growth, knot, width, power, rising):  # type: ignore[no-untyped-def]
+    """Write by how much the functions up to k are left behind at every x: S_k of Eq. 6."""
+    if not sigmoid:
+        for i in range(len(x)):
+            share = (x[i] - knot) / width
+            share = share if share > 0.0 else 0.0
+            rising[i] = share if share < 1.0 else 1.0
+        return
+    if even and k > 0:
+        for i in range(len(x)):
+            power[i] = power[i] * growth
+    else:
+        for i in range(len(x)):
+            exponent = -slope * (x[i] - bound)
+            exponent = exponent if exponent < 500.0 else 500.0
+            power[i] = exponential(exponent if exponent > -500.0 else -500.0)
+    for i in range(len(x)):
+        rising[i] = 1.0 / (1.0 + power[i]) if power[i] < LARGE else 0.0
+
+
+@njit(cache=True, error_model="numpy", fastmath=_FAST)
+def _fall(level, rising, out):  # type: ignore[no-untyped-def]
+    """Add what lies between two levels, and go down to the lower."""
+    for i in range(len(level)):
+        lower = rising[i] if rising[i] < level[i] else level[i]
+        out[i] += level[i] - lower
+        level[i] = lower
+
+
+@njit(cache=True)
+def many_strengths(j: int, x: FloatArray, lay: Layout, out: FloatArray) -> None:
+    """Write the firing strengths of variable j at many x ``(R,)`` into ``out[:counts[j]]``.
+
+    What `strengths_of` writes for one, `out` being ``(most memberships, R)``.
+    """
+    m, last = lay.counts[j], lay.n_knots[j] - 1
+    x = x.copy()
+    for i in range(len(x)):
+        x[i] = _wrapped(j, x[i], lay)
+    level, power, rising = np.ones(len(x)), np.empty(len(x)), np.empty(len(x))
+    out[:] = 0.0
+    even = lay.growths[j] > 0.0
+    for k in range(last):
+        knot = lay.knots[j, k]
+        _rise(
+            x, k, lay.sigmoid, even, lay.slopes[j, k], lay.bounds[j, k], lay.growths[j],
+            knot, lay.knots[j, k + 1] - knot, power, rising,
+        )  # fmt: skip
+        _fall(level, rising, out[k % m])
+    for i in range(len(x)):
+        out[last % m, i] += level[i]

@@ -7,14 +7,14 @@ from numba import njit
 
 from ..arrays import FloatArray
 from .layout import Layout
-from .strengths import NEGLIGIBLE, product_of, strengths_of
+from .strengths import negligible, product_of, strengths_of
 
 
 @njit(cache=True, fastmath={"contract"})
-def _advance(theta, trace, shared, weight, decay, step) -> None:  # type: ignore[no-untyped-def]
-    """Decay one row of traces, add ``weight * shared``, and move a row of theta along it."""
-    for c in range(len(shared)):
-        e = decay * trace[c] + weight * shared[c]
+def _advance(theta, trace, tail, weight, decay, step) -> None:  # type: ignore[no-untyped-def]
+    """Decay one row of traces, add ``weight * tail``, and move a row of theta along it."""
+    for c in range(len(tail)):
+        e = decay * trace[c] + weight * tail[c]
         trace[c] = e
         theta[c] += step * e
 
@@ -25,14 +25,14 @@ def td_update(  # type: ignore[no-untyped-def]
 ) -> None:
     """Decay the traces, add phi of the states, and move theta along them, in one pass (Eq. 12, 13).
 
-    Rows of traces that no longer reach `NEGLIGIBLE` are set to zero and passed over.
+    Rows of traces that no longer reach what is negligible are set to zero and passed over.
 
     Parameters
     ----------
     theta, trace
         ``(n, n_rules)`` consequent weights and eligibility traces, both modified.
     reach
-        ``(n, own rules of all terms)`` the most that any trace of a row of rules can be, modified.
+        ``(n, rows of all terms)`` the most that any trace of a row of rules can be, modified.
     states
         ``(n, d)`` the previous states of the agents.
     steps
@@ -41,27 +41,26 @@ def td_update(  # type: ignore[no-untyped-def]
         Discount times trace decay.
     """
     strengths = np.empty((len(lay.counts), lay.counts.max()))
-    own = np.empty(lay.own_sizes.max())
-    shared = np.empty(lay.shared_sizes.max(), theta.dtype)
-    kept = theta.dtype.type(decay)
+    heads = np.empty(lay.row_sizes.max())
+    tail = np.empty(((lay.offsets[1:] - lay.offsets[:-1]) // lay.row_sizes).max(), theta.dtype)
+    kept, least = theta.dtype.type(decay), negligible(theta)
     for i in range(len(states)):
         for j in range(len(lay.counts)):
             strengths_of(j, states[i, j], lay, strengths[j])
         step = theta.dtype.type(steps[i])
         row = 0
         for t in range(len(lay.lengths)):
-            product_of(t, 0, lay.own_lengths[t], lay, strengths, own, 0)
-            product_of(t, lay.own_lengths[t], lay.lengths[t], lay, strengths, shared, 0)
-            columns = lay.shared_sizes[t]
-            for r in range(lay.own_sizes[t]):
+            product_of(t, 0, lay.row_lengths[t], lay, strengths, heads, 0)
+            product_of(t, lay.row_lengths[t], lay.lengths[t], lay, strengths, tail, 0)
+            columns = (lay.offsets[t + 1] - lay.offsets[t]) // lay.row_sizes[t]
+            for r in range(lay.row_sizes[t]):
                 at = lay.offsets[t] + r * columns
                 before = reach[i, row]
-                reach[i, row] = decay * before + own[r]
-                if reach[i, row] > NEGLIGIBLE:
-                    weight = theta.dtype.type(own[r])
+                reach[i, row] = decay * before + heads[r]
+                if reach[i, row] > least:
                     _advance(
                         theta[i, at : at + columns], trace[i, at : at + columns],
-                        shared[:columns], weight, kept, step,
+                        tail[:columns], theta.dtype.type(heads[r]), kept, step,
                     )  # fmt: skip
                 elif before > 0.0:
                     trace[i, at : at + columns] = 0.0

@@ -39,7 +39,7 @@ class GradientTD(Online):
     def _update(self, states: FloatArray, reward: float, entered: FloatArray | None) -> int:
         s, rules = self.settings, self.rules
         delta = self._errors(states, reward, entered)
-        expected = rules.each(self.second, states)
+        expected = rules.each(self.second, states[:, None])[:, 0]
         along = s.step_size * delta if s.correction == "tdc" else np.zeros_like(delta)
         kernels.td_update(
             self.theta, self.trace, self.reach, states, along, s.discount * s.trace_decay,

@@ -32,7 +32,8 @@ class Online(ABC):
 
     def begin_episode(self) -> None:
         """Clear the traces."""
-        self.trace[:], self.reach[:] = 0.0, 0.0
+        if self.reach.any():  # memory that is never written is never taken
+            self.trace[:], self.reach[:] = 0.0, 0.0
         self._previous = None
 
     def observe(
@@ -64,8 +65,10 @@ class Online(ABC):
 
     def _errors(self, states: FloatArray, reward: float, entered: FloatArray | None) -> FloatArray:
         """Return the TD errors ``(n,)`` (Eq. 7)."""
-        ahead = 0.0 if entered is None else self.discount * self.rules.each(self.theta, entered)
-        errors: FloatArray = reward + ahead - self.rules.each(self.theta, states)
+        met = states[:, None] if entered is None else np.stack([states, entered], axis=1)
+        values = self.rules.each(self.theta, met)
+        ahead = 0.0 if entered is None else self.discount * values[:, 1]
+        errors: FloatArray = reward + ahead - values[:, 0]
         return errors
 
     def arrays(self) -> dict[str, FloatArray]:

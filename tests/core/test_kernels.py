@@ -5,6 +5,8 @@ from math import pi
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from nested_agents.core import kernels, twins
 from nested_agents.core.fuzzy import Partition
@@ -84,8 +86,9 @@ def test_block_values(base: RuleBase, rng: np.random.Generator) -> None:
     codes = rng.integers(N_ACTIONS**N_AGENTS, size=90)
     expected = twins.block_values(base, theta, blocks, codes)
     assert base.block_values(theta, blocks, codes) == pytest.approx(expected, rel=0, abs=1e-12)
+    strengths = kernels.shared_strengths(blocks.shared, base.layout)
     dense = kernels.block_values_dense(
-        theta, blocks.own, blocks.own_rows, blocks.shared, blocks.shared_rows, blocks.divisor,
+        theta, blocks.own, blocks.own_rows, strengths, blocks.shared_rows, blocks.divisor,
         codes, base.layout,
     )  # fmt: skip
     assert dense == pytest.approx(expected, rel=0, abs=1e-12)
@@ -103,10 +106,30 @@ def test_td_update(base: RuleBase, rng: np.random.Generator) -> None:
     assert theta == pytest.approx(theta_twin, rel=0, abs=1e-12)
 
 
-def test_each(base: RuleBase, rng: np.random.Generator) -> None:
-    theta, states = rng.normal(size=(5, base.n_rules)), states_of(rng, 5)
-    expected = np.einsum("ij,ij->i", base.features(states), theta)
-    assert base.each(theta, states) == pytest.approx(expected, rel=0, abs=1e-12)
+def test_strengths_of_many(base: RuleBase, rng: np.random.Generator) -> None:
+    lay = base.layout
+    states = states_of(rng, 300)
+    states[-3:] = [[-90.0] * 4, [90.0] * 4, [1e6] * 4]
+    for j, partition in enumerate(base.partitions):
+        out = np.empty((lay.counts.max(), len(states)))
+        kernels.many_strengths(j, states[:, j], lay, out)
+        expected = partition.strengths(states[:, j]).T
+        assert out[: lay.counts[j]] == pytest.approx(expected, rel=0, abs=1e-14)
+
+
+@given(st.floats(-690, 690))
+def test_exponentials_are_exact_to_the_last_bits(x: float) -> None:
+    assert kernels.exponential(x) == pytest.approx(np.exp(x), rel=1e-15, abs=0)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_each(base: RuleBase, rng: np.random.Generator, count: int) -> None:
+    theta = rng.normal(size=(5, base.n_rules))
+    states = states_of(rng, 5 * count).reshape(5, count, -1)
+    expected = [base.features(states[i]) @ theta[i] for i in range(5)]
+    assert base.each(theta, states) == pytest.approx(np.array(expected), rel=0, abs=1e-12)
+    dense = kernels.each_dense(theta, states, base.layout)
+    assert dense == pytest.approx(np.array(expected), rel=0, abs=1e-12)
 
 
 def test_single_precision(base: RuleBase, rng: np.random.Generator) -> None:
@@ -120,7 +143,10 @@ def test_single_precision(base: RuleBase, rng: np.random.Generator) -> None:
             base.block_values(theta[0], blocks, codes),
             twins.block_values(base, wide[0][0], blocks, codes),
         ),
-        (base.each(theta, states), np.einsum("ij,ij->i", base.features(states), wide[0])),
+        (
+            base.each(theta, states[:, None])[:, 0],
+            np.einsum("ij,ij->i", base.features(states), wide[0]),
+        ),
     ):
         assert found == pytest.approx(expected, rel=1e-5, abs=1e-5 * scale)
     reach = np.full((3, base.n_rows), 5.0)

@@ -152,4 +152,6 @@ def test_squared_lengths_and_values_by_row(membership: str) -> None:
     states, theta = rng.uniform(-0.2, 1.2, (6, 3)), rng.normal(size=(6, base.n_rules))
     features = base.features(states)
     assert base.squared_lengths(states) == pytest.approx((features**2).sum(axis=1), abs=1e-14)
-    assert base.each(theta, states) == pytest.approx((features * theta).sum(axis=1), abs=1e-12)
+    assert base.each(theta, states[:, None])[:, 0] == pytest.approx(
+        (features * theta).sum(axis=1), abs=1e-12
+    )

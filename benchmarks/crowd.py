@@ -1,0 +1,50 @@
+"""Render an episode of 64 robots, 128 agents in a chain: ``python -m benchmarks.crowd FILE.png``.
+
+The team learns online while it acts, deciding by moments every 0.5 s; drawn is the last moment with
+the trails of all robots. Prints what a control step took.
+"""
+
+from __future__ import annotations
+
+import argparse
+from itertools import pairwise
+from pathlib import Path
+
+from nested_agents.core.config import Decision, TDLambdaSettings
+from nested_agents.core.hierarchy import Hierarchy
+from nested_agents.core.loop import control_loop, policy_seed, world_seed
+from nested_agents.core.team import Team
+from nested_agents.scenarios import ScenarioSettings, build
+from nested_agents.scenarios.rendering import snapshot
+from nested_agents.studies.episodes import EpisodeRecorder, Stopwatch
+from nested_agents.studies.trial import CONTROL_PERIOD
+
+
+def main() -> None:
+    """Run the episode and write the picture."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.crowd", description=__doc__)
+    parser.add_argument("file", type=Path, metavar="FILE.png")
+    parser.add_argument("--robots", type=int, default=64)
+    parser.add_argument("--steps", type=int, default=60)
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args()
+    settings = ScenarioSettings(robots=options.robots)
+    scenario = build(settings)
+    hierarchy = Hierarchy(scenario.agents, list(pairwise(scenario.agents)))
+    learner = TDLambdaSettings(step_size=0.05, decision=Decision(others="mean"))
+    team = Team.build(learner, scenario, hierarchy, policy_seed(options.seed))
+    watch, steps = Stopwatch(), 0
+    scenario.reset(world_seed(options.seed, 0), 0)
+    recorder = EpisodeRecorder(scenario.measure())
+    for record in control_loop(scenario, team, episodes=1, steps=options.steps, seed=options.seed):
+        recorder.add(record.transition)
+        watch.add(record)
+        steps += 1
+    dt = settings.hold * CONTROL_PERIOD
+    snapshot(recorder.recording(dt=dt, robot="e-puck", box="square"), steps, options.file)
+    spent = ", ".join(f"{name} {1e3 * s / steps:.1f} ms" for name, s in watch.seconds.items())
+    print(f"{len(scenario.agents)} agents, {steps} decisions of {1e3 * dt:.0f} ms each: {spent}")
+
+
+if __name__ == "__main__":
+    main()
