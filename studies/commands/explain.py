@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+import tyro
+
 from .options import Directory
 
 
 def command(
     directory: Directory,
-    condition: str | None = None,
-    seed: int | None = None,
+    condition: Annotated[str | None, tyro.conf.arg(metavar="LABEL")] = None,
+    seed: Annotated[int | None, tyro.conf.arg(metavar="SEED")] = None,
 ) -> int:
     """Explain a trained team: its rules in words, its policy around the box, its self-model.
 

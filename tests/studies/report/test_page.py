@@ -1,10 +1,13 @@
 import re
 import shutil
+from pathlib import Path
 
 import pytest
 
+from nested_agents import studies
 from nested_agents.studies.cli import main
 from nested_agents.studies.report.page import page
+from nested_agents.studies.spec import Spec
 from nested_agents.studies.store import DATABASE
 
 
@@ -83,3 +86,14 @@ def test_what_the_user_can_mend(arguments, complaint, finished, tmp_path, capsys
     assert err.startswith(f"nested-agents: error: {placed(complaint)}")
     assert err.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
+
+
+SPECS = sorted(Path(studies.__file__).parent.glob("*.toml"))
+
+
+@pytest.mark.parametrize("path", SPECS, ids=[path.stem for path in SPECS])
+def test_every_study_has_a_report_before_it_has_begun(path, kept, tmp_path):
+    spec = Spec.load(path, ["seeds=1"])
+    html = page(kept(tmp_path, spec, done=0))
+    assert f"<h1>{spec.study}</h1>" in html
+    assert "There is nothing to show yet." in html
