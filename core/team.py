@@ -70,6 +70,7 @@ class Team:
         # How often each agent was seen to take each action; one of each to begin with.
         self._seen: FloatArray = np.ones((len(hierarchy), len(action_set)))
         self._greedy: Explorer = Greedy()
+        self._above = [np.array(hierarchy.above(i), dtype=np.int64) for i in range(len(hierarchy))]
 
     @classmethod
     def build(
@@ -135,8 +136,7 @@ class Team:
         joint = np.full(n, self.action_set.neutral)
         for i in self.hierarchy.order:
             known = np.full(n, self.action_set.neutral)
-            above = list(self.hierarchy.above(i))
-            known[above] = joint[above]
+            known[self._above[i]] = joint[self._above[i]]
             values = self.evaluator.values(
                 i, known, self.learner.theta[i], prediction, frequencies, self.rng
             )

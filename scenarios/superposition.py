@@ -104,18 +104,16 @@ class PushSuperposition:
         prediction, m = self._prediction, len(local)
         r = prediction.robot_of(agent)
         box = self._box + sums
-        robots = np.empty((m, *self._poses[:, 0].shape))
-        robots[:] = np.einsum("gl,glk->gk", shares, self._poses)
-        robots[:, r] = self._poses[r, local]
-        gaps = np.empty((m, len(robots[0])))
-        gaps[:] = np.einsum("gl,gl->g", shares, self._gaps)
+        # In memory the situations stand next to each other, as kernels want them.
+        robots, gaps = np.empty((len(shares), 3, m)), np.empty((len(shares), m))
+        robots[:] = np.einsum("gl,glk->gk", shares, self._poses)[:, :, None]
+        robots[r] = self._poses[r, local].T
+        gaps[:] = np.einsum("gl,gl->g", shares, self._gaps)[:, None]
         model = prediction.model
-        gaps[:, r] = _gaps(
-            robots[:, r], box, model.edges, model.rounding, np.full(m, model.radii[r])
-        )
+        gaps[r] = _gaps(robots[r].T, box, model.edges, model.rounding, np.full(m, model.radii[r]))
         own, which = prediction.own_block(agent)
-        view = View(robots, box, gaps, prediction.situation.goal)
-        return np.concatenate([own[which[local]], prediction.space.shared(view, r)], axis=1)
+        view = View(robots.transpose(2, 0, 1), box, gaps.T, prediction.situation.goal)
+        return np.concatenate([own[which[local]], prediction.space.shared_of(view, [r])[0]], axis=1)
 
 
 @njit(cache=True)
