@@ -8,6 +8,8 @@ from pathlib import Path
 import jinja2
 from markupsafe import Markup
 
+from ..claims import judge
+from ..claims_table import result
 from ..results import read
 from ..spec_toml import dumps
 from ..store import Store
@@ -49,6 +51,11 @@ def page(directory: Path) -> str:
         verdict=words.contest(analysis.table, getattr(analysis, "headline", None)),
         notes=list(getattr(analysis, "notes", ())),
         table=tabulate(analysis.table),
+        claims=[
+            (finding.claim, result(finding), finding.verdict)
+            for finding in judge({spec.study: results})
+            if finding.claim.study == spec.study and finding.measured is not None
+        ],
         pictures=pictures(study, analysis) if analysis.table else [],
         replays=packed,
         failed=failed,

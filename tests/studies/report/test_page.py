@@ -22,11 +22,21 @@ def sections(html):
 
 def test_a_finished_study_has_everything(finished):
     html = page(finished)
-    assert sections(html) == ["summary", "table", "figures", "replay", "spec", "versions"]
+    assert sections(html) == [
+        "summary", "table", "claims", "figures", "replay", "spec", "versions",
+    ]  # fmt: skip
     assert "All 6 trials are done." in html
     assert "success greedy: highest is" in html
     assert "preset = [&#34;default&#34;, &#34;frozen&#34;]" in html
     assert len(html) < 500_000
+
+
+def test_what_a_study_says_of_the_paper(finished):
+    html = page(finished)
+    claims = html[html.index('<section id="claims"') : html.index('<section id="figures"')]
+    assert "wheels learn over epochs to push the box to the goal<small>IX-A, Fig. 5b" in claims
+    assert claims.count("<strong>not decided</strong>") == claims.count("<strong>") > 0
+    assert "the shape of the box is indifferent" not in claims
 
 
 def test_equal_results_give_equal_bytes_wherever_they_are(finished, tmp_path):
