@@ -51,7 +51,7 @@ def steps(kind: str, n_agents: int, budget: float) -> Row:
             candidates["factorised"] = baselines.factorised_step
         if n_agents <= LARGEST_LITERAL:
             candidates["literal"] = baselines.literal_step
-    times = paired(candidates, budget=budget)
+    times = paired(candidates, budget=budget, clock=time.thread_time)
     ours = times.median("ours")
     return {
         "rule_base": kind,
@@ -95,6 +95,7 @@ def large(kind: str, n_agents: int, budget: float) -> Row:
         },
         budget=budget,
         most_rounds=20,
+        clock=time.thread_time,
     )
     row: Row = {f"{name}_ms": 1e3 * times.median(name) for name in times.seconds}
     total = sum(row.values())
