@@ -30,3 +30,13 @@ def test_the_smallest_benchmark_of_worlds_runs(tmp_path: Path) -> None:
     result = json.loads(path.read_text(encoding="utf-8"))
     assert [row["robots"] for row in result["by_size"]] == [2]
     assert len(result["others"]) + len(result["missing"]) == 6
+
+
+@pytest.mark.slow
+def test_a_small_crowd_is_drawn(tmp_path: Path) -> None:
+    path = tmp_path / "crowd.png"
+    sizes = ["--robots", "8", "--steps", "2"]
+    command = [sys.executable, "-m", "benchmarks.crowd", str(path), *sizes]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert run.stdout.startswith("16 agents, 2 decisions of 512 ms each")
+    assert path.stat().st_size > 5000
