@@ -185,7 +185,7 @@ class BoxPushing:
         believed = (
             situation, self._model, self._space, self.action_set, self.settings.reward,
             hold * CONTROL_PERIOD, self.settings.lookahead * CONTROL_PERIOD,
-            self.settings.speed_increment, self._limits,
+            self.settings.speed_increment, self._limits, self.infrared,
         )  # fmt: skip
         if self._playground is None or self._saved is None:
             return BoxPrediction(*believed)

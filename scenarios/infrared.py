@@ -223,6 +223,6 @@ def strongest_reading(world: SeesBox, rng: np.random.Generator) -> FloatArray:
     return world.sensor.noisy(world.infrared_of_box(), rng).max(axis=1)
 
 
-def expected_reading(gaps: FloatArray, spec: InfraredSpec = InfraredSpec()) -> FloatArray:
+def expected_reading(gaps: FloatArray, spec: InfraredSpec) -> FloatArray:
     """Return the reading of a sensor that looks straight at the box across gaps [m]."""
     return spec.reading(gaps)

@@ -18,7 +18,7 @@ from ..core.protocols import Blocks
 from ..core.spaces import ActionSet
 from .config import RewardSettings
 from .drives import Drives, choices_of, drives_of, motion_table
-from .infrared import expected_reading
+from .infrared import InfraredSpec, expected_reading
 from .push import PushModel, push
 from .reward import reward
 from .state_spaces import BoxStateSpace, View, wrap
@@ -65,6 +65,7 @@ class BoxPrediction:
     seconds: float
     increment: float
     limits: FloatArray
+    infrared: InfraredSpec
 
     merges: ClassVar[bool] = True
     """Whether drives of one twist are taken to lead to the same place."""
@@ -215,7 +216,7 @@ class BoxPrediction:
             distance - np.hypot(goal[0] - before[0], goal[1] - before[1]),
             wrap(view.box[:, 2] - goal[2]),
             view.gaps < CONTACT_GAP,
-            expected_reading(view.gaps),
+            expected_reading(view.gaps, self.infrared),
         )
 
 

@@ -65,7 +65,7 @@ def test_readings_by_hand() -> None:
     strongest = strongest_reading(world, RNG)
     assert strongest[0] == pytest.approx(exp(-0.03 / SPEC.decay))
     assert strongest[1] == 0.0
-    np.testing.assert_allclose(expected_reading(world.gaps), strongest, atol=1e-12)
+    np.testing.assert_allclose(expected_reading(world.gaps, SPEC), strongest, atol=1e-12)
 
 
 def test_touching_reads_one_and_far_reads_zero() -> None:

@@ -56,6 +56,13 @@ def test_the_own_block_of_the_paper_is_that_of_the_robot_alone() -> None:
         assert np.abs(tables - states)[:, 2].max() < 0.05
 
 
+def test_predicted_rewards_know_the_sensors() -> None:
+    usual = moving().predict().reward_table()
+    short = moving(infrared={"reach": 0.001}).predict().reward_table()
+    assert (short <= usual).all()
+    assert (short < usual).any()
+
+
 def test_rewards_by_code_are_the_rewards_of_every_joint_action() -> None:
     prediction = moving().predict()
     np.testing.assert_array_equal(
