@@ -9,7 +9,7 @@ from nested_agents.studies import store as store_module
 from nested_agents.studies.spec import Spec
 from nested_agents.studies.spec_errors import SpecError
 from nested_agents.studies.store import DATABASE, SPEC_FILE, Store
-from nested_agents.studies.trial import trials_of
+from nested_agents.studies.trial import RESULTS_VERSION, trials_of
 
 
 def changed(**changes):
@@ -148,7 +148,7 @@ def test_another_study_is_refused_and_nothing_changed(finished, changes, said):
 def test_results_of_another_version_are_refused(finished, monkeypatch):
     monkeypatch.setattr(store_module, "RESULTS_VERSION", 99)
     with (
-        pytest.raises(SpecError, match="holds results of version 1, this is version 99"),
+        pytest.raises(SpecError, match=f"holds results of version {RESULTS_VERSION}, this is version 99"),
         Store.create(finished, made_up.SPEC),
     ):
         pass

@@ -166,6 +166,7 @@ def test_agents_that_are_not_seen_maintain() -> None:
     maintain = scenario.action_set.neutral
     hierarchy = Hierarchy(scenario.agents, [("cart1", "cart2")])  # cart3, cart4 unseen by both
     team = team_of(scenario, hierarchy)
+    team.learner.theta[:] = 1.0  # with all weights zero nothing would be asked of the prediction
     scenario.reset(0)
     prediction = scenario.predict()
     joint = team.act(prediction)
