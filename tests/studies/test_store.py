@@ -147,8 +147,9 @@ def test_another_study_is_refused_and_nothing_changed(finished, changes, said):
 
 def test_results_of_another_version_are_refused(finished, monkeypatch):
     monkeypatch.setattr(store_module, "RESULTS_VERSION", 99)
+    said = f"holds results of version {RESULTS_VERSION}, this is version 99"
     with (
-        pytest.raises(SpecError, match=f"holds results of version {RESULTS_VERSION}, this is version 99"),
+        pytest.raises(SpecError, match=said),
         Store.create(finished, made_up.SPEC),
     ):
         pass
