@@ -172,6 +172,20 @@ class BatchTDSettings(ReplaySettings):
     """lambda: 0 bootstraps from the next state, 1 sums the rewards of the whole episode."""
 
 
+class AnovaTDSettings(ReplaySettings):
+    """Batch TD(lambda) of the full product, with a prior that prefers few variables at a time."""
+
+    kind: Literal["anova-td"] = "anova-td"
+    trace_decay: Fraction = 0.0
+    """lambda, as of batch TD."""
+    interaction: Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)] = 0.1
+    """rho: prior variance of a function of k + 1 variables over that of one of k."""
+    tolerance: Annotated[float, Field(gt=0, le=1)] = 0.01
+    """Share of its prior variance that may be left out of an after-state."""
+    dictionary: Annotated[int, Field(ge=1, le=4096)] = 800
+    """After-states that all others are described by, at most."""
+
+
 class FittedValueSettings(ReplaySettings):
     """Fitted value iteration: towards the best of the predicted next states."""
 
@@ -187,7 +201,12 @@ class FrozenSettings(LearnerSettings):
 
 
 Learner = Annotated[
-    TDLambdaSettings | GradientTDSettings | BatchTDSettings | FittedValueSettings | FrozenSettings,
+    TDLambdaSettings
+    | GradientTDSettings
+    | BatchTDSettings
+    | AnovaTDSettings
+    | FittedValueSettings
+    | FrozenSettings,
     Field(discriminator="kind"),
 ]
 """Any learner's settings, told apart by `kind`."""

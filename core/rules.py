@@ -78,8 +78,12 @@ class RuleBase:
         self.n_rows = int(self.layout.row_sizes.sum())
         self.dtype = np.dtype(dtype)
         self.compact = self.partitions[0].membership == "triangular"
-        # Looking up 2 ** order corners is cheaper than contracting theta for small orders only.
-        self._looks_up = self.compact and max(len(term) for term in self.terms) <= 3
+        # Looking up 2 ** order corners is cheaper than contracting theta, unless the order is high
+        # and most variables are own ones, which are contracted once for many joint actions.
+        self._looks_up = self.compact and all(
+            len(term) <= 3 or 2 ** len(term) <= size
+            for term, size in zip(self.terms, self.layout.shared_sizes, strict=True)
+        )
 
     @classmethod
     def build(cls, space: StateSpace, settings: RuleBaseSettings) -> RuleBase:

@@ -9,6 +9,7 @@ R(s) / (1 - discount). Siblings differ where their mathematics differs.
 from __future__ import annotations
 
 from ..config import (
+    AnovaTDSettings,
     BatchTDSettings,
     FittedValueSettings,
     FrozenSettings,
@@ -17,12 +18,14 @@ from ..config import (
 )
 from ..config import Learner as LearnerSettings
 from ..rules import RuleBase
+from .anova import AnovaTD
 from .batch import BatchTD, FittedValue
 from .gradient import GradientTD
 from .learner import Frozen, Learner
 from .td import TDLambda
 
 __all__ = [
+    "AnovaTD",
     "BatchTD",
     "FittedValue",
     "Frozen",
@@ -39,6 +42,8 @@ def build_learner(settings: LearnerSettings, rules: RuleBase, n_agents: int) -> 
         return TDLambda(settings, rules, n_agents)
     if isinstance(settings, GradientTDSettings):
         return GradientTD(settings, rules, n_agents)
+    if isinstance(settings, AnovaTDSettings):
+        return AnovaTD(settings, rules, n_agents)
     if isinstance(settings, BatchTDSettings):
         return BatchTD(settings, rules, n_agents)
     if isinstance(settings, FittedValueSettings):
