@@ -111,6 +111,22 @@ class SelfModelSettings(Settings):
     """Share of the prior covariance that is added then."""
 
 
+class CalibrationSettings(Settings):
+    """Whether and how fast a team revises the constants of its predictor."""
+
+    enabled: bool = False
+    """Otherwise they stay as the scenario believes them to be."""
+    prior: Positive = 0.7
+    """Standard deviation of the logarithm of a constant at first: 0.7 is a factor of 2."""
+    noise: Positive = 0.008
+    """Standard deviation of a measured speed around the predicted one [m/s]."""
+    surprise: Positive = 4.0
+    """Mean squared innovation of a body, in units of the expected square, above which it counts
+    less."""
+    drift: NonNegative = 0.003
+    """What is added to the standard deviation (as squares) by every decision that pushes."""
+
+
 class LearnerSettings(Settings):
     """What all learners share."""
 
@@ -122,6 +138,7 @@ class LearnerSettings(Settings):
     )
     decision: Decision = Decision()
     self_model: SelfModelSettings = SelfModelSettings()
+    calibration: CalibrationSettings = CalibrationSettings()
 
 
 class TDLambdaSettings(LearnerSettings):

@@ -94,6 +94,8 @@ class Transition:
     motions
         ``(M, 3)`` mean twist of every group's body in its own frame [m/s, m/s, rad/s], if bodies
         measure it.
+    pushed
+        ``(3,)`` the same of what the bodies push together, if they see it and push nothing else.
     """
 
     states: FloatArray
@@ -102,6 +104,7 @@ class Transition:
     truncated: bool
     info: Mapping[str, Any]
     motions: FloatArray | None = None
+    pushed: FloatArray | None = None
 
 
 @runtime_checkable
@@ -231,4 +234,39 @@ class EmbodiedScenario(Scenario, Protocol):
 
     def predict_with(self, effects: Sequence[FloatArray]) -> EmbodiedPrediction:
         """Predict from the present state, believing in these effects."""
+        ...
+
+
+class CalibratedPrediction(EmbodiedPrediction, Protocol):
+    """A prediction that rests on constants of which other values could be believed."""
+
+    def outcomes(self, joint_action: IntArray, constants: FloatArray) -> FloatArray:
+        """Return what a joint action would lead to under each of the constants ``(k, n)``.
+
+        Mean twists ``(k, M + 1, 3)`` of what is pushed, and then of the bodies.
+        """
+        ...
+
+
+@runtime_checkable
+class CalibratedScenario(EmbodiedScenario, Protocol):
+    """A scenario whose predictions rest on positive constants that can be calibrated."""
+
+    @property
+    def constants(self) -> tuple[str, ...]:
+        """Names of the constants; none if the present predictor has none."""
+        ...
+
+    @property
+    def levers(self) -> FloatArray:
+        """``(M + 1,)`` speed per turning rate of what is pushed and of the bodies [m]."""
+        ...
+
+    def predict_with(
+        self, effects: Sequence[FloatArray], constants: FloatArray | None = None
+    ) -> CalibratedPrediction:
+        """Predict, believing in these effects and in these constants.
+
+        The constants are logarithms, in units of what is believed without them.
+        """
         ...

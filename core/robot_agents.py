@@ -18,6 +18,8 @@ import numpy as np
 from .arrays import FloatArray, IntArray
 from .protocols import (
     Blocks,
+    CalibratedPrediction,
+    CalibratedScenario,
     EmbodiedPrediction,
     EmbodiedScenario,
     Prediction,
@@ -108,9 +110,25 @@ class EmbodiedRobotAgents(RobotAgents):
         """Per body the effect of its wheel speeds on its twist."""
         return cast(EmbodiedScenario, self.scenario).nominal_effects
 
-    def predict_with(self, effects: Sequence[FloatArray]) -> RobotPrediction:
-        """Predict from the present state, believing in these effects."""
-        return RobotPrediction(cast(EmbodiedScenario, self.scenario).predict_with(effects), self)
+    @property
+    def constants(self) -> tuple[str, ...]:
+        """Names of the constants that can be calibrated, if any."""
+        return self.scenario.constants if isinstance(self.scenario, CalibratedScenario) else ()
+
+    @property
+    def levers(self) -> FloatArray:
+        """Speed per turning rate of what is pushed and of the bodies."""
+        return cast(CalibratedScenario, self.scenario).levers
+
+    def predict_with(
+        self, effects: Sequence[FloatArray], constants: FloatArray | None = None
+    ) -> RobotPrediction:
+        """Predict from the present state, believing in these effects and constants."""
+        if constants is None:
+            prediction = cast(EmbodiedScenario, self.scenario).predict_with(effects)
+        else:
+            prediction = cast(CalibratedScenario, self.scenario).predict_with(effects, constants)
+        return RobotPrediction(prediction, self)
 
 
 def per_robot(scenario: Scenario) -> RobotAgents:
@@ -172,6 +190,11 @@ class RobotPrediction:
         """Return by how much contact is predicted to change the bodies' twists, ``(M, 3)``."""
         wheels = self._robots.wheels(joint_action[None])[0]
         return cast(EmbodiedPrediction, self._prediction).slips(wheels)
+
+    def outcomes(self, joint_action: IntArray, constants: FloatArray) -> FloatArray:
+        """Return what local codes ``(M,)`` would lead to under constants ``(k, n)``."""
+        wheels = self._robots.wheels(joint_action[None])[0]
+        return cast(CalibratedPrediction, self._prediction).outcomes(wheels, constants)
 
 
 def _robot(agent: str) -> str:

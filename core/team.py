@@ -9,6 +9,7 @@ from typing import cast
 import numpy as np
 
 from .arrays import FloatArray, IntArray
+from .calibration import Calibration
 from .config import Decision
 from .config import Learner as LearnerSettings
 from .evaluators import Evaluator, ExactEnumeration, Extremes, Moments, Sampling
@@ -16,6 +17,8 @@ from .exploration import Explorer, Greedy, build_explorer
 from .hierarchy import Hierarchy
 from .learners import Learner, build_learner
 from .protocols import (
+    CalibratedPrediction,
+    CalibratedScenario,
     EmbodiedPrediction,
     EmbodiedScenario,
     Prediction,
@@ -51,6 +54,8 @@ class Team:
         Source of everything random in the team.
     self_model
         What the wheels do, as learned; none: prediction takes every robot as nominal.
+    calibration
+        The predictor's constants, as learned; none: as the scenario believes them to be.
     """
 
     def __init__(
@@ -62,10 +67,11 @@ class Team:
         evaluator: AnyEvaluator | None,
         seed: np.random.SeedSequence,
         self_model: SelfModel | None = None,
+        calibration: Calibration | None = None,
     ) -> None:
         self.hierarchy, self.action_set = hierarchy, action_set
         self.learner, self.explorer, self.evaluator = learner, explorer, evaluator
-        self.self_model = self_model
+        self.self_model, self.calibration = self_model, calibration
         self.rng = np.random.Generator(np.random.PCG64(seed))
         # How often each agent was seen to take each action; one of each to begin with.
         self._seen: FloatArray = np.ones((len(hierarchy), len(action_set)))
@@ -98,6 +104,16 @@ class Team:
             if not isinstance(scenario, EmbodiedScenario):
                 raise ValueError("learner.self_model.enabled: the scenario has no bodies on wheels")
             self_model = SelfModel(settings.self_model, scenario.nominal_effects)
+        calibration = None
+        if settings.calibration.enabled:
+            if not isinstance(scenario, CalibratedScenario) or not scenario.constants:
+                raise ValueError(
+                    "learner.calibration.enabled: the scenario's predictor has no constants "
+                    "to calibrate"
+                )
+            calibration = Calibration(
+                settings.calibration, len(scenario.constants), scenario.levers
+            )
         rules = RuleBase.build(scenario.state_space, settings.rule_base)
         n = len(hierarchy)
         return cls(
@@ -108,6 +124,7 @@ class Team:
             _build_evaluator(settings.decision, rules, hierarchy, scenario, settings.discount),
             seed,
             self_model,
+            calibration,
         )
 
     def begin_episode(self) -> None:
@@ -116,11 +133,14 @@ class Team:
         self.learner.begin_episode()
 
     def predict(self, scenario: Scenario) -> Prediction:
-        """Predict from the scenario's present state, by the self-model if there is one."""
-        if self.self_model is None:
+        """Predict from the scenario's present state, by what has been learned of it."""
+        if self.self_model is None and self.calibration is None:
             return scenario.predict()
-        assert isinstance(scenario, EmbodiedScenario)
-        return scenario.predict_with(self.self_model.effects)
+        embodied = cast(EmbodiedScenario, scenario)
+        effects = self.self_model.effects if self.self_model else embodied.nominal_effects
+        if self.calibration is None:
+            return embodied.predict_with(effects)
+        return cast(CalibratedScenario, scenario).predict_with(effects, self.calibration.constants)
 
     def act(self, prediction: Prediction, *, explore: bool = True) -> IntArray:
         """Decide a joint action ``(n,)``, from the top of the hierarchy down.
@@ -147,11 +167,13 @@ class Team:
         return joint
 
     def adapt(self, prediction: Prediction, joint_action: IntArray, transition: Transition) -> None:
-        """Revise the self-model by what `joint_action` did, against what was predicted of it.
+        """Revise self-model and constants by what `joint_action` did, against what was predicted.
 
-        What contact is predicted to take from the motion is given back first: a robot that pushes
-        a box is slow, not broken.
+        What contact is predicted to take from the motion is given back to the self-model: a robot
+        that pushes a box is slow, not broken. The constants are held against what was pushed.
         """
+        if self.calibration is not None:
+            self._calibrate(cast(CalibratedPrediction, prediction), joint_action, transition)
         if self.self_model is None or transition.motions is None:
             return
         embodied = cast(EmbodiedPrediction, prediction)
@@ -159,6 +181,15 @@ class Team:
         free = transition.motions - embodied.slips(joint_action)
         for body, group in enumerate(embodied.groups):
             self.self_model.observe(body, speeds[list(group)], free[body])
+
+    def _calibrate(
+        self, prediction: CalibratedPrediction, joint_action: IntArray, transition: Transition
+    ) -> None:
+        moved, motions = transition.pushed, transition.motions
+        if self.calibration is None or moved is None or motions is None or not moved.any():
+            return
+        foreseen = prediction.outcomes(joint_action, self.calibration.points)
+        self.calibration.observe(np.vstack([moved, motions]), foreseen)
 
     def learn(self, transition: Transition, prediction: Prediction) -> None:
         """Take in what a step led to, and the prediction from there."""
@@ -206,6 +237,8 @@ class Team:
         learner = {f"learner.{name}": array for name, array in self.learner.arrays().items()}
         if self.self_model is not None:
             learner |= {f"self_model.{k}": v for k, v in self.self_model.arrays().items()}
+        if self.calibration is not None:
+            learner |= {f"calibration.{k}": v for k, v in self.calibration.arrays().items()}
         return {
             "generator": np.array(generator, dtype=np.uint64),
             "explorer": self.explorer.memory,
@@ -239,6 +272,8 @@ class Team:
         self.learner.restore(_part(arrays, "learner."))
         if self.self_model is not None:
             self.self_model.restore(_part(arrays, "self_model."))
+        if self.calibration is not None:
+            self.calibration.restore(_part(arrays, "calibration."))
 
 
 def _part(arrays: Mapping[str, FloatArray], prefix: str) -> dict[str, FloatArray]:

@@ -16,6 +16,7 @@ import numpy as np
 from ..core.arrays import BoolArray, FloatArray, IntArray
 from ..core.protocols import Transition
 from ..core.spaces import ActionSet, StateSpace
+from .belief import APART, CONSTANTS, PushBelief, least_gap
 from .boxes import box_for
 from .config import ScenarioSettings
 from .failures import Failures
@@ -76,9 +77,10 @@ class BoxPushing:
         self.world = World([self.robot] * settings.robots, self.box, infrared=self.infrared)
         self._space = state_space_for(settings.state_space, self.robot.max_speed)
         self._limits: FloatArray = np.full(len(self.agents), self.robot.max_speed)
-        self._effects = self.nominal_effects
+        self._effects = (nominal_effect(self.robot),) * settings.robots
         robots = [self.robot] * settings.robots
-        self._model = push_model(settings.predictor, robots, self.box)
+        self._model = push_model(settings.predictor, robots, self.box, settings.belief)
+        self._belief = PushBelief.of(self._model, robots, settings.belief.stiffness)
         self._playground = World(robots, self.box) if settings.predictor == "exact" else None
         self._failures = (
             Failures(settings.failures, self.agents, self._limits) if settings.failures else None
@@ -140,12 +142,16 @@ class BoxPushing:
         unit = self.settings.speed_increment * self._limits
         self._speeds = self.action_set.apply(self._speeds, joint_action, unit, self._limits)
         before, poses = self._distance(), self.world.robot_poses.copy()
+        box, radius = self.world.box_pose.copy(), self.robot.radius
         begin = perf_counter()
         self._advance(self._speeds)
         moved = perf_counter()
         states = self._observe()
         period = self.settings.hold * CONTROL_PERIOD
         motions = mean_twists(poses, self.world.robot_poses, period)
+        pushed = None
+        if min(least_gap(poses, radius), least_gap(self.world.robot_poses, radius)) > APART:
+            pushed = mean_twists(box[None], self.world.box_pose[None], period)[0]
         measured = self.measure()
         readings = strongest_reading(self.world, self._sensing)
         terminated = self._reached()
@@ -164,26 +170,42 @@ class BoxPushing:
         self._save()
         measured["seconds"] = {"physics": moved - begin, "sensors": sensed - moved}
         truncated = not terminated and measured["distance_m"] > self.settings.arena
-        return Transition(states, float(gained[0]), terminated, truncated, measured, motions)
+        return Transition(
+            states, float(gained[0]), terminated, truncated, measured, motions, pushed
+        )
 
     @property
     def nominal_effects(self) -> tuple[FloatArray, ...]:
         """Per robot the ``(3, w + 1)`` effect of its wheel speeds on its twist."""
-        return (nominal_effect(self.robot),) * self.settings.robots
+        return self._effects
 
     def predict(self) -> BoxPrediction:
         """Predict from the present state, every robot taken as nominal."""
         return self.predict_with(self._effects)
 
-    def predict_with(self, effects: Sequence[FloatArray]) -> BoxPrediction:
-        """Predict from the present state, believing in these effects of the wheels."""
+    @property
+    def constants(self) -> tuple[str, ...]:
+        """Names of what the push predictor can calibrate; the other predictors have none."""
+        return CONSTANTS if self.settings.predictor == "push" else ()
+
+    @property
+    def levers(self) -> FloatArray:
+        """Speed per turning rate of the box and of every robot ``(M + 1,)`` [m]."""
+        radii = [self.robot.radius] * self.settings.robots
+        return np.array([self.box.friction_radius, *radii])
+
+    def predict_with(
+        self, effects: Sequence[FloatArray], constants: FloatArray | None = None
+    ) -> BoxPrediction:
+        """Predict, believing in these effects of the wheels and constants of the push."""
         situation = Situation(
             self.world.robot_poses.copy(), self.world.box_pose.copy(), self._goal,
             self._speeds, tuple(effects), self.groups,
         )  # fmt: skip
         hold = self.settings.hold
+        model = self._model if constants is None else self._belief.believing(constants)
         believed = (
-            situation, self._model, self._space, self.action_set, self.settings.reward,
+            situation, model, self._belief, self._space, self.action_set, self.settings.reward,
             hold * CONTROL_PERIOD, self.settings.lookahead * CONTROL_PERIOD,
             self.settings.speed_increment, self._limits, self.infrared,
         )  # fmt: skip

@@ -138,6 +138,9 @@ def _form(of: Examination) -> str | None:
         motions = frame.get("motions")
         if motions is not None and np.shape(motions) != (len(scenario.groups), 3):
             return f"motions of shape {np.shape(motions)}, must be {(len(scenario.groups), 3)}"
+        pushed = frame.get("pushed")
+        if pushed is not None and np.shape(pushed) != (3,):
+            return f"pushed of shape {np.shape(pushed)}, must be (3,)"
     return None
 
 

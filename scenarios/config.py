@@ -207,6 +207,17 @@ class InfraredSettings(Settings):
         return self
 
 
+class BeliefSettings(Settings):
+    """By what factors the push predictor takes constants for other than the world has them."""
+
+    stiffness: Positive = 1.0
+    """Of the wheels, ahead and sideways."""
+    load: Positive = 1.0
+    """Of the ground friction of the box."""
+    contact_friction: Positive = 1.0
+    """Of the friction between robots and box."""
+
+
 def label(thing: str | Settings) -> str:
     """Return the name of a thing, or what it consists of, as text that can be read back."""
     return thing if isinstance(thing, str) else thing.model_dump_json()
@@ -231,6 +242,8 @@ class ScenarioSettings(Settings):
     """Eq. 1, or the relational variables."""
     predictor: Literal["push", "rigid", "static", "exact"] = "push"
     """What predictions take the world for, see `nested_agents.scenarios.predictors`."""
+    belief: BeliefSettings = BeliefSettings()
+    """What the predictor `push` is told of constants that robots cannot see."""
     reward: RewardSettings = RewardSettings()
     hold: Count = 8
     """Control periods of 64 ms for which a decision is held."""
@@ -244,3 +257,9 @@ class ScenarioSettings(Settings):
     """Distance of the box from the goal [m] beyond which an episode is broken off."""
     orientation_tolerance: Positive | None = None
     """Orientation error that still counts as reached [rad]; none: any."""
+
+    @model_validator(mode="after")
+    def _believes(self) -> Self:
+        if self.predictor != "push" and self.belief != BeliefSettings():
+            raise ValueError(f"belief is for predictor = 'push', received {self.predictor!r}")
+        return self

@@ -16,6 +16,7 @@ import numpy as np
 from ..core.arrays import FloatArray, IntArray
 from ..core.protocols import Blocks
 from ..core.spaces import ActionSet
+from .belief import PushBelief, outcomes
 from .config import RewardSettings
 from .drives import Drives, choices_of, drives_of, motion_table
 from .infrared import InfraredSpec, expected_reading
@@ -58,6 +59,7 @@ class BoxPrediction:
 
     situation: Situation
     model: PushModel
+    belief: PushBelief
     space: BoxStateSpace
     action_set: ActionSet
     rewards_of: RewardSettings
@@ -197,6 +199,18 @@ class BoxPrediction:
         after = self._after(choices, self.hold).robots[0]
         free = self.drives.twists[np.arange(len(after)), choices[0]]
         return mean_twists(self.situation.robots, after, self.hold) - free
+
+    def outcomes(self, joint_action: IntArray, constants: FloatArray) -> FloatArray:
+        """Return mean twists ``(k, M + 1, 3)``, the box's first, under constants ``(k, 3)``.
+
+        Over the decision period, to be held against what is measured in it.
+        """
+        choices = self._choices(joint_action[None])[0]
+        twists = self.drives.twists[np.arange(len(choices)), choices]
+        found: FloatArray = outcomes(
+            self.situation.robots, self.situation.box, twists, self.hold, self.belief, constants
+        )
+        return found
 
     def rewards(self, joint_actions: IntArray) -> FloatArray:
         """Return the predicted rewards ``(m,)`` of joint actions ``(m, n)``."""

@@ -22,6 +22,7 @@ import numpy as np
 
 from ..core.arrays import FloatArray, IntArray
 from .boxes import BoxSpec
+from .config import BeliefSettings
 from .failures import Failures
 from .prediction import BoxPrediction
 from .push import PushModel
@@ -33,17 +34,22 @@ IMMOBILE = 1e6
 """Ground friction [N] against which nothing moves."""
 
 
-def push_model(predictor: str, robots: list[RobotSpec], box: BoxSpec) -> PushModel:
-    """Return what a predictor believes of robots and box."""
+def push_model(
+    predictor: str,
+    robots: list[RobotSpec],
+    box: BoxSpec,
+    belief: BeliefSettings = BeliefSettings(),  # noqa: B008 - frozen
+) -> PushModel:
+    """Return what a predictor believes of robots and box, the constants being off as told."""
     model = PushModel(
         edges=box.outline.edges,
         rounding=box.outline.rounding,
         reach=box.reach,
         radii=np.array([robot.radius for robot in robots]),
-        compliance=np.stack([compliance(robot) for robot in robots]),
-        friction_force=box.friction_force,
+        compliance=np.stack([compliance(robot) for robot in robots]) / belief.stiffness,
+        friction_force=box.friction_force * belief.load,
         friction_radius=box.friction_radius,
-        contact_friction=box.contact_friction,
+        contact_friction=box.contact_friction * belief.contact_friction,
     )
     if predictor == "rigid":
         return model._replace(compliance=np.zeros_like(model.compliance), contact_friction=0.0)

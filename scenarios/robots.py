@@ -106,7 +106,7 @@ class RobotSpec:
                 )
         if not all(isfinite(angle) for angle in self.sensors):
             raise ValueError(f"robot {self.name!r}: sensors {self.sensors}, must be finite angles")
-        if np.linalg.cond(_resistance(self)) > 1e12:
+        if np.linalg.cond(resistance(self)) > 1e12:
             raise ValueError(
                 f"robot {self.name!r}: its wheels cannot resist turning, "
                 "there must be two at different places"
@@ -128,13 +128,14 @@ class RobotSpec:
         return self.traction * self.mass * GRAVITY / len(self.wheels)
 
 
-def _resistance(robot: RobotSpec) -> FloatArray:
+def resistance(robot: RobotSpec, ahead: float = 1.0, sideways: float = 1.0) -> FloatArray:
     """Return the wrench per twist ``(3, 3)`` with which standing wheels resist a motion.
 
-    The sum over wheels of ``J' diag(stiffness, lateral) J``, J the velocity of the wheel point.
+    The sum over wheels of ``J' diag(stiffness, lateral) J``, J the velocity of the wheel point,
+    the stiffnesses multiplied by the factors `ahead` and `sideways`.
     """
     total = np.zeros((3, 3))
-    stiffness = np.diag([robot.stiffness, robot.lateral_stiffness])
+    stiffness = np.diag([ahead * robot.stiffness, sideways * robot.lateral_stiffness])
     for wheel in robot.wheels:
         jacobian = np.array([[1.0, 0.0, -wheel.y], [0.0, 1.0, wheel.x]])
         total += jacobian.T @ stiffness @ jacobian
@@ -149,7 +150,7 @@ def compliance(robot: RobotSpec) -> FloatArray:
     FloatArray
         ``(3, 3)`` twist per wrench at its centre, body frame [m/s, m/s, rad/s per N, N, N m].
     """
-    return np.linalg.inv(_resistance(robot))
+    return np.linalg.inv(resistance(robot))
 
 
 def nominal_effect(robot: RobotSpec) -> FloatArray:
