@@ -151,6 +151,8 @@ class TDLambdaSettings(LearnerSettings):
     """lambda of Eq. 8."""
     normalised: bool = False
     """Divide the step size by the squared length of the feature vector."""
+    averaging: Annotated[float, Field(ge=1, allow_inf_nan=False)] = 1.0
+    """Steps over which the weights that decide average those that learn; 1: they are the same."""
 
 
 class GradientTDSettings(LearnerSettings):

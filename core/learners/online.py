@@ -25,6 +25,8 @@ class Online(ABC):
     def __init__(self, discount: float, rules: RuleBase, n_agents: int) -> None:
         self.discount, self.rules = discount, rules
         self.theta: FloatArray = np.zeros((n_agents, rules.n_rules), rules.dtype)
+        self.weights = self.theta
+        """The consequent weights that learn; those that decide, theta, may be an average."""
         self.trace: FloatArray = np.zeros_like(self.theta)
         self.reach: FloatArray = np.zeros((n_agents, rules.n_rows))
         self._previous: FloatArray | None = None
@@ -66,7 +68,7 @@ class Online(ABC):
     def _errors(self, states: FloatArray, reward: float, entered: FloatArray | None) -> FloatArray:
         """Return the TD errors ``(n,)`` (Eq. 7)."""
         met = states[:, None] if entered is None else np.stack([states, entered], axis=1)
-        values = self.rules.each(self.theta, met)
+        values = self.rules.each(self.weights, met)
         ahead = 0.0 if entered is None else self.discount * values[:, 1]
         errors: FloatArray = reward + ahead - values[:, 0]
         return errors
@@ -81,5 +83,7 @@ class Online(ABC):
         """Continue from `arrays`."""
         for name in self.kept:
             setattr(self, name, arrays[name].copy())
+        if "weights" not in self.kept:
+            self.weights = self.theta
         self._previous = arrays["previous"].copy() if arrays["previous"].size else None
         self._reward = float(arrays["reward"])

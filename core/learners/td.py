@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from .. import kernels
 from ..arrays import FloatArray
 from ..config import TDLambdaSettings
@@ -20,11 +22,22 @@ class TDLambda(Online):
 
     With a normalised step size alpha is divided by the squared length of phi(s), so that
     ``step_size = 1`` would remove the TD error of s at once.
+
+    With averaging over n steps this is learned by w in place of theta, and the agent decides by::
+
+        theta = theta + (w - theta) / min(t, n)    after t updates
+
+    the mean of all w so far, later an exponential one (Polyak and Juditsky 1992): a constant step
+    size then keeps learning without its noise deciding.
     """
 
     def __init__(self, settings: TDLambdaSettings, rules: RuleBase, n_agents: int) -> None:
         super().__init__(settings.discount, rules, n_agents)
         self.settings = settings
+        self.updates: FloatArray = np.zeros(())
+        if settings.averaging > 1:
+            self.weights = np.zeros_like(self.theta)
+            self.kept = (*self.kept, "weights", "updates")
 
     def _update(self, states: FloatArray, reward: float, entered: FloatArray | None) -> int:
         steps = self.settings.step_size * self._errors(states, reward, entered)
@@ -32,6 +45,10 @@ class TDLambda(Online):
             steps = steps / self.rules.squared_lengths(states)
         decay = self.discount * self.settings.trace_decay
         kernels.td_update(
-            self.theta, self.trace, self.reach, states, steps, decay, self.rules.layout
+            self.weights, self.trace, self.reach, states, steps, decay, self.rules.layout
         )
+        if self.settings.averaging > 1:
+            self.updates += 1.0
+            share = 1.0 / min(float(self.updates), self.settings.averaging)
+            self.theta += share * (self.weights - self.theta)
         return self.theta.size

@@ -1,5 +1,7 @@
 """TD(lambda) against hand-worked numbers, the lambda-return, and solutions in closed form."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -259,3 +261,45 @@ def test_observing_leaves_its_arguments_alone() -> None:
     learner.observe(np.zeros((1, 2)), 0.0, False)
     expected = FUZZY.features(np.full((1, 2), 0.3))
     assert learner.trace == pytest.approx(expected, abs=1e-15)
+
+
+@pytest.mark.parametrize("rules", [TABLE, FUZZY])
+def test_averaged_weights_decide_and_others_learn(rules: RuleBase) -> None:
+    common: dict[str, Any] = {
+        "step_size": 0.3,
+        "discount": 0.9,
+        "trace_decay": 0.7,
+        "normalised": True,
+    }
+    plain, averaged = learner_of(rules, **common), learner_of(rules, averaging=4.0, **common)
+    rng = np.random.default_rng(6)
+    d = len(rules.partitions)
+    plain.begin_episode()
+    averaged.begin_episode()
+    mean = np.zeros_like(plain.theta)
+    for t in range(12):
+        state, reward = rng.uniform(0, 1, (1, d)), float(rng.normal())
+        plain.observe(state, reward, False)
+        averaged.observe(state, reward, False)
+        assert (averaged.weights == plain.theta).all()
+        if t > 0:
+            mean += (plain.theta - mean) / min(t, 4)
+        assert averaged.theta == pytest.approx(mean, rel=0, abs=1e-14)
+    assert (plain.theta == plain.weights).all()
+    assert abs(averaged.theta - plain.theta).max() > 1e-3
+
+
+@pytest.mark.parametrize("averaging", [1.0, 5.0])
+def test_a_restored_learner_goes_on_with_the_same_bits(averaging: float) -> None:
+    rng = np.random.default_rng(7)
+    states, rewards = rng.uniform(-1, 1, (20, 2)), rng.normal(size=20)
+    learner, restored = (
+        learner_of(FUZZY, step_size=0.3, trace_decay=0.7, averaging=averaging) for _ in range(2)
+    )
+    feed(learner, states[:8], rewards[:8], False)
+    restored.restore({name: array.copy() for name, array in learner.arrays().items()})
+    for each in (learner, restored):
+        for state, reward in zip(states[8:], rewards[8:], strict=True):
+            each.observe(state[None], float(reward), False)
+    assert (restored.theta == learner.theta).all()
+    assert (restored.weights == learner.weights).all()
