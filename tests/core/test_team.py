@@ -25,9 +25,11 @@ TEAMS = {
         "rule_base": {"membership": "sigmoid", "memberships": 5, "order": 2},
         "decision": {"others": "observed"},
     },
+    "td-lambda, averaged": {"kind": "td-lambda", "step_size": 0.1, "averaging": 5.0},
     "gradient-td": {"kind": "gradient-td", "exploration": PAPER},
     "batch-td": {"kind": "batch-td", "ridge": 0.1, "exploration": BURST},
     "batch-td, sigmoid": {"kind": "batch-td", "rule_base": {"membership": "sigmoid"}},
+    "anova-td": {"kind": "anova-td", "rule_base": {"order": 3}, "ridge": 0.1},
     "fitted-value": {"kind": "fitted-value", "candidates": 5, "sweeps": 3},
     "sampling": {
         "kind": "batch-td",
