@@ -8,6 +8,12 @@ For each of its three components a Kalman filter tracks the row of the ``(3, w +
 starting from the nominal geometry. When an innovation is larger than the filter believes possible,
 its covariance is inflated: something has changed, so old experience counts less. The effect feeds
 the predictor; this is how a team learns that a wheel has failed.
+
+Wheels that pull against each other skid, and a twist is then not linear in their speeds. The
+filter takes what is left over for a change and goes after it, surer of it than it should be. So it
+keeps count of how large its innovations have been, in units of what it expected: its own
+covariance, which decides how fast it learns, stays as it is; the deviations that it reports are
+multiplied by that ratio (Birge 1932).
 """
 
 from __future__ import annotations
@@ -18,6 +24,9 @@ import numpy as np
 
 from .arrays import FloatArray
 from .config import SelfModelSettings
+
+MEMORY = 100
+"""Decisions over which the size of innovations is averaged."""
 
 
 class SelfModel:
@@ -52,6 +61,8 @@ class SelfModel:
         )
         self._prior = tuple(self._spread(effect.shape[1]) for effect in nominal)
         self._covariances = tuple(np.stack([prior] * 3) for prior in self._prior)
+        # Mean squared innovation of each component in units of the expected square.
+        self._ratios = tuple(np.ones(3) for _ in nominal)
 
     def _spread(self, size: int) -> FloatArray:
         spread = np.full(size, self.settings.prior_effect**2)
@@ -60,10 +71,17 @@ class SelfModel:
 
     @property
     def deviations(self) -> tuple[FloatArray, ...]:
-        """Per robot the ``(3, w + 1)`` standard deviations that its filters give its effect."""
+        """Per robot the ``(3, w + 1)`` standard deviations of its effect.
+
+        Those of its filters, times how much larger their innovations are than they expect.
+        """
         return tuple(
-            unit[:, None] * np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
-            for unit, covariances in zip(self._units, self._covariances, strict=True)
+            unit[:, None]
+            * np.sqrt(np.maximum(1.0, ratios))[:, None]
+            * np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
+            for unit, ratios, covariances in zip(
+                self._units, self._ratios, self._covariances, strict=True
+            )
         )
 
     def observe(self, robot: int, speeds: FloatArray, twist: FloatArray) -> None:
@@ -71,10 +89,12 @@ class SelfModel:
         noise = self.settings.noise**2
         regressor = np.append(speeds, 1.0)
         effect, covariances = self.effects[robot], self._covariances[robot]
+        ratios = self._ratios[robot]
         for row, unit in enumerate(self._units[robot]):
             innovation = float(twist[row] - effect[row] @ regressor) / unit
             carried = covariances[row] @ regressor
             expected = float(regressor @ carried) + noise
+            ratios[row] += (innovation**2 / expected - ratios[row]) / MEMORY
             if innovation**2 > self.settings.surprise * expected:
                 covariances[row] += self.settings.inflation * self._prior[robot]
                 carried = covariances[row] @ regressor
@@ -84,13 +104,19 @@ class SelfModel:
             covariances[row] -= np.outer(gain, carried)
 
     def arrays(self) -> dict[str, FloatArray]:
-        """Return effects and covariances by robot."""
-        named: dict[str, FloatArray] = {}
-        for r, (effect, covariance) in enumerate(zip(self.effects, self._covariances, strict=True)):
-            named[f"effect{r}"], named[f"covariance{r}"] = effect, covariance
-        return named
+        """Return effects, covariances and ratios of innovations by robot."""
+        return {
+            f"{name}{r}": array
+            for name, arrays in self._remembered.items()
+            for r, array in enumerate(arrays)
+        }
 
     def restore(self, arrays: Mapping[str, FloatArray]) -> None:
         """Continue from `arrays`."""
-        for r, (effect, covariance) in enumerate(zip(self.effects, self._covariances, strict=True)):
-            effect[:], covariance[:] = arrays[f"effect{r}"], arrays[f"covariance{r}"]
+        for name, own in self._remembered.items():
+            for r, array in enumerate(own):
+                array[:] = arrays[f"{name}{r}"]
+
+    @property
+    def _remembered(self) -> dict[str, tuple[FloatArray, ...]]:
+        return {"effect": self.effects, "covariance": self._covariances, "ratio": self._ratios}

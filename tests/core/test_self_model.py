@@ -60,6 +60,7 @@ def test_it_continues_from_what_was_saved() -> None:
     for one in (model, other):
         taught(one, NOMINAL, 5)
     np.testing.assert_array_equal(model.effects[0], other.effects[0])
+    np.testing.assert_array_equal(model.deviations[0], other.deviations[0])
 
 
 def test_its_deviations_shrink_to_what_is_known() -> None:
@@ -72,3 +73,24 @@ def test_its_deviations_shrink_to_what_is_known() -> None:
     # Of a wheel that has not moved nothing new is known.
     variance = 0.09 - (0.09 * 0.1) ** 2 / (0.09 * 0.01 + 9e-6 + 1.6e-5)
     np.testing.assert_allclose(model.deviations[0][0, :2], [variance**0.5, 0.3], rtol=1e-12)
+
+
+def test_innovations_larger_than_expected_are_owned_up_to() -> None:
+    # Skidding: the twist is off by fifteen times the noise that the filter reckons with.
+    covered = {}
+    for surprise in (False, True):
+        model, rng, inside = SelfModel(SETTINGS, [NOMINAL]), np.random.default_rng(1), []
+        for step in range(600):
+            speeds = rng.choice([-0.13, -0.065, 0.0, 0.065, 0.13], size=2)
+            skid = 0.06 * rng.normal(size=3) * [1.0, 1.0, 20.0]
+            model.observe(0, speeds, NOMINAL @ np.append(speeds, 1.0) + skid)
+            if step >= 100:
+                deviations = model.deviations[0]
+                if not surprise:
+                    ratios = np.sqrt(np.maximum(1.0, model.arrays()["ratio0"]))
+                    deviations = deviations / ratios[:, None]
+                off = np.abs(model.effects[0] - NOMINAL)[:, :2]
+                inside.append((off < 2.0 * deviations[:, :2]).mean())
+        covered[surprise] = np.mean(inside)
+    assert covered[False] < 0.6
+    assert covered[True] > 0.9
