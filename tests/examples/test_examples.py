@@ -34,6 +34,14 @@ def test_the_documented_prediction_errors_are_those_of_the_example() -> None:
     assert f"| square | {count} | {row}|" in documented
 
 
+def test_calibrated_constants_foresee_as_well_as_the_right_ones() -> None:
+    example = runpy.run_path(str(EXAMPLES / "calibration.py"), run_name="example")
+    found, errors = example["calibrated"]("e-puck", "too soft", 3)
+    believed, calibrated, right = errors[20:].mean(axis=0)
+    assert calibrated < 1.2 * right < 0.3 * believed
+    assert abs(found[-1] - 1.0).max() < 0.3
+
+
 def test_the_documented_free_motion_is_that_of_the_example(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

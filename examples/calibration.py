@@ -1,0 +1,81 @@
+"""
+What calibration finds out
+==========================
+
+Teams of the default learner begin with constants of the push that are wrong by a factor of 2 each,
+and calibrate them. Told are the constants over the right ones after so many decisions that pushed,
+and how far the box was from where it was foreseen to be: by what was believed at first, by the
+constants calibrated until then, and by the simulator's own.
+"""
+
+import sys
+from typing import Any
+
+import numpy as np
+
+from nested_agents.core.config import BatchTDSettings, CalibrationSettings, SelfModelSettings
+from nested_agents.core.loop import policy_seed, world_seed
+from nested_agents.core.team import Team
+from nested_agents.scenarios import BoxPushing, ScenarioSettings
+from nested_agents.topologies import build, parse
+
+BELIEFS = {
+    "right": {"stiffness": 1.0, "load": 1.0, "contact_friction": 1.0},
+    "too soft": {"stiffness": 0.5, "load": 2.0, "contact_friction": 0.5},
+    "too stiff": {"stiffness": 2.0, "load": 0.5, "contact_friction": 2.0},
+}
+SEED, STEPS = 10000, 200
+AFTER = (20, 40, 80, 160)
+
+
+def calibrated(robot: str, believed: str, episodes: int) -> tuple[Any, Any]:
+    """Return the constants over the right ones after every push, and errors of the box [mm].
+
+    Errors are those of what was believed, of what was calibrated, and of the right constants.
+    """
+    belief = BELIEFS[believed]
+    scenario = BoxPushing(ScenarioSettings.model_validate({"robot": robot, "belief": belief}))
+    settings = BatchTDSettings(
+        calibration=CalibrationSettings(enabled=True),
+        self_model=SelfModelSettings(enabled=robot != "e-puck"),
+    )
+    hierarchy = build(parse("chain"), scenario.agents, scenario.groups)
+    team = Team.build(settings, scenario, hierarchy, policy_seed(SEED))
+    assert team.calibration is not None
+    slip = belief["load"] / belief["stiffness"]
+    right = -np.log([slip, slip, belief["contact_friction"]])
+    found, errors = [], []
+    for episode in range(episodes):
+        scenario.reset(world_seed(SEED, episode), episode)
+        team.begin_episode()
+        prediction = team.predict(scenario)
+        for step in range(STEPS):
+            joint = team.act(prediction)
+            tried = np.array([np.zeros(3), team.calibration.constants, right])
+            foreseen = prediction.outcomes(joint, tried)  # type: ignore[attr-defined]
+            transition = scenario.step(joint)
+            team.adapt(prediction, joint, transition)
+            if transition.pushed is not None and np.hypot(*transition.pushed[:2]) > 0.002:
+                off = np.hypot(*(foreseen[:, 0] - transition.pushed)[:, :2].T)
+                errors.append(1000 * off * scenario.settings.hold * 0.064)
+                found.append(np.exp(team.calibration.constants - right))
+            prediction = team.predict(scenario)
+            team.learn(transition, prediction)
+            if transition.terminated or transition.truncated or step == STEPS - 1:
+                break
+        team.end_episode()
+    return np.array(found), np.array(errors)
+
+
+if __name__ == "__main__":
+    print("| robot, believed | " + " | ".join(f"after {k}" for k in AFTER), end=" ")
+    print("| after all | pushes | believed [mm] | calibrated [mm] | right [mm] |")
+    print("|---" * (len(AFTER) + 6) + "|")
+    for robot, episodes in (("e-puck", 6), ("four-wheel", 4)):
+        for believed in BELIEFS:
+            found, errors = calibrated(robot, believed, episodes)
+            told = [found[min(k, len(found)) - 1] for k in (*AFTER, len(found))]
+            cells = [", ".join(f"{factor:.2f}" for factor in factors) for factors in told]
+            means = " | ".join(f"{mean:.1f}" for mean in errors.mean(axis=0))
+            print(f"| {robot}, {believed} | {' | '.join(cells)} | {len(found)} | {means} |")
+            sys.stdout.flush()
