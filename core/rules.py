@@ -75,15 +75,20 @@ class RuleBase:
         )
         self.n_rules = sum(self.sizes)
         self.layout = kernels.layout(self.partitions, self.terms, n_own)
-        self.n_rows = int(self.layout.row_sizes.sum())
+        lay = kernels.unpack.py_func(self.layout)
+        self.n_rows = int(lay.row_sizes.sum())
         self.dtype = np.dtype(dtype)
         self.compact = self.partitions[0].membership == "triangular"
-        # Looking up 2 ** order corners is cheaper than contracting theta, unless the order is high
-        # and most variables are own ones, which are contracted once for many joint actions.
-        self._looks_up = self.compact and all(
-            len(term) <= 3 or 2 ** len(term) <= size
-            for term, size in zip(self.terms, self.layout.shared_sizes, strict=True)
-        )
+        self._enumerate = kernels.enumerate_dense
+        if self.compact:
+            # Looking up 2 ** order corners is cheaper than contracting theta, unless the order is
+            # high and most variables are own ones, contracted once for many joint actions.
+            looks_up = all(
+                len(term) <= 3 or 2 ** len(term) <= size
+                for term, size in zip(self.terms, lay.shared_sizes, strict=True)
+            )
+            kind = kernels.enumerate_looked_up if looks_up else kernels.enumerate_contracted
+            self._enumerate = kind
 
     @classmethod
     def build(cls, space: StateSpace, settings: RuleBaseSettings) -> RuleBase:
@@ -162,33 +167,41 @@ class RuleBase:
         strengths = self.features(states)
         return np.broadcast_to(np.arange(self.n_rules), strengths.shape), strengths
 
-    def shared_strengths(self, shared: FloatArray) -> FloatArray:
-        """Return what `block_values` can be given of shared blocks ``(R, d - n_own)``."""
-        if self._looks_up:
-            return np.zeros((0, 0, 0))
-        return kernels.shared_strengths(np.ascontiguousarray(shared, dtype=float), self.layout)
-
-    def block_values(
-        self,
-        theta: FloatArray,
-        blocks: Blocks,
-        codes: IntArray,
-        strengths: FloatArray | None = None,
-    ) -> FloatArray:
+    def block_values(self, theta: FloatArray, blocks: Blocks, codes: IntArray) -> FloatArray:
         """Return f ``(len(codes),)`` of the next states that joint-action `codes` lead to.
 
         The own part of theta is contracted once per distinct own block, or the few active rules
-        are looked up; the feature vector of a joint action is never built. Who values for several
-        agents with one shared block may hand in its `shared_strengths`.
+        are looked up; the feature vector of a joint action is never built.
         """
-        if self._looks_up:
-            return kernels.block_values_compact(
-                theta, blocks.own, blocks.own_rows, blocks.shared, blocks.shared_rows,
-                blocks.divisor, codes, self.layout,
-            )  # fmt: skip
-        if strengths is None:
-            strengths = self.shared_strengths(blocks.shared)
-        return kernels.block_values_dense(
-            theta, blocks.own, blocks.own_rows, strengths, blocks.shared_rows, blocks.divisor,
-            codes, self.layout,
+        none = np.zeros(0, dtype=np.int64)
+        tried = kernels.Tried(np.ascontiguousarray(codes)[:, None], none, none)
+        return self.enumerate(theta, blocks, tried, none, np.zeros((0, 0)))
+
+    def enumerate(
+        self,
+        theta: FloatArray,
+        blocks: Blocks,
+        tried: kernels.Tried,
+        joint_action: IntArray,
+        chances: FloatArray,
+    ) -> FloatArray:
+        """Return the value ``(A,)`` of each own action over the joint actions `tried`.
+
+        Parameters
+        ----------
+        theta
+            ``(n_rules,)`` consequent weights.
+        blocks
+            Where joint actions lead.
+        tried
+            Which ones.
+        joint_action
+            ``(n,)`` actions of the agents that are given.
+        chances
+            ``(n, A)`` probabilities of the actions of the agents below, to average over; with
+            ``(0, 0)`` the maximum is taken.
+        """
+        return self._enumerate(
+            theta, blocks.own, blocks.own_rows, blocks.shared, blocks.shared_rows, blocks.divisor,
+            tried, joint_action, chances, self.layout,
         )  # fmt: skip

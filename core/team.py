@@ -76,7 +76,12 @@ class Team:
         # How often each agent was seen to take each action; one of each to begin with.
         self._seen: FloatArray = np.ones((len(hierarchy), len(action_set)))
         self._greedy: Explorer = Greedy()
-        self._above = [np.array(hierarchy.above(i), dtype=np.int64) for i in range(len(hierarchy))]
+        # Agents in the order of decision, each with those before it that it does not see.
+        order = hierarchy.order
+        self._order = [
+            (i, np.array(sorted({*order[:k]} - {*hierarchy.above(i)}), dtype=np.int64))
+            for k, i in enumerate(order)
+        ]
 
     @classmethod
     def build(
@@ -154,9 +159,11 @@ class Team:
         explorer = self.explorer if explore else self._greedy
         frequencies = self._seen / self._seen.sum(axis=1, keepdims=True)
         joint = np.full(n, self.action_set.neutral)
-        for i in self.hierarchy.order:
-            known = np.full(n, self.action_set.neutral)
-            known[self._above[i]] = joint[self._above[i]]
+        for i, unseen in self._order:
+            known = joint
+            if len(unseen):  # decided, but not above: taken to maintain
+                known = joint.copy()
+                known[unseen] = self.action_set.neutral
             values = self.evaluator.values(
                 i, known, self.learner.theta[i], prediction, frequencies, self.rng
             )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import FloatArray, IntArray
+from ..kernels import Tried
 from ..protocols import Prediction
 from .evaluator import Gathering, combinations, weights_of
 
@@ -34,22 +35,20 @@ class ExactEnumeration(Gathering):
                     f"decision.evaluator: agent {name!r} would try {a} ** {free} joint actions, "
                     f"exact enumeration allows {MOST_JOINT_ACTIONS}; use sampling"
                 )
-        self._prediction: Prediction | None = None
-        self._strengths: dict[int, tuple[FloatArray, FloatArray]] = {}
-        self._tried = [combinations(self.hierarchy.below(i), a) for i in range(n)]
+        self._below = [combinations(self.hierarchy.below(i), a) for i in range(n)]
         self._tabulated = self.hierarchy.joint_actions(a) >= a**n
-        if not self._tabulated:
-            return
-        self._places = a ** np.arange(n - 1, -1, -1, dtype=np.int64)
-        self._fixed_places = np.tile(self._places, (n, 1))  # of the actions that are given
-        for i in range(n):
-            self._fixed_places[i, [i, *self.hierarchy.below(i)]] = 0
-        # Code offsets (A, A ** k): own action by joint action of the agents below.
-        self._offsets = [
-            np.arange(a)[:, None] * self._places[i]
-            + (self._tried[i] @ self._places[list(self.hierarchy.below(i))])[None, :]
-            for i in range(n)
-        ]
+        self._chances = np.full((n, a), 1.0 / a) if self.others == "mean" else np.zeros((0, 0))
+        if self._tabulated:
+            places = a ** np.arange(n - 1, -1, -1, dtype=np.int64)
+            self._tried = [self._tried_by(i, places) for i in range(n)]
+
+    def _tried_by(self, agent: int, places: IntArray) -> Tried:
+        below = np.array(self.hierarchy.below(agent), dtype=np.int64)
+        codes = np.arange(self.n_actions)[:, None] * places[agent]
+        codes = codes + (self._below[agent] @ places[below])[None, :]
+        given = places.copy()
+        given[agent] = given[below] = 0
+        return Tried(codes, given, below)
 
     def values(
         self,
@@ -61,36 +60,31 @@ class ExactEnumeration(Gathering):
         rng: np.random.Generator,
     ) -> FloatArray:
         """Return the value ``(A,)`` of each action of `agent`, see `Evaluator.values`."""
-        below, tried = self.hierarchy.below(agent), self._tried[agent]
+        if self._tabulated and self.rule == "value":
+            tried = self._tried[agent]
+            self.count(tried.codes.size)
+            return self.rules.enumerate(
+                theta, prediction.blocks(agent), tried, joint_action,
+                frequencies if self.others == "observed" else self._chances,
+            )  # fmt: skip
+        below, combined = self.hierarchy.below(agent), self._below[agent]
         if self.indifferent(theta):
-            self.count(self.n_actions * len(tried))
+            self.count(self.n_actions * len(combined))
             return np.zeros(self.n_actions)
         weights = weights_of(frequencies, below) if self.others == "observed" else None
         if self._tabulated:
             table = self._by_codes(agent, joint_action, theta, prediction)
         else:
-            table = self.by_states(agent, joint_action, tried, theta, prediction)
+            table = self.by_states(agent, joint_action, combined, theta, prediction)
         return self.gather(table, weights)
 
     def _by_codes(
         self, agent: int, joint_action: IntArray, theta: FloatArray, prediction: Prediction
     ) -> FloatArray:
-        codes = (self._offsets[agent] + int(joint_action @ self._fixed_places[agent])).ravel()
+        tried = self._tried[agent]
+        codes = (tried.codes + int(joint_action @ tried.places)).ravel()
         self.count(len(codes))
-        rewards = values = None
-        if self.rule != "value":
-            rewards = prediction.reward_table()[codes]
+        rewards, values = prediction.reward_table()[codes], None
         if self.rule != "reward":
-            blocks = prediction.blocks(agent)
-            strengths = self._strengths_of(prediction, blocks.shared)
-            values = self.rules.block_values(theta, blocks, codes, strengths)
+            values = self.rules.block_values(theta, prediction.blocks(agent), codes)
         return self.combine(rewards, values).reshape(self.n_actions, -1)
-
-    def _strengths_of(self, prediction: Prediction, shared: FloatArray) -> FloatArray:
-        """Return the strengths of a shared block, found once for all agents that have it."""
-        if prediction is not self._prediction:
-            self._prediction = prediction
-            self._strengths.clear()
-        if id(shared) not in self._strengths:
-            self._strengths[id(shared)] = shared, self.rules.shared_strengths(shared)
-        return self._strengths[id(shared)][1]

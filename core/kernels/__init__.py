@@ -8,27 +8,31 @@ The dense kernels leave out rows of rules whose firing strength is below `NEGLIG
 strengths sum to one, so that a value changes by less than 1e-12 of the largest weight.
 """
 
-from .compact import active_compact, block_values_compact, each_compact, values_compact
-from .dense import block_values_dense, each_dense, shared_strengths, values_dense
-from .layout import Layout, layout
+from .compact import active_compact, each_compact, values_compact
+from .dense import each_dense, values_dense
+from .enumeration import Tried, enumerate_contracted, enumerate_dense, enumerate_looked_up
+from .layout import Layout, Packed, layout, unpack
 from .strengths import NEGLIGIBLE, exponential, many_strengths, strengths_of
 from .updates import add_features, td_update
 
 __all__ = [
     "NEGLIGIBLE",
     "Layout",
+    "Packed",
+    "Tried",
     "active_compact",
     "add_features",
-    "block_values_compact",
-    "block_values_dense",
     "each_compact",
     "each_dense",
+    "enumerate_contracted",
+    "enumerate_dense",
+    "enumerate_looked_up",
     "exponential",
     "layout",
     "many_strengths",
-    "shared_strengths",
     "strengths_of",
     "td_update",
+    "unpack",
     "values_compact",
     "values_dense",
 ]

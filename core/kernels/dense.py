@@ -7,7 +7,8 @@ from numba import njit
 
 from ..arrays import FloatArray, IntArray
 from .contraction import LANES, contract, fold, total_width
-from .layout import Layout
+from .layout import Layout, Packed, unpack
+from .pairs import pairs
 from .strengths import many_strengths
 
 CHUNK = 64
@@ -17,7 +18,7 @@ ROWS = 256
 
 
 @njit(cache=True)
-def shared_strengths(shared: FloatArray, lay: Layout) -> FloatArray:
+def _shared_strengths(shared, lay: Layout):  # type: ignore[no-untyped-def]
     """Return the strengths ``(d - n_own, most memberships, R)`` of shared blocks."""
     out = np.zeros((shared.shape[1], lay.counts.max(), len(shared)))
     for j in range(shared.shape[1]):
@@ -45,8 +46,9 @@ def _fill(strengths, row, lane, lay: Layout, room) -> None:  # type: ignore[no-u
 
 
 @njit(cache=True)
-def values_dense(theta: FloatArray, states: FloatArray, lay: Layout) -> FloatArray:
+def values_dense(theta: FloatArray, states: FloatArray, packed: Packed) -> FloatArray:
     """Return f ``(m,)`` of states ``(m, d)``, all membership functions active."""
+    lay = unpack(packed)
     out = np.empty(len(states))
     room, one, two, found = _scratch(theta, lay)
     which = np.empty(CHUNK, np.int64)
@@ -68,7 +70,7 @@ def values_dense(theta: FloatArray, states: FloatArray, lay: Layout) -> FloatArr
                 own[count] = chunk[s, : lay.n_own]
                 count += 1
         contract(theta, own[:count], lay, partial[:count])
-        strengths = shared_strengths(chunk[:, lay.n_own :], lay)
+        strengths = _shared_strengths(chunk[:, lay.n_own :], lay)
         for b in range(count):
             lane = 0
             for s in range(len(chunk)):
@@ -85,18 +87,19 @@ def values_dense(theta: FloatArray, states: FloatArray, lay: Layout) -> FloatArr
 
 
 @njit(cache=True)
-def each_dense(theta: FloatArray, states: FloatArray, lay: Layout) -> FloatArray:
+def each_dense(theta: FloatArray, states: FloatArray, packed: Packed) -> FloatArray:
     """Return f ``(n, s)`` of states ``(n, s, d)``, each by its own row of theta ``(n, n_rules)``.
 
     Theta is read once, whatever s.
     """
+    lay = unpack(packed)
     n, s, _ = states.shape
     out = np.empty((n, s))
     room, one, two, found = _scratch(theta, lay)
     partial = np.empty((s, total_width(lay)), theta.dtype)
     for i in range(n):
         contract(theta[i], states[i, :, : lay.n_own], lay, partial)
-        strengths = shared_strengths(states[i, :, lay.n_own :], lay)
+        strengths = _shared_strengths(states[i, :, lay.n_own :], lay)
         for k in range(s):
             _fill(strengths, k, 0, lay, room)
             fold(partial[k], room, lay, one, two, found, 1)
@@ -105,48 +108,42 @@ def each_dense(theta: FloatArray, states: FloatArray, lay: Layout) -> FloatArray
 
 
 @njit(cache=True)
-def block_values_dense(  # type: ignore[no-untyped-def]
-    theta, own, own_rows, strengths, shared_rows, divisor: int, codes: IntArray, lay: Layout
+def folded(  # type: ignore[no-untyped-def]
+    theta, own, own_rows, shared, shared_rows, divisor: int, codes: IntArray, lay: Layout
 ) -> FloatArray:
     """Return f of joint-action codes from block tables, all membership functions active.
 
     Contracts theta with each own block that occurs, once; each distinct pair of own and shared
-    block is then folded, once, whatever the number of codes that lead to it. `strengths` are the
-    shared blocks', by `shared_strengths`.
+    block is then folded, once, whatever the number of codes that lead to it.
     """
-    n_local = len(own_rows) if len(own_rows) else len(own)
-    slots = np.full(len(own), -1)
-    used = np.empty_like(own)
-    count = 0
-    slot_of, row_of = np.empty(len(codes), np.int32), np.empty(len(codes), np.int32)
-    n_rows = strengths.shape[2]
-    wanted = np.zeros((len(own), n_rows), np.bool_)
-    for c in range(len(codes)):
-        local = codes[c] // divisor % n_local
-        at = own_rows[local] if len(own_rows) else local
-        if slots[at] < 0:
-            slots[at] = count
-            used[count] = own[at]
-            count += 1
-        slot_of[c] = slots[at]
-        row_of[c] = shared_rows[codes[c]] if len(shared_rows) else codes[c]
-        wanted[slot_of[c], row_of[c]] = True
+    used, slot_of, row_of, wanted = pairs(own, own_rows, shared, shared_rows, divisor, codes)
+    count, n_rows = wanted.shape
+    blocks = np.empty((count, own.shape[1]))
+    for b in range(count):
+        blocks[b] = own[used[b]]
     partial = np.empty((count, total_width(lay)), theta.dtype)
-    contract(theta, used[:count], lay, partial)
+    contract(theta, blocks, lay, partial)
+    met = np.empty(n_rows, np.int64)  # rows of shared blocks that occur
+    n_met = 0
+    for row in range(n_rows):
+        if wanted[:, row].any():
+            met[n_met] = row
+            n_met += 1
+    strengths = _shared_strengths(shared[met[:n_met]], lay)
     room, one, two, found = _scratch(theta, lay)
     rows = np.empty(LANES, np.int64)
     values = np.empty((count, n_rows))
-    for slot in range(count):
+    for b in range(count):
         lane = 0
-        for row in range(n_rows):
-            if wanted[slot, row]:
-                rows[lane] = row
-                _fill(strengths, row, lane, lay, room)
+        for k in range(n_met):
+            if wanted[b, met[k]]:
+                rows[lane] = met[k]
+                _fill(strengths, k, lane, lay, room)
                 lane += 1
-            if lane and (lane == LANES or row == n_rows - 1):
-                fold(partial[slot], room, lay, one, two, found, lane)
-                for k in range(lane):
-                    values[slot, rows[k]] = found[k]
+            if lane and (lane == LANES or k == n_met - 1):
+                fold(partial[b], room, lay, one, two, found, lane)
+                for i in range(lane):
+                    values[b, rows[i]] = found[i]
                 lane = 0
     out = np.empty(len(codes))
     for c in range(len(codes)):

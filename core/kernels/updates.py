@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from ..arrays import FloatArray
-from .layout import Layout
+from .layout import Packed, unpack
 from .strengths import negligible, product_of, strengths_of
 
 
@@ -21,7 +21,7 @@ def _advance(theta, trace, tail, weight, decay, step) -> None:  # type: ignore[n
 
 @njit(cache=True)
 def td_update(  # type: ignore[no-untyped-def]
-    theta, trace, reach, states: FloatArray, steps: FloatArray, decay: float, lay: Layout
+    theta, trace, reach, states: FloatArray, steps: FloatArray, decay: float, packed: Packed
 ) -> None:
     """Decay the traces, add phi of the states, and move theta along them, in one pass (Eq. 12, 13).
 
@@ -40,6 +40,7 @@ def td_update(  # type: ignore[no-untyped-def]
     decay
         Discount times trace decay.
     """
+    lay = unpack(packed)
     strengths = np.empty((len(lay.counts), lay.counts.max()))
     heads = np.empty(lay.row_sizes.max())
     tail = np.empty(((lay.offsets[1:] - lay.offsets[:-1]) // lay.row_sizes).max(), theta.dtype)
@@ -70,9 +71,10 @@ def td_update(  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def add_features(  # type: ignore[no-untyped-def]
-    target, states: FloatArray, weights: FloatArray, lay: Layout
+    target, states: FloatArray, weights: FloatArray, packed: Packed
 ) -> None:
     """Add ``weights[i] * phi(states[i])`` to row i of ``target (n, n_rules)``, in place."""
+    lay = unpack(packed)
     strengths = np.empty((len(lay.counts), lay.counts.max()))
     own = np.empty(lay.own_sizes.max())
     shared = np.empty(lay.shared_sizes.max())

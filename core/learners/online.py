@@ -67,7 +67,10 @@ class Online(ABC):
 
     def _errors(self, states: FloatArray, reward: float, entered: FloatArray | None) -> FloatArray:
         """Return the TD errors ``(n,)`` (Eq. 7)."""
-        met = states[:, None] if entered is None else np.stack([states, entered], axis=1)
+        met = states[:, None]
+        if entered is not None:
+            met = np.empty((len(states), 2, states.shape[1]))
+            met[:, 0], met[:, 1] = states, entered
         values = self.rules.each(self.weights, met)
         ahead = 0.0 if entered is None else self.discount * values[:, 1]
         errors: FloatArray = reward + ahead - values[:, 0]

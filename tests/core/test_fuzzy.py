@@ -27,7 +27,7 @@ def partitions(draw: st.DrawFn, flattest: float = 1.0) -> Partition:
 
 
 def by_kernel(partition: Partition, x: np.ndarray) -> np.ndarray:
-    lay = kernels.layout([partition], [(0,)], 0)
+    lay = kernels.unpack(kernels.layout([partition], [(0,)], 0))
     out = np.empty((len(x), partition.size))
     for row, value in zip(out, x, strict=True):
         kernels.strengths_of(0, value, lay, row)

@@ -86,12 +86,43 @@ def test_block_values(base: RuleBase, rng: np.random.Generator) -> None:
     codes = rng.integers(N_ACTIONS**N_AGENTS, size=90)
     expected = twins.block_values(base, theta, blocks, codes)
     assert base.block_values(theta, blocks, codes) == pytest.approx(expected, rel=0, abs=1e-12)
-    strengths = kernels.shared_strengths(blocks.shared, base.layout)
-    dense = kernels.block_values_dense(
-        theta, blocks.own, blocks.own_rows, strengths, blocks.shared_rows, blocks.divisor,
-        codes, base.layout,
-    )  # fmt: skip
-    assert dense == pytest.approx(expected, rel=0, abs=1e-12)
+    # Whatever the shape, the other kernels agree.
+    none = np.zeros(0, dtype=np.int64)
+    tried = kernels.Tried(codes[:, None], none, none)
+    kinds = [kernels.enumerate_dense]
+    if base.compact:
+        kinds += [kernels.enumerate_looked_up, kernels.enumerate_contracted]
+    for kind in kinds:
+        found = kind(
+            theta, blocks.own, blocks.own_rows, blocks.shared, blocks.shared_rows, blocks.divisor,
+            tried, none, np.zeros((0, 0)), base.layout,
+        )  # fmt: skip
+        assert found == pytest.approx(expected, rel=0, abs=1e-12)
+
+
+@pytest.mark.parametrize("averaged", [False, True])
+@pytest.mark.parametrize("agent", [0, 1, 3])
+def test_enumerate(base: RuleBase, rng: np.random.Generator, agent: int, averaged: bool) -> None:
+    theta, blocks = rng.normal(size=base.n_rules), blocks_of(rng, base.n_own)
+    joint, chances = rng.integers(N_ACTIONS, size=N_AGENTS), rng.random((N_AGENTS, N_ACTIONS))
+    below = np.arange(agent + 1, N_AGENTS)
+    grid = np.indices((N_ACTIONS,) * (1 + len(below))).reshape(1 + len(below), -1)
+    every = np.tile(joint[:, None], grid.shape[1])
+    every[agent:] = grid
+    places = N_ACTIONS ** np.arange(N_AGENTS - 1, -1, -1)
+    values = twins.block_values(base, theta, blocks, places @ every).reshape(N_ACTIONS, -1)
+    given = np.where(np.arange(N_AGENTS) < agent, places, 0)
+    codes = (places[agent:] @ grid).reshape(N_ACTIONS, -1)
+    tried = kernels.Tried(codes, given, below)
+    expected = values.max(axis=1)
+    if averaged:
+        weights = np.ones(1)
+        for one in below:
+            weights = np.multiply.outer(weights, chances[one]).ravel()
+        expected = values @ (weights / weights.sum())
+    found = base.enumerate(theta, blocks, tried, joint, chances if averaged else np.zeros((0, 0)))
+    assert found == pytest.approx(expected, rel=0, abs=1e-12)
+    assert not base.enumerate(0.0 * theta, blocks, tried, joint, np.zeros((0, 0))).any()
 
 
 def test_td_update(base: RuleBase, rng: np.random.Generator) -> None:
@@ -107,7 +138,7 @@ def test_td_update(base: RuleBase, rng: np.random.Generator) -> None:
 
 
 def test_strengths_of_many(base: RuleBase, rng: np.random.Generator) -> None:
-    lay = base.layout
+    lay = kernels.unpack(base.layout)
     states = states_of(rng, 300)
     states[-3:] = [[-90.0] * 4, [90.0] * 4, [1e6] * 4]
     for j, partition in enumerate(base.partitions):
