@@ -26,7 +26,8 @@ from .predictors import ExactPrediction, Future, push_model
 from .reward import reward
 from .robots import nominal_effect, robot_for
 from .starts import place
-from .state_spaces import View, state_space_for
+from .state_spaces import state_space_for
+from .view import View
 from .world import CONTROL_PERIOD, World, WorldState
 
 SENSING = 2**32 - 1
@@ -112,7 +113,8 @@ class BoxPushing:
             elif variable.unit == "m/s":
                 limits.append((-self.robot.max_speed, self.robot.max_speed))
             else:
-                limits.append((-depth if variable.name.endswith("gap") else 0.0, np.inf))
+                low = -depth if variable.name.endswith("gap") else 0.0
+                limits.append((-np.inf if variable.low < 0.0 else low, np.inf))
         return np.array(limits)
 
     def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
@@ -135,7 +137,7 @@ class BoxPushing:
             self._failures.begin(seed, episode)
             self.world.set_grip(self._failures.grip)
         self._save()
-        return self._observe()
+        return self._observe(self._distance())
 
     def step(self, joint_action: IntArray) -> Transition:
         """Command the wheels, let the world go on for one decision period, observe and reward."""
@@ -146,7 +148,7 @@ class BoxPushing:
         begin = perf_counter()
         self._advance(self._speeds)
         moved = perf_counter()
-        states = self._observe()
+        states = self._observe(before)
         period = self.settings.hold * CONTROL_PERIOD
         motions = mean_twists(poses, self.world.robot_poses, period)
         pushed = None
@@ -269,10 +271,14 @@ class BoxPushing:
         self._advance(np.zeros(len(self.agents)))
         return self._reached()
 
-    def _observe(self) -> FloatArray:
-        """Return the states ``(n, d)`` of all agents: the error observation layer."""
+    def _observe(self, before: float) -> FloatArray:
+        """Return the states ``(n, d)`` of all agents: the error observation layer.
+
+        `before` is the distance of the box from the goal one decision period ago [m].
+        """
         poses = self.world.robot_poses
-        view = View(poses[None], self.world.box_pose[None], self.world.gaps[None], self._goal)
+        world = self.world
+        view = View(poses[None], world.box_pose[None], world.gaps[None], self._goal, before, 1.0)
         rows = []
         for r, group in enumerate(self.groups):
             shared = self._space.shared(view, r)[0]

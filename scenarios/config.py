@@ -238,8 +238,9 @@ class ScenarioSettings(Settings):
     """Start distribution."""
     failures: tuple[Failure, ...] = ()
     """Failures of wheels, as ``[[scenario.failures]]`` tables."""
-    state_space: Literal["paper", "relational"] = "relational"
-    """Eq. 1, or the relational variables."""
+    state_space: Literal["paper", "relational", "pose"] | tuple[str, ...] = "relational"
+    """Eq. 1, the relational variables, those and the orientation of the box, or relational
+    variables by name, see `nested_agents.scenarios.relational`."""
     predictor: Literal["push", "rigid", "static", "exact"] = "push"
     """What predictions take the world for, see `nested_agents.scenarios.predictors`."""
     belief: BeliefSettings = BeliefSettings()

@@ -22,8 +22,9 @@ from .drives import Drives, choices_of, drives_of, motion_table
 from .infrared import InfraredSpec, expected_reading
 from .push import PushModel, push
 from .reward import reward
-from .state_spaces import BoxStateSpace, View, wrap
+from .state_spaces import BoxStateSpace
 from .superposition import PushSuperposition
+from .view import View, wrap
 
 
 @dataclass(frozen=True)
@@ -95,7 +96,13 @@ class BoxPrediction:
             seconds,
             self.model,
         )
-        return View(robots, box, gaps, self.situation.goal)
+        return self.seen(robots, box, gaps, seconds)
+
+    def seen(self, robots: FloatArray, box: FloatArray, gaps: FloatArray, seconds: float) -> View:
+        """Return a view of situations that the present leads to in `seconds`."""
+        goal, now = self.situation.goal, self.situation.box
+        before = float(np.hypot(goal[0] - now[0], goal[1] - now[1]))
+        return View(robots, box, gaps, goal, before, seconds / self.hold)
 
     def _choices(self, joint_actions: IntArray) -> IntArray:
         """Return the drive ``(m, M)`` of each robot in joint actions ``(m, n)``."""

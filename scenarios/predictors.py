@@ -27,7 +27,7 @@ from .failures import Failures
 from .prediction import BoxPrediction
 from .push import PushModel
 from .robots import RobotSpec, compliance
-from .state_spaces import View
+from .view import View
 from .world import CONTROL_PERIOD, World, WorldState
 
 IMMOBILE = 1e6
@@ -109,4 +109,4 @@ class ExactPrediction(BoxPrediction):
             poses.append(pose)
             gaps.append(gap)
         pose, gap = np.array(poses)[which], np.array(gaps)[which]
-        return View(pose[:, 1:], pose[:, 0], gap, self.situation.goal)
+        return self.seen(pose[:, 1:], pose[:, 0], gap, seconds)

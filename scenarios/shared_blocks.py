@@ -1,7 +1,7 @@
-"""Shared blocks of many predicted situations, compiled: those of `state_spaces`, only faster.
+"""Shared blocks of many predicted situations, compiled: those of `relational`, only faster.
 
 Situations stand side by side in flat scratch rows, as in `push_lanes`, and all loops over them are
-free of branches. The NumPy functions of the state spaces are the definition and the test oracle;
+free of branches. The NumPy functions of `relational` are the definition and the test oracle;
 they also serve sensing, where there is one situation only.
 """
 
@@ -12,15 +12,27 @@ from math import pi
 import numpy as np
 from numba import njit
 
-from ..core.arrays import FloatArray
+from ..core.arrays import FloatArray, IntArray
 
 LANES = 32
 """Situations side by side."""
 _EXACT = {"contract", "nsz"}
 
-# Scratch rows.
-COURSE, DISTANCE, PUSH, TURN, OTHERS, BEARING, OFF = 0, 1, 2, 3, 4, 5, 6
-_ROWS = 8
+# Columns, in the order of `relational.VARIABLES`: a row of scratch each.
+GAP, BEARING, SIDE, OTHERS, PUSH, MISS, DISTANCE, APPROACH, TURN, BEND = (
+    0,
+    1,
+    2,
+    3,
+    4,
+    5,
+    6,
+    7,
+    8,
+    9,
+)
+_COURSE, _X, _Y = 10, 11, 12
+_ROWS = 13
 
 
 @njit(cache=True, error_model="numpy", fastmath=_EXACT)
@@ -61,49 +73,60 @@ def wrapped(angle):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy", fastmath=_EXACT)
-def _to_goal(box, goal, first, count, work):  # type: ignore[no-untyped-def]
-    gx, gy = goal[0], goal[1]
-    bx, by = box[0, first : first + count], box[1, first : first + count]
-    for k in range(count):
-        dx, dy = gx - bx[k], gy - by[k]
-        work[COURSE * LANES + k] = angle_of(dx, dy)
-        work[DISTANCE * LANES + k] = np.sqrt(dx * dx + dy * dy)
-
-
-@njit(cache=True, error_model="numpy", fastmath=_EXACT)
-def _push(robots, box, goal, first, count, work):  # type: ignore[no-untyped-def]
-    """Write where the robots' middle would push the box relative to the course, and its turn."""
-    n, turned = len(robots), goal[2]
-    for k in range(count):
-        work[BEARING * LANES + k] = work[OFF * LANES + k] = 0.0
-    for r in range(n):
-        x, y = robots[r, 0, first : first + count], robots[r, 1, first : first + count]
-        for k in range(count):
-            work[BEARING * LANES + k] += x[k]
-            work[OFF * LANES + k] += y[k]
+def _of_box(box, goal, before, periods, first, count, work):  # type: ignore[no-untyped-def]
+    """Write how far the box has to go and has come, and how it is turned."""
+    gx, gy, turned = goal[0], goal[1], goal[2]
     bx, by, psi = (
         box[0, first : first + count], box[1, first : first + count], box[2, first : first + count],
     )  # fmt: skip
     for k in range(count):
-        dx, dy = bx[k] - work[BEARING * LANES + k] / n, by[k] - work[OFF * LANES + k] / n
-        work[PUSH * LANES + k] = wrapped(angle_of(dx, dy) - work[COURSE * LANES + k])
-        work[TURN * LANES + k] = wrapped(psi[k] - turned)
+        dx, dy = gx - bx[k], gy - by[k]
+        course, distance = angle_of(dx, dy), np.sqrt(dx * dx + dy * dy)
+        work[_COURSE * LANES + k] = course
+        work[DISTANCE * LANES + k] = distance
+        work[APPROACH * LANES + k] = (before - distance) / periods
+        turn = wrapped(psi[k] - turned)
+        work[TURN * LANES + k] = turn
+        work[BEND * LANES + k] = wrapped(turn - 2.0 * wrapped(course - turned))
 
 
 @njit(cache=True, error_model="numpy", fastmath=_EXACT)
-def _stand(robot, box, first, count, work):  # type: ignore[no-untyped-def]
-    """Write the bearing of the box from a robot, and where round the box it stands."""
+def _of_push(robots, box, goal, first, count, work):  # type: ignore[no-untyped-def]
+    """Write where the robots' middle would push the box, and by how much it would miss."""
+    n, gx, gy = len(robots), goal[0], goal[1]
+    for k in range(count):
+        work[_X * LANES + k] = work[_Y * LANES + k] = 0.0
+    for r in range(n):
+        x, y = robots[r, 0, first : first + count], robots[r, 1, first : first + count]
+        for k in range(count):
+            work[_X * LANES + k] += x[k]
+            work[_Y * LANES + k] += y[k]
+    bx, by = box[0, first : first + count], box[1, first : first + count]
+    for k in range(count):
+        dx, dy = bx[k] - work[_X * LANES + k] / n, by[k] - work[_Y * LANES + k] / n
+        ahead, left = gx - bx[k], gy - by[k]
+        work[PUSH * LANES + k] = wrapped(angle_of(dx, dy) - work[_COURSE * LANES + k])
+        length = np.sqrt(dx * dx + dy * dy)
+        across = (ahead * dy - left * dx) / (length if length > 0.0 else 1.0)
+        beyond = np.copysign(work[DISTANCE * LANES + k], across)
+        work[MISS * LANES + k] = across if ahead * dx + left * dy >= 0.0 else beyond
+
+
+@njit(cache=True, error_model="numpy", fastmath=_EXACT)
+def _of_robot(robot, gap, box, first, count, work):  # type: ignore[no-untyped-def]
+    """Write the gap of a robot, the bearing of the box from it, and on which side it stands."""
     x, y = robot[0, first : first + count], robot[1, first : first + count]
     bx, by = box[0, first : first + count], box[1, first : first + count]
-    psi = robot[2, first : first + count]
+    psi, apart = robot[2, first : first + count], gap[first : first + count]
     for k in range(count):
         azimuth = angle_of(bx[k] - x[k], by[k] - y[k])
+        work[GAP * LANES + k] = apart[k]
         work[BEARING * LANES + k] = wrapped(azimuth - psi[k])
-        work[OFF * LANES + k] = wrapped(azimuth - work[COURSE * LANES + k])
+        work[SIDE * LANES + k] = wrapped(azimuth - work[_COURSE * LANES + k])
 
 
 @njit(cache=True, error_model="numpy", fastmath=_EXACT)
-def _others(gaps, robot, first, count, work):  # type: ignore[no-untyped-def]
+def _of_others(gaps, robot, first, count, work):  # type: ignore[no-untyped-def]
     """Write the greatest gap of the other robots; of the robot itself if it is alone."""
     n = len(gaps)
     for k in range(count):
@@ -116,34 +139,34 @@ def _others(gaps, robot, first, count, work):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def relational(
-    robots: FloatArray, box: FloatArray, gaps: FloatArray, goal: FloatArray, wanted: FloatArray
+def relational(  # type: ignore[no-untyped-def]
+    robots, box, gaps, goal, before: float, periods: float, wanted: IntArray, columns: IntArray
 ) -> FloatArray:
-    """Return the relational shared blocks ``(robots wanted, m, 7)``.
+    """Return relational shared blocks ``(robots wanted, m, columns)``.
 
     Parameters
     ----------
     robots, box, gaps
         ``(M, 3, m)``, ``(3, m)`` and ``(M, m)``: a `View`, its situations last.
-    goal
-        ``(3,)`` pose.
+    goal, before, periods
+        Of the view.
     wanted
         Indices of robots.
+    columns
+        Indices of variables.
     """
     m = box.shape[1]
-    out, work = np.empty((len(wanted), m, 7)), np.empty(_ROWS * LANES)
+    out, work = np.empty((len(wanted), m, len(columns))), np.empty(_ROWS * LANES)
     for first in range(0, m, LANES):
         count = min(LANES, m - first)
-        _to_goal(box, goal, first, count, work)
-        _push(robots, box, goal, first, count, work)
+        _of_box(box, goal, before, periods, first, count, work)
+        _of_push(robots, box, goal, first, count, work)
         for i in range(len(wanted)):
             r = wanted[i]
-            _stand(robots[r], box, first, count, work)
-            _others(gaps, r, first, count, work)
+            _of_robot(robots[r], gaps[r], box, first, count, work)
+            _of_others(gaps, r, first, count, work)
             for k in range(count):
                 row = out[i, first + k]
-                row[0] = gaps[r, first + k]
-                row[1], row[2] = work[BEARING * LANES + k], work[OFF * LANES + k]
-                row[3], row[4] = work[OTHERS * LANES + k], work[PUSH * LANES + k]
-                row[5], row[6] = work[TURN * LANES + k], work[DISTANCE * LANES + k]
+                for c in range(len(columns)):
+                    row[c] = work[columns[c] * LANES + k]
     return out

@@ -18,7 +18,6 @@ from ..core.arrays import BoolArray, FloatArray, IntArray
 from .geometry import surface
 from .push import push
 from .push_lanes import MARGIN
-from .state_spaces import View
 
 if TYPE_CHECKING:
     from .prediction import BoxPrediction
@@ -112,7 +111,7 @@ class PushSuperposition:
         model = prediction.model
         gaps[r] = _gaps(robots[r].T, box, model.edges, model.rounding, np.full(m, model.radii[r]))
         own, which = prediction.own_block(agent)
-        view = View(robots.transpose(2, 0, 1), box, gaps.T, prediction.situation.goal)
+        view = prediction.seen(robots.transpose(2, 0, 1), box, gaps.T, prediction.seconds)
         return np.concatenate([own[which[local]], prediction.space.shared_of(view, [r])[0]], axis=1)
 
 

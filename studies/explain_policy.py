@@ -21,7 +21,7 @@ from ..scenarios.box_pushing import BoxPushing
 from ..scenarios.geometry import surface
 from ..scenarios.prediction import BoxPrediction, Situation
 from ..scenarios.starts import place
-from ..scenarios.state_spaces import wrap
+from ..scenarios.view import wrap
 
 AHEAD = 0.6
 """From the box to the goal [m]."""

@@ -22,7 +22,7 @@ from .episodes import EpisodeMeter, EpisodeRecorder, EpisodeRow, Recording, Stop
 from .spec import Spec
 from .spec_errors import SpecError
 
-RESULTS_VERSION = 2
+RESULTS_VERSION = 3
 """Raise it when the code changes so that the same trial gives other results."""
 
 EVALUATION_WORLDS = 10**6

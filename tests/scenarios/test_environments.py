@@ -43,7 +43,7 @@ def test_gymnasium_finds_nothing(settings: ScenarioSettings) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         # Robots may go as far away as they like: such bounds are the true ones.
-        warnings.filterwarnings("ignore", message=".*A Box observation space m.* infinity.*")
+        warnings.filterwarnings("ignore", message=".*A Box observation space m.*infinity.*")
         check_env(env.unwrapped)
     env.close()
 

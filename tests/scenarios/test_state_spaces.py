@@ -8,21 +8,27 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nested_agents.scenarios import BoxPushing, ScenarioSettings
+from nested_agents.scenarios.relational import VARIABLES
 from nested_agents.scenarios.shared_blocks import angle_of
-from nested_agents.scenarios.state_spaces import STATE_SPACES, View, state_space_for, wrap
+from nested_agents.scenarios.state_spaces import STATE_SPACES, relational, state_space_for
+from nested_agents.scenarios.view import View, wrap
 
 GOAL = np.array([1.0, 0.0, 0.0])
 
 
 def view(robots, box, gaps) -> View:
-    return View(np.array([robots], float), np.array([box], float), np.array([gaps], float), GOAL)
+    described = np.array([robots], float), np.array([box], float), np.array([gaps], float)
+    return View(*described, GOAL, before=1.03, periods=3.0)
+
+
+EVERY = relational("every", *VARIABLES)
 
 
 @pytest.mark.parametrize("name", STATE_SPACES)
 def test_functions_fill_the_space_they_describe(name: str) -> None:
     spec = STATE_SPACES[name]
     poses = np.random.default_rng(0).uniform(-1, 1, (5, 2, 3))
-    seen = View(poses, poses[:, 0], np.abs(poses[:, :, 0]), GOAL)
+    seen = View(poses, poses[:, 0], np.abs(poses[:, :, 0]), GOAL, 1.0, 1.0)
     assert spec.own(poses[:, 0], poses[:, 0, 0], GOAL).shape == (5, spec.space.n_own)
     assert spec.shared(seen, 1).shape == (5, spec.space.n_variables - spec.space.n_own)
 
@@ -30,20 +36,33 @@ def test_functions_fill_the_space_they_describe(name: str) -> None:
 def test_relational_variables_by_hand() -> None:
     # The box 1 m before the goal, robot 1 straight behind it, robot 2 on its left, facing it.
     situation = view([[-0.2, 0.0, 0.1], [0.0, 0.2, -pi / 2]], [0.0, 0.0, 0.3], [0.06, 0.08])
-    first = STATE_SPACES["relational"].shared(situation, 0)[0]
-    gap, bearing, side, others, push, turn, distance = first
-    assert (gap, others, distance) == (0.06, 0.08, 1.0)
-    assert bearing == pytest.approx(-0.1)
-    assert side == pytest.approx(0.0)
-    assert push == pytest.approx(-pi / 4)  # their middle is behind on the left, pushes to the right
-    assert turn == pytest.approx(0.3)
-    second = STATE_SPACES["relational"].shared(situation, 1)[0]
-    assert second[1] == pytest.approx(0.0)
-    assert second[2] == pytest.approx(-pi / 2)
+    first = dict(zip(VARIABLES, EVERY.shared(situation, 0)[0], strict=True))
+    assert (first["gap"], first["others_gap"], first["box_distance"]) == (0.06, 0.08, 1.0)
+    assert first["box_bearing"] == pytest.approx(-0.1)
+    assert first["side"] == pytest.approx(0.0)
+    # Their middle is behind on the left and pushes to the right.
+    assert first["push_bearing"] == pytest.approx(-pi / 4)
+    assert first["miss"] == pytest.approx(-np.sqrt(0.5))
+    assert first["approach"] == pytest.approx(0.01)  # 3 cm in three periods
+    assert first["box_turn"] == first["bend"] == pytest.approx(0.3)  # straight ahead
+    second = dict(zip(VARIABLES, EVERY.shared(situation, 1)[0], strict=True))
+    assert second["box_bearing"] == pytest.approx(0.0)
+    assert second["side"] == pytest.approx(-pi / 2)
+
+
+def test_a_push_away_from_the_goal_misses_it_by_the_whole_distance() -> None:
+    situation = view([[0.2, 0.1, 0.0]], [0.0, 0.0, 0.0], [0.06])
+    assert EVERY.shared(situation, 0)[0][list(VARIABLES).index("miss")] == -1.0
+
+
+def test_the_arc_to_the_goal_pose_bends_twice_as_far_as_the_course() -> None:
+    # 45 degrees to the left of the way to the goal: an arc begins at right angles to it.
+    situation = view([[0.0, 0.0, 0.0]], [0.0, 1.0, -pi / 2], [0.06])
+    assert EVERY.shared(situation, 0)[0][list(VARIABLES).index("bend")] == pytest.approx(0.0)
 
 
 def test_a_single_robot_has_no_others() -> None:
-    shared = STATE_SPACES["relational"].shared(view([[-0.2, 0, 0]], [0, 0, 0], [0.06]), 0)[0]
+    shared = EVERY.shared(view([[-0.2, 0, 0]], [0, 0, 0], [0.06]), 0)[0]
     assert shared[3] == shared[0] == 0.06
 
 
@@ -59,11 +78,13 @@ def test_mirrored_worlds_have_mirrored_angles() -> None:
     robots, box = rng.uniform(-1, 1, (2, 3)), rng.uniform(-0.5, 0.5, 3)
     flip = np.array([1.0, -1.0, -1.0])
     for robot in (0, 1):
-        seen = STATE_SPACES["relational"].shared(view(robots, box, [0.1, 0.2]), robot)[0]
-        mirrored = STATE_SPACES["relational"].shared(
-            view(robots * flip, box * flip, [0.1, 0.2]), robot
-        )[0]
-        np.testing.assert_allclose(mirrored, seen * [1, -1, -1, 1, -1, -1, 1], atol=1e-12)
+        seen = EVERY.shared(view(robots, box, [0.1, 0.2]), robot)[0]
+        mirrored = EVERY.shared(view(robots * flip, box * flip, [0.1, 0.2]), robot)[0]
+        signs = [
+            -1 if described.low < 0 and name != "approach" else 1
+            for name, (described, _) in VARIABLES.items()
+        ]
+        np.testing.assert_allclose(mirrored, seen * signs, atol=1e-12)
 
 
 def test_angles_wrap() -> None:
@@ -102,18 +123,37 @@ def test_a_fast_robot_gets_them() -> None:
 
 
 @pytest.mark.parametrize("robots", [1, 2, 5])
-@pytest.mark.parametrize("name", [name for name, s in STATE_SPACES.items() if s.compiled])
-def test_compiled_blocks_are_those_of_the_definition(name: str, robots: int) -> None:
+@pytest.mark.parametrize("names", [tuple(VARIABLES), ("miss",), ("bend", "gap")])
+def test_compiled_blocks_are_those_of_the_definition(names: tuple[str, ...], robots: int) -> None:
     rng = np.random.default_rng(robots)
     seen = View(
         rng.normal(size=(100, robots, 3)) * [1, 1, 9], rng.normal(size=(100, 3)) * [1, 1, 9],
-        rng.normal(size=(100, robots)), rng.normal(size=3),
+        rng.normal(size=(100, robots)), rng.normal(size=3), 0.7, 3.0,
     )  # fmt: skip
-    space, wanted = STATE_SPACES[name], list(range(robots))[::-1]
+    space, wanted = relational("some", *names), list(range(robots))[::-1]
     expected = np.array([space.shared(seen, r) for r in wanted])
     np.testing.assert_allclose(space.shared_of(seen, wanted), expected, rtol=0, atol=1e-12)
 
 
 @given(st.floats(-1e9, 1e9), st.floats(-1e9, 1e9))
 def test_angles_are_exact_to_the_last_bits(x: float, y: float) -> None:
-    assert angle_of(x, y) == pytest.approx(np.arctan2(y + 0.0, x), rel=0, abs=1e-15)
+    assert angle_of(x, y) == pytest.approx(np.arctan2(y + 0.0, x + 0.0), rel=0, abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("names", "complaint"),
+    [
+        (("gap", "mass"), "scenario.state_space: unknown variable 'mass', known: gap, "),
+        (("gap", "gap"), "scenario.state_space: gap, gap: must be distinct"),
+        ((), "at least one"),
+    ],
+)
+def test_lists_that_make_no_state_space_are_refused(names: tuple[str, ...], complaint: str) -> None:
+    with pytest.raises(ValueError, match=complaint):
+        BoxPushing(ScenarioSettings(state_space=names))
+
+
+def test_a_state_space_may_be_listed() -> None:
+    scenario = BoxPushing(ScenarioSettings(state_space=("gap", "miss")))
+    assert [v.name for v in scenario.state_space.variables] == ["wheel_speed", "gap", "miss"]
+    assert scenario.reset(0).shape == (4, 3)
