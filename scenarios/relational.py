@@ -95,9 +95,9 @@ _DESCRIBED: tuple[_Described, ...] = (
         ),
         _approach,
     ),
-    (angle("box_turn", SIDES, TURNS), lambda view, robot: view.turn),
+    (angle("box_turn", (-0.8, -0.2, 0.0, 0.2, 0.8), TURNS), lambda view, robot: view.turn),
     # By how much the box is turned off the arc that ends in the goal pose.
-    (angle("bend", (-1.2, -0.25, 0.0, 0.25, 1.2), TURNS), _bend),
+    (angle("bend", (-0.8, -0.15, 0.0, 0.15, 0.8), TURNS), _bend),
 )  # fmt: skip
 
 VARIABLES: dict[str, _Described] = {variable.name: (variable, f) for variable, f in _DESCRIBED}
