@@ -23,7 +23,7 @@ from .failures import Failures
 from .infrared import InfraredSpec, strongest_reading
 from .prediction import BoxPrediction, Situation, mean_twists
 from .predictors import ExactPrediction, Future, push_model
-from .reward import reward
+from .reward import Task, reward
 from .robots import nominal_effect, robot_for
 from .starts import place
 from .state_spaces import state_space_for
@@ -86,6 +86,7 @@ class BoxPushing:
         self._failures = (
             Failures(settings.failures, self.agents, self._limits) if settings.failures else None
         )
+        self._task = Task(settings.reward, settings.tolerance, settings.orientation_tolerance)
         self._goal: FloatArray = np.zeros(3)
         self._sensing = np.random.default_rng(0)  # until reset
         self._speeds: FloatArray = np.zeros(len(self.agents))
@@ -158,7 +159,7 @@ class BoxPushing:
         readings = strongest_reading(self.world, self._sensing)
         terminated = self._reached()
         gained = reward(
-            self.settings.reward,
+            self._task,
             np.array([measured["distance_m"]]),
             np.array([measured["distance_m"] - before]),
             np.array([measured["orientation_rad"]]),
@@ -207,7 +208,7 @@ class BoxPushing:
         hold = self.settings.hold
         model = self._model if constants is None else self._belief.believing(constants)
         believed = (
-            situation, model, self._belief, self._space, self.action_set, self.settings.reward,
+            situation, model, self._belief, self._space, self.action_set, self._task,
             hold * CONTROL_PERIOD, self.settings.lookahead * CONTROL_PERIOD,
             self.settings.speed_increment, self._limits, self.infrared,
         )  # fmt: skip
@@ -262,9 +263,8 @@ class BoxPushing:
         return float((self.world.box_pose[2] - self._goal[2] + pi) % (2.0 * pi) - pi)
 
     def _reached(self) -> bool:
-        allowed = self.settings.orientation_tolerance
-        turned = allowed is None or abs(self._orientation()) <= allowed
-        return self._distance() <= self.settings.tolerance and turned
+        distance, orientation = np.array([self._distance()]), np.array([self._orientation()])
+        return bool(self._task.reached(distance, orientation)[0])
 
     def _stays(self) -> bool:
         """Stop all wheels and tell whether the box comes to rest within the tolerance."""

@@ -32,6 +32,9 @@ class RewardSettings(Settings):
     """Reward under Condition 4."""
     all_out_of_range: float = -0.002
     """Reward under Condition 5."""
+    pays_at_goal: bool = True
+    """Whether reaching the goal pays c1, even if a robot has lost touch of the box; otherwise the
+    conditions hold there as anywhere."""
     attraction_without_contact: bool = False
     """Whether R1 counts under Condition 3 as printed; without it robots do not hover."""
 

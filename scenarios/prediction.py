@@ -17,11 +17,10 @@ from ..core.arrays import FloatArray, IntArray
 from ..core.protocols import Blocks
 from ..core.spaces import ActionSet
 from .belief import PushBelief, outcomes
-from .config import RewardSettings
 from .drives import Drives, choices_of, drives_of, motion_table
 from .infrared import InfraredSpec, expected_reading
 from .push import PushModel, push
-from .reward import reward
+from .reward import Task, reward
 from .state_spaces import BoxStateSpace
 from .superposition import PushSuperposition
 from .view import View, wrap
@@ -63,7 +62,7 @@ class BoxPrediction:
     belief: PushBelief
     space: BoxStateSpace
     action_set: ActionSet
-    rewards_of: RewardSettings
+    task: Task
     hold: float
     seconds: float
     increment: float
@@ -232,7 +231,7 @@ class BoxPrediction:
         goal, before = self.situation.goal, self.situation.box
         distance = np.hypot(goal[0] - view.box[:, 0], goal[1] - view.box[:, 1])
         return reward(
-            self.rewards_of,
+            self.task,
             distance,
             distance - np.hypot(goal[0] - before[0], goal[1] - before[1]),
             wrap(view.box[:, 2] - goal[2]),

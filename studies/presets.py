@@ -33,7 +33,11 @@ PRESETS: dict[str, Preset] = {
                 "lookahead": 1,
                 "speed_increment": 0.25,
                 "arena": 100.0,
-                "reward": {"least_approach": 0.0, "attraction_without_contact": True},
+                "reward": {
+                    "least_approach": 0.0,
+                    "pays_at_goal": False,
+                    "attraction_without_contact": True,
+                },
             },
             "topology": {"kind": "chain"},
             "learner": {

@@ -6,14 +6,16 @@ import numpy as np
 import pytest
 
 from nested_agents.scenarios.config import RewardSettings
-from nested_agents.scenarios.reward import reward
+from nested_agents.scenarios.reward import Task, reward
 
-SETTINGS = RewardSettings()
+TASK = Task(RewardSettings(), tolerance=0.05, orientation_tolerance=0.25)
 
 
-def one(distance=0.5, approach=-0.02, turn=0.2, contact=(True, True), readings=(1.0, 0.9)) -> float:
+def one(
+    distance=0.5, approach=-0.02, turn=0.2, contact=(True, True), readings=(1.0, 0.9), task=TASK
+) -> float:
     value = reward(
-        SETTINGS,
+        task,
         np.array([distance]),
         np.array([approach]),
         np.array([turn]),
@@ -44,10 +46,9 @@ def test_condition_3_all_within_range() -> None:
 
 
 def test_condition_3_as_printed_adds_the_attraction() -> None:
-    printed = RewardSettings(attraction_without_contact=True)
-    half = np.array([0.5])
-    value = reward(printed, half, half, half, np.zeros((1, 2), bool), np.full((1, 2), 0.1))
-    assert value[0] == pytest.approx(0.01 * exp(-0.75) - penalties(0.1, 0.1))
+    printed = TASK._replace(reward=RewardSettings(attraction_without_contact=True))
+    value = one(contact=(False, False), readings=(0.1, 0.1), task=printed)
+    assert value == pytest.approx(0.01 * exp(-0.75) - penalties(0.1, 0.1))
 
 
 def test_conditions_4_and_5_out_of_range() -> None:
@@ -57,3 +58,16 @@ def test_conditions_4_and_5_out_of_range() -> None:
 
 def test_any_number_of_robots() -> None:
     assert one(contact=(True,), readings=(1.0,)) > one(contact=(True,) * 4, readings=(1.0,) * 4)
+
+
+@pytest.mark.parametrize("contact", [(True, True), (False, True), (False, False)])
+def test_the_goal_pays_whatever_the_robots_do(contact: tuple[bool, bool]) -> None:
+    assert one(distance=0.05, contact=contact) == 0.01
+    assert one(distance=0.05, turn=0.3, contact=contact) != 0.01
+    printed = TASK._replace(reward=RewardSettings(pays_at_goal=False))
+    assert one(distance=0.05, contact=contact, task=printed) < 0.01
+
+
+def test_any_orientation_counts_unless_one_is_asked_for() -> None:
+    task = TASK._replace(orientation_tolerance=None)
+    assert one(distance=0.05, turn=3.0, task=task) == 0.01
