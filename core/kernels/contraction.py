@@ -167,19 +167,24 @@ def contract(theta, own, lay: Layout, partial) -> None:  # type: ignore[no-untyp
         outer = lay.own_sizes[t] // m
         heads[:, outer : (outer + 3) // 4 * 4] = 0.0
         n_levels = _own_strengths(theta, t, own, lay, heads, levels, level, strengths)
-        part, slab = partial[:, start : start + width], theta[lay.offsets[t] :]
+        slab = theta[lay.offsets[t] :]
         if m == 5 and count <= 3:
-            _contract_few(slab, columns, outer, heads, levels, level, part)
+            _contract_few(slab, columns, outer, heads, levels, level, partial, start)
         else:
-            _contract_many(slab, columns, outer, m, heads, levels[: n_levels + 2], level, part)
+            _contract_many(
+                slab, columns, outer, m, heads, levels, n_levels, level, partial, start
+            )  # fmt: skip
         start += width
 
 
 @njit(cache=True)
-def _contract_few(slab, columns, outer, heads, levels, level, part):  # type: ignore[no-untyped-def]
-    """Contract with up to three own blocks at once, five rows at a time."""
-    count, width, least = part.shape[0], part.shape[1], negligible(slab)
-    spare = np.empty(width if count < 3 else 0, slab.dtype)
+def _contract_few(slab, columns, outer, heads, levels, level, partial, start):  # type: ignore[no-untyped-def]
+    """Contract with up to three own blocks at once, five rows at a time.
+
+    `partial` comes whole, with the term's `start`: a slice of its columns would be strided.
+    """
+    count, width, least = len(partial), width_of(columns), negligible(slab)
+    spare = np.zeros((2, width), slab.dtype)
     weights = np.zeros((3, 5), slab.dtype)
     for p in range(outer):
         needed = False
@@ -192,16 +197,19 @@ def _contract_few(slab, columns, outer, heads, levels, level, part):  # type: ig
             # A row may be read on into the next one, where there is one.
             n = width if at + 4 * columns + width <= len(slab) else columns
             _add_five(
-                slab[at:], columns, weights, part[0, :n],
-                part[1, :n] if count > 1 else spare[:n], part[2, :n] if count > 2 else spare[:n],
+                slab[at:], columns, weights, partial[0, start : start + n],
+                partial[1, start : start + n] if count > 1 else spare[0, :n],
+                partial[2, start : start + n] if count > 2 else spare[1, :n],
             )  # fmt: skip
 
 
 @njit(cache=True)
-def _contract_many(slab, columns, outer, m, heads, levels, level, part):  # type: ignore[no-untyped-def]
+def _contract_many(  # type: ignore[no-untyped-def]
+    slab, columns, outer, m, heads, levels, n_levels, level, partial, start
+):
     """Contract with any number of own blocks: by level first, four heads at a time."""
-    count, width, least = part.shape[0], part.shape[1], negligible(slab)
-    n_levels, order = len(levels) - 2, np.argsort(level, kind="mergesort")
+    count, width, least = len(partial), width_of(columns), negligible(slab)
+    order, end = np.argsort(level, kind="mergesort"), start + width
     blended = np.zeros((n_levels + 2, 4 * width), slab.dtype)
     flat, needed = blended.ravel(), np.empty(4)
     for p in range(0, outer, 4):
@@ -230,13 +238,13 @@ def _contract_many(slab, columns, outer, m, heads, levels, level, part):  # type
             if k + 2 < count and level[order[k + 2]] == level[b]:
                 c, d = order[k + 1], order[k + 2]
                 _add_four_to_three(
-                    part[b], part[c], part[d], rows, width,
+                    partial[b, start:end], partial[c, start:end], partial[d, start:end], rows, width,
                     four, heads[c, p : p + 4], heads[d, p : p + 4],
                 )  # fmt: skip
                 k += 3
                 continue
             if max(max(four[0], four[1]), max(four[2], four[3])) > least:
-                _add_four(part[b], rows, width, four)
+                _add_four(partial[b, start:end], rows, width, four)
             k += 1
 
 
