@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import radians
 
 import numpy as np
 
@@ -85,13 +84,11 @@ def success(episodes: slice) -> Measure:
 
 
 def oriented(results: Results) -> Measured | None:
-    """Measure how often the default brings the box to the goal within 15 degrees."""
-    if "default" not in results.training:
+    """Measure how often preset pose, which asks for it, brings the box to the goal pose."""
+    if "pose" not in results.training:
         return None
-    arrays = results.training["default"]
-    turned = arrays["final_orientation_rad"][:, LAST] <= radians(15.0)
-    outcomes = arrays["success"][:, LAST].astype(bool) & turned
-    return Measured(rate(outcomes), len(outcomes))
+    outcomes = results.training["pose"]["success"][:, LAST]
+    return Measured(rate(outcomes), len(outcomes), "preset pose")
 
 
 def contact_gained(results: Results) -> Measured | None:

@@ -24,6 +24,13 @@ PRESETS: dict[str, Preset] = {
         "the best learner known: batch TD on a first-order rule base over relational variables",
         {"learner": {"kind": "batch-td"}},
     ),
+    "pose": Preset(
+        "as default, and the box must stand within 15 degrees of the goal pose to be there",
+        {
+            "scenario": {"state_space": "pose", "orientation_tolerance": 0.2618},
+            "learner": {"kind": "batch-td", "ridge": 3.0},
+        },
+    ),
     "paper": Preset(
         "constants as printed in the paper; what it does not print is in docs/fidelity.md",
         {

@@ -238,8 +238,8 @@ def _contract_many(  # type: ignore[no-untyped-def]
             if k + 2 < count and level[order[k + 2]] == level[b]:
                 c, d = order[k + 1], order[k + 2]
                 _add_four_to_three(
-                    partial[b, start:end], partial[c, start:end], partial[d, start:end], rows, width,
-                    four, heads[c, p : p + 4], heads[d, p : p + 4],
+                    partial[b, start:end], partial[c, start:end], partial[d, start:end],
+                    rows, width, four, heads[c, p : p + 4], heads[d, p : p + 4],
                 )  # fmt: skip
                 k += 3
                 continue
