@@ -88,7 +88,7 @@ def oriented(results: Results) -> Measured | None:
     if "pose" not in results.training:
         return None
     outcomes = results.training["pose"]["success"][:, LAST]
-    return Measured(rate(outcomes), len(outcomes), "preset pose")
+    return Measured(rate(outcomes), len(outcomes), note="preset pose")
 
 
 def contact_gained(results: Results) -> Measured | None:
