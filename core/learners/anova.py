@@ -36,7 +36,7 @@ from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from ..arrays import FloatArray, IntArray
 from ..config import AnovaTDSettings
 from ..rules import RuleBase
-from .batch import CUT_OFF, REWARD_SCALE, Replay, _lambda_returns, _moment
+from .batch import REWARD_SCALE, Replay, _lambda_returns, _moment
 from .dictionary import Dictionary
 
 MOST_RULES = 5**9
@@ -77,11 +77,7 @@ class AnovaTD(Replay):
     def _regress(self) -> int:
         self._extend()
         s = self._anova
-        rewards = REWARD_SCALE * np.array(self._rewards)
-        follower = np.array(self._follower)
-        follower[follower == len(follower)] = CUT_OFF  # of a running episode: not known yet
-        known = (follower != CUT_OFF).astype(float)
-        low, high = rewards.min() / (1.0 - s.discount), rewards.max() / (1.0 - s.discount)
+        rewards, follower, known, low, high = self._experience()
         for i, held in enumerate(self._dictionaries):
             z = held.coordinates
             gram = (known[:, None] * z).T @ z + s.ridge * np.eye(z.shape[1])

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -26,6 +27,20 @@ REWARD_SCALE = 100.0
 
 TERMINAL, CUT_OFF = -1, -2
 """In place of the index of the next after-state: it is entered for ever; it is not known."""
+
+
+class Experience(NamedTuple):
+    """All after-states in memory, as a regression needs them; rewards are scaled."""
+
+    rewards: FloatArray
+    follower: IntArray
+    """Index of the next after-state, `TERMINAL` or `CUT_OFF`."""
+    known: FloatArray
+    """1 where what follows is known, else 0."""
+    low: float
+    """Least discounted sum of rewards that could be."""
+    high: float
+    """Greatest one."""
 
 
 class Replay(ABC):
@@ -85,12 +100,7 @@ class Replay(ABC):
 
     def _regress(self) -> int:
         self._extend()
-        rewards = REWARD_SCALE * np.array(self._rewards)
-        follower = np.array(self._follower)
-        follower[follower == len(follower)] = CUT_OFF  # of a running episode: not known yet
-        known = (follower != CUT_OFF).astype(float)
-        gamma = self.settings.discount
-        low, high = rewards.min() / (1.0 - gamma), rewards.max() / (1.0 - gamma)
+        rewards, follower, known, low, high = self._experience()
         for i, (active, strengths) in enumerate(self._rows):
             gram = self.settings.ridge * np.eye(self.rules.n_rules)
             _add_gram(gram, active, strengths, known)
@@ -102,6 +112,15 @@ class Replay(ABC):
                 theta = cho_solve(factor, moment, check_finite=False)
             self.theta[i] += self.settings.mixing * (theta / REWARD_SCALE - self.theta[i])
         return self.theta.size
+
+    def _experience(self) -> Experience:
+        rewards = REWARD_SCALE * np.array(self._rewards)
+        follower = np.array(self._follower)
+        follower[follower == len(follower)] = CUT_OFF  # of a running episode: not known yet
+        known = (follower != CUT_OFF).astype(float)
+        gamma = self.settings.discount
+        low, high = rewards.min() / (1.0 - gamma), rewards.max() / (1.0 - gamma)
+        return Experience(rewards, follower, known, low, high)
 
     @abstractmethod
     def _targets(
