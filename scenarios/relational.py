@@ -77,7 +77,10 @@ _DESCRIBED: tuple[_Described, ...] = (
     (angle("push_bearing", SIDES, TURNS), _push_bearing),
     # By how much that push would miss the goal; beyond it the whole distance.
     (
-        Variable("miss", "m", -0.4, 0.4, False, (-0.3, -0.06, 0.0, 0.06, 0.3), TURNS),
+        Variable(
+            "miss", "m", -0.4, 0.4, False, (-0.3, -0.06, 0.0, 0.06, 0.3),
+            ("far right", "right", "none", "left", "far left"),
+        ),
         _miss,
     ),
     (
