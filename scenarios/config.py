@@ -267,3 +267,8 @@ class ScenarioSettings(Settings):
         if self.predictor != "push" and self.belief != BeliefSettings():
             raise ValueError(f"belief is for predictor = 'push', received {self.predictor!r}")
         return self
+
+    @property
+    def onset(self) -> int | None:
+        """Episode in which the first wheel fails; none: none does."""
+        return min((failure.episode for failure in self.failures), default=None)

@@ -78,6 +78,19 @@ class Trial:
         text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
         return hashlib.sha256(text.encode()).hexdigest()[:32]
 
+    @property
+    def recorded(self) -> dict[int, str]:
+        """Names of the training episodes that are recorded, by number.
+
+        The first and the last; if a wheel fails, also the one before, and the one in which it does.
+        """
+        named = {}
+        onset = self.settings.scenario.onset
+        if onset is not None:
+            named = {onset - 1: "before", onset: "after"}
+        named |= {0: "first", self.episodes - 1: "last"}
+        return {k: named[k] for k in sorted(named) if 0 <= k < self.episodes}
+
 
 @dataclass(frozen=True)
 class TrialResult:
@@ -88,8 +101,7 @@ class TrialResult:
     rows
         The episodes in order, training first. A function of the trial, bit by bit.
     recordings
-        The ``first`` and the ``last`` training episode, ``last`` alone if there is one only. A
-        function of the trial, too.
+        Training episodes by name, those of `Trial.recorded`. A function of the trial, too.
     seconds
         Time spent in each part of the control loop; differs from run to run.
     numbers
@@ -186,10 +198,9 @@ class Session:
     ) -> None:
         """Let the team (or another one, whose time is not counted) explore, learn, be measured.
 
-        Recorded are the first and the last episode of the trial's training.
+        Recorded are, of the trial's own team, the episodes of `Trial.recorded`.
         """
-        last = {self.trial.episodes - 1: "last"}
-        kept = {0: "first"} | last if team is None else {}
+        kept = self.trial.recorded if team is None else {}
         trained = self.team if team is None else team
         for record in control_loop(
             self.scenario, trained, episodes=episodes, steps=self.trial.steps,

@@ -22,7 +22,6 @@ import numpy as np
 
 from ..core.config import FrozenSettings, LearnerSettings
 from ..core.team import Team
-from ..scenarios.config import ScenarioSettings
 from .comparison import Array, Difference
 from .paired_tests import holm, paired_permutation
 from .results import Arrays, Results
@@ -51,7 +50,8 @@ ADAPTS = {
 
 def measure(trial: Trial) -> TrialResult:
     """Train a team through a failure, and a copy that keeps its weights from there on."""
-    onset = onset_of(trial.settings.scenario)
+    onset = trial.settings.scenario.onset
+    assert onset is not None, "see check"
     session = Session(trial)
     session.train(onset)
     kept = _keeping_weights(session)
@@ -65,23 +65,17 @@ def measure(trial: Trial) -> TrialResult:
 def check(spec: Spec) -> None:
     """Raise `SpecError` unless a wheel fails in every condition, after and before some training."""
     for condition in spec.conditions():
-        failures = condition.settings.scenario.failures
-        if not failures:
+        onset = condition.settings.scenario.onset
+        if onset is None:
             raise SpecError(
                 f"scenario.failures = []: wheel-failure needs one (condition {condition.label!r})"
             )
-        onset = onset_of(condition.settings.scenario)
         if not BLOCK <= onset <= spec.episodes - BLOCK:
             raise SpecError(
                 f"scenario.failures: the first begins in episode {onset}, allowed {BLOCK} to "
                 f"{spec.episodes - BLOCK} of {spec.episodes} episodes "
                 f"(condition {condition.label!r})"
             )
-
-
-def onset_of(scenario: ScenarioSettings) -> int:
-    """Return the episode in which the first wheel fails."""
-    return min(failure.episode for failure in scenario.failures)
 
 
 def _keeping_weights(session: Session) -> Team:

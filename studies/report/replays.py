@@ -27,8 +27,6 @@ from ..store import Store
 from ..trial import Trial
 from .words import runs
 
-EPISODES = ("first", "last")
-"""The recordings that a trial may have, as `TrialResult.recordings` names them."""
 NEEDED = (*RECORDED, "goal_pose", "dt", "robot", "box")
 LEAST_SCALE = 1e-4
 """Positions are kept to a tenth of a millimetre, or coarser where they reach beyond 3 m [m]."""
@@ -85,12 +83,10 @@ def replays(store: Store, trials: Iterable[Trial], most_bytes: int = MOST_BYTES)
         if size >= most_bytes:
             miss(trial, "Left out to keep the page small")
             continue
-        names = EPISODES if trial.episodes > 1 else EPISODES[1:]
         try:
-            kept = {name: store.recording(trial, name) for name in names}
-            for name, recording in kept.items():
+            kept = {k: store.recording(trial, name) for k, name in trial.recorded.items()}
+            for number, recording in kept.items():
                 body = _body_of(recording, bodies, found.bodies)
-                number = 0 if name == "first" else trial.episodes - 1
                 episode = {
                     "condition": trial.condition,
                     "seed": trial.seed,

@@ -65,7 +65,9 @@ def test_training_goes_through_the_failure_and_a_copy_keeps_its_weights() -> Non
     assert [row.episode for row in kept] == [5, 6, 7, 8, 9]
     assert kept[0] == training[5]._replace(phase=KEPT), "no learning ends before the first episode"
     assert result.numbers == {"onset": 5.0}
-    assert sorted(result.recordings) == ["first", "last"]
+    assert list(result.recordings) == ["first", "before", "after", "last"]
+    assert not result.recordings["before"]["failed"].any()
+    assert result.recordings["after"]["failed"][1:].any()
 
 
 def test_the_copy_keeps_weights_but_not_its_model_of_itself() -> None:
