@@ -104,7 +104,7 @@ def relational(name: str, *shared: str) -> BoxStateSpace:
             )
     if not shared or len(set(shared)) != len(shared):
         raise ValueError(
-            f"scenario.state_space: {', '.join(shared)}: must be distinct and at least one"
+            f"scenario.state_space = {list(shared)}: variables must be distinct and at least one"
         )
     functions = [VARIABLES[variable][1] for variable in shared]
     return BoxStateSpace(

@@ -144,7 +144,7 @@ def test_angles_are_exact_to_the_last_bits(x: float, y: float) -> None:
     ("names", "complaint"),
     [
         (("gap", "mass"), "scenario.state_space: unknown variable 'mass', known: gap, "),
-        (("gap", "gap"), "scenario.state_space: gap, gap: must be distinct"),
+        (("gap", "gap"), r"scenario.state_space = \['gap', 'gap'\]: variables must be distinct"),
         ((), "at least one"),
     ],
 )
