@@ -73,15 +73,8 @@ def test_exact_where_values_are_linear(
     common = (rules, hierarchy, A, "value", others, 0.9)
     exact = ExactEnumeration(*common)
     exact._tabulated = True
-    exact._places = A ** np.arange(N - 1, -1, -1)
-    exact._fixed_places = np.tile(exact._places, (N, 1))
-    for i in range(N):
-        exact._fixed_places[i, [i, *hierarchy.below(i)]] = 0
-    exact._offsets = [
-        np.arange(A)[:, None] * exact._places[i]
-        + (exact._tried[i] @ exact._places[list(hierarchy.below(i))])[None, :]
-        for i in range(N)
-    ]
+    places = A ** np.arange(N - 1, -1, -1)
+    exact._tried = [exact._tried_by(i, places) for i in range(N)]
     evaluator = summed(GROUPS, *common)
     for agent in range(N):
         joint = np.full(N, NEUTRAL)
