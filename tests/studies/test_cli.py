@@ -36,8 +36,14 @@ def run_here(measure, *arguments):
 def start(measure, *arguments, **options):
     command = [sys.executable, str(PROGRAM), measure, *map(str, arguments)]
     return subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, **options
-    )
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        preexec_fn=heeding_interrupts, **options,
+    )  # fmt: skip
+
+
+def heeding_interrupts() -> None:
+    """Undo what a shell does to the commands that it begins in the background."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def finish(process):
