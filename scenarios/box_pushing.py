@@ -276,8 +276,7 @@ class BoxPushing:
 
         `before` is the distance of the box from the goal one decision period ago [m].
         """
-        poses = self.world.robot_poses
-        world = self.world
+        world, poses = self.world, self.world.robot_poses
         view = View(poses[None], world.box_pose[None], world.gaps[None], self._goal, before, 1.0)
         rows = []
         for r, group in enumerate(self.groups):

@@ -228,13 +228,11 @@ class BoxPrediction:
         return self._rewards(view)[row]
 
     def _rewards(self, view: View) -> FloatArray:
-        goal, before = self.situation.goal, self.situation.box
-        distance = np.hypot(goal[0] - view.box[:, 0], goal[1] - view.box[:, 1])
         return reward(
             self.task,
-            distance,
-            distance - np.hypot(goal[0] - before[0], goal[1] - before[1]),
-            wrap(view.box[:, 2] - goal[2]),
+            view.distance,
+            view.distance - view.before,
+            view.turn,
             view.gaps < CONTACT_GAP,
             expected_reading(view.gaps, self.infrared),
         )
