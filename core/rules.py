@@ -76,10 +76,11 @@ class RuleBase:
         self.n_rules = sum(self.sizes)
         self.layout = kernels.layout(self.partitions, self.terms, n_own)
         lay = kernels.unpack.py_func(self.layout)
-        self.n_rows = int(lay.row_sizes.sum())
+        self.n_parts = int(lay.row_sizes @ lay.part_sizes)
         self.dtype = np.dtype(dtype)
         self.compact = self.partitions[0].membership == "triangular"
         self._enumerate = kernels.enumerate_dense
+        self._td_update = kernels.td_compact if self.compact else kernels.td_dense
         if self.compact:
             # Looking up 2 ** order corners is cheaper than contracting theta, unless the order is
             # high and most variables are own ones, contracted once for many joint actions.
@@ -144,6 +145,25 @@ class RuleBase:
         if self.compact:
             return kernels.each_compact(theta, states, self.layout)
         return kernels.each_dense(theta, states, self.layout)
+
+    def td_update(
+        self,
+        theta: FloatArray,
+        trace: FloatArray,
+        reach: FloatArray,
+        states: FloatArray,
+        entered: FloatArray,
+        reward: float,
+        discount: float,
+        step_size: float,
+        lengths: FloatArray,
+        decay: float,
+    ) -> None:
+        """Make one TD(lambda) update of all agents, see `nested_agents.core.kernels.td_dense`."""
+        self._td_update(
+            theta, trace, reach, states, entered, reward, discount, step_size, lengths, decay,
+            self.layout,
+        )  # fmt: skip
 
     def squared_lengths(self, states: FloatArray) -> FloatArray:
         """Return the squared length ``(m,)`` of phi of states ``(m, d)``.

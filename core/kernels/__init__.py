@@ -8,8 +8,8 @@ The dense kernels leave out rows of rules whose firing strength is below `NEGLIG
 strengths sum to one, so that a value changes by less than 1e-12 of the largest weight.
 """
 
-from .compact import active_compact, each_compact, values_compact
-from .dense import each_dense, values_dense
+from .compact import active_compact, each_compact, td_compact, values_compact
+from .dense import each_dense, td_dense, values_dense
 from .enumeration import Tried, enumerate_contracted, enumerate_dense, enumerate_looked_up
 from .layout import Layout, Packed, layout, unpack
 from .strengths import NEGLIGIBLE, exponential, many_strengths, strengths_of
@@ -31,6 +31,8 @@ __all__ = [
     "layout",
     "many_strengths",
     "strengths_of",
+    "td_compact",
+    "td_dense",
     "td_update",
     "unpack",
     "values_compact",

@@ -10,10 +10,11 @@ import numpy as np
 from numba import njit
 
 from ..arrays import FloatArray, IntArray
-from .contraction import total_width, width_of
+from .contraction import total_width
 from .layout import Layout, Packed, unpack
 from .pairs import pairs
-from .strengths import pair
+from .strengths import all_strengths, pair, strengths_room
+from .updates import advance
 
 
 @njit(cache=True)
@@ -24,7 +25,7 @@ def _room(lay: Layout):  # type: ignore[no-untyped-def]
     return functions, (np.empty(most, np.int64), np.empty(most))
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _pairs_of(x, first: int, lay: Layout, functions) -> None:  # type: ignore[no-untyped-def]
     """Find the active functions of variables first, first + 1, ... at the values x."""
     lows, highs, shares = functions
@@ -32,7 +33,7 @@ def _pairs_of(x, first: int, lay: Layout, functions) -> None:  # type: ignore[no
         lows[first + j], highs[first + j], shares[first + j] = pair(first + j, x[j], lay)
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _corners(t: int, first: int, last: int, lay: Layout, functions, room) -> int:  # type: ignore[no-untyped-def]
     """Write rule and strength of every corner over variables first..last-1 of a term."""
     lows, highs, shares = functions
@@ -48,7 +49,7 @@ def _corners(t: int, first: int, last: int, lay: Layout, functions, room) -> int
     return size
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _compact_value(theta, lay: Layout, functions, room) -> float:  # type: ignore[no-untyped-def]
     """Return f of one state given its two active membership functions per variable."""
     lows, highs, shares = functions
@@ -88,6 +89,25 @@ def each_compact(theta: FloatArray, states: FloatArray, packed: Packed) -> Float
     for i in range(len(states)):
         _values(theta[i], states[i], lay, out[i])
     return out
+
+
+@njit(cache=True)
+def td_compact(  # type: ignore[no-untyped-def]
+    theta, trace, reach, states: FloatArray, entered: FloatArray, reward: float, discount: float,
+    step_size: float, lengths: FloatArray, decay: float, packed: Packed,
+) -> None:  # fmt: skip
+    """Do what `nested_agents.core.kernels.td_dense` does, triangular partitions."""
+    lay = unpack(packed)
+    strengths, spare = strengths_room(lay)
+    functions, room = _room(lay)
+    for i in range(len(states)):
+        _pairs_of(entered[i], 0, lay, functions)
+        ahead = _compact_value(theta[i], lay, functions, room)
+        _pairs_of(states[i], 0, lay, functions)
+        now = _compact_value(theta[i], lay, functions, room)
+        all_strengths(states[i], lay, strengths, spare)
+        step = step_size * (reward + discount * ahead - now) / lengths[i]
+        advance(theta[i], trace[i], reach[i], strengths, decay, step, lay)
 
 
 @njit(cache=True)
@@ -161,7 +181,7 @@ def contracted(  # type: ignore[no-untyped-def]
                 at = lay.offsets[t] + rules[c] * columns
                 weight = theta.dtype.type(strengths[c])
                 _add(partial[b, start : start + columns], theta[at : at + columns], weight)
-            start += width_of(columns)
+            start += columns
     values = np.empty(wanted.shape)
     for row in range(wanted.shape[1]):
         if not wanted[:, row].any():
@@ -175,7 +195,7 @@ def contracted(  # type: ignore[no-untyped-def]
                 if wanted[b, row]:
                     for c in range(size):
                         values[b, row] += strengths[c] * partial[b, start + rules[c]]
-            start += width_of(lay.shared_sizes[t])
+            start += lay.shared_sizes[t]
     out = np.empty(len(codes))
     for c in range(len(codes)):
         out[c] = values[slot_of[c], row_of[c]]

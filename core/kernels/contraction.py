@@ -5,6 +5,9 @@ left when every axis has been contracted with the firing strengths of its variab
 first, for every own block that occurs at once (`contract`): the last of them is contracted with
 each of its *levels*, the few distinct values that it takes, the others with each own block. Then
 the shared axes, for many situations side by side (`fold`).
+
+Innermost loops count without sign: an index that could be negative would be checked at every turn.
+Where five functions to a variable are spelled out, it is for the paper's case.
 """
 
 from __future__ import annotations
@@ -13,109 +16,19 @@ import numpy as np
 from numba import njit
 
 from .layout import Layout
-from .strengths import negligible, product_of, strengths_of
-
-LANES = 32
-"""Situations side by side."""
+from .strengths import negligible, product_of, strengths_of, strengths_room
 
 _FAST = {"reassoc", "contract"}
 
 
 @njit(cache=True)
-def width_of(columns: int) -> int:
-    """Return the room that a row of theta takes in scratch: a whole number of vectors."""
-    return (columns + 7) // 8 * 8
-
-
-@njit(cache=True)
 def total_width(lay: Layout) -> int:
-    """Return the room that the rows of all terms take."""
-    total = 0
-    for t in range(len(lay.lengths)):
-        total += width_of(lay.shared_sizes[t])
-    return total
-
-
-@njit(cache=True, fastmath=_FAST)
-def _blend(rows, stride, weights, out):  # type: ignore[no-untyped-def]
-    """Write the weighted sum of rows that begin `stride` apart."""
-    n, m = len(out), len(weights)
-    if m == 5:  # as everywhere in the paper; all rows at once
-        a, b, c, d, e = weights[0], weights[1], weights[2], weights[3], weights[4]
-        one, two, three = rows[:n], rows[stride : stride + n], rows[2 * stride : 2 * stride + n]
-        four, five = rows[3 * stride : 3 * stride + n], rows[4 * stride : 4 * stride + n]
-        for k in range(n):
-            out[k] = (a * one[k] + b * two[k]) + (c * three[k] + d * four[k]) + e * five[k]
-        return
-    for k in range(n):
-        out[k] = weights[0] * rows[k]
-    for s in range(1, m):
-        row, weight = rows[s * stride : s * stride + n], weights[s]
-        for k in range(n):
-            out[k] += weight * row[k]
-
-
-@njit(cache=True, fastmath=_FAST)
-def _blend_three(rows, stride, weights, out, room, n):  # type: ignore[no-untyped-def]
-    """Write three weighted sums of five rows, `room` apart; the rows are read once."""
-    one, two, three = rows[:n], rows[stride : stride + n], rows[2 * stride : 2 * stride + n]
-    four, five = rows[3 * stride : 3 * stride + n], rows[4 * stride : 4 * stride + n]
-    a0, a1, a2, a3, a4 = weights[0, 0], weights[0, 1], weights[0, 2], weights[0, 3], weights[0, 4]
-    b0, b1, b2, b3, b4 = weights[1, 0], weights[1, 1], weights[1, 2], weights[1, 3], weights[1, 4]
-    c0, c1, c2, c3, c4 = weights[2, 0], weights[2, 1], weights[2, 2], weights[2, 3], weights[2, 4]
-    x, y, z = out[:n], out[room : room + n], out[2 * room : 2 * room + n]
-    for k in range(n):
-        p, q, r, s, t = one[k], two[k], three[k], four[k], five[k]
-        x[k] = (a0 * p + a1 * q) + (a2 * r + a3 * s) + a4 * t
-        y[k] = (b0 * p + b1 * q) + (b2 * r + b3 * s) + b4 * t
-        z[k] = (c0 * p + c1 * q) + (c2 * r + c3 * s) + c4 * t
-
-
-@njit(cache=True, fastmath=_FAST)
-def _add_five(rows, stride, weights, x, y, z):  # type: ignore[no-untyped-def]
-    """Add three weighted sums of five rows to x, y and z; the rows are read once."""
-    n = len(x)
-    one, two, three = rows[:n], rows[stride : stride + n], rows[2 * stride : 2 * stride + n]
-    four, five = rows[3 * stride : 3 * stride + n], rows[4 * stride : 4 * stride + n]
-    a0, a1, a2, a3, a4 = weights[0, 0], weights[0, 1], weights[0, 2], weights[0, 3], weights[0, 4]
-    b0, b1, b2, b3, b4 = weights[1, 0], weights[1, 1], weights[1, 2], weights[1, 3], weights[1, 4]
-    c0, c1, c2, c3, c4 = weights[2, 0], weights[2, 1], weights[2, 2], weights[2, 3], weights[2, 4]
-    for k in range(n):
-        p, q, r, s, t = one[k], two[k], three[k], four[k], five[k]
-        x[k] += (a0 * p + a1 * q) + (a2 * r + a3 * s) + a4 * t
-        y[k] += (b0 * p + b1 * q) + (b2 * r + b3 * s) + b4 * t
-        z[k] += (c0 * p + c1 * q) + (c2 * r + c3 * s) + c4 * t
-
-
-@njit(cache=True, fastmath=_FAST)
-def _add_four(part, rows, room, weights):  # type: ignore[no-untyped-def]
-    """Add four weighted rows, `room` apart, to `part`."""
-    n = len(part)
-    one, two = rows[:n], rows[room : room + n]
-    three, four = rows[2 * room : 2 * room + n], rows[3 * room : 3 * room + n]
-    a, b, c, d = weights[0], weights[1], weights[2], weights[3]
-    for k in range(n):
-        part[k] += (a * one[k] + b * two[k]) + (c * three[k] + d * four[k])
-
-
-@njit(cache=True, fastmath=_FAST)
-def _add_four_to_three(x, y, z, rows, room, a, b, c):  # type: ignore[no-untyped-def]
-    """Add three weighted sums of four rows to x, y and z; the rows are read once."""
-    n = len(x)
-    one, two = rows[:n], rows[room : room + n]
-    three, four = rows[2 * room : 2 * room + n], rows[3 * room : 3 * room + n]
-    a0, a1, a2, a3 = a[0], a[1], a[2], a[3]
-    b0, b1, b2, b3 = b[0], b[1], b[2], b[3]
-    c0, c1, c2, c3 = c[0], c[1], c[2], c[3]
-    for k in range(n):
-        p, q, r, s = one[k], two[k], three[k], four[k]
-        x[k] += (a0 * p + a1 * q) + (a2 * r + a3 * s)
-        y[k] += (b0 * p + b1 * q) + (b2 * r + b3 * s)
-        z[k] += (c0 * p + c1 * q) + (c2 * r + c3 * s)
+    """Return how many weights of shared rules all terms leave."""
+    return lay.shared_sizes.sum()
 
 
 @njit(cache=True)
-def _own_strengths(theta, t, own, lay: Layout, heads, levels, level, strengths) -> int:  # type: ignore[no-untyped-def]
+def _own_strengths(t: int, own, lay: Layout, heads, levels, level) -> int:  # type: ignore[no-untyped-def]
     """Write the strengths of own variables of a term, the last of them by level.
 
     `heads` ``(K, outer)`` takes the products over all own variables but the last, `levels` the
@@ -124,200 +37,273 @@ def _own_strengths(theta, t, own, lay: Layout, heads, levels, level, strengths) 
     """
     last = lay.own_lengths[t] - 1
     j = lay.terms[t, max(last, 0)]
+    strengths, room = strengths_room(lay)
     n_levels = 0
-    levels[:] = 0.0
     for b in range(len(own)):
         for v in range(last):
-            strengths_of(lay.terms[t, v], own[b, lay.terms[t, v]], lay, strengths[lay.terms[t, v]])
-        product_of(t, 0, max(last, 0), lay, strengths, heads[b], 0)
+            other = lay.terms[t, v]
+            strengths_of(other, own[b, other], lay, strengths[other], room)
+        product_of(t, 0, max(last, 0), lay, strengths, heads[b])
         level[b] = -1
-        for other in range(b):
-            if last < 0 or own[other, j] == own[b, j]:
-                level[b] = level[other]
+        for earlier in range(b):
+            if last < 0 or own[earlier, j] == own[b, j]:
+                level[b] = level[earlier]
                 break
         if level[b] < 0:
             level[b] = n_levels
+            levels[n_levels] = 0.0
             if last < 0:
                 levels[n_levels, 0] = 1.0
             else:
-                strengths_of(j, own[b, j], lay, strengths[j])
+                strengths_of(j, own[b, j], lay, strengths[j], room)
                 levels[n_levels, : lay.counts[j]] = strengths[j, : lay.counts[j]]
             n_levels += 1
     return n_levels
 
 
 @njit(cache=True)
-def contract(theta, own, lay: Layout, partial) -> None:  # type: ignore[no-untyped-def]
+def contract(theta, own, peaks, lay: Layout, partial) -> None:  # type: ignore[no-untyped-def]
     """Contract theta with the strengths of every own block ``(K, n_own)``.
 
     Writes the weights ``(K, total_width)`` that remain for the shared rules, term by term. Each row
-    of theta is read once, however many own blocks there are.
+    of theta is read once, however many own blocks there are. `peaks` ``(d, most memberships)`` are
+    the greatest strengths that shared variables will have: what cannot matter stays zero.
     """
-    count = len(own)
-    strengths = np.empty((max(1, len(lay.counts)), lay.counts.max()))
-    heads = np.zeros((count, (lay.own_sizes.max() + 3) // 4 * 4), theta.dtype)
-    levels = np.empty((count + 2, lay.counts.max()), theta.dtype)
+    count, start = len(own), 0
     level = np.empty(count, np.int64)
-    partial[:] = 0.0
-    start = 0
+    # Room for two blocks, two levels and one head that weigh nothing, to make up round numbers.
+    levels = np.empty((count + 2, max(5, lay.counts.max())), theta.dtype)
     for t in range(len(lay.lengths)):
         columns, last = lay.shared_sizes[t], lay.own_lengths[t] - 1
-        width = width_of(columns)
         m = lay.counts[lay.terms[t, last]] if last >= 0 else 1
         outer = lay.own_sizes[t] // m
-        heads[:, outer : (outer + 3) // 4 * 4] = 0.0
-        n_levels = _own_strengths(theta, t, own, lay, heads, levels, level, strengths)
-        slab = theta[lay.offsets[t] :]
-        if m == 5 and count <= 3:
-            _contract_few(slab, columns, outer, heads, levels, level, partial, start)
+        heads = np.zeros((count + 2, outer + 1), theta.dtype)
+        n_levels = _own_strengths(t, own, lay, heads, levels, level)
+        levels[n_levels:] = 0.0
+        slab = theta[lay.offsets[t] : lay.offsets[t + 1]].reshape(outer, m, columns)
+        out = np.zeros((count + 2, columns), theta.dtype)
+        peak = peaks[max(0, lay.terms[t, last + 1])] if lay.lengths[t] > last + 1 else _WHOLE
+        parts = lay.counts[lay.terms[t, last + 1]] if lay.lengths[t] > last + 1 else 1
+        if m != 5:
+            _contract_any(slab, heads, levels, level, out)
+        elif count <= 3:
+            _add_five(slab, heads, levels, level, peak[:parts], out)
         else:
-            _contract_many(
-                slab, columns, outer, m, heads, levels, n_levels, level, partial, start
-            )  # fmt: skip
-        start += width
+            _blend_and_add(slab, heads, levels, level, n_levels, peak[:parts], out)
+        partial[:, start : start + columns] = out[:count]
+        start += columns
+
+
+_WHOLE = np.ones(1)
 
 
 @njit(cache=True)
-def _contract_few(slab, columns, outer, heads, levels, level, partial, start):  # type: ignore[no-untyped-def]
-    """Contract with up to three own blocks at once, five rows at a time.
-
-    `partial` comes whole, with the term's `start`: a slice of its columns would be strided.
-    """
-    count, width, least = len(partial), width_of(columns), negligible(slab)
-    spare = np.zeros((2, width), slab.dtype)
-    weights = np.zeros((3, 5), slab.dtype)
-    for p in range(outer):
-        needed = False
-        for b in range(count):
-            needed = needed or heads[b, p] > least
-            for s in range(5):
-                weights[b, s] = heads[b, p] * levels[level[b], s]
-        if needed:
-            at = p * 5 * columns
-            # A row may be read on into the next one, where there is one.
-            n = width if at + 4 * columns + width <= len(slab) else columns
-            _add_five(
-                slab[at:], columns, weights, partial[0, start : start + n],
-                partial[1, start : start + n] if count > 1 else spare[0, :n],
-                partial[2, start : start + n] if count > 2 else spare[1, :n],
-            )  # fmt: skip
-
-
-@njit(cache=True)
-def _contract_many(  # type: ignore[no-untyped-def]
-    slab, columns, outer, m, heads, levels, n_levels, level, partial, start
-):
-    """Contract with any number of own blocks: by level first, four heads at a time."""
-    count, width, least = len(partial), width_of(columns), negligible(slab)
-    order, end = np.argsort(level, kind="mergesort"), start + width
-    blended = np.zeros((n_levels + 2, 4 * width), slab.dtype)
-    flat, needed = blended.ravel(), np.empty(4)
-    for p in range(0, outer, 4):
-        for i in range(4):
-            needed[i] = 0.0
-            for b in range(count):
-                needed[i] = max(needed[i], heads[b, p + i])
-            if needed[i] > least:
-                at = (p + i) * m * columns
-                # A row may be read on into the next one, where there is one.
-                n = width if at + (m - 1) * columns + width <= len(slab) else columns
-                for v in range(0, n_levels, 3):
-                    if m == 5 and n_levels - v > 1:
-                        to = flat[v * 4 * width + i * width :]
-                        _blend_three(slab[at:], columns, levels[v : v + 3], to, 4 * width, n)
-                        continue
-                    for one in range(v, min(v + 3, n_levels)):
-                        to = blended[one, i * width : i * width + n]
-                        _blend(slab[at:], columns, levels[one, :m], to)
-        if needed.max() <= least:
-            continue
-        k = 0
-        while k < count:
-            b = order[k]
-            rows, four = blended[level[b]], heads[b, p : p + 4]
-            if k + 2 < count and level[order[k + 2]] == level[b]:
-                c, d = order[k + 1], order[k + 2]
-                _add_four_to_three(
-                    partial[b, start:end], partial[c, start:end], partial[d, start:end],
-                    rows, width, four, heads[c, p : p + 4], heads[d, p : p + 4],
-                )  # fmt: skip
-                k += 3
-                continue
-            if max(max(four[0], four[1]), max(four[2], four[3])) > least:
-                _add_four(partial[b, start:end], rows, width, four)
-            k += 1
+def hull(bounds, first, last, least):  # type: ignore[no-untyped-def]
+    """Return where the bounds first..last-1 that exceed `least` begin and end."""
+    while first < last and bounds[first] <= least:
+        first += 1
+    while last > first and bounds[last - 1] <= least:
+        last -= 1
+    return first, last
 
 
 @njit(cache=True, fastmath=_FAST)
-def _fold_weights(weights, m, strengths, out, lanes):  # type: ignore[no-untyped-def]
+def _contract_any(slab, heads, levels, level, out) -> None:  # type: ignore[no-untyped-def]
+    """Contract ``(outer, m, columns)`` block by block."""
+    outer, m, columns = slab.shape
+    for b in range(len(level)):
+        for p in range(outer):
+            for s in range(m):
+                weight = heads[b, p] * levels[level[b], s]
+                if weight > negligible(slab):
+                    for k in range(columns):
+                        out[b, k] += weight * slab[p, s, k]
+
+
+@njit(cache=True, fastmath=_FAST)
+def _add_five(slab, heads, levels, level, peak, out) -> None:  # type: ignore[no-untyped-def]
+    """Contract five rows to a head with up to three blocks at once."""
+    bound, least = _bound(heads), negligible(slab)
+    width = slab.shape[2] // len(peak)
+    i, j = level[0], level[min(1, len(level) - 1)]
+    l = level[min(2, len(level) - 1)]  # noqa: E741
+    for p in range(len(slab)):
+        if bound[p] <= least:
+            continue
+        first, last = hull(peak, 0, len(peak), least / bound[p])
+        a, b, c = heads[0, p], heads[1, p], heads[2, p]
+        a0, a1, a2 = a * levels[i, 0], a * levels[i, 1], a * levels[i, 2]
+        b0, b1, b2 = b * levels[j, 0], b * levels[j, 1], b * levels[j, 2]
+        c0, c1, c2 = c * levels[l, 0], c * levels[l, 1], c * levels[l, 2]
+        a3, a4, b3, b4 = a * levels[i, 3], a * levels[i, 4], b * levels[j, 3], b * levels[j, 4]
+        c3, c4 = c * levels[l, 3], c * levels[l, 4]
+        for k in range(np.uint64(first * width), np.uint64(last * width)):
+            q, r, s = slab[p, 0, k], slab[p, 1, k], slab[p, 2, k]
+            t, x = slab[p, 3, k], slab[p, 4, k]
+            out[0, k] += (a0 * q + a1 * r) + (a2 * s + a3 * t) + a4 * x
+            out[1, k] += (b0 * q + b1 * r) + (b2 * s + b3 * t) + b4 * x
+            out[2, k] += (c0 * q + c1 * r) + (c2 * s + c3 * t) + c4 * x
+
+
+@njit(cache=True, fastmath=_FAST)
+def _blend_and_add(slab, heads, levels, level, n_levels, peak, out) -> None:  # type: ignore[no-untyped-def]
+    """Contract five rows to a head: by level, and then, four heads at a time, by block."""
+    outer, _, columns = slab.shape
+    bound, least, width = _bound(heads), negligible(slab), columns // len(peak)
+    triples = _triples(level, n_levels)
+    blended = np.zeros((4, n_levels + 2, columns), slab.dtype)
+    which, n, begin, end = np.empty(4, np.int64), 0, columns, 0
+    for p in range(outer):
+        if bound[p] > least:
+            first, last = hull(peak, 0, len(peak), least / bound[p])
+            begin, end = min(begin, first * width), max(end, last * width)
+            which[n] = p
+            n += 1
+        if n == 4 or (p == outer - 1 and n > 0):
+            which[n:] = outer
+            for slot in range(n):
+                for v in range(0, n_levels, 3):
+                    _blend_five(slab, which[slot], levels, v, blended, slot, begin, end)
+            for g in range(len(triples)):
+                v = level[triples[g, 0]]
+                _add_four(blended, v, heads, which, triples[g], out, begin, end)
+            n, begin, end = 0, columns, 0
+
+
+@njit(cache=True, fastmath=_FAST, inline="always")
+def _blend_five(slab, p, levels, v, out, slot, begin, end):  # type: ignore[no-untyped-def]
+    """Write the weighted sums of five rows for three levels; the rows are read once."""
+    u, w = v + 1, v + 2
+    a0, a1, a2, a3, a4 = levels[v, 0], levels[v, 1], levels[v, 2], levels[v, 3], levels[v, 4]
+    b0, b1, b2, b3, b4 = levels[u, 0], levels[u, 1], levels[u, 2], levels[u, 3], levels[u, 4]
+    c0, c1, c2, c3, c4 = levels[w, 0], levels[w, 1], levels[w, 2], levels[w, 3], levels[w, 4]
+    for k in range(np.uint64(begin), np.uint64(end)):
+        q, r, s = slab[p, 0, k], slab[p, 1, k], slab[p, 2, k]
+        t, x = slab[p, 3, k], slab[p, 4, k]
+        out[slot, v, k] = (a0 * q + a1 * r) + (a2 * s + a3 * t) + a4 * x
+        out[slot, u, k] = (b0 * q + b1 * r) + (b2 * s + b3 * t) + b4 * x
+        out[slot, w, k] = (c0 * q + c1 * r) + (c2 * s + c3 * t) + c4 * x
+
+
+@njit(cache=True, fastmath=_FAST, inline="always")
+def _add_four(blended, v, heads, which, blocks, out, begin, end):  # type: ignore[no-untyped-def]
+    """Add four weighted rows of one level to three blocks; the rows are read once."""
+    b, c, d = blocks[0], blocks[1], blocks[2]
+    e, f, g, h = which[0], which[1], which[2], which[3]
+    b0, b1, b2, b3 = heads[b, e], heads[b, f], heads[b, g], heads[b, h]
+    c0, c1, c2, c3 = heads[c, e], heads[c, f], heads[c, g], heads[c, h]
+    d0, d1, d2, d3 = heads[d, e], heads[d, f], heads[d, g], heads[d, h]
+    for k in range(np.uint64(begin), np.uint64(end)):
+        q, r, s, t = blended[0, v, k], blended[1, v, k], blended[2, v, k], blended[3, v, k]
+        out[b, k] += (b0 * q + b1 * r) + (b2 * s + b3 * t)
+        out[c, k] += (c0 * q + c1 * r) + (c2 * s + c3 * t)
+        out[d, k] += (d0 * q + d1 * r) + (d2 * s + d3 * t)
+
+
+@njit(cache=True)
+def _bound(heads):  # type: ignore[no-untyped-def]
+    """Return the greatest of every head among the blocks."""
+    out = heads[0].copy()
+    for b in range(1, len(heads)):
+        row = heads[b]
+        for p in range(len(out)):
+            out[p] = row[p] if row[p] > out[p] else out[p]
+    return out
+
+
+@njit(cache=True)
+def _triples(level, n_levels):  # type: ignore[no-untyped-def]
+    """Return threes ``(g, 3)`` of blocks of one level, made up with blocks K and K + 1."""
+    count, n = len(level), 0
+    triples = np.empty((count, 3), np.int64)
+    for v in range(n_levels):
+        found = 0
+        for b in range(count):
+            if level[b] == v:
+                if found == 0:
+                    triples[n, 1], triples[n, 2] = count, count + 1
+                    n += 1
+                triples[n - 1, found] = b
+                found = (found + 1) % 3
+    return triples[:n]
+
+
+@njit(cache=True, fastmath=_FAST)
+def _fold_weights(weights, start, size, m, strengths, out, lanes) -> None:  # type: ignore[no-untyped-def]
     """Contract the last axis of weights that are the same in all lanes."""
-    for i in range(len(weights) // m):
+    for i in range(size // m):
+        at = start + i * m
         if m == 5:
-            a, b, c = weights[5 * i], weights[5 * i + 1], weights[5 * i + 2]
-            d, e = weights[5 * i + 3], weights[5 * i + 4]
-            for k in range(lanes):
-                out[i * LANES + k] = (
-                    (a * strengths[k] + b * strengths[LANES + k])
-                    + (c * strengths[2 * LANES + k] + d * strengths[3 * LANES + k])
-                    + e * strengths[4 * LANES + k]
+            a, b, c = weights[at], weights[at + 1], weights[at + 2]
+            d, e = weights[at + 3], weights[at + 4]
+            for k in range(np.uint64(lanes)):
+                out[i, k] = (
+                    (a * strengths[0, k] + b * strengths[1, k])
+                    + (c * strengths[2, k] + d * strengths[3, k])
+                    + e * strengths[4, k]
                 )
             continue
-        for k in range(lanes):
-            out[i * LANES + k] = weights[i * m] * strengths[k]
+        for k in range(np.uint64(lanes)):
+            out[i, k] = weights[at] * strengths[0, k]
         for s in range(1, m):
-            weight = weights[i * m + s]
-            for k in range(lanes):
-                out[i * LANES + k] += weight * strengths[s * LANES + k]
+            for k in range(np.uint64(lanes)):
+                out[i, k] += weights[at + s] * strengths[s, k]
 
 
 @njit(cache=True, fastmath=_FAST)
-def _fold_rows(rows, size, m, strengths, out, lanes):  # type: ignore[no-untyped-def]
+def _fold_rows(rows, size, m, strengths, out, lanes) -> None:  # type: ignore[no-untyped-def]
     """Contract the last axis of `size` rows of lanes."""
     for i in range(size // m):
-        for k in range(lanes):
-            out[i * LANES + k] = rows[i * m * LANES + k] * strengths[k]
+        at = i * m
+        if m == 5:
+            for k in range(np.uint64(lanes)):
+                out[i, k] = (
+                    (rows[at, k] * strengths[0, k] + rows[at + 1, k] * strengths[1, k])
+                    + (rows[at + 2, k] * strengths[2, k] + rows[at + 3, k] * strengths[3, k])
+                    + rows[at + 4, k] * strengths[4, k]
+                )
+            continue
+        for k in range(np.uint64(lanes)):
+            out[i, k] = rows[at, k] * strengths[0, k]
         for s in range(1, m):
-            row = rows[(i * m + s) * LANES : (i * m + s) * LANES + LANES]
-            strength = strengths[s * LANES : s * LANES + LANES]
-            for k in range(lanes):
-                out[i * LANES + k] += row[k] * strength[k]
+            for k in range(np.uint64(lanes)):
+                out[i, k] += rows[at + s, k] * strengths[s, k]
 
 
 @njit(cache=True)
-def fold(partial, strengths, lay: Layout, one, two, out, lanes) -> None:  # type: ignore[no-untyped-def]
-    """Contract what `contract` left for one own block with up to `LANES` shared blocks.
+def fold(partial, strengths, lay: Layout, one, two, out, wanted) -> None:  # type: ignore[no-untyped-def]
+    """Contract what `contract` left for one own block with shared blocks side by side.
 
     Parameters
     ----------
     partial
         ``(total_width,)`` weights of the shared rules.
     strengths
-        ``(d - n_own, most memberships * LANES)`` of the shared variables, lanes side by side.
+        ``(d - n_own, most memberships, lanes)`` of the shared variables.
     one, two
-        Scratch, ``(largest shared size * LANES,)``.
+        Scratch, ``(largest shared size, lanes)``.
     out
-        ``(LANES,)`` the values.
-    lanes
-        How many are wanted.
+        ``(lanes,)`` the values.
+    wanted
+        How many of them are wanted.
     """
-    out[:lanes] = 0.0
+    lanes = (wanted + 7) // 8 * 8  # whole vectors
+    out[:] = 0.0
     start = 0
     for t in range(len(lay.lengths)):
         size, first = lay.shared_sizes[t], lay.own_lengths[t]
-        weights = partial[start : start + size]
-        start += width_of(size)
-        if first == lay.lengths[t]:
-            out[:lanes] += weights[0]
-            continue
         v = lay.lengths[t] - 1
-        j = lay.terms[t, v]
-        _fold_weights(weights, lay.counts[j], strengths[j - lay.n_own], one, lanes)
-        size //= lay.counts[j]
-        while v > first:
-            v -= 1
+        if first > v:
+            out += partial[start]
+        else:
             j = lay.terms[t, v]
-            _fold_rows(one, size, lay.counts[j], strengths[j - lay.n_own], two, lanes)
-            one, two = two, one
-            size //= lay.counts[j]
-        for k in range(lanes):
-            out[k] += one[k]
+            _fold_weights(partial, start, size, lay.counts[j], strengths[j - lay.n_own], one, lanes)
+            left = size // lay.counts[j]
+            while v > first:
+                v -= 1
+                j = lay.terms[t, v]
+                _fold_rows(one, left, lay.counts[j], strengths[j - lay.n_own], two, lanes)
+                one, two = two, one
+                left //= lay.counts[j]
+            out += one[0]
+        start += size

@@ -38,6 +38,8 @@ class Layout(NamedTuple):
     shared_sizes: IntArray  # (t,) shared rules: columns of the term's matrix
     row_lengths: IntArray  # (t,) leading variables that tell the rows of traces apart
     row_sizes: IntArray  # (t,) rows of traces
+    part_lengths: IntArray  # (t,) leading variables that tell the parts of all rows apart
+    part_sizes: IntArray  # (t,) parts of every row
     offsets: IntArray  # (t + 1,) start of each term in theta
     n_active: int  # active rules under compact support
     n_own: int  # own variables
@@ -53,7 +55,7 @@ class Packed(NamedTuple):
 def layout(partitions: Sequence[Partition], terms: Sequence[tuple[int, ...]], n_own: int) -> Packed:
     """Pack partitions and terms for the kernels."""
     d, t = len(partitions), len(terms)
-    widest = max(len(p.knots) for p in partitions)
+    widest = (max(len(p.knots) for p in partitions) + 7) // 8 * 8  # whole vectors
     knots, bounds, slopes = np.zeros((d, widest)), np.zeros((d, widest)), np.zeros((d, widest))
     for j, p in enumerate(partitions):
         k = p.knots
@@ -67,9 +69,13 @@ def layout(partitions: Sequence[Partition], terms: Sequence[tuple[int, ...]], n_
     own = [[j for j in term if j < n_own] for term in terms]
     own_sizes = np.array([int(np.prod(counts[o])) for o in own])
     sizes = np.array([int(np.prod(counts[list(term)])) for term in terms])
-    # Rows of traces: long ones where all rules are active, else those of the own variables.
+    # Rows of traces: long ones where all rules are active, by parts, else those of own variables.
     sigmoid = partitions[0].membership == "sigmoid"
-    rows = [o[:-1] if sigmoid else o for o in own]
+    rows = [list(term[:-3]) if sigmoid else o for term, o in zip(terms, own, strict=True)]
+    parts = [
+        term[len(row) : max(len(row), len(term) - 2)] if sigmoid else ()
+        for row, term in zip(rows, terms, strict=True)
+    ]
     # In the order in which `unpack` takes them.
     whole = [
         [int(sigmoid), d, t, widest, sum(2 ** len(term) for term in terms), n_own],
@@ -81,6 +87,8 @@ def layout(partitions: Sequence[Partition], terms: Sequence[tuple[int, ...]], n_
         sizes // own_sizes,
         [len(row) for row in rows],
         [int(np.prod(counts[row])) for row in rows],
+        [len(row) + len(part) for row, part in zip(rows, parts, strict=True)],
+        [int(np.prod(counts[list(part)])) for part in parts],
         [0, *np.cumsum(sizes)],
         padded,
     ]
@@ -102,7 +110,7 @@ def unpack(packed: Packed) -> Layout:
     whole, real = packed.whole, packed.real
     d, t, k = whole[1], whole[2], whole[3]
     # By d, by t, and what comes after them.
-    by_d, by_t, rest = 6, 6 + 2 * d, 6 + 2 * d + 6 * t
+    by_d, by_t, rest = 6, 6 + 2 * d, 6 + 2 * d + 8 * t
     knots, tail = d * k, 3 * d * k
     return Layout(
         sigmoid=whole[0] > 0,
@@ -120,14 +128,21 @@ def unpack(packed: Packed) -> Layout:
         own_sizes=whole[by_t + 2 * t : by_t + 3 * t],
         shared_sizes=whole[by_t + 3 * t : by_t + 4 * t],
         row_lengths=whole[by_t + 4 * t : by_t + 5 * t],
-        row_sizes=whole[by_t + 5 * t : rest],
+        row_sizes=whole[by_t + 5 * t : by_t + 6 * t],
+        part_lengths=whole[by_t + 6 * t : by_t + 7 * t],
+        part_sizes=whole[by_t + 7 * t : rest],
         offsets=whole[rest : rest + t + 1],
         n_active=whole[4],
         n_own=whole[5],
     )
 
 
+MOST_GROWTH = 400.0
+"""Logarithm of the range that a series of exponentials may span: what was cut off stays so."""
+
+
 def _growth(partition: Partition) -> float:
     gaps = np.diff(partition.knots)
     even = np.allclose(gaps, gaps[0], rtol=1e-9, atol=0.0)
+    even = even and partition.steepness * len(gaps) <= MOST_GROWTH
     return float(np.exp(partition.steepness)) if even else 0.0

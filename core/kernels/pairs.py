@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy")
 def pairs(own, own_rows, shared, shared_rows, divisor: int, codes):  # type: ignore[no-untyped-def]
     """Sort joint-action codes by the blocks that they lead to.
 

@@ -12,8 +12,11 @@ NEGLIGIBLE, NEGLIGIBLE_SINGLE = 1e-15, 1e-9
 """Firing strengths below this are left out of sums in which all strengths add up to one; the other
 is for weights in single precision."""
 
-FLAT, LARGE = 37.0, 1.17191423728026e16
-"""Beyond this exponent, or this exponential, a sigmoid is zero or one to the last bit."""
+LANES, ROWS = 32, 256
+"""Situations side by side: a multiple of the one, and no more than the other at a time."""
+
+FAR, LARGE = 500.0, 1.17191423728026e16
+"""Exponents of sigmoids are cut off here; beyond this exponential one is zero to the last bit."""
 
 
 @njit(cache=True)
@@ -22,7 +25,7 @@ def negligible(theta) -> float:  # type: ignore[no-untyped-def]
     return NEGLIGIBLE if theta.itemsize == 8 else NEGLIGIBLE_SINGLE
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def _wrapped(j: int, x: float, lay: Layout) -> float:
     period, low = lay.periods[j], lay.lows[j]
     if period > 0.0 and not low <= x < low + period:
@@ -30,7 +33,7 @@ def _wrapped(j: int, x: float, lay: Layout) -> float:
     return x
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def pair(j: int, x: float, lay: Layout) -> tuple[int, int, float]:
     """Return the two neighbouring triangular functions (lower, upper) and the upper's strength."""
     x = _wrapped(j, x, lay)
@@ -50,59 +53,6 @@ def pair(j: int, x: float, lay: Layout) -> tuple[int, int, float]:
     if upper >= m:
         upper -= m
     return lower, upper, share
-
-
-@njit(cache=True)
-def strengths_of(j: int, x: float, lay: Layout, out: FloatArray) -> None:
-    """Write the firing strengths of variable j at x into ``out[:counts[j]]``."""
-    m = lay.counts[j]
-    for k in range(m):
-        out[k] = 0.0
-    if not lay.sigmoid:
-        low, high, share = pair(j, x, lay)
-        out[low] += 1.0 - share
-        out[high] += share
-        return
-    x = _wrapped(j, x, lay)
-    last = lay.n_knots[j] - 1
-    bounds, slopes = lay.bounds[j], lay.slopes[j]
-    # Evenly spread centres share one slope: the exponentials form a geometric series.
-    even, growth = lay.growths[j] > 0.0, lay.growths[j]
-    level, power = 1.0, -1.0
-    at = 0
-    for k in range(last):
-        exponent = -slopes[k] * (x - bounds[k])
-        rising = 0.0
-        if exponent < -FLAT:
-            rising = 1.0
-        elif exponent < FLAT:
-            power = power * growth if even and power > 0.0 else np.exp(exponent)
-            rising = 1.0 / (1.0 + power)
-        if rising > level:
-            rising = level
-        out[at] += level - rising
-        level = rising
-        at = at + 1 if at + 1 < m else 0
-    out[at] += level
-
-
-@njit(cache=True)
-def product_of(term: int, first: int, last: int, lay: Layout, strengths, out, start: int) -> None:  # type: ignore[no-untyped-def]
-    """Write the products of the strengths of variables first..last-1 of a term, in C order."""
-    room = out[start:]
-    room[0] = 1.0
-    size = 1
-    for v in range(first, last):
-        j = lay.terms[term, v]
-        m = lay.counts[j]
-        row = strengths[j, :m]
-        # From the end, so that no product is overwritten before it is used.
-        for r in range(size - 1, -1, -1):
-            base = room[r]
-            part = room[r * m : r * m + m]
-            for k in range(m):
-                part[k] = base * row[k]
-        size *= m
 
 
 _POWERS = 2.0 ** np.arange(-1000, 1001)
@@ -132,6 +82,68 @@ def exponential(x: float) -> float:
 
 
 @njit(cache=True, error_model="numpy", fastmath=_FAST)
+def _sigmoids(x, slopes, bounds, out):  # type: ignore[no-untyped-def]
+    """Write by how much the functions up to every bound are left behind at x: S_k of Eq. 6."""
+    for k in range(len(out)):
+        exponent = -slopes[k] * (x - bounds[k])
+        exponent = exponent if exponent < FAR else FAR
+        power = exponential(exponent if exponent > -FAR else -FAR)
+        out[k] = 1.0 / (1.0 + power) if power < LARGE else 0.0
+
+
+@njit(cache=True, inline="always")
+def strengths_of(j: int, x: float, lay: Layout, out: FloatArray, room: FloatArray) -> None:
+    """Write the firing strengths of variable j at x into ``out[:counts[j]]``.
+
+    `room` is scratch, as long as `lay.bounds` is wide.
+    """
+    m = lay.counts[j]
+    out[:m] = 0.0
+    if not lay.sigmoid:
+        low, high, share = pair(j, x, lay)
+        out[low] += 1.0 - share
+        out[high] += share
+        return
+    _sigmoids(_wrapped(j, x, lay), lay.slopes[j], lay.bounds[j], room)
+    level, at = 1.0, 0
+    for k in range(lay.n_knots[j] - 1):
+        lower = room[k] if room[k] < level else level
+        out[at] += level - lower
+        level = lower
+        at = at + 1 if at + 1 < m else 0
+    out[at] += level
+
+
+@njit(cache=True)
+def all_strengths(state: FloatArray, lay: Layout, out: FloatArray, room: FloatArray) -> None:
+    """Write the firing strengths ``(d, most memberships)`` of all variables of a state ``(d,)``."""
+    for j in range(len(state)):
+        strengths_of(j, state[j], lay, out[j], room)
+
+
+@njit(cache=True)
+def strengths_room(lay: Layout) -> tuple[FloatArray, FloatArray]:
+    """Return room for the strengths of a state, and for finding them."""
+    return np.empty((len(lay.counts), lay.counts.max())), np.empty(lay.bounds.shape[1])
+
+
+@njit(cache=True, fastmath=_FAST, inline="always")
+def product_of(term: int, first: int, last: int, lay: Layout, strengths, out) -> None:  # type: ignore[no-untyped-def]
+    """Write the products of the strengths of variables first..last-1 of a term, in C order."""
+    out[0] = 1.0
+    size = 1
+    # The last variable first: what is multiplied stands side by side.
+    for v in range(last - 1, first - 1, -1):
+        j = lay.terms[term, v]
+        # From the end, so that no product is overwritten before it is used.
+        for s in range(lay.counts[j] - 1, -1, -1):
+            strength, part = strengths[j, s], out[s * size : s * size + size]
+            for k in range(size):
+                part[k] = strength * out[k]
+        size *= lay.counts[j]
+
+
+@njit(cache=True, error_model="numpy", fastmath=_FAST)
 def _rise(x, k, sigmoid, even, slope, bound, growth, knot, width, power, rising):  # type: ignore[no-untyped-def]
     """Write by how much the functions up to k are left behind at every x: S_k of Eq. 6."""
     if not sigmoid:
@@ -146,8 +158,8 @@ def _rise(x, k, sigmoid, even, slope, bound, growth, knot, width, power, rising)
     else:
         for i in range(len(x)):
             exponent = -slope * (x[i] - bound)
-            exponent = exponent if exponent < 500.0 else 500.0
-            power[i] = exponential(exponent if exponent > -500.0 else -500.0)
+            exponent = exponent if exponent < FAR else FAR
+            power[i] = exponential(exponent if exponent > -FAR else -FAR)
     for i in range(len(x)):
         rising[i] = 1.0 / (1.0 + power[i]) if power[i] < LARGE else 0.0
 
@@ -162,24 +174,27 @@ def _fall(level, rising, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def many_strengths(j: int, x: FloatArray, lay: Layout, out: FloatArray) -> None:
-    """Write the firing strengths of variable j at many x ``(R,)`` into ``out[:counts[j]]``.
+def many_strengths(j: int, values: FloatArray, lay: Layout, out: FloatArray) -> None:
+    """Write the firing strengths of variable j at many values ``(R,)`` into ``out[:counts[j]]``.
 
     What `strengths_of` writes for one, `out` being ``(most memberships, R)``.
     """
-    m, last = lay.counts[j], lay.n_knots[j] - 1
-    x = x.copy()
-    for i in range(len(x)):
-        x[i] = _wrapped(j, x[i], lay)
-    level, power, rising = np.ones(len(x)), np.empty(len(x)), np.empty(len(x))
-    out[:] = 0.0
+    m, last, total = lay.counts[j], lay.n_knots[j] - 1, len(values)
+    lanes = min(ROWS, (total + LANES - 1) // LANES * LANES)
+    x, level, power, rising = np.zeros(lanes), np.empty(lanes), np.empty(lanes), np.empty(lanes)
+    found = np.empty((m, lanes))
     even = lay.growths[j] > 0.0
-    for k in range(last):
-        knot = lay.knots[j, k]
-        _rise(
-            x, k, lay.sigmoid, even, lay.slopes[j, k], lay.bounds[j, k], lay.growths[j],
-            knot, lay.knots[j, k + 1] - knot, power, rising,
-        )  # fmt: skip
-        _fall(level, rising, out[k % m])
-    for i in range(len(x)):
-        out[last % m, i] += level[i]
+    for first in range(0, total, lanes):
+        n = min(lanes, total - first)
+        for i in range(n):
+            x[i] = _wrapped(j, values[first + i], lay)
+        level[:], found[:] = 1.0, 0.0
+        for k in range(last):
+            knot = lay.knots[j, k]
+            _rise(
+                x, k, lay.sigmoid, even, lay.slopes[j, k], lay.bounds[j, k], lay.growths[j],
+                knot, lay.knots[j, k + 1] - knot, power, rising,
+            )  # fmt: skip
+            _fall(level, rising, found[k % m])
+        found[last % m] += level
+        out[:m, first : first + n] = found[:, :n]

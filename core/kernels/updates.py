@@ -6,67 +6,84 @@ import numpy as np
 from numba import njit
 
 from ..arrays import FloatArray
-from .layout import Packed, unpack
-from .strengths import negligible, product_of, strengths_of
+from .contraction import hull
+from .layout import Layout, Packed, unpack
+from .strengths import all_strengths, negligible, product_of, strengths_room
 
 
 @njit(cache=True, fastmath={"contract"})
-def _advance(theta, trace, tail, weight, decay, step) -> None:  # type: ignore[no-untyped-def]
-    """Decay one row of traces, add ``weight * tail``, and move a row of theta along it."""
-    for c in range(len(tail)):
-        e = decay * trace[c] + weight * tail[c]
-        trace[c] = e
-        theta[c] += step * e
+def _reach_on(reach, heads, decay, least) -> None:  # type: ignore[no-untyped-def]
+    """Decay bounds of traces and add what comes to them; those below `least` become zero."""
+    for r in range(len(reach)):
+        bound = decay * reach[r] + heads[r]
+        reach[r] = bound if bound > least else 0.0
+
+
+@njit(cache=True, fastmath={"contract"})
+def _advance(theta, trace, heads, reach, tail, decay, step) -> None:  # type: ignore[no-untyped-def]
+    """Decay the traces ``(rows, columns)`` of a term, add ``heads * tail``, move theta along them.
+
+    Of every row only what lies between parts that reach anything.
+    """
+    parts = len(reach) // len(heads)
+    width = len(tail) // parts
+    for r in range(len(heads)):
+        at = r * parts
+        first, last = hull(reach, at, at + parts, 0.0)
+        head = heads[r]
+        for c in range(np.uint64((first - at) * width), np.uint64((last - at) * width)):
+            e = decay * trace[r, c] + head * tail[c]
+            trace[r, c] = e
+            theta[r, c] += step * e
+
+
+@njit(cache=True)
+def advance(theta, trace, reach, strengths, decay: float, step: float, lay: Layout) -> None:  # type: ignore[no-untyped-def]
+    """Decay the traces of one agent, add phi, and move theta along them, in one pass (Eq. 12, 13).
+
+    Parameters
+    ----------
+    theta, trace
+        ``(n_rules,)`` consequent weights and eligibility traces, both modified.
+    reach
+        ``(parts of all rows,)`` the most that any trace of a part of a row of rules can be,
+        modified; 0 where traces are negligible, they stay as they are.
+    strengths
+        ``(d, most memberships)`` firing strengths of the previous state.
+    decay
+        Discount times trace decay.
+    step
+        Step size times TD error.
+    lay
+        Layout of the rule base.
+    """
+    kept, step, done = theta.dtype.type(decay), theta.dtype.type(step), 0
+    for t in range(len(lay.lengths)):
+        first, last, rows = lay.offsets[t], lay.offsets[t + 1], lay.row_sizes[t]
+        columns, parts = (last - first) // rows, rows * lay.part_sizes[t]
+        heads, tail = np.empty(rows, theta.dtype), np.empty(columns, theta.dtype)
+        product_of(t, 0, lay.row_lengths[t], lay, strengths, heads)
+        product_of(t, lay.row_lengths[t], lay.lengths[t], lay, strengths, tail)
+        bounds = np.empty(parts)
+        product_of(t, 0, lay.part_lengths[t], lay, strengths, bounds)
+        _reach_on(reach[done : done + parts], bounds, decay, negligible(theta))
+        _advance(
+            theta[first:last].reshape(rows, columns), trace[first:last].reshape(rows, columns),
+            heads, reach[done : done + parts], tail, kept, step,
+        )  # fmt: skip
+        done += parts
 
 
 @njit(cache=True)
 def td_update(  # type: ignore[no-untyped-def]
     theta, trace, reach, states: FloatArray, steps: FloatArray, decay: float, packed: Packed
 ) -> None:
-    """Decay the traces, add phi of the states, and move theta along them, in one pass (Eq. 12, 13).
-
-    Rows of traces that no longer reach what is negligible are set to zero and passed over.
-
-    Parameters
-    ----------
-    theta, trace
-        ``(n, n_rules)`` consequent weights and eligibility traces, both modified.
-    reach
-        ``(n, rows of all terms)`` the most that any trace of a row of rules can be, modified.
-    states
-        ``(n, d)`` the previous states of the agents.
-    steps
-        ``(n,)`` step size times TD error of each agent.
-    decay
-        Discount times trace decay.
-    """
+    """Do `advance` for all agents: everything has an axis ``n`` before its own."""
     lay = unpack(packed)
-    strengths = np.empty((len(lay.counts), lay.counts.max()))
-    heads = np.empty(lay.row_sizes.max())
-    tail = np.empty(((lay.offsets[1:] - lay.offsets[:-1]) // lay.row_sizes).max(), theta.dtype)
-    kept, least = theta.dtype.type(decay), negligible(theta)
+    strengths, room = strengths_room(lay)
     for i in range(len(states)):
-        for j in range(len(lay.counts)):
-            strengths_of(j, states[i, j], lay, strengths[j])
-        step = theta.dtype.type(steps[i])
-        row = 0
-        for t in range(len(lay.lengths)):
-            product_of(t, 0, lay.row_lengths[t], lay, strengths, heads, 0)
-            product_of(t, lay.row_lengths[t], lay.lengths[t], lay, strengths, tail, 0)
-            columns = (lay.offsets[t + 1] - lay.offsets[t]) // lay.row_sizes[t]
-            for r in range(lay.row_sizes[t]):
-                at = lay.offsets[t] + r * columns
-                before = reach[i, row]
-                reach[i, row] = decay * before + heads[r]
-                if reach[i, row] > least:
-                    _advance(
-                        theta[i, at : at + columns], trace[i, at : at + columns],
-                        tail[:columns], theta.dtype.type(heads[r]), kept, step,
-                    )  # fmt: skip
-                elif before > 0.0:
-                    trace[i, at : at + columns] = 0.0
-                    reach[i, row] = 0.0
-                row += 1
+        all_strengths(states[i], lay, strengths, room)
+        advance(theta[i], trace[i], reach[i], strengths, decay, steps[i], lay)
 
 
 @njit(cache=True)
@@ -75,15 +92,13 @@ def add_features(  # type: ignore[no-untyped-def]
 ) -> None:
     """Add ``weights[i] * phi(states[i])`` to row i of ``target (n, n_rules)``, in place."""
     lay = unpack(packed)
-    strengths = np.empty((len(lay.counts), lay.counts.max()))
-    own = np.empty(lay.own_sizes.max())
-    shared = np.empty(lay.shared_sizes.max())
+    strengths, room = strengths_room(lay)
+    own, shared = np.empty(lay.own_sizes.max()), np.empty(lay.shared_sizes.max())
     for i in range(len(states)):
-        for j in range(len(lay.counts)):
-            strengths_of(j, states[i, j], lay, strengths[j])
+        all_strengths(states[i], lay, strengths, room)
         for t in range(len(lay.lengths)):
-            product_of(t, 0, lay.own_lengths[t], lay, strengths, own, 0)
-            product_of(t, lay.own_lengths[t], lay.lengths[t], lay, strengths, shared, 0)
+            product_of(t, 0, lay.own_lengths[t], lay, strengths, own)
+            product_of(t, lay.own_lengths[t], lay.lengths[t], lay, strengths, shared)
             columns = lay.shared_sizes[t]
             for r in range(lay.own_sizes[t]):
                 at = lay.offsets[t] + r * columns

@@ -28,13 +28,13 @@ class Online(ABC):
         self.weights = self.theta
         """The consequent weights that learn; those that decide, theta, may be an average."""
         self.trace: FloatArray = np.zeros_like(self.theta)
-        self.reach: FloatArray = np.zeros((n_agents, rules.n_rows))
+        self.reach: FloatArray = np.zeros((n_agents, rules.n_parts))
         self._previous: FloatArray | None = None
         self._reward = 0.0
 
     def begin_episode(self) -> None:
         """Clear the traces."""
-        if self.reach.any():  # memory that is never written is never taken
+        if self._previous is not None:  # memory that is never written is never taken
             self.trace[:], self.reach[:] = 0.0, 0.0
         self._previous = None
 

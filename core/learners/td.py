@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from .. import kernels
 from ..arrays import FloatArray
 from ..config import TDLambdaSettings
 from ..rules import RuleBase
@@ -40,13 +39,14 @@ class TDLambda(Online):
             self.kept = (*self.kept, "weights", "updates")
 
     def _update(self, states: FloatArray, reward: float, entered: FloatArray | None) -> int:
-        steps = self.settings.step_size * self._errors(states, reward, entered)
+        lengths: FloatArray = np.ones(len(states))
         if self.settings.normalised:
-            steps = steps / self.rules.squared_lengths(states)
-        decay = self.discount * self.settings.trace_decay
-        kernels.td_update(
-            self.weights, self.trace, self.reach, states, steps, decay, self.rules.layout
-        )
+            lengths = self.rules.squared_lengths(states)
+        self.rules.td_update(
+            self.weights, self.trace, self.reach, states, states if entered is None else entered,
+            reward, 0.0 if entered is None else self.discount, self.settings.step_size, lengths,
+            self.discount * self.settings.trace_decay,
+        )  # fmt: skip
         if self.settings.averaging > 1:
             self.updates += 1.0
             share = 1.0 / min(float(self.updates), self.settings.averaging)

@@ -28,9 +28,9 @@ def partitions(draw: st.DrawFn, flattest: float = 1.0) -> Partition:
 
 def by_kernel(partition: Partition, x: np.ndarray) -> np.ndarray:
     lay = kernels.unpack(kernels.layout([partition], [(0,)], 0))
-    out = np.empty((len(x), partition.size))
+    out, room = np.empty((len(x), partition.size)), np.empty(lay.bounds.shape[1])
     for row, value in zip(out, x, strict=True):
-        kernels.strengths_of(0, value, lay, row)
+        kernels.strengths_of(0, value, lay, row, room)
     return out
 
 

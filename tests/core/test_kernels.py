@@ -128,10 +128,29 @@ def test_enumerate(base: RuleBase, rng: np.random.Generator, agent: int, average
 def test_td_update(base: RuleBase, rng: np.random.Generator) -> None:
     theta, trace = rng.normal(size=(2, 3, base.n_rules))
     theta_twin, trace_twin = theta.copy(), trace.copy()
-    reach = np.full((3, base.n_rows), 5.0)
+    reach = np.full((3, base.n_parts), 5.0)
     for _ in range(60):
         states, steps = states_of(rng, 3), 0.1 * rng.normal(size=3)
         kernels.td_update(theta, trace, reach, states, steps, 0.38, base.layout)
+        twins.td_update(base, theta_twin, trace_twin, states, steps, 0.38)
+    assert trace == pytest.approx(trace_twin, rel=0, abs=1e-12)
+    assert theta == pytest.approx(theta_twin, rel=0, abs=1e-12)
+
+
+@pytest.mark.parametrize("discount", [0.95, 0.0])
+def test_td_updates_with_their_errors(
+    base: RuleBase, rng: np.random.Generator, discount: float
+) -> None:
+    theta, trace = rng.normal(size=(2, 3, base.n_rules))
+    theta_twin, trace_twin, lengths = theta.copy(), trace.copy(), np.array([1.0, 2.0, 0.5])
+    reach = np.full((3, base.n_parts), 5.0)
+    for _ in range(5):
+        states, entered = states_of(rng, 6).reshape(2, 3, -1)
+        now, ahead = (
+            np.einsum("ij,ij->i", base.features(met), theta_twin) for met in (states, entered)
+        )
+        base.td_update(theta, trace, reach, states, entered, -0.3, discount, 0.1, lengths, 0.38)
+        steps = 0.1 * (-0.3 + discount * ahead - now) / lengths
         twins.td_update(base, theta_twin, trace_twin, states, steps, 0.38)
     assert trace == pytest.approx(trace_twin, rel=0, abs=1e-12)
     assert theta == pytest.approx(theta_twin, rel=0, abs=1e-12)
@@ -146,6 +165,14 @@ def test_strengths_of_many(base: RuleBase, rng: np.random.Generator) -> None:
         kernels.many_strengths(j, states[:, j], lay, out)
         expected = partition.strengths(states[:, j]).T
         assert out[: lay.counts[j]] == pytest.approx(expected, rel=0, abs=1e-14)
+
+
+def test_strengths_of_many_between_steep_sigmoids() -> None:
+    steep = Partition(tuple(np.linspace(0.0, 1.0, 9).tolist()), "sigmoid", steepness=120.0)
+    x = np.linspace(-2.0, 3.0, 501)
+    out = np.empty((9, len(x)))
+    kernels.many_strengths(0, x, kernels.unpack(kernels.layout([steep], [(0,)], 0)), out)
+    assert out == pytest.approx(steep.strengths(x).T, rel=0, abs=1e-13)
 
 
 @given(st.floats(-690, 690))
@@ -180,7 +207,7 @@ def test_single_precision(base: RuleBase, rng: np.random.Generator) -> None:
         ),
     ):
         assert found == pytest.approx(expected, rel=1e-5, abs=1e-5 * scale)
-    reach = np.full((3, base.n_rows), 5.0)
+    reach = np.full((3, base.n_parts), 5.0)
     kernels.td_update(theta, trace, reach, states, steps, 0.38, base.layout)
     twins.td_update(base, *wide, states, steps, 0.38)
     assert theta.dtype == trace.dtype == np.float32
@@ -211,16 +238,23 @@ def test_the_papers_78125_rules(membership: str, rng: np.random.Generator) -> No
     base = RuleBase([circle, circle, line, line, circle, circle, line], [tuple(range(7))], n_own=4)
     assert base.n_rules == 5**7
     theta, states = rng.normal(size=base.n_rules), rng.uniform(-4, 4, (4, 7))
+    expected = [float(base.features(state[None])[0] @ theta) for state in states]
+    assert base.each(theta[None], states[None])[0] == pytest.approx(expected, rel=0, abs=1e-12)
+    states = np.tile(states, (6, 1))
+    states[:, 4:] += 0.01 * rng.normal(size=(24, 3))  # a few own blocks, shared ones near by
     expected = twins.values(base, theta, states)
     assert base.values(theta, states) == pytest.approx(expected, rel=0, abs=1e-12)
-    blocks, codes = blocks_of(rng, 4, 7), rng.integers(N_ACTIONS**N_AGENTS, size=6)
-    expected = twins.block_values(base, theta, blocks, codes)
-    assert base.block_values(theta, blocks, codes) == pytest.approx(expected, rel=0, abs=1e-12)
+    for size in (1, 2, 3, 24):
+        blocks, codes = blocks_of(rng, 4, 7), rng.integers(N_ACTIONS**N_AGENTS, size=size)
+        blocks.own[:, 3] = rng.choice([0.1, 0.5, 0.52, 0.9], len(blocks.own))  # levels shared
+        expected = twins.block_values(base, theta, blocks, codes)
+        found = base.block_values(theta, blocks, codes)
+        assert found == pytest.approx(expected, rel=0, abs=1e-12)
 
     theta, trace = rng.normal(size=(2, 2, base.n_rules))
     theta_twin, trace_twin = theta.copy(), trace.copy()
     steps = np.array([0.01, -0.02])
-    reach = np.full((2, base.n_rows), 5.0)
+    reach = np.full((2, base.n_parts), 5.0)
     kernels.td_update(theta, trace, reach, states[:2], steps, 0.3996, base.layout)
     twins.td_update(base, theta_twin, trace_twin, states[:2], steps, 0.3996)
     assert np.abs(trace - trace_twin).max() <= 1e-12
