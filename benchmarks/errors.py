@@ -131,7 +131,7 @@ def times(n_agents: int, budget: float = 3.0) -> dict[str, float]:
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.errors", description=__doc__)
-    parser.add_argument("--robots", type=int, nargs="*", default=[2, 3, 4, 6, 8])
+    parser.add_argument("--robots", type=int, nargs="*", default=[2, 3, 4, 6, 8, 32])
     parser.add_argument("--steps", type=int, default=80)
     parser.add_argument("--seeds", type=int, default=5, help="from 10000")
     parser.add_argument("--times", type=int, nargs="*", default=[8, 16, 64, 128], metavar="AGENTS")

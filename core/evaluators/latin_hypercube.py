@@ -5,7 +5,9 @@ same joint moves of the other bodies: all there are if the budget allows, and th
 exact. Otherwise as many as it allows, drawn as a Latin hypercube (McKay, Beckman & Conover 1979):
 for every body the chances of its moves are cut into as many equal strata as there are draws, and
 each stratum is drawn once, in an order of its own. The mean over the draws is unbiased, and what is
-a sum of effects of single bodies, given the own move, has hardly any sampling error.
+a sum of effects of single bodies, given the own move, has hardly any sampling error. Where the
+bodies are few the orders come from an orthogonal array (Tang 1993), so that sums of effects of two
+bodies at a time have little too.
 
 The budget is of moves of bodies predicted for a decision of the whole team, since these cost the
 time: a decision takes no longer the more bodies there are, but its values rest on fewer draws. It
@@ -15,6 +17,7 @@ to the others.
 
 from __future__ import annotations
 
+from math import isqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +31,8 @@ from .grouping import Grouping
 
 LEAST = 4
 """Joint moves of the other bodies that are drawn at least."""
+SPARED = 0.25
+"""Share of the draws allowed that may be given up for an orthogonal array."""
 
 
 class _Tried(NamedTuple):
@@ -190,12 +195,11 @@ def joint_moves(
     free = np.flatnonzero(counts > 1)
     drawn = counts[free].prod(dtype=float) > most
     if drawn:
-        strata = rng.random((len(free), most)).argsort(axis=1)
-        places = (strata + rng.random(strata.shape)) / most
+        places = latin_hypercube(most, len(free), rng)
         ladder = chances[free].cumsum(axis=1)
         ladder /= ladder[:, -1:]
         found = (places[:, :, None] >= ladder[:, None, :]).sum(axis=2).T
-        weights = np.full(most, 1.0 / most)
+        weights = np.full(len(found), 1.0 / len(found))
     else:
         found, weights = np.zeros((1, 0), dtype=np.int64), np.ones(1)
         for g in free:
@@ -207,3 +211,23 @@ def joint_moves(
     codes = np.tile(possible.argmax(axis=1), (len(found), 1))
     codes[:, free] = found
     return codes, weights
+
+
+def latin_hypercube(most: int, d: int, rng: np.random.Generator) -> FloatArray:
+    """Return at most `most` points ``(d, m)`` of the unit cube, one in each m-th of every side.
+
+    If the square of a prime p >= d - 1 is not much below `most`, it is taken for m, and any two
+    sides cut into p span squares that hold one point each.
+    """
+    p = max((q for q in range(2, isqrt(most) + 1) if all(q % f for f in range(2, q))), default=1)
+    m, levels = most, np.zeros((d, 1), dtype=np.int64)
+    if p >= d - 1 and p * p >= (1.0 - SPARED) * most:
+        m = p * p
+        row, column = np.divmod(np.arange(m), p)
+        slopes = np.arange(d)[:, None]
+        lines = np.where(slopes < p, row + slopes * column, column) % p
+        relabelled = rng.random((d, p)).argsort(axis=1)
+        levels = np.take_along_axis(relabelled, lines, axis=1)
+    ranks = (levels + rng.random((d, m))).argsort(axis=1).argsort(axis=1)
+    places: FloatArray = (ranks + rng.random((d, m))) / m
+    return places

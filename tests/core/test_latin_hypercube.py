@@ -1,13 +1,13 @@
 """Latin hypercubes: exact if the budget allows, unbiased and within it otherwise."""
 
-from itertools import pairwise
+from itertools import combinations, pairwise, product
 
 import numpy as np
 import pytest
 
 from nested_agents.core.config import BatchTDSettings, Decision, RuleBaseSettings
 from nested_agents.core.evaluators import ExactEnumeration, LatinHypercube
-from nested_agents.core.evaluators.latin_hypercube import LEAST, joint_moves
+from nested_agents.core.evaluators.latin_hypercube import LEAST, joint_moves, latin_hypercube
 from nested_agents.core.hierarchy import Hierarchy
 from nested_agents.core.rules import RuleBase
 from nested_agents.core.team import _build_evaluator
@@ -27,10 +27,8 @@ def chain(agents: tuple[str, ...]) -> Hierarchy:
     return Hierarchy(agents, list(pairwise(agents)))
 
 
-@pytest.fixture(scope="module")
-def pushing():
-    """Three robots, six wheel agents, in the middle of an episode: where, and what they know."""
-    scenario = build(ScenarioSettings(robots=3))
+def pushing_in(state_space: str):
+    scenario = build(ScenarioSettings(robots=3, state_space=state_space))
     scenario.reset(2)
     rng = np.random.default_rng(2)
     for _ in range(8):
@@ -38,6 +36,12 @@ def pushing():
     rules = RuleBase.build(scenario.state_space, RuleBaseSettings())
     theta = rng.normal(size=(6, rules.n_rules))
     return scenario, rules, theta, rng.dirichlet(np.ones(A), size=6)
+
+
+@pytest.fixture(scope="module")
+def pushing():
+    """Three robots, six wheel agents, in the middle of an episode: where, and what they know."""
+    return pushing_in("relational")
 
 
 @pytest.mark.parametrize("others", OTHERS)
@@ -66,15 +70,19 @@ def test_all_is_tried_if_the_budget_allows(
         )
 
 
-@pytest.mark.parametrize("others", OTHERS)
-def test_moves_that_come_to_the_same_are_tried_once(others: str, pushing) -> None:
-    scenario, rules, theta, frequencies = pushing
+@pytest.mark.parametrize(
+    ("state_space", "others"), [*product(["relational"], OTHERS), ("paper", "mean")]
+)
+def test_moves_that_come_to_the_same_are_tried_once(state_space: str, others: str) -> None:
+    scenario, rules, theta, frequencies = pushing_in(state_space)
     hierarchy, prediction = chain(scenario.agents), scenario.predict()
     common = (rules, hierarchy, A, "value", others, DISCOUNT)
     exact, evaluator = (
         ExactEnumeration(*common),
         LatinHypercube(scenario.groups, UNBOUNDED, *common),
     )
+    # Its table takes own poses as if alone, which matters where they are variables.
+    exact._tabulated = state_space == "relational"
     for agent in range(6):
         joint = np.full(6, scenario.action_set.neutral)
         joint[:agent] = 3
@@ -127,8 +135,22 @@ def test_every_body_draws_its_moves_as_often_as_they_are_likely(rng: np.random.G
     assert (codes[:, 2] == 0).all()
     assert (codes[:, 3] == 8).all()
     for g in (0, 1, 4):
-        assert np.abs(np.bincount(codes[:, g], minlength=9) - 64 * chances[g]).max() < 2.0
+        often = np.bincount(codes[:, g], minlength=9)
+        assert np.abs(often - len(codes) * chances[g]).max() < 2.0
     assert len(np.unique(codes[:, [0, 1]], axis=0)) > 20
+
+
+@pytest.mark.parametrize(("most", "d", "m"), [(130, 12, 121), (130, 13, 130), (100, 3, 100)])
+def test_every_slice_of_the_cube_holds_one_point(
+    most: int, d: int, m: int, rng: np.random.Generator
+) -> None:
+    places = latin_hypercube(most, d, rng)
+    assert places.shape == (d, m)
+    assert (np.sort((places * m).astype(int), axis=1) == np.arange(m)).all()
+    if m == 121:  # an orthogonal array: so does every square that two sides span
+        levels = (places * 11).astype(int)
+        for i, j in combinations(range(d), 2):
+            assert len(np.unique(11 * levels[i] + levels[j])) == m
 
 
 def test_a_crowd_is_tried_sparsely(line_world, rng: np.random.Generator) -> None:
