@@ -19,6 +19,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
@@ -103,8 +104,10 @@ def _evaluators(
     groups: tuple[tuple[int, ...], ...], n: int, others: str, common: tuple[Any, ...]
 ) -> tuple[list[Evaluator], dict[str, Evaluator]]:
     """Return what is taken for exact, and what is measured."""
-    references: list[Evaluator] = [ExactEnumeration(*common)]
-    if n > LARGEST_EXACT:
+    references: list[Evaluator]
+    if n <= LARGEST_EXACT:
+        references = [ExactEnumeration(*common)]
+    else:
         references = [LatinHypercube(groups, BUDGET, *common) for _ in range(REPLICATES)]
     summed = Extremes if others == "max" else Moments
     evaluators: dict[str, Evaluator] = {
@@ -136,8 +139,9 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=5, help="from 10000")
     parser.add_argument("--times", type=int, nargs="*", default=[8, 16, 64, 128], metavar="AGENTS")
     options = parser.parse_args()
-    console = Console(width=88)
-    table = Table("scenario", "n", "others", "evaluator", "median", "90 %", "99 %", "regret", "of")
+    console = Console(width=80)
+    heads = ("scenario", "n", "others", "evaluator", "median", "90 %", "99 %", "regret", "of")
+    table = Table(*heads, box=SIMPLE, padding=(0, 1, 0, 0))
     for name, settings in SCENARIOS.items():
         for robots in options.robots:
             for others in ("observed", "max"):
@@ -154,7 +158,8 @@ def main() -> None:
     console.print(table)
     if options.times:
         taken = {n: times(n) for n in options.times}
-        table = Table("ms per decision", *(f"n = {n}" for n in taken))
+        heads = ("ms per decision", *(f"n = {n}" for n in taken))
+        table = Table(*heads, box=SIMPLE)
         for name in dict.fromkeys(name for row in taken.values() for name in row):
             cells = [f"{row[name]:.3g}" if name in row else "" for row in taken.values()]
             table.add_row(name, *cells)
