@@ -82,12 +82,17 @@ class Decision(Settings):
     others: Literal["max", "mean", "observed"] = "max"
     """What the agents below are expected to do: the best for this agent, anything with equal
     chance, or what they were seen to do so far (the paper's "stochastically observing")."""
-    evaluator: Literal["auto", "exact", "sampling", "moments", "extremes"] = "auto"
-    """Enumerate all joint actions, try a random sample of them, or go by the sum of what robots
-    contribute: `moments` for others "mean" and "observed", `extremes` for others "max". Auto: exact
-    up to `exact_up_to`, sampling up to `sampling_up_to`, beyond by sums if the scenario can."""
+    evaluator: Literal["auto", "exact", "sampling", "latin-hypercube", "moments", "extremes"] = (
+        "auto"
+    )
+    """Enumerate all joint actions, try a random sample of them, try as many as `budget` allows and
+    spread them evenly if that is not all, or go by the sum of what robots contribute: `moments` for
+    others "mean" and "observed", `extremes` for others "max". Auto: exact up to `exact_up_to`,
+    sampling up to `sampling_up_to`, beyond by sums if the scenario can."""
     samples: Annotated[int, Field(ge=1)] = 64
     """Joint actions of the agents below tried with each own action when sampling."""
+    budget: Annotated[int, Field(ge=1)] = 131_072
+    """Moves of robots predicted for a decision of the whole team, about, by latin-hypercube."""
     exact_up_to: Annotated[int, Field(ge=1, le=10)] = 5
     """Agents that may still be free when `evaluator` is auto and enumeration is exact."""
     sampling_up_to: Annotated[int, Field(ge=1)] = 12

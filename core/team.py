@@ -12,7 +12,7 @@ from .arrays import FloatArray, IntArray
 from .calibration import Calibration
 from .config import Decision
 from .config import Learner as LearnerSettings
-from .evaluators import Evaluator, ExactEnumeration, Extremes, Moments, Sampling
+from .evaluators import Evaluator, ExactEnumeration, Extremes, LatinHypercube, Moments, Sampling
 from .exploration import Explorer, Greedy, build_explorer
 from .hierarchy import Hierarchy
 from .learners import Learner, build_learner
@@ -30,7 +30,7 @@ from .rules import RuleBase
 from .self_model import SelfModel
 from .spaces import ActionSet
 
-AnyEvaluator = ExactEnumeration | Sampling | Moments | Extremes
+AnyEvaluator = ExactEnumeration | Sampling | LatinHypercube | Moments | Extremes
 
 
 class Team:
@@ -308,6 +308,8 @@ def _build_evaluator(
         return ExactEnumeration(*common)
     if kind == "sampling":
         return Sampling(decision.samples, *common)
+    if kind == "latin-hypercube":
+        return LatinHypercube(scenario.groups, decision.budget, *common)
     if not superposes:
         raise ValueError(
             f"decision.evaluator = {kind!r}: the scenario predicts no sums, use exact or sampling"

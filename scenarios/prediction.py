@@ -97,6 +97,17 @@ class BoxPrediction:
         )
         return self.seen(robots, box, gaps, seconds)
 
+    def _view_again(self, choices: IntArray) -> View:
+        """Return the view of `choices`: the last one, if they are the same."""
+        last = self._last
+        if not (last and np.array_equal(last[0][0], choices)):
+            last[:] = [(choices, self._view(choices))]
+        return last[0][1]
+
+    @cached_property
+    def _last(self) -> list[tuple[IntArray, View]]:
+        return []
+
     def seen(self, robots: FloatArray, box: FloatArray, gaps: FloatArray, seconds: float) -> View:
         """Return a view of situations that the present leads to in `seconds`."""
         goal, now = self.situation.goal, self.situation.box
@@ -106,6 +117,17 @@ class BoxPrediction:
     def _choices(self, joint_actions: IntArray) -> IntArray:
         """Return the drive ``(m, M)`` of each robot in joint actions ``(m, n)``."""
         return choices_of(joint_actions, self.drives.which, len(self.action_set))
+
+    @cached_property
+    def alike(self) -> IntArray:
+        """The first local code of a robot ``(M, A ** w)`` that gives the same wheel speeds."""
+        return first_alike(self.drives.which)
+
+    @cached_property
+    def alike_elsewhere(self) -> IntArray:
+        """The first local code of a robot ``(M, A ** w)`` that gives the same motion."""
+        drives = self.drives
+        return first_alike(np.take_along_axis(drives.motions, drives.which, axis=1))
 
     @cached_property
     def _table(self) -> tuple[View, IntArray]:
@@ -177,7 +199,7 @@ class BoxPrediction:
         """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
         r, wheel = self._places[agent]
         choices = self._choices(joint_actions)
-        view = self._view(choices)
+        view = self._view_again(choices)
         speeds = self.drives.speeds[r, choices[:, r], wheel]
         own = self.space.own(view.robots[:, r], speeds, self.situation.goal)
         return np.concatenate([own, self.space.shared_of(view, [r])[0]], axis=1)
@@ -220,7 +242,7 @@ class BoxPrediction:
 
     def rewards(self, joint_actions: IntArray) -> FloatArray:
         """Return the predicted rewards ``(m,)`` of joint actions ``(m, n)``."""
-        return self._rewards(self._view(self._choices(joint_actions)))
+        return self._rewards(self._view_again(self._choices(joint_actions)))
 
     def reward_table(self) -> FloatArray:
         """Return the predicted rewards ``(A ** n,)`` of all joint actions."""
@@ -236,6 +258,11 @@ class BoxPrediction:
             view.gaps < CONTACT_GAP,
             expected_reading(view.gaps, self.infrared),
         )
+
+
+def first_alike(keys: IntArray) -> IntArray:
+    """Return in every row of ``(M, L)`` the first column that holds the same."""
+    return (keys[:, :, None] == keys[:, None, :]).argmax(axis=2)
 
 
 def mean_twists(before: FloatArray, after: FloatArray, seconds: float) -> FloatArray:

@@ -46,8 +46,7 @@ class PushSuperposition:
         n, n_drives = twists.shape[:2]
         n_codes = which.shape[1]
         self.contributions: FloatArray = np.zeros((n, n_codes, 3))
-        # The first local code of each drive, for every code that gives it.
-        self.alike: IntArray = (which[:, :, None] == which[:, None, :]).argmax(axis=2)
+        self.alike: IntArray = prediction.alike
         self._poses: FloatArray = np.zeros((n, n_codes, 3))
         self._gaps: FloatArray = np.zeros((n, n_codes))
         every = np.arange(n)

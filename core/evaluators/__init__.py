@@ -8,6 +8,7 @@ often the agents below were seen to act so. Evaluators differ in which joint act
 
 from .evaluator import Counts, Evaluator, Rule
 from .exact import MOST_JOINT_ACTIONS, ExactEnumeration
+from .latin_hypercube import LatinHypercube
 from .sampling import Sampling
 from .summed import Extremes, Moments
 
@@ -17,6 +18,7 @@ __all__ = [
     "Evaluator",
     "ExactEnumeration",
     "Extremes",
+    "LatinHypercube",
     "Moments",
     "Rule",
     "Sampling",

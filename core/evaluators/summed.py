@@ -25,10 +25,11 @@ from ..hierarchy import Hierarchy
 from ..protocols import Prediction, Superposition
 from ..rules import RuleBase
 from .evaluator import Gathering, Others, Rule
+from .grouping import Grouping
 
 
 class _Summed(Gathering, ABC):
-    """What the two share: probabilities of local codes, and the own group enumerated.
+    """What the two share: the own group is enumerated.
 
     Raises
     ------
@@ -56,14 +57,7 @@ class _Summed(Gathering, ABC):
             raise ValueError(
                 f"decision.others = {others!r}: {self.name} evaluates {', '.join(self.allowed)}"
             )
-        self.groups = groups
-        self._group_of = {agent: g for g, group in enumerate(groups) for agent in group}
-        # Groups of one size at a time: which they are, and their members (groups, size).
-        self._sizes = []
-        for w in sorted({len(group) for group in groups}):
-            which = [g for g, group in enumerate(groups) if len(group) == w]
-            self._sizes.append((np.array(which), np.array([groups[g] for g in which])))
-        self._below = [np.array(hierarchy.below(i), dtype=int) for i in range(len(hierarchy))]
+        self._grouping = Grouping(groups, hierarchy, n_actions, others)
 
     def values(
         self,
@@ -75,15 +69,10 @@ class _Summed(Gathering, ABC):
         rng: np.random.Generator,
     ) -> FloatArray:
         """Return the value ``(A,)`` of each action of `agent`, see `Evaluator.values`."""
-        n, a = len(joint_action), self.n_actions
+        a = self.n_actions
         superposition = cast(Superposition, prediction.superposition)  # type: ignore[attr-defined]
-        chances: FloatArray = np.zeros((n, a))
-        chances[np.arange(n), joint_action] = 1.0
-        below = self._below[agent]
-        chances[below] = frequencies[below] if self.others == "observed" else 1.0 / a
-        chances[agent] = 1.0
-        shares = self._shares(chances, superposition.contributions.shape[1])
-        mine = self._group_of[agent]
+        shares = self._grouping.shares(agent, joint_action, frequencies)
+        mine = self._grouping.of[agent]
         weights = shares[mine].copy()  # of the partners' actions, given each own action
         shares[mine] = 0.0
         local = np.flatnonzero(weights)
@@ -97,23 +86,12 @@ class _Summed(Gathering, ABC):
         found = self.rules.values(theta, states).reshape(len(distinct), -1)
         self.count(found.size)
         valued = self._over_sums(found, chance)[which]
-        place = len(self.groups[mine]) - 1 - self.groups[mine].index(agent)
-        own = local // a**place % a
+        own = self._grouping.actions[mine][local, self._grouping.place[agent]]
         if self.others == "max":
             best = np.full(a, -np.inf)
             np.maximum.at(best, own, valued)
             return best
         return np.bincount(own, weights[local] * valued, a) / np.bincount(own, weights[local], a)
-
-    def _shares(self, chances: FloatArray, n_local: int) -> FloatArray:
-        """Return the probabilities ``(G, L)`` of local codes, members being independent."""
-        shares = np.zeros((len(self.groups), n_local))
-        for which, members in self._sizes:
-            joint = chances[members[:, 0]]
-            for column in members.T[1:]:
-                joint = (joint[:, :, None] * chances[column][:, None, :]).reshape(len(which), -1)
-            shares[which, : joint.shape[1]] = joint
-        return shares
 
     @abstractmethod
     def _sums(self, contributions: FloatArray, shares: FloatArray) -> tuple[FloatArray, FloatArray]:

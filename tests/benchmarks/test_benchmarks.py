@@ -33,6 +33,17 @@ def test_the_smallest_benchmark_of_worlds_runs(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_errors_of_few_states_are_told() -> None:
+    few = ["--robots", "2", "5", "--seeds", "1", "--steps", "9", "--times", "2"]
+    command = [sys.executable, "-m", "benchmarks.errors", *few]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    lines = run.stdout.splitlines()
+    assert all(len(line) <= 80 for line in lines)
+    for kind in ("sampling", "moments", "extremes", "latin-hypercube", "reference", "exact"):
+        assert any(kind in line for line in lines)
+
+
+@pytest.mark.slow
 def test_a_small_crowd_is_drawn(tmp_path: Path) -> None:
     path = tmp_path / "crowd.png"
     sizes = ["--robots", "8", "--steps", "2"]
