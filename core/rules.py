@@ -223,5 +223,5 @@ class RuleBase:
         """
         return self._enumerate(
             theta, blocks.own, blocks.own_rows, blocks.shared, blocks.shared_rows, blocks.divisor,
-            tried, joint_action, chances, self.layout,
+            tried.codes, tried.places, tried.below, joint_action, chances, self.layout,
         )  # fmt: skip

@@ -36,24 +36,24 @@ class Tried(NamedTuple):
 
 
 @njit(cache=True)
-def _codes(tried: Tried, joint_action):  # type: ignore[no-untyped-def]
+def _codes(tried, places, joint_action):  # type: ignore[no-untyped-def]
     given = 0
     for i in range(len(joint_action)):
-        given += tried.places[i] * joint_action[i]
-    return (tried.codes + given).ravel()
+        given += places[i] * joint_action[i]
+    return (tried + given).ravel()
 
 
 @njit(cache=True)
-def _gather(values, tried: Tried, chances):  # type: ignore[no-untyped-def]
+def _gather(values, n_own: int, below, chances):  # type: ignore[no-untyped-def]
     """Return per own action the mean by chances ``(n, A)``, or the maximum if there are none."""
-    n_own, m = tried.codes.shape
+    m = len(values) // n_own
     out = np.empty(n_own)
     if not len(chances):
         for a in range(n_own):
             out[a] = values[a * m : (a + 1) * m].max()
         return out
     weights, size = np.ones(m), 1
-    for agent in tried.below:
+    for agent in below:
         n_actions = chances.shape[1]
         for c in range(size - 1, -1, -1):
             weight = weights[c]
@@ -81,7 +81,8 @@ def _learned(theta) -> bool:  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def enumerate_looked_up(  # type: ignore[no-untyped-def]
     theta, own, own_rows, shared, shared_rows, divisor: int,
-    tried: Tried, joint_action: IntArray, chances: FloatArray, packed: Packed,
+    tried: IntArray, places: IntArray, below: IntArray, joint_action: IntArray,
+    chances: FloatArray, packed: Packed,
 ) -> FloatArray:  # fmt: skip
     """Value the own actions ``(A,)`` by looking up every active rule, triangular partitions.
 
@@ -91,8 +92,8 @@ def enumerate_looked_up(  # type: ignore[no-untyped-def]
         ``(n_rules,)`` the agent's consequent weights.
     own, own_rows, shared, shared_rows, divisor
         As in `nested_agents.core.protocols.Blocks`.
-    tried
-        Which joint actions.
+    tried, places, below
+        Which joint actions: the parts of a `Tried`.
     joint_action
         ``(n,)`` the actions that are given.
     chances
@@ -102,33 +103,35 @@ def enumerate_looked_up(  # type: ignore[no-untyped-def]
         Layout of the rule base.
     """
     if not _learned(theta):
-        return np.zeros(len(tried.codes))
-    codes, lay = _codes(tried, joint_action), unpack(packed)
+        return np.zeros(len(tried))
+    codes, lay = _codes(tried, places, joint_action), unpack(packed)
     values = looked_up(theta, own, own_rows, shared, shared_rows, divisor, codes, lay)
-    return _gather(values, tried, chances)
+    return _gather(values, len(tried), below, chances)
 
 
 @njit(cache=True)
 def enumerate_contracted(  # type: ignore[no-untyped-def]
     theta, own, own_rows, shared, shared_rows, divisor: int,
-    tried: Tried, joint_action: IntArray, chances: FloatArray, packed: Packed,
+    tried: IntArray, places: IntArray, below: IntArray, joint_action: IntArray,
+    chances: FloatArray, packed: Packed,
 ) -> FloatArray:  # fmt: skip
     """Do what `enumerate_looked_up` does, by summing up the active own rules first."""
     if not _learned(theta):
-        return np.zeros(len(tried.codes))
-    codes, lay = _codes(tried, joint_action), unpack(packed)
+        return np.zeros(len(tried))
+    codes, lay = _codes(tried, places, joint_action), unpack(packed)
     values = contracted(theta, own, own_rows, shared, shared_rows, divisor, codes, lay)
-    return _gather(values, tried, chances)
+    return _gather(values, len(tried), below, chances)
 
 
 @njit(cache=True)
 def enumerate_dense(  # type: ignore[no-untyped-def]
     theta, own, own_rows, shared, shared_rows, divisor: int,
-    tried: Tried, joint_action: IntArray, chances: FloatArray, packed: Packed,
+    tried: IntArray, places: IntArray, below: IntArray, joint_action: IntArray,
+    chances: FloatArray, packed: Packed,
 ) -> FloatArray:  # fmt: skip
     """Do what `enumerate_looked_up` does, for any partitions."""
     if not _learned(theta):
-        return np.zeros(len(tried.codes))
-    codes, lay = _codes(tried, joint_action), unpack(packed)
+        return np.zeros(len(tried))
+    codes, lay = _codes(tried, places, joint_action), unpack(packed)
     values = folded(theta, own, own_rows, shared, shared_rows, divisor, codes, lay)
-    return _gather(values, tried, chances)
+    return _gather(values, len(tried), below, chances)

@@ -95,7 +95,7 @@ def test_block_values(base: RuleBase, rng: np.random.Generator) -> None:
     for kind in kinds:
         found = kind(
             theta, blocks.own, blocks.own_rows, blocks.shared, blocks.shared_rows, blocks.divisor,
-            tried, none, np.zeros((0, 0)), base.layout,
+            *tried, none, np.zeros((0, 0)), base.layout,
         )  # fmt: skip
         assert found == pytest.approx(expected, rel=0, abs=1e-12)
 
