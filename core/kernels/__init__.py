@@ -4,8 +4,9 @@ Every kernel has a plain-NumPy twin: firing strengths in `nested_agents.core.fuz
 `RuleBase.features`, values and temporal differences in `nested_agents.core.twins`. Nothing is
 compiled on import; each kernel is compiled at its first call and cached on disk.
 
-The dense kernels leave out rows of rules whose firing strength is below `NEGLIGIBLE`: firing
-strengths sum to one, so that a value changes by less than 1e-12 of the largest weight.
+The dense kernels leave out rules if all of them that share all but the last two variables come to
+less than `NEGLIGIBLE`: firing strengths sum to one, so that a value of the paper's rule base, with
+its 5^5 such parts, changes by less than 1e-12 of the largest weight.
 """
 
 from .compact import active_compact, each_compact, td_compact, values_compact

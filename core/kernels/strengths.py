@@ -8,7 +8,7 @@ from numba import njit
 from ..arrays import FloatArray
 from .layout import Layout
 
-NEGLIGIBLE, NEGLIGIBLE_SINGLE = 1e-15, 1e-9
+NEGLIGIBLE, NEGLIGIBLE_SINGLE = 3e-16, 1e-9
 """Firing strengths below this are left out of sums in which all strengths add up to one; the other
 is for weights in single precision."""
 
