@@ -74,6 +74,28 @@ class Grouping:
             shares[which, : joint.shape[1]] = joint
         return shares
 
+    def by_action(
+        self, agent: int, local: IntArray, weights: FloatArray, values: FloatArray
+    ) -> FloatArray:
+        """Return the value ``(A,)`` of each action of `agent` over what its partners may do.
+
+        Parameters
+        ----------
+        agent
+            The deciding agent.
+        local
+            ``(m,)`` possible local codes of its group.
+        weights, values
+            ``(m,)`` probabilities of the partners' actions in each, and what it is worth.
+        """
+        own = self.actions[self.of[agent]][local, self.place[agent]]
+        if self.others == "max":
+            best = np.full(self.n_actions, -np.inf)
+            np.maximum.at(best, own, values)
+            return best
+        total = np.bincount(own, weights * values, self.n_actions)
+        return total / np.bincount(own, weights, self.n_actions)
+
     def joint_actions(self, codes: IntArray) -> IntArray:
         """Return the joint actions ``(m, n)`` of local codes ``(m, G)`` of all groups."""
         joint = np.empty((len(codes), len(self.of)), dtype=np.int64)

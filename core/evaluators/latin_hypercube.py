@@ -116,12 +116,7 @@ class LatinHypercube(Gathering):
             values = self.rules.values(theta, states[wanted])
         found = self.combine(rewards, values).reshape(len(moves), m)
         valued = self.gather(found, tried.chances)[which]
-        own = self._grouping.actions[mine][local, self._grouping.place[agent]]
-        if self.others == "max":
-            best = np.full(a, -np.inf)
-            np.maximum.at(best, own, valued)
-            return best
-        return np.bincount(own, weights[local] * valued, a) / np.bincount(own, weights[local], a)
+        return self._grouping.by_action(agent, local, weights[local], valued)
 
     def _begin(self, prediction: Prediction) -> None:
         """Note what comes to the same, and deal out the budget."""

@@ -69,7 +69,6 @@ class _Summed(Gathering, ABC):
         rng: np.random.Generator,
     ) -> FloatArray:
         """Return the value ``(A,)`` of each action of `agent`, see `Evaluator.values`."""
-        a = self.n_actions
         superposition = cast(Superposition, prediction.superposition)  # type: ignore[attr-defined]
         shares = self._grouping.shares(agent, joint_action, frequencies)
         mine = self._grouping.of[agent]
@@ -86,12 +85,7 @@ class _Summed(Gathering, ABC):
         found = self.rules.values(theta, states).reshape(len(distinct), -1)
         self.count(found.size)
         valued = self._over_sums(found, chance)[which]
-        own = self._grouping.actions[mine][local, self._grouping.place[agent]]
-        if self.others == "max":
-            best = np.full(a, -np.inf)
-            np.maximum.at(best, own, valued)
-            return best
-        return np.bincount(own, weights[local] * valued, a) / np.bincount(own, weights[local], a)
+        return self._grouping.by_action(agent, local, weights[local], valued)
 
     @abstractmethod
     def _sums(self, contributions: FloatArray, shares: FloatArray) -> tuple[FloatArray, FloatArray]:
