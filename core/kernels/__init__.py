@@ -10,8 +10,9 @@ its 5^5 such parts, changes by less than 1e-12 of the largest weight.
 """
 
 from .compact import active_compact, each_compact, td_compact, values_compact
-from .dense import each_dense, td_dense, values_dense
+from .dense import values_dense
 from .enumeration import Tried, enumerate_contracted, enumerate_dense, enumerate_looked_up
+from .few_states import each_dense, td_dense
 from .layout import Layout, Packed, layout, unpack
 from .strengths import NEGLIGIBLE, exponential, many_strengths, strengths_of
 from .updates import add_features, td_update

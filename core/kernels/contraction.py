@@ -3,8 +3,8 @@
 A term of a rule base is a tensor theta with one axis per variable. Its value at a state is what is
 left when every axis has been contracted with the firing strengths of its variable. Own axes come
 first, for every own block that occurs at once (`contract`): the last of them is contracted with
-each of its *levels*, the few distinct values that it takes, the others with each own block. Then
-the shared axes, for many situations side by side (`fold`).
+each of its *levels*, the few distinct values that it takes, the others with each own block. The
+shared axes follow in `nested_agents.core.kernels.folding`.
 
 Innermost loops count without sign: an index that could be negative would be checked at every turn.
 Where five functions to a variable are spelled out, it is for the paper's case.
@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit
 
 from .layout import Layout
-from .strengths import negligible, product_of, strengths_of, strengths_room
+from .strengths import hull, negligible, product_of, strengths_of, strengths_room
 
 _FAST = {"reassoc", "contract"}
 
@@ -95,16 +95,6 @@ def contract(theta, own, peaks, lay: Layout, partial) -> None:  # type: ignore[n
 
 
 _WHOLE = np.ones(1)
-
-
-@njit(cache=True)
-def hull(bounds, first, last, least):  # type: ignore[no-untyped-def]
-    """Return where the bounds first..last-1 that exceed `least` begin and end."""
-    while first < last and bounds[first] <= least:
-        first += 1
-    while last > first and bounds[last - 1] <= least:
-        last -= 1
-    return first, last
 
 
 @njit(cache=True, fastmath=_FAST)
@@ -226,84 +216,3 @@ def _triples(level, n_levels):  # type: ignore[no-untyped-def]
                 triples[n - 1, found] = b
                 found = (found + 1) % 3
     return triples[:n]
-
-
-@njit(cache=True, fastmath=_FAST)
-def _fold_weights(weights, start, size, m, strengths, out, lanes) -> None:  # type: ignore[no-untyped-def]
-    """Contract the last axis of weights that are the same in all lanes."""
-    for i in range(size // m):
-        at = start + i * m
-        if m == 5:
-            a, b, c = weights[at], weights[at + 1], weights[at + 2]
-            d, e = weights[at + 3], weights[at + 4]
-            for k in range(np.uint64(lanes)):
-                out[i, k] = (
-                    (a * strengths[0, k] + b * strengths[1, k])
-                    + (c * strengths[2, k] + d * strengths[3, k])
-                    + e * strengths[4, k]
-                )
-            continue
-        for k in range(np.uint64(lanes)):
-            out[i, k] = weights[at] * strengths[0, k]
-        for s in range(1, m):
-            for k in range(np.uint64(lanes)):
-                out[i, k] += weights[at + s] * strengths[s, k]
-
-
-@njit(cache=True, fastmath=_FAST)
-def _fold_rows(rows, size, m, strengths, out, lanes) -> None:  # type: ignore[no-untyped-def]
-    """Contract the last axis of `size` rows of lanes."""
-    for i in range(size // m):
-        at = i * m
-        if m == 5:
-            for k in range(np.uint64(lanes)):
-                out[i, k] = (
-                    (rows[at, k] * strengths[0, k] + rows[at + 1, k] * strengths[1, k])
-                    + (rows[at + 2, k] * strengths[2, k] + rows[at + 3, k] * strengths[3, k])
-                    + rows[at + 4, k] * strengths[4, k]
-                )
-            continue
-        for k in range(np.uint64(lanes)):
-            out[i, k] = rows[at, k] * strengths[0, k]
-        for s in range(1, m):
-            for k in range(np.uint64(lanes)):
-                out[i, k] += rows[at + s, k] * strengths[s, k]
-
-
-@njit(cache=True)
-def fold(partial, strengths, lay: Layout, one, two, out, wanted) -> None:  # type: ignore[no-untyped-def]
-    """Contract what `contract` left for one own block with shared blocks side by side.
-
-    Parameters
-    ----------
-    partial
-        ``(total_width,)`` weights of the shared rules.
-    strengths
-        ``(d - n_own, most memberships, lanes)`` of the shared variables.
-    one, two
-        Scratch, ``(largest shared size, lanes)``.
-    out
-        ``(lanes,)`` the values.
-    wanted
-        How many of them are wanted.
-    """
-    lanes = (wanted + 7) // 8 * 8  # whole vectors
-    out[:] = 0.0
-    start = 0
-    for t in range(len(lay.lengths)):
-        size, first = lay.shared_sizes[t], lay.own_lengths[t]
-        v = lay.lengths[t] - 1
-        if first > v:
-            out += partial[start]
-        else:
-            j = lay.terms[t, v]
-            _fold_weights(partial, start, size, lay.counts[j], strengths[j - lay.n_own], one, lanes)
-            left = size // lay.counts[j]
-            while v > first:
-                v -= 1
-                j = lay.terms[t, v]
-                _fold_rows(one, left, lay.counts[j], strengths[j - lay.n_own], two, lanes)
-                one, two = two, one
-                left //= lay.counts[j]
-            out += one[0]
-        start += size

@@ -25,6 +25,16 @@ def negligible(theta) -> float:  # type: ignore[no-untyped-def]
     return NEGLIGIBLE if theta.itemsize == 8 else NEGLIGIBLE_SINGLE
 
 
+@njit(cache=True)
+def hull(bounds, first, last, least):  # type: ignore[no-untyped-def]
+    """Return where the bounds first..last-1 that exceed `least` begin and end."""
+    while first < last and bounds[first] <= least:
+        first += 1
+    while last > first and bounds[last - 1] <= least:
+        last -= 1
+    return first, last
+
+
 @njit(cache=True, inline="always")
 def _wrapped(j: int, x: float, lay: Layout) -> float:
     period, low = lay.periods[j], lay.lows[j]

@@ -6,9 +6,8 @@ import numpy as np
 from numba import njit
 
 from ..arrays import FloatArray
-from .contraction import hull
 from .layout import Layout, Packed, unpack
-from .strengths import all_strengths, negligible, product_of, strengths_room
+from .strengths import all_strengths, hull, negligible, product_of, strengths_room
 
 
 @njit(cache=True, fastmath={"contract"})
