@@ -261,7 +261,8 @@ class Team:
                 f"team: saved arrays {', '.join(sorted(arrays))} are not this team's "
                 f"{', '.join(sorted(own))}"
             )
-        for name in ("learner.theta", "seen", "explorer", "generator"):
+        fixed = ("learner.theta", "learner.trace", "learner.reach", "seen", "explorer", "generator")
+        for name in (name for name in fixed if name in own):
             if arrays[name].shape != own[name].shape:
                 raise ValueError(
                     f"team: saved {name} has shape {arrays[name].shape}, this team's "
