@@ -92,12 +92,17 @@ def exponential(x: float) -> float:
 
 
 @njit(cache=True, error_model="numpy", fastmath=_FAST)
+def _cut_exponential(x: float) -> float:
+    """Return exp(x), or what it is at the nearer of -FAR and FAR."""
+    x = x if x < FAR else FAR
+    return exponential(x if x > -FAR else -FAR)
+
+
+@njit(cache=True, error_model="numpy", fastmath=_FAST)
 def _sigmoids(x, slopes, bounds, out):  # type: ignore[no-untyped-def]
     """Write by how much the functions up to every bound are left behind at x: S_k of Eq. 6."""
     for k in range(len(out)):
-        exponent = -slopes[k] * (x - bounds[k])
-        exponent = exponent if exponent < FAR else FAR
-        power = exponential(exponent if exponent > -FAR else -FAR)
+        power = _cut_exponential(-slopes[k] * (x - bounds[k]))
         out[k] = 1.0 / (1.0 + power) if power < LARGE else 0.0
 
 
@@ -167,9 +172,7 @@ def _rise(x, k, sigmoid, even, slope, bound, growth, knot, width, power, rising)
             power[i] = power[i] * growth
     else:
         for i in range(len(x)):
-            exponent = -slope * (x[i] - bound)
-            exponent = exponent if exponent < FAR else FAR
-            power[i] = exponential(exponent if exponent > -FAR else -FAR)
+            power[i] = _cut_exponential(-slope * (x[i] - bound))
     for i in range(len(x)):
         rising[i] = 1.0 / (1.0 + power[i]) if power[i] < LARGE else 0.0
 
