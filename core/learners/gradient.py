@@ -54,3 +54,14 @@ class GradientTD(Online):
         self.second += (s.second_step_size * delta)[:, None] * self.trace
         kernels.add_features(self.second, states, -s.second_step_size * expected, rules.layout)
         return 2 * self.theta.size
+
+    def _errors(self, states: FloatArray, reward: float, entered: FloatArray | None) -> FloatArray:
+        """Return the TD errors ``(n,)`` (Eq. 7)."""
+        met = states[:, None]
+        if entered is not None:
+            met = np.empty((len(states), 2, states.shape[1]))
+            met[:, 0], met[:, 1] = states, entered
+        values = self.rules.each(self.theta, met)
+        ahead = 0.0 if entered is None else self.discount * values[:, 1]
+        errors: FloatArray = reward + ahead - values[:, 0]
+        return errors

@@ -65,17 +65,6 @@ class Online(ABC):
         Returns the number of weights changed.
         """
 
-    def _errors(self, states: FloatArray, reward: float, entered: FloatArray | None) -> FloatArray:
-        """Return the TD errors ``(n,)`` (Eq. 7)."""
-        met = states[:, None]
-        if entered is not None:
-            met = np.empty((len(states), 2, states.shape[1]))
-            met[:, 0], met[:, 1] = states, entered
-        values = self.rules.each(self.weights, met)
-        ahead = 0.0 if entered is None else self.discount * values[:, 1]
-        errors: FloatArray = reward + ahead - values[:, 0]
-        return errors
-
     def arrays(self) -> dict[str, FloatArray]:
         """Return weights, traces and the previous states with their reward."""
         previous = self._previous if self._previous is not None else np.zeros((0, 0))
