@@ -4,9 +4,14 @@ from math import pi
 
 import numpy as np
 import pytest
+from hypothesis import settings
 
 from nested_agents.core.protocols import Blocks, Transition
 from nested_agents.core.spaces import ActionSet, StateSpace, Variable
+
+# The first example of a test may compile a kernel.
+settings.register_profile("no deadline", deadline=None)
+settings.load_profile("no deadline")
 
 
 def decode(codes: np.ndarray, n_agents: int, n_actions: int) -> np.ndarray:

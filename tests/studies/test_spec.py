@@ -316,19 +316,19 @@ def is_spec_or_one_line(make):
     return message and "\n" not in message
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=400)
 @given(st.dictionaries(KEYS, VALUES, max_size=5))
 def test_any_table_is_a_spec_or_one_line(table):
     assert is_spec_or_one_line(lambda: Spec.of(table))
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.text(max_size=60), st.lists(st.text(max_size=20), max_size=2))
 def test_any_text_is_a_spec_or_one_line(text, changes):
     assert is_spec_or_one_line(lambda: Spec.parse(text, changes))
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.dictionaries(st.text(max_size=4), VALUES, max_size=4))
 def test_written_tables_are_read_back(table):
     def same(a, b):

@@ -134,7 +134,7 @@ def mutated(draw):
 
 
 @pytest.mark.timeout(1800)
-@settings(max_examples=EXAMPLES, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=EXAMPLES, suppress_health_check=[HealthCheck.too_slow])
 @given(mutated())
 def test_a_mutated_spec_is_accepted_or_refused_in_one_line(table):
     before = copy.deepcopy(table)

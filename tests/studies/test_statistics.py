@@ -104,7 +104,7 @@ def test_rates_are_by_column():
     assert together.high[2] == rate(outcomes[:, 2:3]).high
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.integers(2, 9), st.integers(1, 6), st.randoms(use_true_random=False))
 def test_a_rate_lies_within_its_interval(runs, episodes, random):
     outcomes = [[random.random() < 0.5 for _ in range(episodes)] for _ in range(runs)]
