@@ -28,7 +28,7 @@ class Layout(NamedTuple):
     n_knots: IntArray  # (d,)
     bounds: FloatArray  # (d, k) midpoints between knots
     slopes: FloatArray  # (d, k) sigmoid slopes
-    growths: FloatArray  # (d,) ratio of neighbouring exponentials, 0 if slopes are unequal
+    series: FloatArray  # (d, k) exponentials at one point over the first, 0 if slopes are unequal
     periods: FloatArray  # (d,) 0 for linear variables
     lows: FloatArray  # (d,) lower end of the period in use
     terms: IntArray  # (t, d) variables of each term, padded with -1
@@ -91,7 +91,7 @@ def layout(partitions: Sequence[Partition], terms: Sequence[tuple[int, ...]], n_
     ]
     real = [
         *(knots, bounds, slopes),
-        [_growth(p) for p in partitions],
+        [_series(p, widest) for p in partitions],
         [p.period for p in partitions],
         [0.5 * (p.centres[0] + p.centres[-1] - p.period) for p in partitions],
     ]
@@ -108,17 +108,17 @@ def unpack(packed: Packed) -> Layout:
     d, t, k = whole[1], whole[2], whole[3]
     # By d, by t, and what comes after them.
     by_d, by_t, rest = 6, 6 + 2 * d, 6 + 2 * d + 8 * t
-    knots, tail = d * k, 3 * d * k
+    row, tail = d * k, 4 * d * k
     return Layout(
         sigmoid=whole[0] > 0,
         counts=whole[by_d : by_d + d],
-        knots=real[:knots].reshape(d, k),
+        knots=real[:row].reshape(d, k),
         n_knots=whole[by_d + d : by_t],
-        bounds=real[knots : 2 * knots].reshape(d, k),
-        slopes=real[2 * knots : tail].reshape(d, k),
-        growths=real[tail : tail + d],
-        periods=real[tail + d : tail + 2 * d],
-        lows=real[tail + 2 * d :],
+        bounds=real[row : 2 * row].reshape(d, k),
+        slopes=real[2 * row : 3 * row].reshape(d, k),
+        series=real[3 * row : tail].reshape(d, k),
+        periods=real[tail : tail + d],
+        lows=real[tail + d :],
         terms=whole[rest + t + 1 :].reshape(t, d),
         lengths=whole[by_t : by_t + t],
         own_lengths=whole[by_t + t : by_t + 2 * t],
@@ -138,8 +138,10 @@ MOST_GROWTH = 400.0
 """Logarithm of the range that a series of exponentials may span: what was cut off stays so."""
 
 
-def _growth(partition: Partition) -> float:
-    gaps = np.diff(partition.knots)
+def _series(partition: Partition, width: int) -> FloatArray:
+    """Return the exponentials of all sigmoids at one point, as multiples of the first's."""
+    gaps, series = np.diff(partition.knots), np.zeros(width)
     even = np.allclose(gaps, gaps[0], rtol=1e-9, atol=0.0)
-    even = even and partition.steepness * len(gaps) <= MOST_GROWTH
-    return float(np.exp(partition.steepness)) if even else 0.0
+    if even and partition.steepness * len(gaps) <= MOST_GROWTH:
+        series[: len(gaps)] = np.exp(partition.steepness * np.arange(len(gaps)))
+    return series

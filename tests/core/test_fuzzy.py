@@ -28,7 +28,7 @@ def partitions(draw: st.DrawFn, flattest: float = 1.0) -> Partition:
 
 def by_kernel(partition: Partition, x: np.ndarray) -> np.ndarray:
     lay = kernels.unpack(kernels.layout([partition], [(0,)], 0))
-    out, room = np.empty((len(x), partition.size)), np.empty(lay.bounds.shape[1])
+    out, room = np.empty((len(x), partition.size)), np.empty(lay.bounds.shape[1] + 1)
     for row, value in zip(out, x, strict=True):
         kernels.strengths_of(0, value, lay, row, room)
     return out
@@ -43,7 +43,7 @@ def places(partition: Partition) -> np.ndarray:
 
 
 @given(partitions(), st.lists(st.floats(-1e6, 1e6), max_size=5))
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 def test_strengths_are_a_partition_of_unity(partition: Partition, more: list[float]) -> None:
     strengths = partition.strengths(np.concatenate([places(partition), more]))
     assert strengths.min() >= 0.0
@@ -51,14 +51,14 @@ def test_strengths_are_a_partition_of_unity(partition: Partition, more: list[flo
 
 
 @given(partitions())
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_the_kernel_computes_the_same(partition: Partition) -> None:
     x = places(partition)
     assert by_kernel(partition, x) == pytest.approx(partition.strengths(x), rel=0, abs=1e-12)
 
 
 @given(partitions().filter(lambda p: p.period), st.integers(-3, 3))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_a_circle_closes(partition: Partition, turns: int) -> None:
     # The seam of the period in use lies opposite the middle of the centres.
     seam = 0.5 * (partition.centres[0] + partition.centres[-1] - partition.period)
@@ -70,7 +70,7 @@ def test_a_circle_closes(partition: Partition, turns: int) -> None:
 
 
 @given(partitions().filter(lambda p: p.period), st.floats(-10, 10), st.integers(-5, 5))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_a_circle_repeats(partition: Partition, x: float, turns: int) -> None:
     here, there = partition.strengths(np.array([x, x + turns * partition.period]))
     steepest = max(1.0, partition.steepness) / np.diff(partition.knots).min()
@@ -79,7 +79,7 @@ def test_a_circle_repeats(partition: Partition, x: float, turns: int) -> None:
 
 
 @given(partitions())
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_strengths_are_continuous(partition: Partition) -> None:
     x = places(partition)[:-2]
     step = 1e-9
