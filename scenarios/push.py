@@ -115,7 +115,7 @@ def push(  # type: ignore[no-untyped-def]
             _substep(bodies, shared, near, reach, dt, model, width)
         lanes.head(shared, width)
         for r in range(n):
-            lanes.localise(bodies[r], shared, width)
+            lanes.localise(bodies[r], shared, reach[r], width)
             lanes.approach(model.edges, shared, width)
             for k in range(used):
                 gap = np.sqrt(shared[lanes.SQUARE * LANES + k]) * shared[lanes.SIDE * LANES + k]
@@ -139,7 +139,7 @@ def _substep(bodies, box, near, reach, dt, model, width) -> None:  # type: ignor
         lanes.head(body, width)
         lanes.release(body, width)
         near[r] = False
-        if lanes.localise(body, box, width) <= reach[r]:
+        if lanes.localise(body, box, reach[r], width) > 0:
             lanes.approach(model.edges, box, width)
             radius, compliance = model.radii[r], model.compliance[r]
             near[r] = lanes.touch(body, box, radius, model.rounding, compliance, dt, width) > 0

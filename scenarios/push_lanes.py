@@ -40,7 +40,8 @@ BODY_ROWS = 20
 U_X, U_Y, U_W, MOBILITY = 5, 6, 7, 8
 FORCE_X, FORCE_Y, TORQUE = 9, 10, 11
 LOCAL_X, LOCAL_Y = 12, 13  # the point, in the frame of the box
-SQUARE, NEAR_X, NEAR_Y, SIDE, EDGE_X, EDGE_Y = 14, 15, 16, 17, 18, 19
+SQUARE, NEAR_X, NEAR_Y, SIDE = 14, 15, 16, 17
+EDGE_X, EDGE_Y = 18, 19  # unit vector along the nearest edge
 BOX_ROWS = 20
 
 _EXACT = {"contract", "nsz"}
@@ -81,17 +82,16 @@ def head(rows, lanes):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy", fastmath=_EXACT)
-def localise(body, box, lanes):  # type: ignore[no-untyped-def]
-    """Write where the robot is in the frame of the box; return the least distance of the two."""
-    least = np.inf
+def localise(body, box, reach, lanes):  # type: ignore[no-untyped-def]
+    """Write where the robot is in the frame of the box; return in how many lanes within reach."""
+    within, square = 0, reach * reach
     for k in range(lanes):
         dx, dy = body[X * LANES + k] - box[X * LANES + k], body[Y * LANES + k] - box[Y * LANES + k]
         cos, sin = box[COS * LANES + k], box[SIN * LANES + k]
         box[LOCAL_X * LANES + k] = cos * dx + sin * dy
         box[LOCAL_Y * LANES + k] = cos * dy - sin * dx
-        square = dx * dx + dy * dy
-        least = square if square < least else least
-    return np.sqrt(least)
+        within += 1 if dx * dx + dy * dy <= square else 0
+    return within
 
 
 @njit(cache=True, error_model="numpy", fastmath=_EXACT)
@@ -109,6 +109,8 @@ def approach(edges, box, lanes):  # type: ignore[no-untyped-def]
         length2 = dx * dx + dy * dy
         scale = 1.0 / length2 if length2 > 0.0 else 0.0
         slope = dx / dy if dy != 0.0 else 0.0
+        ex = dx / np.sqrt(length2) if length2 > 0.0 else 0.0
+        ey = dy / np.sqrt(length2) if length2 > 0.0 else 1.0
         for k in range(lanes):
             x, y = box[LOCAL_X * LANES + k], box[LOCAL_Y * LANES + k]
             t = ((x - x0) * dx + (y - y0) * dy) * scale
@@ -120,8 +122,8 @@ def approach(edges, box, lanes):  # type: ignore[no-untyped-def]
             box[SQUARE * LANES + k] = square if nearer else box[SQUARE * LANES + k]
             box[NEAR_X * LANES + k] = cx if nearer else box[NEAR_X * LANES + k]
             box[NEAR_Y * LANES + k] = cy if nearer else box[NEAR_Y * LANES + k]
-            box[EDGE_X * LANES + k] = dx if nearer else box[EDGE_X * LANES + k]
-            box[EDGE_Y * LANES + k] = dy if nearer else box[EDGE_Y * LANES + k]
+            box[EDGE_X * LANES + k] = ex if nearer else box[EDGE_X * LANES + k]
+            box[EDGE_Y * LANES + k] = ey if nearer else box[EDGE_Y * LANES + k]
             crosses = ((y0 > y) != (y1 > y)) & (x < x0 + (y - y0) * slope)
             side = box[SIDE * LANES + k]
             box[SIDE * LANES + k] = -side if crosses else side
@@ -133,33 +135,30 @@ def touch(body, box, radius, rounding, compliance, dt, lanes):  # type: ignore[n
     c00, c01, c02 = compliance[0, 0], compliance[0, 1], compliance[0, 2]
     c10, c11, c12 = compliance[1, 0], compliance[1, 1], compliance[1, 2]
     c20, c21, c22 = compliance[2, 0], compliance[2, 1], compliance[2, 2]
-    touching = 0.0
+    touching = 0
     for k in range(lanes):
         ahead, left, turn = (
             body[AHEAD * LANES + k], body[LEFT * LANES + k], body[TURN * LANES + k],
         )  # fmt: skip
         qx, qy, side = box[NEAR_X * LANES + k], box[NEAR_Y * LANES + k], box[SIDE * LANES + k]
         off = np.sqrt(box[SQUARE * LANES + k])
-        ex, ey = box[EDGE_X * LANES + k], box[EDGE_Y * LANES + k]
         # Away from the surface the normal points from the nearest point, on it across the edge.
         apart = off > 1e-12
-        length = np.sqrt(ex * ex + ey * ey)
-        mx = side * (box[LOCAL_X * LANES + k] - qx) if apart else (ey if length > 0.0 else 1.0)
-        my = side * (box[LOCAL_Y * LANES + k] - qy) if apart else -ex
-        scale = 1.0 / (off if apart else (length if length > 0.0 else 1.0))
-        mx, my = mx * scale, my * scale
+        scale = side / (off if apart else 1.0)
+        mx = scale * (box[LOCAL_X * LANES + k] - qx) if apart else box[EDGE_Y * LANES + k]
+        my = scale * (box[LOCAL_Y * LANES + k] - qy) if apart else -box[EDGE_X * LANES + k]
         px, py = qx + rounding * mx, qy + rounding * my
         gap = side * off - rounding - radius
         travel = dt * np.sqrt(ahead * ahead + left * left)
-        active = 1.0 if gap <= 2.0 * travel + MARGIN else 0.0
-        touching += active
+        touches = gap <= 2.0 * travel + MARGIN
+        touching += 1 if touches else 0
         cos, sin = box[COS * LANES + k], box[SIN * LANES + k]
         ix, iy = sin * my - cos * mx, -sin * mx - cos * my
         wx, wy = cos * px - sin * py, sin * px + cos * py
         ch, sh = body[COS * LANES + k], body[SIN * LANES + k]
         n0, n1 = ch * ix + sh * iy, ch * iy - sh * ix
         t0, t1 = -n1, n0
-        body[ACTIVE * LANES + k] = active
+        body[ACTIVE * LANES + k] = 1.0 if touches else 0.0
         body[NX * LANES + k], body[NY * LANES + k] = ix, iy
         body[LEVER_N * LANES + k] = wx * iy - wy * ix
         body[LEVER_T * LANES + k] = wx * ix + wy * iy
