@@ -253,7 +253,7 @@ class BoxPrediction:
         return reward(
             self.task,
             view.distance,
-            view.distance - view.before,
+            -view.approach,
             view.turn,
             view.gaps < CONTACT_GAP,
             expected_reading(view.gaps, self.infrared),

@@ -55,8 +55,7 @@ def _miss(view: View, robot: int) -> FloatArray:
 
 
 def _approach(view: View, robot: int) -> FloatArray:
-    approach: FloatArray = (view.before - view.distance) / view.periods
-    return approach
+    return view.approach
 
 
 def _bend(view: View, robot: int) -> FloatArray:

@@ -46,6 +46,11 @@ class View:
         ahead = self.goal[:2] - self.box[:, :2]
         return np.hypot(ahead[:, 0], ahead[:, 1])
 
+    @property
+    def approach(self) -> FloatArray:
+        """How much nearer ``(m,)`` the box comes to the goal in a decision period [m]."""
+        return (self.before - self.distance) / self.periods
+
     @cached_property
     def course(self) -> FloatArray:
         """Direction ``(m,)`` from the box to the goal [rad]."""

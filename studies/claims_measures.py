@@ -24,8 +24,10 @@ Measure = Callable[[Results], "Measured | None"]
 
 LAST = slice(-5, None)
 FIRST = slice(None, 5)
-CONTROLS = ("frozen", "random")
-"""What a learner is compared with; whichever fares better."""
+UNTOLD = ("frozen", "random")
+"""Controls that know no more of the task than a learner does before its first reward."""
+TOLD = "greedy"
+"""The control that is told the reward and plans by it."""
 PAPER_NESTED, PAPER_SINGLE = 2.45e12, 1.1e27
 """What the paper prints in Section VII."""
 
@@ -54,12 +56,20 @@ class Measured:
 
 def learned(condition: str) -> Measure:
     """Return what measures success at the end of training, less that of the better control."""
+    return _gained(condition, UNTOLD)
 
+
+def more_than_told(condition: str) -> Measure:
+    """Return what measures success at the end of training, less that of the greedy control."""
+    return _gained(condition, (TOLD,))
+
+
+def _gained(condition: str, known: tuple[str, ...]) -> Measure:
     def outcomes(r: Results, name: str) -> np.ndarray:
         return np.asarray(r.training[name]["success"][:, LAST])
 
     def compute(results: Results) -> Measured | None:
-        controls = [c for c in CONTROLS if c in results.training]
+        controls = [c for c in known if c in results.training]
         if condition not in results.training or not controls:
             return None
         best = max(controls, key=lambda c: float(outcomes(results, c).mean()))
@@ -69,6 +79,14 @@ def learned(condition: str) -> Measure:
         )
 
     return compute
+
+
+def sooner_than_told(results: Results) -> Measured | None:
+    """Measure the default's decisions in an episode after training, over greedy's, seed by seed."""
+    if not {"default", TOLD} <= results.evaluation.keys():
+        return None
+    base, own = paired(results, TOLD, "default", lambda r, c: r.evaluation[c]["steps"].mean(axis=1))
+    return Measured(bootstrap(own / base), len(own)) if len(own) else None
 
 
 def success(episodes: slice) -> Measure:
@@ -92,12 +110,19 @@ def oriented(results: Results) -> Measured | None:
 
 
 def contact_gained(results: Results) -> Measured | None:
-    """Measure by how much the default's time in contact grows in training."""
-    if "default" not in results.training:
+    """Measure by how much more the default's time in contact grows than the greedy control's.
+
+    That of any agent grows in training, since fewer and fewer actions are random.
+    """
+
+    def gained(r: Results, name: str) -> np.ndarray:
+        contact = r.training[name]["contact_fraction"]
+        return np.asarray(contact[:, LAST].mean(axis=1) - contact[:, FIRST].mean(axis=1))
+
+    if not {"default", TOLD} <= results.training.keys():
         return None
-    contact = results.training["default"]["contact_fraction"]
-    gained = contact[:, LAST].mean(axis=1) - contact[:, FIRST].mean(axis=1)
-    return Measured(bootstrap(gained), len(gained))
+    base, own = paired(results, TOLD, "default", gained)
+    return Measured(bootstrap(own - base), len(own)) if len(own) else None
 
 
 def cost_error(results: Results) -> Measured:

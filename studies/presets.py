@@ -67,8 +67,13 @@ PRESETS: dict[str, Preset] = {
         {"learner": {"kind": "frozen", "decision": {"rule": "random"}}},
     ),
     "greedy": Preset(
-        "control: one-step lookahead on the predicted reward, nothing learned",
-        {"learner": {"kind": "frozen", "decision": {"rule": "reward"}}},
+        "control: greedy on the predicted reward, which it is told; nothing is learned",
+        {
+            # With R_1 under Condition 3 as printed, and 3 s ahead: what did best on seeds 10000 to
+            # 10009. With the default's reward and 1.5 s it brings the box home in .6 of episodes.
+            "scenario": {"lookahead": 48, "reward": {"attraction_without_contact": True}},
+            "learner": {"kind": "frozen", "decision": {"rule": "reward"}},
+        },
     ),
 }
 """Every preset by name."""

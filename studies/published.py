@@ -19,7 +19,7 @@ from .spec_errors import SpecError
 from .trial import RESULTS_VERSION
 
 MEASURES: dict[str, tuple[str, ...]] = {
-    "learning-curve": ("success", "final_orientation_rad", "contact_fraction"),
+    "learning-curve": ("success", "steps", "final_orientation_rad", "contact_fraction"),
     "wheel-failure": ("success", "steps"),
     "scaling": ("success", "steps"),
 }

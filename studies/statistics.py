@@ -22,6 +22,11 @@ STATISTICS: dict[str, Callable[[Array], Array]] = {
 }
 """Statistics of the last axis by name; the interquartile mean leaves out a quarter at each end."""
 
+ALIKE = 2.0
+"""Failures that `rate` supposes beside those seen. With seeds of which one in twenty never learns,
+and .99 succeed of the others' episodes, intervals of 10 to 30 seeds and 10 episodes then cover the
+truth in 94 to 97 % of simulations, without it in 69 to 75 %."""
+
 
 @dataclass(frozen=True)
 class Estimate:
@@ -89,10 +94,11 @@ def rate(outcomes: ArrayLike, level: float = 0.95) -> Estimate:
     """Return a success rate with its Wilson interval, runs as clusters.
 
     With one episode a run this is Wilson's score interval (Wilson 1927). With several, the number
-    of episodes is divided by the design effect (Kish 1965): how much more the rates of the runs
-    vary than those of independent episodes would. It lies between 1 (episodes independent) and
-    the number of episodes a run (all alike), and is taken as the latter if every episode of every
-    run ended the same way, for then nothing can be said of it.
+    of episodes is divided by the design effect (Kish 1965), ``1 + (n_episodes - 1) r``, where r is
+    the correlation of the episodes of a run: how much more the rates of the runs vary than those
+    of independent episodes would. A few failures tell little of r: it is estimated as if
+    `ALIKE` failures more had been seen, in runs all of whose episodes end alike. So if every
+    episode of every run ended the same way, the number of runs is what counts.
 
     Parameters
     ----------
@@ -112,10 +118,13 @@ def rate(outcomes: ArrayLike, level: float = 0.95) -> Estimate:
     p = array.mean()
     if n_runs < 2:
         return Estimate(p, np.full_like(p, np.nan), np.full_like(p, np.nan))
-    independent = p * (1.0 - p) / (n_runs * n_episodes)
-    observed = array.mean(axis=1).var(ddof=1) / n_runs
-    effect = observed / independent if independent > 0.0 else float(n_episodes)
-    n = n_runs * n_episodes / np.clip(effect, 1.0, n_episodes)
+    rarer = min(array.sum(), array.size - array.sum())
+    alike = 1.0
+    if rarer > 0.0 and n_episodes > 1:
+        effect = n_episodes * array.mean(axis=1).var(ddof=1) / (p * (1.0 - p))
+        alike = (np.clip(effect, 1.0, n_episodes) - 1.0) / (n_episodes - 1)
+    alike = (ALIKE + rarer * alike) / (ALIKE + rarer)
+    n = array.size / (1.0 + (n_episodes - 1) * alike)
     z = stats.norm.ppf(0.5 + level / 2.0)
     centre = (p + z**2 / (2.0 * n)) / (1.0 + z**2 / n)
     half = z / (1.0 + z**2 / n) * np.sqrt(p * (1.0 - p) / n + z**2 / (4.0 * n**2))

@@ -46,14 +46,16 @@ def test_criteria_decide_by_the_whole_interval(criterion, measured, verdict) -> 
     assert criterion.decide(measured) == verdict
 
 
-def curves(default: float, paper: float) -> Results:
+def curves(default: float, paper: float, greedy: float) -> Results:
     rng = np.random.default_rng(5)
     chances = {"default": np.linspace(0.0, 4 * default, 20).clip(0, default)}
-    others = {"pose": default, "frozen": 0.02, "random": 0.0, "paper": paper}
+    others = {"pose": default, "frozen": 0.02, "random": 0.0, "greedy": greedy, "paper": paper}
     chances |= {c: np.full(20, p) for c, p in others.items()}
     training = {c: arrays(chance, rng) for c, chance in chances.items()}
-    training["default"]["contact_fraction"][:, :5] -= 0.3 * default - 0.2
-    return Results(training, {}, {"training": training}, dict.fromkeys(chances, tuple(range(20))))
+    training["default"]["contact_fraction"][:, :5] -= 0.5 * default - 0.3
+    evaluation = {c: arrays(chance[-5:], rng) for c, chance in chances.items()}
+    phases = {"training": training, "evaluation": evaluation}
+    return Results(training, evaluation, phases, dict.fromkeys(chances, tuple(range(20))))
 
 
 def orders(chances: list[float]) -> Results:
@@ -67,7 +69,7 @@ FAULTS = ("4 wheels, seized", "4 wheels, reversed")
 
 def everything(good: bool) -> dict[str, Results]:
     return {
-        "learning-curve": curves(0.98, 0.9) if good else curves(0.2, 0.0),
+        "learning-curve": curves(0.98, 0.9, 0.4) if good else curves(0.2, 0.0, 0.98),
         "chain-order": orders([0.8] * 3) if good else orders([0.9, 0.9, 0.3]),
         "scaling": scaling({2: 1.0, 64: 1.0 if good else 0.1}, 1e-4 if good else 1e-2),
         "wheel-failure": wheel_failure(dict.fromkeys(FAULTS, GOOD if good else BAD)),
@@ -113,7 +115,7 @@ def test_claims_name_studies_and_conditions_that_their_specs_have() -> None:
             assert spec.study == study
             labels = {condition.label for condition in spec.conditions()}
             wanted = {
-                "learning-curve": {"default", "frozen", "random", "paper"},
+                "learning-curve": {"default", "frozen", "random", "greedy", "paper"},
                 "ablation": {"default", "static predictor"},
                 "wheel-failure": {f"{f}, enabled={e}" for f in FAULTS for e in ("true", "false")},
             }.get(study, set())

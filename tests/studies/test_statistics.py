@@ -92,10 +92,31 @@ def test_runs_that_all_succeed_or_all_fail_count_once():
     assert rate(outcomes).low == pytest.approx(reference.low, abs=0.03)
 
 
-def test_runs_that_are_alike_count_as_many_as_their_episodes():
-    outcomes = np.tile([1, 0, 1, 0, 1], (8, 1))
-    reference = stats.binomtest(24, 40).proportion_ci(method="wilson")
-    assert rate(outcomes).low == pytest.approx(reference.low, abs=1e-12)
+def test_many_failures_spread_over_all_runs_count_as_many_as_their_episodes():
+    outcomes = np.tile(np.arange(500) % 5 < 3, (8, 1))
+    reference = stats.binomtest(2400, 4000).proportion_ci(method="wilson")
+    assert rate(outcomes).low == pytest.approx(reference.low, abs=5e-3)
+
+
+def test_a_failure_more_hardly_raises_the_lower_end():
+    outcomes = np.ones((30, 10))
+    ends = [rate(outcomes).low]
+    for run in range(12):
+        outcomes[run, 0] = 0.0
+        ends.append(rate(outcomes).low)
+    assert ends[0] == pytest.approx(0.886, abs=1e-3)
+    # One failure tells that episodes of a run need not end alike, which is worth a little.
+    assert max(np.diff(ends)) < 0.03
+
+
+@pytest.mark.parametrize(("runs", "dead"), [(10, 0.05), (10, 0.0), (30, 0.05), (30, 0.0)])
+def test_intervals_cover_when_some_runs_never_learn(runs, dead):
+    covered = 0
+    for _ in range(300):
+        chances = np.where(RNG.random(runs) < dead, 0.0, 0.99)
+        estimate = rate(RNG.random((runs, 10)) < chances[:, None])
+        covered += bool(estimate.low <= (1.0 - dead) * 0.99 <= estimate.high)
+    assert covered / 300 >= 0.9
 
 
 def test_rates_are_by_column():
