@@ -38,17 +38,20 @@ def _teams(settings: Any, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
 
 
 def _file(settings: Any, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
-    files.check_digest(settings.path, settings.digest)
+    files.check_digest(settings.path, files.digest(settings.path), settings.digest)
     return from_networkx(files.read_graph(settings.path), agents)
 
 
 def _python(settings: Any, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
-    files.check_digest(files.split_source(settings.source)[0], settings.digest)
+    path, _ = files.split_source(settings.source)
+    files.check_digest(path, files.digest(path), settings.digest)
     function = files.from_python(settings.source)
     return from_networkx(files.called(function, agents, groups), agents)
 
 
 def _package(settings: Any, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
+    found = files.package_digest(settings.name)
+    files.check_digest(f"package {settings.name!r}", found, settings.digest)
     function = files.from_package(settings.name)
     return from_networkx(files.called(function, agents, groups), agents)
 

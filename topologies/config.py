@@ -6,6 +6,7 @@ argument may be.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from difflib import get_close_matches
 from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 
@@ -155,7 +156,7 @@ class FileSettings(TopologySettings):
     @model_validator(mode="before")
     @classmethod
     def _fill_digest(cls, table: Any) -> Any:
-        return _with_digest(table, "path", lambda path: path)
+        return _with_digest(table, "path", files.digest)
 
     @classmethod
     def parsed(cls, argument: str) -> Self:
@@ -177,7 +178,7 @@ class PythonSettings(TopologySettings):
     @model_validator(mode="before")
     @classmethod
     def _fill_digest(cls, table: Any) -> Any:
-        return _with_digest(table, "source", lambda source: files.split_source(source)[0])
+        return _with_digest(table, "source", lambda s: files.digest(files.split_source(s)[0]))
 
     @classmethod
     def parsed(cls, argument: str) -> Self:
@@ -190,8 +191,15 @@ class PackageSettings(TopologySettings):
 
     kind: Literal["package"] = "package"
     name: str
+    digest: str = ""
+    """Hash of the file that defines it, filled in when missing: results belong to that content."""
 
     argument: ClassVar[str] = "NAME"
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_digest(cls, table: Any) -> Any:
+        return _with_digest(table, "name", files.package_digest)
 
     @classmethod
     def parsed(cls, argument: str) -> Self:
@@ -289,9 +297,9 @@ def _integer(text: str, what: str) -> int:
         raise ValueError(f"{what} must be an integer, received {text!r}") from None
 
 
-def _with_digest(table: Any, key: str, path_of: Any) -> Any:
+def _with_digest(table: Any, key: str, digest_of: Callable[[str], str]) -> Any:
     if isinstance(table, dict) and isinstance(table.get(key), str) and not table.get("digest"):
-        return {**table, "digest": files.digest(path_of(table[key]))}
+        return {**table, "digest": digest_of(table[key])}
     return table
 
 

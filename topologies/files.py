@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import importlib.util
+import inspect
 import json
 from collections.abc import Callable, Sequence
 from importlib.metadata import entry_points
@@ -30,11 +31,23 @@ def digest(path: str) -> str:
     return hashlib.sha256(_read(path)).hexdigest()[:16]
 
 
-def check_digest(path: str, expected: str) -> None:
-    """Refuse a file that changed since its settings were written."""
-    found = digest(path)
+def package_digest(name: str) -> str:
+    """Return the `digest` of the file in which an installed package defines its topology.
+
+    Empty for compiled functions, which have no such file.
+    """
+    function = inspect.unwrap(from_package(name))
+    try:
+        path = inspect.getsourcefile(function if inspect.isroutine(function) else type(function))
+    except TypeError:
+        path = None
+    return digest(path) if path else ""
+
+
+def check_digest(what: str, found: str, expected: str) -> None:
+    """Refuse what has changed since its settings were written."""
     if found != expected:
-        raise ValueError(f"{path} has changed: its digest is {found}, the settings say {expected}")
+        raise ValueError(f"{what} has changed: its digest is {found}, the settings say {expected}")
 
 
 def read_graph(path: str) -> nx.DiGraph:
@@ -152,8 +165,21 @@ def called(
     Raises
     ------
     ValueError
-        If it raises, or returns neither a graph nor pairs.
+        If it raises, returns neither a graph nor pairs, or not the same ones twice.
     """
+    graph, again = (_returned(function, agents, groups) for _ in range(2))
+    if set(graph.edges) != set(again.edges):
+        name = getattr(function, "__name__", "the function")
+        raise ValueError(
+            f"{name} returned another hierarchy when called again; random numbers must be drawn "
+            "from a seed of its own"
+        )
+    return graph
+
+
+def _returned(
+    function: UserTopology, agents: Sequence[str], groups: Sequence[Sequence[str]]
+) -> nx.DiGraph:
     name = getattr(function, "__name__", "the function")
     try:
         result = function(tuple(agents), tuple(tuple(group) for group in groups))

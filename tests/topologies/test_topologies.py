@@ -100,7 +100,7 @@ REFUSED = {
     "nothing.json": "topology 'nothing.json': nothing.json: No such file or directory",
     "file:x.csv": "topology 'file:x.csv': x.csv: No such file or directory",
     "nothing.py:f": "topology 'nothing.py:f': nothing.py: No such file or directory",
-    "package:ring": "topology 'package': no installed package offers 'ring', they offer: none",
+    "package:ring": "topology 'package:ring': no installed package offers 'ring', they offer: none",
     "chian": "topology 'chian': did you mean 'chain'? known: chain, tree, star,",
     "": "topology '': known: chain,",
     "single-agent": "topology 'single-agent' is no hierarchy of 4 agents; use topologies.arrange",

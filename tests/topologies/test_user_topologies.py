@@ -113,6 +113,25 @@ def test_entry_points(monkeypatch: pytest.MonkeyPatch) -> None:
         parse("lime")
 
 
+def test_results_belong_to_what_a_package_defines(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(files, "entry_points", points(("line", "mine:f"), ("compiled", "mine:g")))
+    monkeypatch.setattr(EntryPoint, "load", lambda self: path_of if self.name == "line" else len)
+    settings = parse("line")
+    assert settings.digest == files.digest(__file__)
+    changed = settings.model_copy(update={"digest": "0"})
+    with pytest.raises(ValueError, match=r"package 'line' has changed: its digest is .*say 0"):
+        build(changed, AGENTS)
+    assert parse("package:compiled").digest == ""
+
+
+def test_a_function_must_return_the_same_twice(tmp_path: Path) -> None:
+    file = tmp_path / "drawn.py"
+    file.write_text("calls = []\ndef drawn(agents, groups):\n    calls.append(0)\n"
+                    "    return [(agents[0], agents[len(calls)])]\n")  # fmt: skip
+    with pytest.raises(ValueError, match="drawn returned another hierarchy when called again"):
+        build(parse(f"{file}:drawn"), AGENTS)
+
+
 def test_bad_entry_points(monkeypatch: pytest.MonkeyPatch) -> None:
     offered = points(("line", "absent_package:f"), ("pi", "math:pi"))
     monkeypatch.setattr(files, "entry_points", offered)
