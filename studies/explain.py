@@ -95,7 +95,8 @@ def explained(store: Store, trial: Trial) -> Explained:
     Raises
     ------
     SpecError
-        If an episode of the training is not, to the last bit, the one that is kept.
+        If the trial cannot be built, or an episode of the training is not, to the last bit, the one
+        that is kept.
     """
     team, scenario, bodies = _trained(store, trial)
     rules = RuleBase.build(scenario.state_space, trial.settings.learner.rule_base)
@@ -116,7 +117,10 @@ def explained(store: Store, trial: Trial) -> Explained:
 
 
 def _trained(store: Store, trial: Trial) -> tuple[Team, Scenario, Bodies | None]:
-    session = Session(trial)
+    try:
+        session = Session(trial)
+    except ValueError as error:  # a file that settings name is not what it was
+        raise SpecError(f"{store.directory}: {error}") from None
     team, scenario = session.team, session.scenario
     failures = trial.settings.scenario.failures
     strikes = min((f.episode for f in failures), default=None)

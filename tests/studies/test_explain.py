@@ -129,6 +129,19 @@ def test_another_team_than_the_one_that_was_measured_is_not_explained(study, mon
             explain.explained(store, trial)
 
 
+def test_a_topology_file_that_has_changed_since(tmp_path, capsys):
+    file = tmp_path / "mine.py"
+    file.write_text("def mine(agents, groups): return list(zip(agents, agents[1:]))")
+    spec = Spec.of({"seeds": [3], "episodes": 1, "steps": 1, "topology": f"{file}:mine"})
+    (trial,) = trials_of(spec)
+    with Store.create(tmp_path / "out", spec) as store:
+        store.save(trial, run_trial(trial), 1.0)
+    file.write_text("def mine(agents, groups): return []")
+    status, said = run(capsys, tmp_path / "out")
+    assert status == 2
+    assert "mine.py has changed: its digest is" in said.err.splitlines()[-1]
+
+
 @pytest.mark.slow
 def test_an_agent_for_each_robot(tmp_path, capsys):
     one = {"overrides": (), "topology": {"kind": "per-robot"}, "evaluation": 0, "episodes": 2}
