@@ -40,7 +40,7 @@ class Problem:
     Raises
     ------
     ValueError
-        If a quantity is below its least.
+        If a quantity is below its least; in the methods, if n is below 1.
     """
 
     rules: int = PAPER_RULES
@@ -77,6 +77,7 @@ class Problem:
 
         ``L * |S| * ((|A|^2)^(n+1) - |A|^2) / (|A|^2 - 1)``; the division leaves no remainder.
         """
+        _check(n)
         square = self.actions**2
         return self.iterations * self.rules * ((square ** (n + 1) - square) // (square - 1))
 
@@ -85,6 +86,7 @@ class Problem:
 
         ``L * |S| * (|A|^2)^n * (|A|^2 - (|A|^2)^(1-n)) / (|A|^2 - 1)``
         """
+        _check(n)
         square = self.actions**2
         numerator = square - Fraction(1, square ** (n - 1))
         return self.iterations * self.rules * square**n * numerator / (square - 1)
@@ -99,6 +101,7 @@ class Problem:
         >>> Problem().chain_asymptotic(4)
         Fraction(2457600000000, 1)
         """
+        _check(n)
         square = self.actions**2
         return self.iterations * self.rules * square**n * Fraction(square, square - 1)
 
@@ -112,6 +115,7 @@ class Problem:
         >>> f"{Problem().single_agent(4):.4e}"
         '1.0986e+27'
         """
+        _check(n)
         return self.iterations * self.rules**n * self.actions ** (2 * n)
 
     def decision(self, below: Iterable[int]) -> int:
@@ -138,3 +142,8 @@ def is_chain(below: Iterable[int]) -> bool:
     """
     counts = sorted(below)
     return counts == list(range(len(counts)))
+
+
+def _check(n: int) -> None:
+    if n < 1:
+        raise ValueError(f"n = {n}, allowed: 1 or more")

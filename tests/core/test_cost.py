@@ -87,3 +87,12 @@ def test_an_independent_agent_costs_the_same_alone_and_in_company() -> None:
 def test_impossible_quantities_are_refused(arguments: dict[str, int], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         Problem(**arguments)
+
+
+@pytest.mark.parametrize("n", [0, -1])
+@pytest.mark.parametrize(
+    "formula", ["chain_closed_form", "chain_factored", "chain_asymptotic", "single_agent"]
+)
+def test_fewer_agents_than_one_are_refused(formula: str, n: int) -> None:
+    with pytest.raises(ValueError, match=f"n = {n}, allowed: 1 or more"):
+        getattr(PAPER, formula)(n)
