@@ -1,7 +1,8 @@
 """The scaling study: how the number of robots bears on success, time, memory and messages.
 
-Conditions differ in the number of robots and in how joint actions are evaluated. Of every trial it
-keeps, besides the episodes: numbers that are a function of it, and what it took, which is not.
+Conditions differ in the number of robots and in how joint actions are evaluated; those of a spec of
+one's own may differ in anything. Of every trial it keeps, besides the episodes: numbers that are a
+function of it, and what it took, which is not.
 
 Messages of a step are counted as Section V has agents talk: every agent passes the action it has
 decided to each agent below it, so there is one message for every edge of the hierarchy's transitive
@@ -107,7 +108,7 @@ class Point:
     Attributes
     ----------
     evaluator
-        Its label without the number of robots.
+        Its label without the number of robots: the evaluator, and whatever else differs.
     robots, agents, messages
         Sizes.
     values
@@ -147,6 +148,7 @@ class Scaling:
 def analyse(results: Results) -> Scaling:
     """Estimate; 95 % intervals, seeds as the unit of sampling. Times are per step."""
     points, table = [], []
+    sizes = {c: int(results.numbers[c]["robots"][0]) for c in results.training}
     for condition, training in results.training.items():
         numbers, usage = results.numbers[condition], results.usage[condition]
         steps = training["steps"].sum(axis=1)
@@ -164,9 +166,9 @@ def analyse(results: Results) -> Scaling:
             greedy = rate(results.evaluation[condition]["success"])
             values = {"success": values.pop("success"), "greedy": greedy} | values
             values["all touch"] = bootstrap(numbers["all_touching"])
-        robots, agents, passed = (int(numbers[n][0]) for n in ("robots", "agents", "messages"))
-        evaluator = condition.removesuffix(f", robots={robots}")
-        points.append(Point(evaluator, robots, agents, passed, values))
+        agents, passed = (int(numbers[n][0]) for n in ("agents", "messages"))
+        evaluator = _without_robots(condition, sizes)
+        points.append(Point(evaluator, sizes[condition], agents, passed, values))
         shown = {name: values[name] for name in COLUMNS if name in values}
         table.append(Summary(condition, len(steps), shown))
     exponents = _exponents(points)
@@ -174,11 +176,30 @@ def analyse(results: Results) -> Scaling:
         f"\n{evaluator}: " + ", ".join(f"{what} ~ n^{power:.2f}" for what, power in by_what.items())
         for evaluator, by_what in exponents.items()
     ]
-    notes += [
-        f"{p.robots} robots: {p.agents} agents, {p.messages} messages a step"
-        for p in {p.agents: p for p in points}.values()
-    ]
+    notes += _passed(points)
     return Scaling(tuple(table), tuple(points), exponents, tuple(notes))
+
+
+def _without_robots(condition: str, sizes: dict[str, int]) -> str:
+    """Return a condition's label without its number of robots, which may be all it says."""
+    if all(label == str(robots) for label, robots in sizes.items()):
+        return "default"
+    parts = condition.split(", ")
+    return ", ".join(part for part in parts if part != f"robots={sizes[condition]}")
+
+
+def _passed(points: list[Point]) -> list[str]:
+    """Return lines that say how many messages are passed, one per number where all agree."""
+    lines = []
+    for robots in dict.fromkeys(p.robots for p in points):
+        labels: dict[tuple[int, int], list[str]] = {}
+        for p in points:
+            if p.robots == robots:
+                labels.setdefault((p.agents, p.messages), []).append(p.evaluator)
+        for (agents, passed), own in labels.items():
+            whose = f" ({'; '.join(own)})" if len(labels) > 1 else ""
+            lines.append(f"{robots} robots{whose}: {agents} agents, {passed} messages a step")
+    return lines
 
 
 def _exponents(points: list[Point]) -> dict[str, dict[str, float]]:

@@ -28,6 +28,7 @@ def draw(analysis: Scaling, directory: Path) -> list[Path]:
     """Write ``scaling`` as PNG and SVG into an existing directory; return the paths.
 
     Points are means over seeds, bars their 95 % intervals; evaluators differ by colour and marker.
+    Messages are one black line if all evaluators pass as many.
     """
     evaluators = list(dict.fromkeys(p.evaluator for p in analysis.points))
     with mpl.rc_context(SETTINGS):  # type: ignore[arg-type]
@@ -43,11 +44,7 @@ def draw(analysis: Scaling, directory: Path) -> list[Path]:
             else:
                 axes.set_ylim(*((-0.03, 1.03) if name == "greedy" else (0.0, None)))
         panels[0][1].axhline(1e3 * DECISION_PERIOD, color="#888888", linewidth=0.8, ls=":")
-        counts = {p.robots: p.messages for p in analysis.points}
-        axes = panels[1][2]
-        axes.plot(sizes, [counts[size] for size in sizes], "k.-", linewidth=1.2)
-        axes.set_yscale("log")
-        axes.set_title("messages passed down, per step", loc="left")
+        _messages(panels[1][2], analysis, evaluators)
         for axes in panels.flat:
             axes.set_xscale("log", base=2)
             axes.set_xticks(sizes, [str(size) for size in sizes])
@@ -70,6 +67,28 @@ def draw(analysis: Scaling, directory: Path) -> list[Path]:
             metadata = {"Date": None} if path.suffix == ".svg" else {}
             figure.savefig(path, dpi=150, metadata=metadata)
     return paths
+
+
+def _messages(axes: Axes, analysis: Scaling, evaluators: list[str]) -> None:
+    """Draw a black line if all evaluators agree, as one topology's do, else a line of each."""
+    counts = {(p.robots, p.messages) for p in analysis.points}
+    if len(counts) == len({robots for robots, _ in counts}):
+        axes.plot(*zip(*sorted(counts), strict=True), "k.-", linewidth=1.2)
+    else:
+        for index, evaluator in enumerate(evaluators):
+            own = sorted(
+                (p.robots, p.messages) for p in analysis.points if p.evaluator == evaluator
+            )
+            colour, marker = COLOURS[index % len(COLOURS)], MARKERS[index % len(MARKERS)]
+            axes.plot(
+                *zip(*own, strict=True), marker=marker, color=colour, markersize=4, linewidth=1.2
+            )
+    if min(passed for _, passed in counts):
+        axes.set_yscale("log")
+    else:  # agents that see nobody pass nothing
+        axes.set_yscale("symlog", linthresh=1.0)
+        axes.set_ylim(bottom=-0.2)
+    axes.set_title("messages passed down, per step", loc="left")
 
 
 def _line(axes: Axes, analysis: Scaling, evaluator: str, index: int, name: str) -> None:

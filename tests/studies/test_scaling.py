@@ -2,8 +2,10 @@ from pathlib import Path
 
 import pytest
 from made_up_results import scaling
+from matplotlib.figure import Figure
 
 from nested_agents.studies import scaling as module
+from nested_agents.studies import scaling_figure
 from nested_agents.studies.results import Results
 from nested_agents.studies.scaling import analyse, draw, measure, messages
 from nested_agents.studies.spec import Spec
@@ -19,6 +21,76 @@ def test_exponents_and_messages() -> None:
     assert [p.messages for p in analysis.points[:3]] == [6, 120, 8128]
     assert [p.evaluator for p in analysis.points] == ["sums"] * 3 + ["sampling"] * 3
     assert "64 robots: 128 agents, 8128 messages a step" in analysis.notes
+
+
+def by_topology(passed: dict[str, dict[int, int]], first: str = "topology") -> Results:
+    """Results of topologies that pass so many messages, by number of robots."""
+    base = Results({}, {})
+    for name, counts in passed.items():
+        made = scaling(dict.fromkeys(counts, 0.9))
+        for robots, count in counts.items():
+            old, parts = f"sums, robots={robots}", [f"topology={name}", f"robots={robots}"]
+            new = ", ".join(parts if first == "topology" else parts[::-1])
+            for kept, found in (
+                (base.training, made.training),
+                (base.evaluation, made.evaluation),
+                (base.numbers, made.numbers),
+                (base.usage, made.usage),
+            ):
+                kept[new] = found[old]
+            base.numbers[new]["messages"][:] = count
+    return base
+
+
+PASSED = {"chain": {2: 6, 4: 28}, "star": {2: 3, 4: 7}, "independent": {2: 0, 4: 0}}
+
+
+@pytest.mark.parametrize("first", ["topology", "robots"])
+def test_messages_are_told_by_topology_where_they_differ(first: str) -> None:
+    analysis = analyse(by_topology(PASSED, first))
+    assert list(dict.fromkeys(p.evaluator for p in analysis.points)) == [
+        f"topology={name}" for name in PASSED
+    ]
+    told = [note for note in analysis.notes if "messages" in note]
+    assert told == [
+        "2 robots (topology=chain): 4 agents, 6 messages a step",
+        "2 robots (topology=star): 4 agents, 3 messages a step",
+        "2 robots (topology=independent): 4 agents, 0 messages a step",
+        "4 robots (topology=chain): 8 agents, 28 messages a step",
+        "4 robots (topology=star): 8 agents, 7 messages a step",
+        "4 robots (topology=independent): 8 agents, 0 messages a step",
+    ]
+
+
+def test_as_many_agents_of_fewer_robots_have_a_line_of_their_own() -> None:
+    results = by_topology({"two wheels": {2: 6, 4: 28}, "four wheels": {2: 28}})
+    results.numbers["topology=four wheels, robots=2"]["agents"][:] = 8
+    told = [note for note in analyse(results).notes if "messages" in note]
+    assert told == [
+        "2 robots (topology=two wheels): 4 agents, 6 messages a step",
+        "2 robots (topology=four wheels): 8 agents, 28 messages a step",
+        "4 robots: 8 agents, 28 messages a step",
+    ]
+
+
+def test_robots_alone_make_one_line() -> None:
+    made = scaling(SIZES)
+    parts = [made.training, made.evaluation, made.numbers, made.usage]
+    own = [{str(n): part[f"sums, robots={n}"] for n in SIZES} for part in parts]
+    analysis = analyse(Results(*own[:2], numbers=own[2], usage=own[3]))
+    assert {p.evaluator for p in analysis.points} == {"default"}
+    assert analysis.exponents["default"]["deciding"] == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize(("made", "lines"), [(scaling(SIZES), 1), (by_topology(PASSED), 3)])
+def test_the_figure_has_a_line_of_messages_by_topology(made: Results, lines: int) -> None:
+    analysis = analyse(made)
+    axes = Figure().subplots()
+    evaluators = list(dict.fromkeys(p.evaluator for p in analysis.points))
+    scaling_figure._messages(axes, analysis, evaluators)
+    drawn = [list(line.get_ydata()) for line in axes.get_lines()]
+    counts = [[6, 120, 8128]] if lines == 1 else [list(c.values()) for c in PASSED.values()]
+    assert drawn == counts
 
 
 def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
