@@ -17,8 +17,8 @@ their tails need to fall below 1e-11. The NumPy code here is the readable defini
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import ceil
-from typing import Literal
+from math import ceil, inf, isfinite
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -46,7 +46,12 @@ class Partition:
     period
         Period of a circular variable, 0 for a linear one.
     steepness
-        Sigmoid slope c_k times the distance of the two centres it separates.
+        Sigmoid slope c_k times the distance of the two centres it separates, above 0.
+
+    Raises
+    ------
+    ValueError
+        If the shape is neither, or a number is not finite or not in its range.
 
     Examples
     --------
@@ -61,10 +66,21 @@ class Partition:
     steepness: float = 8.0
 
     def __post_init__(self) -> None:
+        if self.membership not in get_args(Membership):
+            raise ValueError(
+                f"partition: membership = {self.membership!r}, allowed: "
+                f"{', '.join(get_args(Membership))}"
+            )
         if len(self.centres) < 2:
             raise ValueError(f"partition: centres = {self.centres}, at least two are needed")
+        if not all(map(isfinite, self.centres)):
+            raise ValueError(f"partition: centres = {self.centres}, all must be finite")
         if any(a >= b for a, b in zip(self.centres, self.centres[1:], strict=False)):
             raise ValueError(f"partition: centres {self.centres} must increase")
+        if not 0.0 <= self.period < inf:
+            raise ValueError(f"partition: period = {self.period}, allowed: 0 or a positive number")
+        if not 0.0 < self.steepness < inf:
+            raise ValueError(f"partition: steepness = {self.steepness}, must be above 0 and finite")
         if self.period and self.centres[-1] - self.centres[0] >= self.period:
             raise ValueError(
                 f"partition: centres {self.centres} must lie within one period of {self.period}"

@@ -122,7 +122,14 @@ class RuleBase:
         return cls(partitions, list(dict.fromkeys(terms)), space.n_own, settings.precision)
 
     def features(self, states: FloatArray) -> FloatArray:
-        """Return phi ``(m, n_rules)`` of states ``(m, d)`` explicitly: the twin of every kernel."""
+        """Return phi ``(m, n_rules)`` of states ``(m, d)`` explicitly: the twin of every kernel.
+
+        Raises
+        ------
+        ValueError
+            If the states have another shape.
+        """
+        self._check_states(states)
         strengths = [p.strengths(states[:, j]) for j, p in enumerate(self.partitions)]
         parts = []
         for term in self.terms:
@@ -133,15 +140,37 @@ class RuleBase:
         return np.concatenate(parts, axis=1)
 
     def values(self, theta: FloatArray, states: FloatArray) -> FloatArray:
-        """Return f ``(m,)`` of states ``(m, d)`` for one agent's consequent weights (Eq. 9)."""
+        """Return f ``(m,)`` of states ``(m, d)`` for one agent's weights ``(n_rules,)`` (Eq. 9).
+
+        Raises
+        ------
+        ValueError
+            If theta or the states have another shape.
+        """
         states = np.ascontiguousarray(states, dtype=float)
+        self._check_states(states)
+        self._check_theta(theta)
         if self.compact:
             return kernels.values_compact(theta, states, self.layout)
         return kernels.values_dense(theta, states, self.layout)
 
     def each(self, theta: FloatArray, states: FloatArray) -> FloatArray:
-        """Return f ``(n, s)`` of states ``(n, s, d)``, by the rows of theta ``(n, n_rules)``."""
+        """Return f ``(n, s)`` of states ``(n, s, d)``, by the rows of theta ``(n, n_rules)``.
+
+        Raises
+        ------
+        ValueError
+            If theta or the states have another shape.
+        """
         states = np.ascontiguousarray(states, dtype=float)
+        if states.shape[2:] != (len(self.partitions),):
+            raise ValueError(
+                f"rule base: states of shape {states.shape}, must be (n, s, {len(self.partitions)})"
+            )
+        if theta.shape != (len(states), self.n_rules):
+            raise ValueError(
+                f"rule base: theta of shape {theta.shape}, must be {(len(states), self.n_rules)}"
+            )
         if self.compact:
             return kernels.each_compact(theta, states, self.layout)
         return kernels.each_dense(theta, states, self.layout)
@@ -159,7 +188,10 @@ class RuleBase:
         lengths: FloatArray,
         decay: float,
     ) -> None:
-        """Make one TD(lambda) update of all agents, see `nested_agents.core.kernels.td_dense`."""
+        """Make one TD(lambda) update of all agents, see `nested_agents.core.kernels.td_dense`.
+
+        Shapes are trusted: a learner calls this at every step.
+        """
         self._td_update(
             theta, trace, reach, states, entered, reward, discount, step_size, lengths, decay,
             self.layout,
@@ -169,7 +201,13 @@ class RuleBase:
         """Return the squared length ``(m,)`` of phi of states ``(m, d)``.
 
         A product's is the product of its variables' squared lengths.
+
+        Raises
+        ------
+        ValueError
+            If the states have another shape.
         """
+        self._check_states(states)
         squares = [
             (p.strengths(states[:, j]) ** 2).sum(axis=1) for j, p in enumerate(self.partitions)
         ]
@@ -180,8 +218,14 @@ class RuleBase:
 
         For triangular partitions ``k`` is the sum of ``2 ** len(term)`` over the terms; for
         sigmoid ones all rules are active.
+
+        Raises
+        ------
+        ValueError
+            If the states have another shape.
         """
         states = np.ascontiguousarray(states, dtype=float)
+        self._check_states(states)
         if self.compact:
             return kernels.active_compact(states, self.layout)
         strengths = self.features(states)
@@ -191,8 +235,15 @@ class RuleBase:
         """Return f ``(len(codes),)`` of the next states that joint-action `codes` lead to.
 
         The own part of theta is contracted once per distinct own block, or the few active rules
-        are looked up; the feature vector of a joint action is never built.
+        are looked up; the feature vector of a joint action is never built. Blocks are trusted, as
+        in `enumerate`.
+
+        Raises
+        ------
+        ValueError
+            If theta is not ``(n_rules,)``.
         """
+        self._check_theta(theta)
         none = np.zeros(0, dtype=np.int64)
         tried = kernels.Tried(np.ascontiguousarray(codes)[:, None], none, none)
         return self.enumerate(theta, blocks, tried, none, np.zeros((0, 0)))
@@ -206,6 +257,9 @@ class RuleBase:
         chances: FloatArray,
     ) -> FloatArray:
         """Return the value ``(A,)`` of each own action over the joint actions `tried`.
+
+        Shapes are trusted: an evaluator calls this at every decision. Whether the blocks of a
+        scenario are sound, `nested_agents.scenarios.checker` finds out.
 
         Parameters
         ----------
@@ -225,3 +279,13 @@ class RuleBase:
             theta, blocks.own, blocks.own_rows, blocks.shared, blocks.shared_rows, blocks.divisor,
             tried.codes, tried.places, tried.below, joint_action, chances, self.layout,
         )  # fmt: skip
+
+    def _check_states(self, states: FloatArray) -> None:
+        if states.shape[1:] != (len(self.partitions),):
+            raise ValueError(
+                f"rule base: states of shape {states.shape}, must be (m, {len(self.partitions)})"
+            )
+
+    def _check_theta(self, theta: FloatArray) -> None:
+        if theta.shape != (self.n_rules,):
+            raise ValueError(f"rule base: theta of shape {theta.shape}, must be {(self.n_rules,)}")

@@ -81,10 +81,12 @@ def outcomes(  # type: ignore[no-untyped-def]
 
     Parameters
     ----------
-    robots, box, seconds
-        As of `nested_agents.scenarios.push.push`.
+    robots, box
+        ``(M, 3)`` and ``(3,)`` present poses.
     twists
         ``(M, 3)`` twists that the robots are asked for.
+    seconds
+        How long the push lasts [s].
     belief
         `PushBelief`.
     constants

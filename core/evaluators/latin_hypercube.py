@@ -59,7 +59,18 @@ class LatinHypercube(Gathering):
     groups
         Agents by body.
     budget
-        Moves of bodies predicted for a decision, about.
+        Moves of bodies predicted for a decision of the whole team, about.
+    rules
+        The agents' rule base.
+    hierarchy
+        Who is below whom: only their moves are drawn.
+    n_actions
+        Actions A of every agent.
+    rule, others
+        By what a joint action is valued, and what the agents below are expected to do; see
+        `nested_agents.core.config.Decision`.
+    discount
+        Of the value, where it is added to the reward.
     """
 
     def __init__(

@@ -62,6 +62,8 @@ def fold(partial, strengths, lay: Layout, one, two, out, wanted) -> None:  # typ
         ``(total_width,)`` weights of the shared rules.
     strengths
         ``(d - n_own, most memberships, lanes)`` of the shared variables.
+    lay
+        Layout of the rule base.
     one, two
         Scratch, ``(largest shared size, lanes)``.
     out

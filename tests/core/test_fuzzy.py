@@ -160,6 +160,12 @@ def test_centres_of_a_variable(variable: Variable, count: int | None, centres: t
         (((0.0, 0.0), "triangular"), "must increase"),
         (((0.0, 1.0), "triangular", 1.0), "within one period of 1.0"),
         (((0.0, 1.0), "sigmoid", 2.0, 0.1), "steepness = 0.1"),
+        (((0.0, 1.0), "gauss"), "membership = 'gauss', allowed: triangular, sigmoid"),
+        (((0.0, 1.0), "sigmoid", 0.0, -1.0), "steepness = -1.0, must be above 0"),
+        (((0.0, 1.0), "sigmoid", 2.0, 0.0), "steepness = 0.0, must be above 0"),
+        (((0.0, 1.0), "sigmoid", 0.0, float("inf")), "steepness = inf, must be above 0 and finite"),
+        (((0.0, float("nan")), "triangular"), "all must be finite"),
+        (((0.0, 1.0), "triangular", -3.0), "period = -3.0, allowed: 0 or a positive number"),
     ],
 )
 def test_a_partition_refuses(arguments: tuple, complaint: str) -> None:

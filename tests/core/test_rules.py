@@ -1,5 +1,6 @@
 """Rule bases: the paper's eight rules by hand, orders, products, values of states and codes."""
 
+import re
 from itertools import combinations, product
 from math import comb
 
@@ -8,6 +9,7 @@ import pytest
 
 from nested_agents.core.config import RuleBaseSettings
 from nested_agents.core.fuzzy import Partition
+from nested_agents.core.protocols import Blocks
 from nested_agents.core.rules import RuleBase
 from nested_agents.core.spaces import StateSpace, Variable
 
@@ -155,3 +157,34 @@ def test_squared_lengths_and_values_by_row(membership: str) -> None:
     assert base.each(theta, states[:, None])[:, 0] == pytest.approx(
         (features * theta).sum(axis=1), abs=1e-12
     )
+
+
+@pytest.mark.parametrize("membership", ["triangular", "sigmoid"])
+def test_wrong_shapes_are_refused_in_one_line(membership: str) -> None:
+    # Compiled kernels do not look where they read: unchecked, some of these end the process.
+    base = RuleBase([Partition((0.0, 1.0), membership)] * 2, [(0, 1)])
+    one, four = np.ones((1, 2)), np.ones(4)
+    pairs = "rule base: states of shape {}, must be (m, 2)"
+    sets = "rule base: states of shape {}, must be (n, s, 2)"
+    for call, complaint in (
+        (lambda: base.values(four, np.zeros((3, 1))), pairs.format((3, 1))),
+        (lambda: base.values(four, np.zeros(2)), pairs.format((2,))),
+        (lambda: base.values(np.ones(2), one), "rule base: theta of shape (2,), must be (4,)"),
+        (lambda: base.values(one, one), "rule base: theta of shape (1, 2), must be (4,)"),
+        (
+            lambda: base.each(np.ones((1, 4)), np.zeros((2, 1, 2))),
+            "rule base: theta of shape (1, 4), must be (2, 4)",
+        ),
+        (lambda: base.each(np.ones((1, 4)), np.zeros((1, 1, 3))), sets.format((1, 1, 3))),
+        (lambda: base.each(np.ones((1, 4)), one), sets.format((1, 2))),
+        (lambda: base.squared_lengths(np.zeros((2, 3))), pairs.format((2, 3))),
+        (lambda: base.active(np.zeros((2, 1))), pairs.format((2, 1))),
+        (lambda: base.active(np.zeros((2, 1, 2))), pairs.format((2, 1, 2))),
+        (lambda: base.features(np.zeros((2, 3))), pairs.format((2, 3))),
+        (
+            lambda: base.block_values(np.ones(3), Blocks(one, one, 1), np.zeros(1, int)),
+            "rule base: theta of shape (3,), must be (4,)",
+        ),
+    ):
+        with pytest.raises(ValueError, match=f"^{re.escape(complaint)}$"):
+            call()
