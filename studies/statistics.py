@@ -47,7 +47,9 @@ def bootstrap(
     """Return a statistic of values pooled over strata, with its stratified bootstrap interval.
 
     Each stratum is resampled on its own, whole runs at a time, so that every stratum keeps its
-    weight (Agarwal et al. 2021, Section 4.1).
+    weight (Agarwal et al. 2021, Section 4.1). The percentiles lie further out than `level` says, by
+    as much as Student's t distribution does and variances of few runs fall short (Hesterberg 2015,
+    Section 5.2); without that, intervals of five normal values cover their mean in 84 %.
 
     Parameters
     ----------
@@ -85,9 +87,15 @@ def bootstrap(
     drawn = [array[rng.integers(len(array), size=(resamples, len(array)))] for array in arrays]
     # (resamples, n_runs) or (resamples, n_runs, n_points): runs last for the statistic.
     samples = np.moveaxis(np.concatenate(drawn, axis=1), 1, -1)
-    tail = (1.0 - level) / 2.0
+    tail = _tail(level, samples.shape[-1])
     low, high = np.quantile(compute(samples), [tail, 1.0 - tail], axis=0)
     return Estimate(value, low, high)
+
+
+def _tail(level: float, n_runs: int) -> float:
+    """Return the share of resamples beyond either end of an interval."""
+    reach = stats.t.ppf(0.5 + level / 2.0, n_runs - 1) * np.sqrt(n_runs / (n_runs - 1))
+    return float(stats.norm.sf(reach))
 
 
 def rate(outcomes: ArrayLike, level: float = 0.95) -> Estimate:
