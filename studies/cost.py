@@ -29,7 +29,12 @@ from ..core.protocols import Scenario
 from ..core.team import Team
 from ..scenarios.line_up import LineUp
 from ..topologies import arrange, build, parse
-from ..topologies.config import ChainSettings, IndependentSettings, SingleAgentSettings
+from ..topologies.config import (
+    ChainSettings,
+    IndependentSettings,
+    PerRobotSettings,
+    SingleAgentSettings,
+)
 from .statistics import Estimate
 from .topology_view import team_of
 
@@ -45,6 +50,8 @@ MOST_OPERATIONS = 4 * 10**8
 """Rule evaluations a step beyond which nothing is measured: about a second a step."""
 LEAST_SECONDS, MOST_TIMES = 0.3, 100
 """How long each case is timed at least, but no more times than that."""
+LEAST_ROWS = 5
+"""The fewest numbers of agents that an exponent is fitted over."""
 
 
 @dataclass(frozen=True)
@@ -111,8 +118,10 @@ def cost_rows(
     Raises
     ------
     ValueError
-        If a topology is refused.
+        If there is no topology, or one is refused.
     """
+    if not topologies:
+        raise ValueError("topology = none, allowed: one or more, such as chain or tree:2")
     for text in topologies:
         for n in agents:
             found = measure(text, n) if measured else None
@@ -134,8 +143,19 @@ def cost_rows(
 
 
 def agents_below(text: str, n: int) -> Sequence[int]:
-    """Return how many agents are below each of n agents in the topology written as `text`."""
+    """Return how many agents are below each of n agents in the topology written as `text`.
+
+    Raises
+    ------
+    ValueError
+        If the topology is refused; so is that of whole robots, for which there is no one |A|.
+    """
     settings = parse(text)
+    if isinstance(settings, PerRobotSettings):
+        raise ValueError(
+            f"topology {text!r}: the cost formulas are of an agent per wheel; what whole robots "
+            f"try is in: nested-agents topology show {text}"
+        )
     if isinstance(settings, ChainSettings) and isinstance(settings.order, str):
         return range(n)  # a thousand hierarchies of a thousand agents take their time
     return below_counts(build(settings, team_of(n, None, None).agents, pairs(n)))
@@ -200,23 +220,34 @@ def measure(text: str, n: int) -> Measured | None:
     )
 
 
+def fitted(rows: Sequence[CostRow]) -> list[CostRow]:
+    """Return the measured rows of a topology that exponents are fitted over, by number of agents.
+
+    These are the larger half of the numbers of agents, where what is fixed per agent and step
+    matters least, but no fewer than five; none if fewer are measured.
+    """
+    measured = sorted((r for r in rows if r.measured is not None), key=lambda r: r.agents)
+    if len(measured) < LEAST_ROWS:
+        return []
+    return measured[min(len(measured) // 2, len(measured) - LEAST_ROWS) :]
+
+
 def exponent(
     rows: Sequence[CostRow], quantity: Literal["deciding", "memory"], level: float = 0.95
 ) -> Estimate | None:
     """Return p of quantity ~ rule evaluations ** p, with its interval; none of too few rows.
 
-    Least squares on logarithms over the larger half of the numbers of agents, where what is fixed
-    per step matters least; at least five are needed. The formula's growth is p = 1.
+    Least squares on logarithms over the `fitted` rows. The formula's growth is p = 1. As long as
+    what is fixed per agent and step matters there, the true p is underestimated.
     """
-    points = sorted(
-        (r.agents, log(r.measured.rule_evaluations_formula), log(getattr(r.measured, quantity)))
-        for r in rows
+    points = [
+        (log(r.measured.rule_evaluations_formula), log(getattr(r.measured, quantity)))
+        for r in fitted(rows)
         if r.measured is not None
-    )
-    points = points[min(len(points) // 2, max(len(points) - 5, 0)) :]
-    if len(points) < 5:
+    ]
+    if not points:
         return None
-    _, x, y = zip(*points, strict=True)
+    x, y = zip(*points, strict=True)
     fit = stats.linregress(x, y)
     half = stats.t.ppf(0.5 + level / 2, len(points) - 2) * fit.stderr
     value, low, high = (np.asarray(v) for v in (fit.slope, fit.slope - half, fit.slope + half))

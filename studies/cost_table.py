@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from fractions import Fraction
 from typing import Any, Literal
 
-from .cost import RULES, CostRow, exponent
+from .cost import RULES, CostRow, Measured, exponent, fitted
 from .statistics import Estimate
 from .topology_view import aligned, readable
 
@@ -28,6 +28,8 @@ FORMULAS = (
     ("ratio", "ratio"),
 )
 """Columns by name, with their heading."""
+MEASURED = ("formula", "counted", "rules valued", "updates", "ms", "MiB")
+"""Headings of what was measured per step."""
 COUNTS = ("joint_actions", "rule_evaluations", "weight_updates")
 
 
@@ -42,7 +44,8 @@ def written(rows: Sequence[CostRow], form: Form) -> str:
         if form == "json":
             return "[" + ",\n ".join(json.dumps(record) for record in records) + "]"
         file = io.StringIO()
-        writer = csv.DictWriter(file, list(records[0]), lineterminator="\n")
+        columns = list(dict.fromkeys(name for record in records for name in record))
+        writer = csv.DictWriter(file, columns, lineterminator="\n")
         writer.writeheader()
         writer.writerows(records)
         return file.getvalue().rstrip("\n")
@@ -118,30 +121,46 @@ def _table(rows: Sequence[CostRow]) -> str:
 
 
 def _measured(rows: Sequence[CostRow]) -> list[str]:
-    cells = [["n", "topology", "formula", "counted", "rules valued", "updates", "ms", "MiB"]]
-    for row in rows:
-        m = row.measured
-        if m is None:
-            cells.append([str(row.agents), row.topology, *["-"] * 6])
-            continue
-        values = [number(v) for v in (m.joint_actions_formula, m.joint_actions, m.rule_evaluations)]
-        values += [number(m.weight_updates), f"{1e3 * (m.deciding + m.learning):.3g}"]
-        cells.append([str(row.agents), row.topology, *values, f"{m.memory / 2**20:.3g}"])
-    measured = [row for row in rows if row.measured is not None]
-    agreeing = sum(row.measured.agrees for row in measured if row.measured is not None)
+    cells = [["n", "topology", *MEASURED]]
+    cells += [[str(row.agents), row.topology, *_measured_cells(row.measured)] for row in rows]
+    measured = [row.measured for row in rows if row.measured is not None]
+    agreeing = sum(m.agrees for m in measured)
     lines = [f"Per step of the running system (line-up scenario, |A| = 4, |S| = {RULES}):", ""]
     lines += [*aligned(cells, "><>>>>>>"), ""]
-    lines += ["formula, counted: joint actions tried; -: beyond a second or so a step."]
+    lines += ["formula, counted: joint actions tried; ms: deciding and learning;"]
+    lines += ["-: beyond a second or so a step."]
     lines += [f"All counts equal the formulas in {agreeing} of {len(measured)} rows."]
+    return lines + _exponents(rows)
+
+
+def _exponents(rows: Sequence[CostRow]) -> list[str]:
+    lines = []
     for text in dict.fromkeys(row.topology for row in rows):
         own = [row for row in rows if row.topology == text]
-        time, memory = exponent(own, "deciding"), exponent(own, "memory")
-        if time is not None and memory is not None:
+        deciding, memory = exponent(own, "deciding"), exponent(own, "memory")
+        if deciding is not None and memory is not None:
+            over = fitted(own)
             lines.append(
-                f"{text}: fitted exponent of rules valued: time {_interval(time)}, "
-                f"memory {_interval(memory)}"
+                f"{text}, n = {over[0].agents} to {over[-1].agents}: "
+                f"deciding {_interval(deciding)}, memory {_interval(memory)}"
             )
-    return lines
+    if not lines:
+        return []
+    return [
+        "",
+        "Exponent p of (rules valued)^p, 95 % interval; by the formula 1. Lower bounds",
+        "while what is fixed per agent and step matters, as it does for few agents:",
+        *lines,
+    ]
+
+
+def _measured_cells(measured: Measured | None) -> list[str]:
+    if measured is None:
+        return ["-"] * len(MEASURED)
+    m = measured
+    counts = (m.joint_actions_formula, m.joint_actions, m.rule_evaluations, m.weight_updates)
+    amounts = (1e3 * (m.deciding + m.learning), m.memory / 2**20)
+    return [*map(number, counts), *(f"{a:.3g}" if a < 1000 else f"{a:,.0f}" for a in amounts)]
 
 
 def _interval(estimate: Estimate) -> str:
@@ -149,22 +168,33 @@ def _interval(estimate: Estimate) -> str:
 
 
 def _latex(rows: Sequence[CostRow]) -> str:
+    """Return a tabular of the formulas and, if anything was measured, a second one of that."""
     titles = ["nested (18)", "closed form (19)", "asymptotic (21)", "single agent (23)", "ratio"]
+    formulas = [[number(getattr(row, name)) for name, _ in FORMULAS] for row in rows]
+    lines = _tabular(rows, titles, formulas)
+    if any(row.measured is not None for row in rows):
+        lines += ["", *_tabular(rows, MEASURED, [_measured_cells(row.measured) for row in rows])]
+    return "\n".join(lines)
+
+
+def _tabular(
+    rows: Sequence[CostRow], titles: Sequence[str], cells: Sequence[Sequence[str]]
+) -> list[str]:
     lines = [
-        r"\begin{tabular}{rlrrrrr}",
+        rf"\begin{{tabular}}{{rl{'r' * len(titles)}}}",
         r"\toprule",
         " & ".join(["$n$", "topology", *titles]) + r" \\",
         r"\midrule",
     ]
-    for row in rows:
-        values = [_latex_number(getattr(row, name)) for name, _ in FORMULAS]
+    for row, values in zip(rows, cells, strict=True):
         topology = row.topology.replace("_", r"\_").replace("#", r"\#").replace(">", "$>$")
-        lines.append(" & ".join([str(row.agents), topology, *values]) + r" \\")
-    return "\n".join([*lines, r"\bottomrule", r"\end{tabular}"])
+        lines.append(" & ".join([str(row.agents), topology, *map(_latex_cell, values)]) + r" \\")
+    return [*lines, r"\bottomrule", r"\end{tabular}"]
 
 
-def _latex_number(value: int | Fraction | None) -> str:
-    if value is None:
+def _latex_cell(text: str) -> str:
+    """Return a number as it is printed, for LaTeX."""
+    if text == "-":
         return "--"
-    mantissa, e, power = number(value).partition("e")
-    return rf"${mantissa}\times 10^{{{power}}}$" if e else mantissa.replace(",", r"\,")
+    mantissa, e, power = text.partition("e")
+    return rf"${mantissa}\times 10^{{{int(power)}}}$" if e else mantissa.replace(",", r"\,")

@@ -27,7 +27,7 @@ def command(
     agents
         Number of agents, or a range: 4, 1:16, 2:64:2.
     topology
-        Topologies as in a spec: chain teams tree:2 ...
+        One or more topologies as in a spec: chain teams tree:2 ...
     rules
         |S|, rules of one agent.
     actions
@@ -47,8 +47,9 @@ def command(
         A figure to write: SVG, PNG or PDF by suffix.
     """
     from ...core.cost import Problem
-    from ..cost import cost_rows
+    from ..cost import MOST_OPERATIONS, cost_rows
     from ..cost_table import written
+    from ..display import say
     from ..spec_errors import SpecError
 
     if learning:
@@ -63,6 +64,11 @@ def command(
     except ValueError as error:
         raise SpecError(str(error)) from None
     print(written(rows, format))
+    if measured and all(row.measured is None for row in rows):
+        say(
+            f"nothing was measured: every step would take more than {MOST_OPERATIONS:,} rule "
+            "evaluations, about a second"
+        )
     return 0
 
 

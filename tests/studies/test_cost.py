@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,15 @@ import pytest
 from nested_agents.core.cost import Problem
 from nested_agents.studies.cli import main
 from nested_agents.studies.commands.cost import numbers
-from nested_agents.studies.cost import CostRow, Measured, agents_below, cost_rows, exponent, measure
+from nested_agents.studies.cost import (
+    CostRow,
+    Measured,
+    agents_below,
+    cost_rows,
+    exponent,
+    fitted,
+    measure,
+)
 from nested_agents.studies.cost_table import written
 
 FIVE = ("chain", "teams", "tree:2", "star", "independent")
@@ -101,6 +110,9 @@ def test_numbers() -> None:
         (("--actions", "1"), "actions = 1, allowed: 2 or more"),
         (("--rules", "0"), "rules = 0, allowed: 1 or more"),
         (("--topology", "ring"), "topology 'ring': known: chain,"),
+        (("--topology",), "topology = none, allowed: one or more"),
+        (("--topology", "--format", "csv"), "topology = none, allowed: one or more"),
+        (("--topology", "per-robot"), "what whole robots try is in: nested-agents topology show"),
         (("--format", "xml"), "invalid choice 'xml'"),
         (("--plot", "cost.txt"), "cost.txt: suffix must be"),
     ],
@@ -147,6 +159,56 @@ def test_exponents_are_found() -> None:
     assert memory is not None
     assert memory.value == pytest.approx(1.0)
     assert exponent(rows[:4], "deciding") is None
+
+
+@pytest.mark.parametrize(
+    ("most", "over"), [(4, []), (5, [1, 5]), (8, [4, 8]), (10, [6, 10]), (16, [9, 16])]
+)
+def test_exponents_are_of_the_larger_half_but_of_five_at_least(most: int, over: list[int]) -> None:
+    chosen = [row.agents for row in fitted([made_up(n, 1.0) for n in range(most, 0, -1)])]
+    assert chosen == (list(range(over[0], over[1] + 1)) if over else [])
+
+
+def test_the_table_says_what_exponents_are_of() -> None:
+    out = written([made_up(n, 1.5) for n in range(1, 11)], "table")
+    assert "chain, n = 6 to 10: deciding 1.50 [1.50, 1.50], memory 1.00 [1.00, 1.00]" in out
+    assert "Lower bounds\nwhile what is fixed per agent and step matters" in out
+    assert "ms: deciding and learning" in out
+    assert max(map(len, out.splitlines())) <= 80
+    assert "Exponent" not in written([made_up(n, 1.5) for n in range(1, 5)], "table")
+
+
+def test_latex_has_what_was_measured() -> None:
+    rows = [made_up(1, 1.0), made_up(10, 2.0), replace(made_up(11, 1.0), measured=None)]
+    formulas, measured = written(rows, "latex").split("\n\n")
+    assert r"\begin{tabular}{rlrrrrr}" in formulas
+    assert measured.splitlines() == [
+        r"\begin{tabular}{rlrrrrrr}",
+        r"\toprule",
+        r"$n$ & topology & formula & counted & rules valued & updates & ms & MiB \\",
+        r"\midrule",
+        r"1 & chain & 4 & 4 & 4 & 1 & 0.005 & $3.81\times 10^{-5}$ \\",
+        r"10 & chain & 1\,048\,576 & 1\,048\,576 & 1\,048\,576 & 10 & 1\,099\,511\,628 & 10 \\",
+        r"11 & chain & -- & -- & -- & -- & -- & -- \\",
+        r"\bottomrule",
+        r"\end{tabular}",
+    ]
+    assert written(rows[2:], "latex").count("tabular") == 2
+
+
+def test_csv_has_columns_of_rows_that_were_measured_later() -> None:
+    rows = [replace(made_up(1, 1.0), measured=None), made_up(2, 1.0)]
+    first, second = csv.DictReader(io.StringIO(written(rows, "csv")))
+    assert (first["memory_bytes"], second["memory_bytes"]) == ("", "160")
+
+
+@pytest.mark.parametrize("form", ["table", "json", "csv", "latex"])
+def test_having_measured_nothing_is_said(said, form: str) -> None:
+    status, out, err = said("--agents", "65", "--measured", "--format", form)
+    assert status == 0
+    assert "65" in out
+    assert err.startswith("nothing was measured: every step would take more than 400,000,000 rule")
+    assert err.count("\n") == 1
 
 
 def test_measured_tables_and_figure(said, tmp_path: Path) -> None:
