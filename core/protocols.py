@@ -30,15 +30,24 @@ class Blocks:
     Attributes
     ----------
     own
-        ``(K, n_own)`` own variables, one row per local code of the agent's group of ``w`` agents,
-        or fewer.
+        ``(K, n_own)`` own variables, one row per local code of the agent's group of ``w`` agents;
+        fewer with `own_rows`, or if there are no own variables: then one row will do.
     shared
-        ``(R, d - n_own)`` shared variables, one row per joint-action code, or fewer.
+        ``(R, d - n_own)`` shared variables, one row per joint-action code; fewer with
+        `shared_rows`.
     divisor
-        The local code of joint-action code ``c`` is ``c // divisor % A ** w``.
+        ``A`` to the power of the number of agents behind the group: the local code of joint-action
+        code ``c`` is ``c // divisor % A ** w``.
     own_rows, shared_rows
         The row of `own` of every local code ``(A ** w,)``, and of `shared` of every joint-action
         code ``(A ** n,)``, where several codes lead to one; empty: each code has its row.
+    alone
+        Whether own variables are those that the group would reach alone, which is an approximation
+        where others matter to them. If not, the blocks give for every code exactly what
+        `Prediction.states` gives; if so, of the shared variables only.
+
+    Compiled kernels read the tables without looking at their sizes.
+    `nested_agents.scenarios.checker` does look.
     """
 
     own: FloatArray
@@ -46,6 +55,7 @@ class Blocks:
     divisor: int
     own_rows: IntArray = field(default_factory=_no_rows)
     shared_rows: IntArray = field(default_factory=_no_rows)
+    alone: bool = False
 
     def states(self, codes: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of joint-action codes ``(m,)``."""
@@ -67,11 +77,11 @@ class Prediction(Protocol):
         ...
 
     def blocks(self, agent: int) -> Blocks:
-        """Return the next states of `agent` for all ``A ** n`` joint actions."""
+        """Return the next states of `agent` for all ``A ** n`` joint actions: as `states` does."""
         ...
 
     def reward_table(self) -> FloatArray:
-        """Return the predicted rewards ``(A ** n,)`` of all joint actions by code."""
+        """Return the rewards ``(A ** n,)`` of all joint actions by code: as `rewards` does."""
         ...
 
 

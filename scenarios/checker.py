@@ -2,8 +2,9 @@
 
 Whole episodes of random actions are played and compared to the last bit: states, reward, end of the
 episode, motions and measurements of every step. Not compared are the measured times, ``seconds``.
-A further check is one function and one line in `CHECKS`; it returns what is wrong, in one line, or
-nothing.
+Predictions are held against each other (see `checked_predictions`), not against what comes true:
+how good they are is not checked. A further check is one function and one line in `CHECKS`; it
+returns what is wrong, in one line, or nothing. What a scenario raises is what is wrong with it.
 """
 
 from __future__ import annotations
@@ -12,13 +13,17 @@ import random
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
+from pathlib import Path
+from traceback import extract_tb
 from typing import Any
 
 import numpy as np
 
 from ..core.arrays import IntArray
 from ..core.protocols import Scenario
+from .checked_predictions import fault_of_prediction
 from .frames import (
+    FIELDS,
     Frame,
     at,
     bits,
@@ -96,7 +101,7 @@ def check_scenario(
     Raises
     ------
     ScenarioError
-        If it breaks a promise; the message is one line.
+        If it breaks a promise, or raises; the message is one line.
 
     Examples
     --------
@@ -111,10 +116,20 @@ def check_scenario(
         )
     examination = Examination(factory, steps, tuple(seeds), tuple(episodes))
     for name, check in CHECKS.items():
-        fault = check(examination)
+        try:
+            fault = check(examination)
+        except Exception as error:
+            fault = _raised(error)
         if fault is not None:
             raise ScenarioError(f"{name}: {fault}")
     return tuple(CHECKS)
+
+
+def _raised(error: Exception) -> str:
+    """Return in one line what was raised, and where."""
+    where = extract_tb(error.__traceback__)[-1]
+    place = f"{where.name}, {Path(where.filename).name}:{where.lineno}"
+    return f"{type(error).__name__} in {place}: {' '.join(str(error).split())}"
 
 
 def _form(of: Examination) -> str | None:
@@ -128,6 +143,11 @@ def _form(of: Examination) -> str | None:
         return f"agents {scenario.agents} must be at least one, of different names"
     if [i for group in scenario.groups for i in group] != list(range(n)):
         return f"groups {scenario.groups} must hold the {n} agents once each, in order"
+    opening(scenario, of.seeds[0], of.episodes[0])
+    transition = scenario.step(of.actions(scenario, of.seeds[0])[0])
+    missing = [field for field in FIELDS if not hasattr(transition, field)]
+    if missing:
+        return f"step returns {type(transition).__name__}, must be Transition: no {missing[0]}"
     for step, frame in enumerate(of.play(scenario, of.seeds[0], of.episodes[0])):
         if np.shape(frame["states"]) != (n, d):
             return f"states of shape {np.shape(frame['states'])} {at(step)}, must be {(n, d)}"
@@ -227,23 +247,14 @@ def _only_looks(of: Examination) -> str | None:
 
 
 def _predicts(of: Examination) -> str | None:
-    """Check that predictions have their shapes and are finite."""
-    scenario = of.factory()
+    """Check that predictions have their shapes, are finite, and that their tables agree."""
+    scenario, rng = of.factory(), np.random.default_rng(of.seeds[0])
     opening(scenario, of.seeds[0], of.episodes[0])
-    n, d = len(scenario.agents), scenario.state_space.n_variables
     actions = of.actions(scenario, of.seeds[0])
     for action in actions[:5]:
-        prediction = scenario.predict()
-        wanted: dict[str, tuple[Any, tuple[int, ...]]] = {
-            f"states of agent {i}": (prediction.states(i, actions), (len(actions), d))
-            for i in range(n)
-        }
-        wanted["rewards"] = prediction.rewards(actions), (len(actions),)
-        for name, (value, shape) in wanted.items():
-            if np.shape(value) != shape:
-                return f"predicted {name} of shape {np.shape(value)}, must be {shape}"
-            if not np.isfinite(value).all():
-                return f"predicted {name} are not finite"
+        fault = fault_of_prediction(scenario, actions, rng)
+        if fault is not None:
+            return fault
         scenario.step(action)
     return None
 

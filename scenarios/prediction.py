@@ -175,7 +175,8 @@ class BoxPrediction:
         row = self._table[1]
         own, which = self.own_block(agent)
         behind = sum(len(group) for group in self.situation.groups[r + 1 :])
-        return Blocks(own, self._shared[r], len(self.action_set) ** behind, which, row)
+        divisor, alone = len(self.action_set) ** behind, self.space.own_needs_pose
+        return Blocks(own, self._shared[r], divisor, which, row, alone)
 
     def own_block(self, agent: int) -> tuple[FloatArray, IntArray]:
         """Return the own variables that occur, as if alone, and which each local code leads to."""

@@ -61,9 +61,17 @@ def _cases(source: str, changes: Changes) -> Iterator[Case]:
         if changes:
             raise SpecError("set: lays values over a spec, not over a Python file")
         try:
-            yield source.rpartition(":")[2], from_python(source), [0, 1]
+            factory = from_python(source)
         except ValueError as error:
-            raise SpecError(str(error)) from None
+            raise SpecError(" ".join(str(error).split())) from None
+        try:
+            factory()
+        except Exception as error:
+            said = " ".join(str(error).split())
+            raise SpecError(
+                f"{source}, called without arguments, raised {type(error).__name__}: {said}"
+            ) from None
+        yield source.rpartition(":")[2], factory, [0, 1]
         return
     seen: set[Any] = set()
     for condition in Spec.load(Path(source), changes).conditions():

@@ -9,13 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nested_agents.core.protocols import Scenario
+from nested_agents.core.protocols import Blocks, Scenario
+from nested_agents.core.robot_agents import per_robot
 from nested_agents.core.single_agent import SingleAgent
 from nested_agents.core.spaces import StateSpace
 from nested_agents.scenarios import BoxPushing, ScenarioSettings
+from nested_agents.scenarios.checked_predictions import fault_of_prediction
 from nested_agents.scenarios.checker import CHECKS, ScenarioError, check_scenario
 from nested_agents.scenarios.config import DelayedSettings, NoisySettings, SeizedSettings
-from nested_agents.scenarios.line_up import LEAD, LineUp
+from nested_agents.scenarios.line_up import LEAD, LineUp, LineUpPrediction
 from nested_agents.studies.cli import main
 
 FAILURES = (
@@ -38,8 +40,9 @@ def line(**changes: Callable[..., Any]) -> Callable[[], Scenario]:
         lambda: BoxPushing(ScenarioSettings()),
         lambda: BoxPushing(ScenarioSettings(state_space="paper", start="hard", box="bar")),
         lambda: BoxPushing(ScenarioSettings(failures=FAILURES)),
+        lambda: per_robot(BoxPushing(ScenarioSettings(state_space="paper"))),
     ],
-    ids=["line-up", "single agent", "box pushing", "paper", "failures"],
+    ids=["line-up", "single agent", "box pushing", "paper", "failures", "robots"],
 )
 def test_sound_scenarios_pass(factory: Callable[[], Scenario]) -> None:
     assert check_scenario(factory, steps=20) == tuple(CHECKS)
@@ -175,6 +178,42 @@ def no_prediction(self: Any) -> Any:
     return prediction
 
 
+def raising(self: Any, joint_action: Any) -> Any:
+    raise KeyError("two\nlines")
+
+
+def a_tuple(self: Any, joint_action: Any) -> Any:
+    transition = LineUp.step(self, joint_action)
+    return transition.states, transition.reward
+
+
+def tables(
+    blocks: Callable[[Blocks], Blocks] | None = None, rewards: Callable[[Any], Any] | None = None
+) -> Callable[[], Scenario]:
+    """Return a factory of line-ups whose predictions have other tables."""
+
+    class Changed(LineUpPrediction):
+        def blocks(self, agent: int) -> Blocks:
+            sound = super().blocks(agent)
+            return blocks(sound) if blocks and agent == 1 else sound
+
+        def reward_table(self) -> Any:
+            sound = super().reward_table()
+            return rewards(sound) if rewards else sound
+
+    def predict(self: Any) -> Any:
+        return Changed(LineUp.predict(self)._places)
+
+    return line(predict=predict)
+
+
+def rowed(**changes: Any) -> Callable[[], Scenario]:
+    """Return a factory of line-ups whose blocks have other fields."""
+    return tables(lambda blocks: replace(blocks, **changes))
+
+
+BLOCKS = "predictions: blocks of agent 1: "
+
 FAULTS: dict[str, tuple[Callable[[], Scenario], str]] = {
     "late noise": (line(step=late_noise), r"equal seeds: two runs with seed 0 differ at step 2"),
     "ignored seed": (line(reset=same_start), "different seeds: seeds 0, 1 give one and the same"),
@@ -202,6 +241,54 @@ FAULTS: dict[str, tuple[Callable[[], Scenario], str]] = {
     "end": (line(step=uncertain_end), "form: terminated and truncated must be bool"),
     "twins": (line(__init__=twins), "form: agents .*, of different names"),
     "groups": (line(__init__=crossed), "form: groups .* must hold the 2 agents once each"),
+    "raises": (line(step=raising), r"form: KeyError in raising, test_checker.py:\d+: .two.*lines"),
+    "tuple": (line(step=a_tuple), "form: step returns tuple, must be Transition: no states"),
+    "own reversed": (
+        tables(lambda b: replace(b, own=b.own[::-1].copy())),
+        BLOCKS + r"distance = \S+ after joint action \[0, 0\], states has",
+    ),
+    "shared reversed": (
+        tables(lambda b: replace(b, shared=b.shared[::-1].copy())),
+        BLOCKS + "lead = ",
+    ),
+    "shared nearly right": (
+        tables(lambda b: replace(b, shared=b.shared + 1e-6)),
+        BLOCKS + "lead = ",
+    ),
+    "rewards reversed": (
+        tables(rewards=lambda table: table[::-1]),
+        "predictions: reward_table: .*, rewards has",
+    ),
+    "rewards short": (
+        tables(rewards=lambda table: table[:5]),
+        r"reward_table of shape \(5,\), must be \(16,\)",
+    ),
+    "divisor": (rowed(divisor=4), BLOCKS + "divisor = 4, must be 1"),
+    "shared short": (
+        tables(lambda b: replace(b, shared=b.shared[:5].copy())),
+        BLOCKS + "shared has 5 rows and no shared_rows, must have 16 rows",
+    ),
+    "own short": (
+        tables(lambda b: replace(b, own=b.own[:1].copy())),
+        BLOCKS + "own has 1 rows and no own_rows, must have 4 rows",
+    ),
+    "own wide": (
+        tables(lambda b: replace(b, own=np.hstack([b.own, b.own]))),
+        BLOCKS + r"own of shape \(4, 2\), must be \(rows, 1\)",
+    ),
+    "own rows": (
+        rowed(own_rows=np.array([0, 1, 2, 4])),
+        BLOCKS + "own_rows names rows 0 to 4, own has 4",
+    ),
+    "negative rows": (
+        rowed(shared_rows=np.arange(16) - 1),
+        BLOCKS + "shared_rows names rows -1 to 14",
+    ),
+    "few rows": (rowed(shared_rows=np.arange(5)), BLOCKS + "shared_rows has 5 .* must have 16"),
+    "broken rows": (rowed(own_rows=np.zeros(4)), BLOCKS + "own_rows is float64, must be an array"),
+    "listed own": (rowed(own=[[0.0]]), BLOCKS + "own is list, must be an array of floats"),
+    "flat own": (rowed(own=np.zeros(4)), BLOCKS + r"own of shape \(4,\), must have 2 axes"),
+    "NaN own": (rowed(own=np.full((4, 1), np.nan)), BLOCKS + "own is not finite"),
     "no scenario": (lambda: object(), "form: object lacks agents, groups, .*measure"),  # type: ignore[dict-item,return-value]
 }
 
@@ -240,6 +327,36 @@ def test_a_full_saver_passes() -> None:
         self._places, self._speeds, self._commands = (part.copy() for part in saved)
 
     assert check_scenario(line(save=save, restore=restore)) == tuple(CHECKS)
+
+
+@pytest.mark.parametrize("own", [0.5, np.nan])
+def test_own_variables_as_if_alone_may_differ_but_must_be_numbers(own: float) -> None:
+    factory = rowed(own=np.full((4, 1), own), alone=True)
+    if np.isfinite(own):
+        assert check_scenario(factory) == tuple(CHECKS)
+    else:
+        with pytest.raises(ScenarioError, match="own is not finite"):
+            check_scenario(factory)
+
+
+def test_many_joint_actions_are_drawn_and_too_many_left_out() -> None:
+    class Reversed(LineUpPrediction):
+        def reward_table(self) -> Any:
+            return super().reward_table()[::-1]
+
+    class Many(LineUp):
+        def predict(self) -> Any:
+            return Reversed(super().predict()._places)
+
+    for n, said in ((6, "reward_table: .* after joint action"), (8, "reward_table: ")):
+        scenario = Many(n)
+        scenario.reset(0)
+        fault = fault_of_prediction(scenario, np.zeros((1, n), int), np.random.default_rng(0))
+        assert re.match(said, fault or "")
+    scenario = Many(9)
+    scenario.reset(0)
+    none = fault_of_prediction(scenario, np.zeros((1, 9), int), np.random.default_rng(0))
+    assert none is None
 
 
 def test_too_little_to_check_is_refused() -> None:

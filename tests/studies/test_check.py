@@ -104,6 +104,12 @@ def drifting():
 
 def failing():
     raise ValueError("no cart")
+
+def exploding():
+    raise RuntimeError("no\\ntrack")
+
+def sized(n):
+    return LineUp(n)
 """
 
 
@@ -117,7 +123,9 @@ def test_a_scenario_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert found.startswith("FAULT   drifting: equal seeds: two runs with seed 0 differ at step 2")
     assert found.count("\n") == 1
     for name, complaint in (
-        ("failing", "no cart"),
+        ("failing", "own.py:failing, called without arguments, raised ValueError: no cart"),
+        ("exploding", "raised RuntimeError: no track"),
+        ("sized", "raised TypeError: sized() missing 1 required positional argument: 'n'"),
         ("missing", "has no function 'missing'"),
         ("", "must be written path/to/file.py:function"),
     ):
