@@ -62,7 +62,7 @@ class RobotAgents:
         neutral = int(np.flatnonzero((self._local == single.neutral).all(axis=1))[0])
         zeros = (0.0,) * len(names)
         self.action_set = ActionSet(names, zeros, zeros, neutral)
-        self.agents = tuple(_robot(scenario.agents[group[0]]) for group in scenario.groups)
+        self.agents = tuple(robot_of(scenario.agents[group[0]]) for group in scenario.groups)
         self.groups = tuple((r,) for r in range(len(self.agents)))
         space = scenario.state_space
         own = tuple(
@@ -197,10 +197,10 @@ class RobotPrediction:
         return cast(CalibratedPrediction, self._prediction).outcomes(wheels, constants)
 
 
-def _robot(agent: str) -> str:
+def robot_of(agent: str) -> str:
     """Return the robot's part of a wheel's name, or the name if it has none.
 
-    >>> _robot("robot1.front-left"), _robot("a")
+    >>> robot_of("robot1.front-left"), robot_of("a")
     ('robot1', 'a')
     """
     return agent.rpartition(".")[0] or agent

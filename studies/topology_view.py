@@ -13,11 +13,13 @@ from typing import Any, Literal
 
 from ..core.cost import below_counts
 from ..core.hierarchy import Hierarchy
+from ..core.robot_agents import MOST_ACTIONS, robot_of
 from ..topologies import KINDS, TopologySettings, build, builders, files, parse
 from ..topologies.config import (
     ChainSettings,
     EdgesSettings,
     FileSettings,
+    PerRobotSettings,
     SingleAgentSettings,
     TeamsSettings,
 )
@@ -44,7 +46,7 @@ class View:
     hierarchy, groups
         What it makes, and the robots.
     tries
-        Joint actions that each agent tries per step, in agent order.
+        Joint actions that each agent tries per step, in agent order. An agent may be a robot.
     """
 
     text: str
@@ -84,9 +86,25 @@ def view(
     if isinstance(settings, SingleAgentSettings):
         single = Hierarchy(["single"], [])
         return View(text, single, ((0,),), (actions ** len(team.agents),))
+    if isinstance(settings, PerRobotSettings):
+        return _of_robots(text, team, actions)
     hierarchy = build(settings, team.agents, team.groups)
     tries = tuple(actions ** (1 + count) for count in below_counts(hierarchy))
     return View(text, hierarchy, team.groups, tries)
+
+
+def _of_robots(text: str, team: Team, actions: int) -> View:
+    """Return the view of one agent per robot, which tries the joint actions of all its wheels."""
+    own = actions ** len(team.groups[0])
+    if own > MOST_ACTIONS:
+        raise ValueError(
+            f"topology {text!r}: {actions} ** {len(team.groups[0])} actions of a robot, allowed: "
+            f"{MOST_ACTIONS} or fewer"
+        )
+    robots = tuple(robot_of(team.agents[wheels[0]]) for wheels in team.groups)
+    hierarchy = Hierarchy(robots, builders.chain(robots).edges)
+    tries = tuple(own ** (1 + count) for count in below_counts(hierarchy))
+    return View(text, hierarchy, tuple((r,) for r in range(len(robots))), tries)
 
 
 def named_by(settings: TopologySettings) -> tuple[str, ...]:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import networkx as nx
+import numpy as np
 
 from ..core.hierarchy import Hierarchy
 from ..core.protocols import Scenario
@@ -86,13 +87,13 @@ def build(
     agents
         Distinct names, in agent order.
     groups
-        Agent indices by body (robot); none: every agent is a body of its own.
+        Agent indices, from 0, by body (robot), each once; none: every agent is a body of its own.
 
     Raises
     ------
     ValueError
-        If the settings do not fit the agents, or do not make a hierarchy. One line; it names the
-        culprit.
+        If the settings or the groups do not fit the agents, or the settings do not make a
+        hierarchy. One line; it names the culprit.
 
     Examples
     --------
@@ -106,11 +107,28 @@ def build(
         other = isinstance(settings, SingleAgentSettings | PerRobotSettings)
         hint = "; use topologies.arrange" if other else ""
         raise ValueError(f"topology {kind!r} is no hierarchy of {len(agents)} agents{hint}")
-    named = [(a,) for a in agents] if groups is None else [[agents[i] for i in g] for g in groups]
     try:
+        if not agents:
+            raise ValueError("no agents")
+        named = [(a,) for a in agents] if groups is None else _named(agents, groups)
         return Hierarchy(agents, BUILDERS[kind](settings, agents, named).edges)
     except ValueError as error:
         raise ValueError(f"topology {kind!r}: {str(error).removeprefix('hierarchy: ')}") from None
+
+
+def _named(agents: Sequence[str], groups: Sequence[Any]) -> Groups:
+    """Return the names of agents given by index, by group; refuse what is no index."""
+    named = []
+    for group in groups:
+        if isinstance(group, str) or not isinstance(group, Iterable):
+            raise ValueError(f"groups: {group!r} is no group, allowed: a sequence of agent indices")
+        for i in group:
+            if not isinstance(i, int | np.integer) or not 0 <= i < len(agents):
+                last = len(agents) - 1
+                raise ValueError(f"groups: {i!r} is no agent index, allowed: 0 to {last}")
+        named.append([agents[i] for i in group])
+    check_names(builders.names_of(named), agents, "groups")
+    return named
 
 
 def arrange(settings: TopologySettings, scenario: Scenario) -> tuple[Scenario, Hierarchy]:

@@ -15,6 +15,7 @@ from typing import Literal, TypeAlias
 import networkx as nx
 import numpy as np
 
+from ..core.hierarchy import Hierarchy
 from .checks import check_names, with_edges
 
 Member: TypeAlias = "str | Sequence[Member]"
@@ -147,12 +148,20 @@ def from_edges(
 
 
 def from_networkx(graph: nx.DiGraph, agents: Sequence[str]) -> nx.DiGraph:
-    """Return any directed graph as a hierarchy over `agents`; nodes are named by their ``str``.
+    """Return a directed acyclic graph over `agents` with its nodes named by their ``str``.
+
+    Parameters
+    ----------
+    graph
+        Its nodes are the agents, its edges lead from superior to subordinate; not modified.
+    agents
+        Names in agent order.
 
     Raises
     ------
     ValueError
-        If it is undirected, has parallel edges, or its nodes are not the agents.
+        If it is undirected, has parallel edges, its nodes are not the agents, or it has a cycle.
+        One line; it names the culprit.
 
     Examples
     --------
@@ -165,6 +174,8 @@ def from_networkx(graph: nx.DiGraph, agents: Sequence[str]) -> nx.DiGraph:
         raise ValueError("the graph is a multigraph: edges could be given more than once")
     named: nx.DiGraph = nx.relabel_nodes(graph, str)
     check_names([str(node) for node in graph], agents, "the graph")
+    if not nx.is_directed_acyclic_graph(named):
+        Hierarchy(agents, named.edges)  # raises and names the cycle
     return named
 
 

@@ -1,13 +1,14 @@
 """``nested-agents topology`` as a user meets it."""
 
 import json
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
 from nested_agents.studies.cli import main
 from nested_agents.studies.topology_view import readable, team_of
-from nested_agents.topologies import KINDS
+from nested_agents.topologies import KINDS, arrange, parse
 
 
 @pytest.fixture
@@ -67,6 +68,35 @@ def test_the_single_agent_is_shown_with_its_joint_actions(said) -> None:
     assert json.loads(out)["joint_actions_per_step"] == 4**4
 
 
+@pytest.mark.parametrize(
+    ("arguments", "robots", "tried"),
+    [
+        (("--agents", "4"), ["robot1", "robot2"], 256 + 16),
+        (("--robots", "2", "--wheels", "4", "--actions", "3"), ["robot1", "robot2"], 81**2 + 81),
+        (("--agents", "3"), ["agent1", "agent2", "agent3"], 64 + 16 + 4),
+    ],
+)
+def test_robots_are_shown_as_a_chain(
+    said, tmp_path: Path, arguments: tuple[str, ...], robots: list[str], tried: int
+) -> None:
+    plot = tmp_path / "robots.svg"
+    status, out, _ = said("show", "per-robot", *arguments, "--format", "json", "--plot", str(plot))
+    shown = json.loads(out)
+    assert (status, shown["agents"]) == (0, robots)
+    assert shown["edges"] == [list(pair) for pair in pairwise(robots)]
+    assert shown["joint_actions_per_step"] == tried
+    assert "<svg" in plot.read_text()
+
+
+def test_robots_are_shown_as_they_are_arranged(said, line_world) -> None:
+    world = line_world(2, 2)
+    scenario, hierarchy = arrange(parse("per-robot"), world)
+    shown = json.loads(said("show", "per-robot", "--agents", "4", "--format", "json")[1])
+    assert len(shown["agents"]) == len(scenario.agents)
+    assert shown["depth"] == hierarchy.depth
+    assert shown["joint_actions_per_step"] == hierarchy.joint_actions(len(scenario.action_set))
+
+
 def test_a_plot_is_written(said, tmp_path: Path) -> None:
     assert said("show", "star", "--plot", str(tmp_path / "star.svg"))[0] == 0
     assert "<svg" in (tmp_path / "star.svg").read_text()
@@ -84,6 +114,10 @@ def test_a_plot_is_written(said, tmp_path: Path) -> None:
         (("show", "chain", "--agents", "5", "--robots", "2"), "agents = 5 cannot be divided"),
         (("show", "chain", "--agents", "4", "--robots", "2", "--wheels", "3"), "are not robots"),
         (("show", "edges:a>b", "--agents", "4"), "the topology names 2 agents, 4 are asked for"),
+        (
+            ("show", "per-robot", "--wheels", "5"),
+            "4 ** 5 actions of a robot, allowed: 256 or fewer",
+        ),
         (("show", "chain", "--plot", "chain.txt"), "chain.txt: suffix must be"),
     ],
 )

@@ -5,6 +5,7 @@ import tomllib
 from pathlib import Path
 
 import networkx as nx
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -163,6 +164,49 @@ def test_from_networkx() -> None:
         from_networkx(nx.MultiDiGraph(graph), ("0", "1", "2"))
     with pytest.raises(ValueError, match="agent '0' occurs more than once"):
         from_networkx(nx.DiGraph([(0, "0")]), ("0",))
+
+
+def test_a_graph_with_a_cycle_is_refused() -> None:
+    graph = nx.DiGraph([("a", "b"), ("c", "d"), ("b", "a")])
+    with pytest.raises(ValueError, match=r"^hierarchy: cycle a -> b -> a$"):
+        from_networkx(graph, AGENTS)
+    with pytest.raises(ValueError, match=r"^hierarchy: agent '1' cannot be its own superior$"):
+        from_networkx(nx.DiGraph([(0, 1), (1, 1)]), ("0", "1"))
+
+
+@pytest.mark.parametrize(
+    ("groups", "message"),
+    [
+        ([["a"], ["b"], ["c"], ["d"]], "groups: 'a' is no agent index, allowed: 0 to 3"),
+        ([(0, 1), (2, 9)], "groups: 9 is no agent index, allowed: 0 to 3"),
+        ([(0, 1), (2, -1)], "groups: -1 is no agent index, allowed: 0 to 3"),
+        ([(0, 1), (2, 3.0)], "groups: 3.0 is no agent index, allowed: 0 to 3"),
+        ([0, 1, 2, 3], "groups: 0 is no group, allowed: a sequence of agent indices"),
+        (["ab", "cd"], "groups: 'ab' is no group, allowed: a sequence of agent indices"),
+        ([(0, 1), (1, 2, 3)], "agent 'b' occurs more than once in groups"),
+        ([(0, 1), (2,)], "agent 'd' is missing from groups"),
+    ],
+)
+@pytest.mark.parametrize("text", ["tree:2", "chain:interleaved", "teams"])
+def test_groups_that_are_not_the_agents_indices_are_refused(
+    text: str, groups: list, message: str
+) -> None:
+    with pytest.raises(ValueError, match=r".") as refusal:
+        build(parse(text), AGENTS, groups)
+    assert str(refusal.value) == f"topology {text.partition(':')[0]!r}: {message}"
+
+
+def test_groups_may_be_arrays() -> None:
+    groups = list(np.arange(4).reshape(2, 2))
+    assert (
+        build(parse("teams"), AGENTS, groups).edges == build(parse("teams"), AGENTS, ROBOTS).edges
+    )
+
+
+@pytest.mark.parametrize("text", ["star", "teams", "chain"])
+def test_no_agents_are_refused(text: str) -> None:
+    with pytest.raises(ValueError, match=f"^topology '{text}': no agents$"):
+        build(parse(text), ())
 
 
 def test_the_single_agent_sees_a_scenario_of_its_own(line_world) -> None:
