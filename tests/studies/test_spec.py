@@ -111,11 +111,13 @@ def test_the_paper_preset_holds_the_printed_constants():
     assert (learner.rule_base.order, learner.rule_base.memberships) == (7, 5)
 
 
-def test_controls_differ_from_the_default_in_the_learner_only():
+def test_controls_differ_from_the_default_in_the_learner_and_greedy_in_what_it_plans_by():
     conditions = Spec.of({"sweep": {"preset": ["default", "frozen", "random", "greedy"]}})
     default, *controls = [c.settings for c in conditions.conditions()]
-    for control in controls:
-        assert control.scenario == default.scenario
+    reward = default.scenario.reward.model_copy(update={"attraction_without_contact": True})
+    planned = default.scenario.model_copy(update={"lookahead": 48, "reward": reward})
+    for control, scenario in zip(controls, [default.scenario] * 2 + [planned], strict=True):
+        assert control.scenario == scenario
         assert control.topology == default.topology
         assert control.learner.kind == "frozen"
         assert control.learner.rule_base == default.learner.rule_base
