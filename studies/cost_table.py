@@ -148,8 +148,8 @@ def _exponents(rows: Sequence[CostRow]) -> list[str]:
         return []
     return [
         "",
-        "Exponent p of (rules valued)^p, 95 % interval; by the formula 1. Lower bounds",
-        "while what is fixed per agent and step matters, as it does for few agents:",
+        "Exponent p of (rules valued)^p, 95 % interval; the formula's is 1. Below that, p",
+        "is a lower bound: what is fixed per agent and step still matters for few agents.",
         *lines,
     ]
 

@@ -172,7 +172,7 @@ def test_exponents_are_of_the_larger_half_but_of_five_at_least(most: int, over: 
 def test_the_table_says_what_exponents_are_of() -> None:
     out = written([made_up(n, 1.5) for n in range(1, 11)], "table")
     assert "chain, n = 6 to 10: deciding 1.50 [1.50, 1.50], memory 1.00 [1.00, 1.00]" in out
-    assert "Lower bounds\nwhile what is fixed per agent and step matters" in out
+    assert "Below that, p\nis a lower bound: what is fixed" in out
     assert "ms: deciding and learning" in out
     assert max(map(len, out.splitlines())) <= 80
     assert "Exponent" not in written([made_up(n, 1.5) for n in range(1, 5)], "table")
