@@ -89,9 +89,9 @@ class Decision(Settings):
     spread them evenly if that is not all, or go by the sum of what robots contribute: `moments` for
     others "mean" and "observed", `extremes` for others "max". Auto: exact up to `exact_up_to`,
     sampling up to `sampling_up_to`, beyond by sums if the scenario can."""
-    samples: Annotated[int, Field(ge=1)] = 64
+    samples: Annotated[int, Field(ge=1, le=1_000_000)] = 64
     """Joint actions of the agents below tried with each own action when sampling."""
-    budget: Annotated[int, Field(ge=1)] = 131_072
+    budget: Annotated[int, Field(ge=1, le=1_000_000_000)] = 131_072
     """Moves of robots predicted for a decision of the whole team, about, by latin-hypercube."""
     exact_up_to: Annotated[int, Field(ge=1, le=10)] = 5
     """Agents that may still be free when `evaluator` is auto and enumeration is exact."""
@@ -179,7 +179,7 @@ class ReplaySettings(LearnerSettings):
 
     ridge: Positive = 10.0
     """Weight of the squared consequents against squared errors of rewards scaled by 100."""
-    sweeps: Annotated[int, Field(ge=1)] = 30
+    sweeps: Annotated[int, Field(ge=1, le=10_000)] = 30
     """Regressions on freshly discounted targets each time."""
     mixing: Annotated[float, Field(gt=0, le=1)] = 0.5
     """Share of the way that the weights go towards the last regression's: below 1 the policy does

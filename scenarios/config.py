@@ -8,7 +8,8 @@ from pydantic import Field, field_validator, model_validator
 
 from ..core.config import NonNegative, Positive, Settings
 
-Count = Annotated[int, Field(ge=1)]
+Periods = Annotated[int, Field(ge=1, le=10_000)]
+"""Control periods: ten minutes at most."""
 Index = Annotated[int, Field(ge=0)]
 
 
@@ -249,9 +250,9 @@ class ScenarioSettings(Settings):
     belief: BeliefSettings = BeliefSettings()
     """What the predictor `push` is told of constants that robots cannot see."""
     reward: RewardSettings = RewardSettings()
-    hold: Count = 8
+    hold: Periods = 8
     """Control periods of 64 ms for which a decision is held."""
-    lookahead: Count = 24
+    lookahead: Periods = 24
     """Control periods that predictions look ahead, the decision being held for all of them."""
     speed_increment: Annotated[float, Field(gt=0, le=1)] = 0.5
     """What increase and decrease change, as a fraction of the greatest wheel speed."""

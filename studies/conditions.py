@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from pydantic import Field, ValidationError
+from pydantic import AfterValidator, Field, ValidationError
 
 from ..core.config import BatchTDSettings, Learner, Settings
 from ..scenarios.config import ScenarioSettings
@@ -40,10 +40,20 @@ class ConditionSettings(Settings):
         )
 
 
+def _printable(name: str) -> str:
+    if not name.strip() or not name.isprintable():
+        raise ValueError("must be a name that can be printed")
+    return name
+
+
+Name = Annotated[str, AfterValidator(_printable)]
+"""How users call something of theirs."""
+
+
 class Override(Settings):
     """A named set of tables laid over those of a spec."""
 
-    name: Annotated[str, Field(min_length=1)]
+    name: Name
     """How its conditions are called."""
     preset: str | None = None
     """The preset under its tables; none: the spec's."""

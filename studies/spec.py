@@ -18,7 +18,7 @@ from pydantic import Field, ValidationError, field_validator
 
 from ..core.config import Settings
 from . import STUDIES
-from .conditions import SECTIONS, Condition, Override, grid, section, tuples
+from .conditions import SECTIONS, Condition, Name, Override, grid, section, tuples
 from .overlay import Table, assignment, flat, overlay
 from .presets import PRESETS
 from .spec_errors import SpecError, closest, explain, show
@@ -70,7 +70,7 @@ class Spec(Settings):
     """Lists of values by dotted key; the conditions are all their combinations."""
     overrides: tuple[Override, ...] = ()
     """Tables by name, each laid over those above and crossed with the sweep."""
-    evaluations: Mapping[str, Mapping[str, Any]] = Field(default_factory=dict)
+    evaluations: Mapping[Name, Mapping[str, Any]] = Field(default_factory=dict)
     """By name, changes of the scenario in which the trained teams are evaluated too."""
 
     @field_validator("study", "preset")

@@ -153,22 +153,27 @@ def check(spec: Spec) -> None:
 
     conditions = spec.conditions()
     for condition in conditions:
-        try:
-            scenario, _ = build(condition.settings, 0)
-            for name, elsewhere in condition.evaluations:
-                other, _ = build(condition.settings.model_copy(update={"scenario": elsewhere}), 0)
-                _check_alike(name, scenario, other)
-        except ValueError as error:
-            where = f" (condition {condition.label!r})" if len(conditions) > 1 else ""
-            raise SpecError(f"{error}{where}") from None
+        where = f" (condition {condition.label!r})" if len(conditions) > 1 else ""
+        scenario = _built(condition.settings, where)
+        for name, elsewhere in condition.evaluations:
+            settings = condition.settings.model_copy(update={"scenario": elsewhere})
+            _check_alike(name, scenario, _built(settings, f" (evaluation {name!r}){where}"))
     own = getattr(load_study(spec.study), "check", None)
     if own is not None:
         own(spec)
 
 
+def _built(settings: ConditionSettings, where: str) -> Scenario:
+    try:
+        scenario, _ = build(settings, 0)
+    except ValueError as error:
+        raise SpecError(f"{error}{where}") from None
+    return scenario
+
+
 def _check_alike(name: str, scenario: Scenario, other: Scenario) -> None:
     if (other.agents, other.state_space) != (scenario.agents, scenario.state_space):
-        raise ValueError(
+        raise SpecError(
             f"evaluations.{name}: a team trained with {len(scenario.agents)} agents over "
             f"{scenario.state_space.name!r} cannot act with {len(other.agents)} over "
             f"{other.state_space.name!r}"

@@ -29,9 +29,10 @@ def page(directory: Path) -> str:
     Raises
     ------
     SpecError
-        If the directory holds no readable study.
+        If the directory holds no readable study, or rows that are damaged.
     """
     with Store.open(directory) as store:
+        store.verify()
         spec, results, counts = store.spec(), read(store), store.counts()
         failed = [
             (condition, seed, words.without_places(error.rstrip()))

@@ -1,5 +1,6 @@
 import re
 import shutil
+import sqlite3
 from pathlib import Path
 
 import pytest
@@ -50,6 +51,15 @@ def test_it_asks_for_nothing_outside(finished):
     html = re.sub(r'xmlns(:\w+)?="[^"]*"', "", page(finished))
     assert re.findall(r"(?:https?:)?//[a-z][\w.]+\.[a-z]+", html) == []
     assert not re.search(r"<(link|iframe|object)\b|\bsrc=\"(?!data:)|@import", html)
+
+
+def test_damaged_rows_are_not_published(finished, tmp_path, capsys):
+    copy = shutil.copytree(finished, tmp_path / "copy")
+    with sqlite3.connect(copy / DATABASE) as connection:
+        connection.execute("UPDATE episodes SET success = 1")
+    assert main(["report", str(copy)]) == 2
+    assert "rows are damaged" in capsys.readouterr().err
+    assert not (copy / "report.html").exists()
 
 
 def test_an_empty_study(kept, tmp_path):
