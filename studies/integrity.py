@@ -9,6 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from . import database
+from .spec_errors import SpecError
 from .tables import OF_A_TRIAL, study_checksum, trial_checksum
 
 
@@ -18,12 +19,15 @@ def damage(path: Path) -> str | None:
     Raises
     ------
     SpecError
-        If it cannot be read for another reason.
+        If it cannot be read for another reason, or is sound but no study's.
     """
     try:
         with database.reading(path) as db:
-            if db.execute("SELECT 1 FROM sqlite_master").fetchone() is None:
+            tables = {name for (name,) in db.execute("SELECT name FROM sqlite_master")}
+            if not tables:
                 return None
+            if not tables & {"meta", "trials", *OF_A_TRIAL}:
+                raise SpecError(f"{path}: is a database, but no study; use another directory")
             (said,) = db.execute("PRAGMA integrity_check(1)").fetchone()
             if said != "ok":
                 return " ".join(str(said).replace("*** in database main ***", "").split())

@@ -172,3 +172,14 @@ def test_no_flipped_bit_anywhere_changes_what_a_study_ends_with(sound, tmp_path)
         finish(study)
         assert content(study) == expected, (path.name, where)
         shutil.rmtree(study)
+
+
+def test_a_database_that_is_no_study_is_left_alone(tmp_path):
+    with sqlite3.connect(tmp_path / DATABASE) as connection:
+        connection.execute("CREATE TABLE precious (x)")
+    before = (tmp_path / DATABASE).read_bytes()
+    refused = pytest.raises(SpecError, match="is a database, but no study")
+    with refused, Store.create(tmp_path, made_up.SPEC):
+        pass
+    assert (tmp_path / DATABASE).read_bytes() == before
+    assert {path.name for path in tmp_path.iterdir()} <= {DATABASE, ".lock"}
