@@ -6,7 +6,10 @@ from pathlib import Path
 import pytest
 
 from nested_agents.scenarios.boxes import BOXES
+from nested_agents.scenarios.checked_predictions import MOST_CODES
+from nested_agents.studies.cli import main
 from nested_agents.studies.spec import Spec
+from nested_agents.studies.spec_errors import SpecError
 from nested_agents.studies.trial import check
 
 TEXT = (Path(__file__).resolve().parents[2] / "docs" / "worlds.md").read_text(encoding="utf-8")
@@ -17,9 +20,43 @@ def test_specs(spec: str) -> None:
     check(Spec.parse(spec))
 
 
-@pytest.mark.parametrize("code", re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL))
+CODE = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
+
+
+@pytest.mark.parametrize("code", [code for code in CODE if "from tank" not in code])
 def test_code(code: str) -> None:
-    exec(code, {})
+    exec(code, {"__name__": "example"})
+
+
+def test_a_scenario_of_ones_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """What the page has one write is checked by the command and learns as the page prints."""
+    (scenario,) = [code for code in CODE if "class Tank" in code]
+    (training,) = [code for code in CODE if "from tank" in code]
+    (printed,) = re.findall(r"```text\n(before training: \d+ of .*?)```", TEXT, re.DOTALL)
+    (tmp_path / "tank.py").write_text(scenario)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    assert "nested-agents check tank.py:Tank\n" in TEXT
+    assert main(["check", "tank.py:Tank"]) == 0
+    assert capsys.readouterr().out.startswith("passed  Tank: ")
+    exec(training, {"__name__": "example"})
+    assert capsys.readouterr().out == printed
+
+
+def test_the_tables_that_the_checker_leaves_out() -> None:
+    (most,) = re.findall(r"more than ([\d,]+) joint actions", TEXT)
+    assert int(most.replace(",", "")) == MOST_CODES
+
+
+@pytest.mark.parametrize(
+    "chosen", ['scenario.kind="tank.py:Tank"', 'learner.kind="mine.py:Learner"']
+)
+def test_studies_take_no_scenario_and_no_learner_of_ones_own(chosen: str) -> None:
+    table, _, value = chosen.partition(".")
+    with pytest.raises(SpecError, match=f"{table}.kind"):
+        Spec.parse(f"[{table}]\n{value}\n")
 
 
 def test_mass_properties() -> None:
