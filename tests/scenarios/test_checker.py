@@ -4,6 +4,7 @@ import random
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -300,6 +301,12 @@ def test_every_planted_fault_is_caught_in_one_line(name: str) -> None:
         check_scenario(factory)
     assert "\n" not in str(fault.value)
     assert len(str(fault.value)) < 200
+
+
+def test_the_documentation_counts_the_faults() -> None:
+    text = (Path(__file__).resolve().parents[2] / "docs" / "worlds.md").read_text(encoding="utf-8")
+    (told,) = re.findall(r"tests hold (\d+) deliberately broken", text)
+    assert int(told) == len(FAULTS)
 
 
 # Where the command line finds them: ``nested-agents check THIS_FILE:fault_late_noise``.
