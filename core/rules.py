@@ -98,7 +98,8 @@ class RuleBase:
         Raises
         ------
         ValueError
-            If the order exceeds the number of variables or a product names an unknown variable.
+            If the order exceeds the number of variables or a product names an unknown variable,
+            one twice, or none.
         """
         names = [v.name for v in space.variables]
         if settings.order > len(names):
@@ -113,6 +114,11 @@ class RuleBase:
                 raise ValueError(
                     f"learner.rule_base.products: unknown variable {unknown[0]!r}, known: "
                     f"{', '.join(names)}"
+                )
+            if not product or len(set(product)) < len(product):
+                raise ValueError(
+                    f"learner.rule_base.products: {list(product)} must name at least one variable, "
+                    "each once"
                 )
             terms.append(tuple(sorted(names.index(name) for name in product)))
         partitions = [

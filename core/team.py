@@ -313,7 +313,8 @@ def _build_evaluator(
         return LatinHypercube(scenario.groups, decision.budget, *common)
     if not superposes:
         raise ValueError(
-            f"decision.evaluator = {kind!r}: the scenario predicts no sums, use exact or sampling"
+            f"learner.decision.evaluator = {kind!r}: the scenario predicts no sums, "
+            "use exact or sampling"
         )
     return (Moments if kind == "moments" else Extremes)(scenario.groups, *common)
 

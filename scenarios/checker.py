@@ -42,6 +42,10 @@ MEMBERS = (
 """Of the protocol `Scenario`."""
 
 
+LEAST_STEPS = 2
+"""Steps of the shortest episodes by which equal and different seeds can be told."""
+
+
 class ScenarioError(ValueError):
     """What is wrong with a scenario: one line."""
 
@@ -109,11 +113,11 @@ def check_scenario(
     >>> len(check_scenario(lambda: LineUp(2))) == len(CHECKS)
     True
     """
-    if len(seeds) < 2 or steps < 2 or not episodes:
-        raise ValueError(
-            f"check: {len(seeds)} seeds, {steps} steps, {len(episodes)} episodes, "
-            "must be at least 2, 2 and 1"
-        )
+    if steps < LEAST_STEPS:
+        raise ValueError(f"steps = {steps}: must be at least {LEAST_STEPS}")
+    for name, numbers, least in (("seeds", seeds, 2), ("episodes", episodes, 1)):
+        if len(numbers) < least:
+            raise ValueError(f"{name} = {list(numbers)}: must hold at least {least}")
     examination = Examination(factory, steps, tuple(seeds), tuple(episodes))
     for name, check in CHECKS.items():
         try:

@@ -15,6 +15,8 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from importlib import import_module
 from importlib.metadata import version
+from shutil import get_terminal_size
+from textwrap import wrap
 
 from .spec_errors import SpecError
 
@@ -69,24 +71,61 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _call(arguments: Sequence[str]) -> int:
     import tyro
 
+    from .arguments import registry
+
     commands: dict[str, Callable[..., int]] = {
         name: import_module(f".commands.{module}", __package__).command
         for name, module in COMMANDS.items()
     }
-    complaint = io.StringIO()
+    complaint, page = io.StringIO(), _Page()
     try:
-        with contextlib.redirect_stderr(complaint):
+        with contextlib.redirect_stderr(complaint), contextlib.redirect_stdout(page):
             chosen = tyro.extras.subcommand_cli_from_dict(
                 {name: _deferred(command) for name, command in commands.items()},
                 prog=PROGRAM,
                 description=DESCRIPTION,
                 args=list(_separate_sets(arguments)) or ["--help"],
+                registry=registry(),
             )
     except SystemExit as exit_:
         if exit_.code in (0, None):
+            print(_folded(page.getvalue()), end="")
             return 0
         raise SpecError(_one_line(complaint.getvalue())) from None
     return int(chosen())
+
+
+class _Page(io.StringIO):
+    """What the parser prints, kept; styled as for the output that it is meant for."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._output = sys.stdout
+
+    @property
+    def encoding(self) -> str:  # type: ignore[override]
+        return self._output.encoding
+
+    def isatty(self) -> bool:
+        return self._output.isatty()
+
+
+def _folded(page: str) -> str:
+    """Return a help page with usage and description folded as its boxes are; else as it is."""
+    if not _plain(page).startswith("usage:"):
+        return page
+    usage, *rest = page.split("\n")
+    usage = usage.replace("{" + ",".join(COMMANDS) + "}", "COMMAND")
+    width = get_terminal_size().columns
+    lines = []
+    for line in (usage, *rest):
+        lines += [line] if len(_plain(line)) <= width else wrap(line, width)
+    return "\n".join(lines)
+
+
+def _plain(text: str) -> str:
+    """Return a text without colours."""
+    return re.sub(r"\x1b\[[0-9;]*m", "", text)
 
 
 def _deferred(command: Callable[..., int]) -> Callable[..., Callable[[], int]]:
@@ -118,10 +157,10 @@ def _separate_sets(arguments: Sequence[str]) -> Iterator[str]:
 
 def _one_line(box: str) -> str:
     """Reduce the parser's box to one line: what is wrong, and what was perhaps meant."""
-    text = re.sub(r"\x1b\[[0-9;]*m", "", box)
-    lines = [line.strip("│╭╮╰╯ ") for line in text.splitlines()][1:]
-    said = " ".join("; " if line and not line.strip("─") else line for line in lines)
+    lines = [line.strip("│╭╮╰╯ ") for line in _plain(box).splitlines()][1:]
+    said = " ".join("; " if line and not line.strip("─-") else line for line in lines)
     said = re.split(r"[; ]*(For full helptext|Argument helptext|in nested-agents)", said)[0]
+    said = re.sub(r"^[; ]*Error parsing \[?(\S+?)\]?: (.*): must ", r"\1 \2: must ", said)
     return re.sub(r" *; *(; *)*", "; ", " ".join(said.split())).strip("; ") or (
         "the arguments are not understood; see --help"
     )

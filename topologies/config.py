@@ -14,6 +14,7 @@ from pydantic import BeforeValidator, Field, ValidationError, model_validator
 from typing_extensions import TypeAliasType
 
 from ..core.config import Fraction, Settings
+from ..core.refusals import rule
 from . import files
 
 Count = Annotated[int, Field(ge=1)]
@@ -47,7 +48,10 @@ class ChainSettings(TopologySettings):
         """Read the order: a word, or all names separated by commas."""
         if argument in ("listed", "reversed", "interleaved"):
             return cls.model_validate({"order": argument})
-        return cls(order=_names(argument))
+        names = _names(argument)
+        if not all(names):
+            raise ValueError(f"order must be written a,b,c, received {argument!r}")
+        return cls(order=names)
 
 
 class TreeSettings(TopologySettings):
@@ -294,7 +298,7 @@ def _integer(text: str, what: str) -> int:
     try:
         return int(text)
     except ValueError:
-        raise ValueError(f"{what} must be an integer, received {text!r}") from None
+        raise ValueError(f"{what} = {text!r}: must be a whole number") from None
 
 
 def _with_digest(table: Any, key: str, digest_of: Callable[[str], str]) -> Any:
@@ -306,7 +310,10 @@ def _with_digest(table: Any, key: str, digest_of: Callable[[str], str]) -> Any:
 def _one_line(error: ValidationError) -> str:
     problems = []
     for problem in error.errors():
-        where = ".".join(str(part) for part in problem["loc"])
-        message = problem["msg"].removeprefix("Value error, ")
-        problems.append(f"{where}: {message}" if where else message)
+        where, value = ".".join(str(part) for part in problem["loc"]), problem["input"]
+        if problem["type"] == "missing":
+            problems.append(f"{where}: missing")
+        else:
+            said = rule(problem["msg"])
+            problems.append(f"{where} = {value!r}: {said}" if where else said)
     return "; ".join(problems)

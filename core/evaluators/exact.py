@@ -32,8 +32,8 @@ class ExactEnumeration(Gathering):
             free = 1 + len(self.hierarchy.below(i))
             if a**free > MOST_JOINT_ACTIONS:
                 raise ValueError(
-                    f"decision.evaluator: agent {name!r} would try {a} ** {free} joint actions, "
-                    f"exact enumeration allows {MOST_JOINT_ACTIONS}; use sampling"
+                    f"learner.decision.evaluator: agent {name!r} would try {a} ** {free} joint "
+                    f"actions, exact enumeration allows {MOST_JOINT_ACTIONS}; use sampling"
                 )
         self._below = [combinations(self.hierarchy.below(i), a) for i in range(n)]
         self._tabulated = self.hierarchy.joint_actions(a) >= a**n

@@ -52,10 +52,13 @@ class _Summed(Gathering, ABC):
     ) -> None:
         super().__init__(rules, hierarchy, n_actions, rule, others, discount)
         if rule != "value":
-            raise ValueError(f"decision.rule = {rule!r}: {self.name} evaluates 'value' only")
+            raise ValueError(
+                f"learner.decision.rule = {rule!r}: {self.name} evaluates 'value' only"
+            )
         if others not in self.allowed:
             raise ValueError(
-                f"decision.others = {others!r}: {self.name} evaluates {', '.join(self.allowed)}"
+                f"learner.decision.others = {others!r}: {self.name} evaluates "
+                f"{', '.join(self.allowed)}"
             )
         self._grouping = Grouping(groups, hierarchy, n_actions, others)
 

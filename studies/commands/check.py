@@ -31,9 +31,11 @@ def command(
     set
         Lay a value over the spec, as for run.
     """
-    from ...scenarios.checker import ScenarioError, check_scenario
+    from ...scenarios.checker import LEAST_STEPS, ScenarioError, check_scenario
     from ..spec_errors import SpecError
 
+    if steps < LEAST_STEPS:
+        raise SpecError(f"--steps {steps}: must be at least {LEAST_STEPS}")
     faults = 0
     for label, factory, episodes in _cases(source, set):
         try:

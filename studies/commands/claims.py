@@ -31,7 +31,7 @@ def command(
         Run the studies that the claims rest on, each in a directory of its own below this one;
         what has been run before is read.
     quick
-        Small versions of the studies: ten minutes on two cores, and wide intervals.
+        Small versions of the studies: six minutes on two cores, and wide intervals.
     jobs
         Trials at a time; one for every core unless said otherwise.
     format
@@ -45,7 +45,7 @@ def command(
 
     if out is None:
         for option, given in (("--quick", quick), ("--publish", publish), ("--jobs", jobs)):
-            if given:
+            if given is not None and given is not False:
                 raise SpecError(f"{option}: needs --out, the directory of the studies")
         found = published.read(published.FOLDER, claims.STUDIES_OF_CLAIMS)
     else:

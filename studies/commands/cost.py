@@ -52,7 +52,11 @@ def command(
     from ..display import say
     from ..spec_errors import SpecError
 
+    if jobs < 1:
+        raise SpecError(f"--jobs {jobs}: must be at least 1")
     if learning:
+        if measured:
+            raise SpecError("--measured: is not for --learning, which measures by itself")
         return _learning(jobs, format, plot)
     try:
         problem = Problem(rules, actions, iterations)

@@ -17,12 +17,23 @@ def command(
     name
         A preset to print as the tables of a spec, defaults included.
     """
+    from shutil import get_terminal_size
+    from textwrap import fill
+
     from ..presets import PRESETS
 
     if name is None:
-        width = max(map(len, PRESETS))
+        left = max(map(len, PRESETS)) + 2
         for key, preset in PRESETS.items():
-            print(f"{key:<{width}}  {preset.summary}")
+            width = get_terminal_size().columns
+            print(
+                fill(
+                    preset.summary,
+                    width,
+                    initial_indent=f"{key:<{left}}",
+                    subsequent_indent=" " * left,
+                )
+            )
         return 0
     from ..conditions import resolve
     from ..spec_toml import dumps

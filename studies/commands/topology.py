@@ -44,6 +44,13 @@ def command(
 
     try:
         if action == "list":
+            if topology is not None:
+                raise SpecError(f"topology list {topology}: takes no SPEC; see topology show")
+            for option, given in (
+                ("--agents", agents), ("--robots", robots), ("--wheels", wheels), ("--plot", plot)
+            ):  # fmt: skip
+                if given is not None:
+                    raise SpecError(f"topology list {option} {given}: is for topology show")
             print(kinds(format))
         elif topology is None:
             raise SpecError("topology show: SPEC is missing; see nested-agents topology list")

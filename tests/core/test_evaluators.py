@@ -265,7 +265,10 @@ def test_too_many_joint_actions_are_refused() -> None:
     edges = [("agent0", name) for name in names[1:]]
     rules = RuleBase.build(ONE_VARIABLE, RuleBaseSettings())
     assert evaluators.MOST_JOINT_ACTIONS == A**12
-    with pytest.raises(ValueError, match=r"'agent0' would try 4 \*\* 13 joint actions") as caught:
+    with pytest.raises(
+        ValueError,
+        match=r"^learner\.decision\.evaluator: agent 'agent0' would try 4 \*\* 13 joint actions",
+    ) as caught:
         ExactEnumeration(rules, Hierarchy(names, edges), A, "value", "max", DISCOUNT)
     assert "\n" not in str(caught.value)
 

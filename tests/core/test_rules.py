@@ -135,8 +135,11 @@ def test_a_rule_base_refuses_an_impossible_own_block(n_own: int) -> None:
     [
         (RuleBaseSettings(order=4), r"order = 4, allowed 1 to 3 in state space 'demo'"),
         (RuleBaseSettings(products=(("x0", "y"),)), "unknown variable 'y', known: x0, x1, x2"),
-        (RuleBaseSettings(products=(("x0", "x0"),)), "must increase"),
-        (RuleBaseSettings(products=((),)), "must increase"),
+        (
+            RuleBaseSettings(products=(("x0", "x0"),)),
+            r"learner\.rule_base\.products: \['x0', 'x0'\] must name .* each once",
+        ),
+        (RuleBaseSettings(products=((),)), "must name at least one variable"),
     ],
 )
 def test_settings_that_do_not_fit_the_state_space(

@@ -109,7 +109,7 @@ def test_directions_are_unit_and_distinct() -> None:
 def test_what_cannot_be_evaluated_is_refused(
     summed, rule: str, others: str, rules: RuleBase
 ) -> None:
-    with pytest.raises(ValueError, match=r"decision\.(rule|others) = "):
+    with pytest.raises(ValueError, match=r"^learner\.decision\.(rule|others) = "):
         summed(GROUPS, rules, Hierarchy("abcd", []), A, rule, others, 0.9)
 
 

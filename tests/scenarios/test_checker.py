@@ -367,5 +367,9 @@ def test_many_joint_actions_are_drawn_and_too_many_left_out() -> None:
 
 
 def test_too_little_to_check_is_refused() -> None:
-    with pytest.raises(ValueError, match="1 seeds, 40 steps, 2 episodes, must be at least"):
+    with pytest.raises(ValueError, match=r"^seeds = \[0\]: must hold at least 2$"):
         check_scenario(lambda: LineUp(2), seeds=(0,))
+    with pytest.raises(ValueError, match=r"^episodes = \[\]: must hold at least 1$"):
+        check_scenario(lambda: LineUp(2), episodes=())
+    with pytest.raises(ValueError, match=r"^steps = 1: must be at least 2$"):
+        check_scenario(lambda: LineUp(2), steps=1)

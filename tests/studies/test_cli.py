@@ -3,6 +3,7 @@ import io
 import json
 import os
 import re
+import shlex
 import signal
 import subprocess
 import sys
@@ -82,11 +83,14 @@ def wait_for_results(directory, process):
 
 
 @pytest.mark.parametrize("command", ["", *COMMANDS])
-def test_help(command, capsys):
+def test_help(command, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
     assert main([*command.split(), "--help"]) == 0
     out = capsys.readouterr().out
     assert "usage: nested-agents" in out
     assert "Parameters" not in out
+    assert "{None}" not in out
+    assert max(map(len, out.splitlines())) <= 80
 
 
 def test_help_says_what_there_is_and_imports_little(capsys):
@@ -194,9 +198,11 @@ def test_failed_trials_are_told_kept_and_retried(spec_file, tmp_path, capsys):
     assert "done     6 of 6 trials" in capsys.readouterr().out
 
 
-def test_presets(capsys):
+def test_presets(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
     assert main(["presets"]) == 0
     listed = capsys.readouterr().out
+    assert max(map(len, listed.splitlines())) <= 80
     assert main(["presets", "paper"]) == 0
     assert "paper" in listed
     assert "step_size = 0.00012" in capsys.readouterr().out
@@ -234,7 +240,21 @@ BAD = {
     "run {spec} --out x --set topology=chan": "'chan'",
     "run {spec} --out x --set steps=4 seeds=a": "seeds = 'a'",
     "run {spec} --out x --jobs 0": "--jobs 0: must be at least 1",
-    "run {spec} --out x --jobs two": "--jobs",
+    "run {spec} --out x --jobs two": "error: --jobs two: must be a whole number",
+    "run {spec} --out x --jobs 1.5": "error: --jobs 1.5: must be a whole number",
+    "run {spec} --out ''": "error: --out '': must not be empty",
+    "run '' --out x": "error: SPEC.toml '': must not be empty",
+    "run {spec} --out x --set ''": "error: --set '': must not be empty",
+    "demo --out ''": "error: --out '': must not be empty",
+    "export '' --out x": "error: DIR '': must not be empty",
+    "explain a --seed x": "error: --seed x: must be a whole number",
+    "check '' --steps 5": "NAME '': must not be empty",
+    "check {spec} --steps 0": "error: --steps 0: must be at least 2",
+    "claims --jobs 0": "error: --jobs: needs --out",
+    "claims --jobs 0 --out x": "error: --jobs 0: must be at least 1",
+    "cost --jobs 0": "error: --jobs 0: must be at least 1",
+    "cost --learning --measured": "error: --measured: is not for --learning",
+    "cost --topology ''": "error: --topology '': must not be empty",
     "run {spec} --out {spec}": "spec.toml: ",
     "run {spec} --out /proc/nowhere/x": "/proc/nowhere",
     "run {spec}": "--out",
@@ -253,7 +273,7 @@ BAD = {
 @pytest.mark.parametrize("line", BAD)
 def test_bad_input_is_one_line_and_status_2(line, spec_file, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    assert main(line.format(spec=spec_file).split()) == 2
+    assert main(shlex.split(line.format(spec=spec_file))) == 2
     out, err = capsys.readouterr()
     assert out == ""
     assert re.fullmatch(r"nested-agents: error: [^\n]+\n", err)

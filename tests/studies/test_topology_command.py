@@ -107,6 +107,12 @@ def test_a_plot_is_written(said, tmp_path: Path) -> None:
     [
         (("show",), "SPEC is missing"),
         (("draw",), "invalid choice 'draw'"),
+        (("list", "chain"), "topology list chain: takes no SPEC"),
+        (("list", "--agents", "3"), "topology list --agents 3: is for topology show"),
+        (("show", "chain:"), "topology 'chain:': order must be written a,b,c, received ''"),
+        (("show", "tree:0"), "topology 'tree:0': branching = 0: must be at least 1"),
+        (("show", "tree:2", "--agents", "x"), "--agents x: must be a whole number"),
+        (("show", "chain", "--plot", ""), "--plot '': must not be empty"),
         (("show", "edges:a>b,b>a"), "topology 'edges': cycle a -> b -> a"),
         (("show", "chian"), "did you mean 'chain'?"),
         (("show", "chain", "--agents", "0"), "agents = 0, allowed: 1 or more"),
