@@ -1,14 +1,33 @@
-"""Rows of results written as a table to read, as CSV or as JSON."""
+"""Rows of results written as a table to read, as CSV or as JSON.
+
+The table is for a terminal of 80 columns: it names condition and phase once, above their rows, and
+rounds. What the condition's label tells already, the swept keys, is left to CSV and JSON.
+"""
 
 from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from shutil import get_terminal_size
+from textwrap import wrap
 from typing import Any, Literal, TextIO
 
 Format = Literal["table", "csv", "json"]
 TRUTHS = ("success", "stopped_at_goal")
+
+TITLES: dict[str, tuple[str, str, str]] = {
+    "seed": ("", "seed", "d"),
+    "episode": ("", "episode", "d"),
+    "steps": ("", "steps", "d"),
+    "success": ("", "success", "d"),
+    "stopped_at_goal": ("stopped", "at goal", "d"),
+    "final_distance_m": ("distance", "[m]", ".3f"),
+    "final_orientation_rad": ("angle", "[rad]", ".3f"),
+    "contact_fraction": ("contact", "[0-1]", ".2f"),
+    "return": ("", "return", ".4g"),
+}
+"""The columns of the table: two lines of header, and the format of a value."""
 
 
 def write_rows(
@@ -31,12 +50,26 @@ def write_rows(
             lines.append(json.dumps(dict(zip(names, values, strict=True))))
         file.write("[" + ",\n ".join(lines) + "]\n")
     else:
-        cells = [[*names], *([_short(value) for value in row] for row in rows)]
-        widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
-        for row in cells:
-            line = "  ".join(cell.rjust(w) for cell, w in zip(row, widths, strict=True))
-            file.write(line.rstrip() + "\n")
+        file.write("\n".join(_table(names, rows)) + "\n")
 
 
-def _short(value: object) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+def _table(names: Sequence[str], rows: Sequence[Sequence[Any]]) -> Iterator[str]:
+    """Yield the lines of the table: a header, then the rows of each condition below its label."""
+    shown = [(i, *TITLES[name]) for i, name in enumerate(names) if name in TITLES]
+    above = [i for i, name in enumerate(names) if name in ("condition", "phase")]
+    header = [[upper for _, upper, _, _ in shown], [lower for _, _, lower, _ in shown]]
+    cells = [[format(row[i], form) for i, _, _, form in shown] for row in rows]
+    widths = [max(map(len, column)) for column in zip(*header, *cells, strict=True)]
+    lines = [
+        "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in header + cells
+    ]
+    yield from (line for line in lines[:2] if line)
+    last: list[Any] = []
+    for row, line in zip(rows, lines[2:], strict=True):
+        here = [row[i] for i in above]
+        if here != last:
+            yield ""
+            yield from wrap(", ".join(here), get_terminal_size().columns)
+            last = here
+        yield line

@@ -19,7 +19,7 @@ def command(
     directory
         Where the study is kept.
     format
-        How to print the rows; CSV and JSON hold every digit.
+        How to print the rows; CSV and JSON hold every digit, and a column for every swept key.
     phase
         The episodes of training, or those of the greedy evaluation after it.
     """

@@ -139,8 +139,12 @@ def test_results_in_every_form(study, capsys):
         assert float(row["return"]) == item["return"]
         assert bool(int(row["success"])) is item["success"]
     table = results(directory, "table", "--phase", "evaluation", capsys=capsys)
-    assert len(table.splitlines()) == 1 + 2 * 3 * 2
-    assert "evaluation" in table
+    lines = table.splitlines()
+    assert len(lines) == 2 + 2 * (2 + 3 * 2)
+    assert [line for line in lines if "evaluation" in line] == [
+        "default, evaluation", "frozen, evaluation",
+    ]  # fmt: skip
+    assert max(map(len, lines)) <= 80
 
 
 def test_the_same_command_again_runs_nothing(study, spec_file, capsys):

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from nested_agents.studies import figures
+from nested_agents.studies.episodes import COLUMNS
 from nested_agents.studies.learning_curve import METRICS, analyse
 from nested_agents.studies.results import MEASURES, Results
-from nested_agents.studies.row_formats import write_rows
+from nested_agents.studies.row_formats import TITLES, write_rows
 from nested_agents.studies.statistics import Estimate
 from nested_agents.studies.summary import interval, number
 
@@ -85,3 +86,7 @@ def test_no_rows_are_still_a_table(form):
     file = io.StringIO()
     write_rows(["seed", "return"], [], form, file)
     assert file.getvalue() == expected[form]
+
+
+def test_the_table_of_rows_has_a_title_for_every_measure():
+    assert list(TITLES) == ["seed", *COLUMNS[1:]]
