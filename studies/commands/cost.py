@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Literal
 
-from .options import CORES, Jobs
+from .options import CORES, Figure, Jobs
 
 
 def command(
@@ -18,7 +18,7 @@ def command(
     learning: bool = False,
     jobs: Jobs = CORES,
     format: Literal["table", "json", "csv", "latex"] = "table",
-    plot: Path | None = None,
+    plot: Figure = None,
 ) -> int:
     """Print the cost of hierarchies, by formula (Eq. 18-23) and, if asked, measured.
 

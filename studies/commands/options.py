@@ -18,6 +18,12 @@ Jobs = Annotated[int, tyro.conf.arg(metavar="N")]
 MostJobs = Annotated[int | None, tyro.conf.arg(metavar="N", help_behavior_hint="")]
 """The same where their number may be left to the backend."""
 
+Number = Annotated[int | None, tyro.conf.arg(help_behavior_hint="")]
+"""A number that has no default, or one that its help tells."""
+
+Figure = Annotated[Path | None, tyro.conf.arg(metavar="PATH", help_behavior_hint="")]
+"""A picture to write."""
+
 Backend = Literal["loky", "dask"]
 """Kind of workers, see `nested_agents.studies.workers`, whose import the help does not wait for."""
 

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
+
+from .options import Figure, Number
 
 
 def command(
     action: Annotated[Literal["list", "show"], tyro.conf.Positional],
     topology: Annotated[str | None, tyro.conf.Positional, tyro.conf.arg(metavar="[SPEC]")] = None,
-    agents: int | None = None,
-    robots: int | None = None,
-    wheels: int | None = None,
+    agents: Number = None,
+    robots: Number = None,
+    wheels: Number = None,
     actions: int = 4,
     format: Literal["table", "json"] = "table",
-    plot: Path | None = None,
+    plot: Figure = None,
 ) -> int:
     """List the topologies, or show one of them: edges, order of decision, who sees whom, cost.
 
