@@ -7,12 +7,12 @@ value found there, what is allowed, and the closest known name.
 from __future__ import annotations
 
 import difflib
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
+from ..core.refusals import rule
 from .overlay import kind_of, model_at, models_of
 
 
@@ -81,20 +81,8 @@ def explain(error: ValidationError, model: type[BaseModel], data: Mapping[str, A
         kinds = [kind_of(m) for m in models_of(_annotation(keys, model, data))]
         return f"{path} = {show(value)}: {closest(value, [k for k in kinds if k])}"
     # The members of a union complain one by one about the same place: say what any would take.
-    rules = dict.fromkeys(_rule(e["msg"]) for place, e in found if place == keys)
+    rules = dict.fromkeys(rule(e["msg"]) for place, e in found if place == keys)
     return f"{path} = {show(value)}: {', or '.join(rules)}"
-
-
-def _rule(message: str) -> str:
-    message = message.removeprefix("Value error, ").replace("Input should be", "must be")
-    message = re.sub(r"a (valid )?dictionary( or .*)?$", "a table", message)
-    message = re.sub(r"a (valid )?(tuple|list)$", "a list", message)
-    message = re.sub(r"a valid integer.*$", "a whole number", message)
-    return (
-        message.replace("a valid ", "a ")
-        .replace("less than or equal to", "at most")
-        .replace("greater than or equal to", "at least")
-    )
 
 
 def _place(loc: Sequence[int | str], data: object) -> tuple[int | str, ...]:
