@@ -127,7 +127,7 @@ def ratio(numerator: ArrayLike, denominator: ArrayLike, level: float = 0.95) -> 
     --------
     >>> e = ratio([[1, 1, 0, 1]] * 20, np.ones((20, 4)))
     >>> f"{e.value:.2f} [{e.low:.2f}, {e.high:.2f}]"
-    '0.75 [0.65, 0.92]'
+    '0.75 [0.63, 0.92]'
     """
     a, b = rate(numerator, level), rate(denominator, level)
     if not b.value > 0.0:
