@@ -40,8 +40,6 @@ MEMBERS = (
     "agents", "groups", "state_space", "action_set", "reset", "step", "predict", "measure",
 )  # fmt: skip
 """Of the protocol `Scenario`."""
-
-
 LEAST_STEPS = 2
 """Steps of the shortest episodes by which equal and different seeds can be told."""
 

@@ -54,17 +54,9 @@ class Measured:
     note: str = ""
 
 
-def learned(condition: str) -> Measure:
+def learned(condition: str, known: tuple[str, ...] = UNTOLD) -> Measure:
     """Return what measures success at the end of training, less that of the better control."""
-    return _gained(condition, UNTOLD)
 
-
-def more_than_told(condition: str) -> Measure:
-    """Return what measures success at the end of training, less that of the greedy control."""
-    return _gained(condition, (TOLD,))
-
-
-def _gained(condition: str, known: tuple[str, ...]) -> Measure:
     def outcomes(r: Results, name: str) -> np.ndarray:
         return np.asarray(r.training[name]["success"][:, LAST])
 

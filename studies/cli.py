@@ -12,6 +12,7 @@ import io
 import os
 import re
 import sys
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from importlib import import_module
 from importlib.metadata import version
@@ -51,6 +52,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if arguments in (["--version"], ["-V"]):
         print(f"{PROGRAM} {version(PROGRAM)}")
         return 0
+    # SVG files keep names as text, in any script; PNG files have boxes for what the font lacks.
+    warnings.filterwarnings("ignore", message=r"Glyph .* missing from font")
     try:
         status = _call(arguments)
         sys.stdout.flush()

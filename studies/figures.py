@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -31,8 +30,6 @@ SETTINGS: dict[str, Any] = {
     "svg.hashsalt": "nested-agents",
     "svg.fonttype": "none",
 }
-# SVG files keep names as text, in any script; PNG files have boxes for what the font lacks.
-warnings.filterwarnings("ignore", message=r"Glyph .* missing from font")
 
 
 def draw(analysis: LearningCurves, directory: Path) -> list[Path]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -79,10 +80,7 @@ def _messages(axes: Axes, analysis: Scaling, evaluators: list[str]) -> None:
             own = sorted(
                 (p.robots, p.messages) for p in analysis.points if p.evaluator == evaluator
             )
-            colour, marker = COLOURS[index % len(COLOURS)], MARKERS[index % len(MARKERS)]
-            axes.plot(
-                *zip(*own, strict=True), marker=marker, color=colour, markersize=4, linewidth=1.2
-            )
+            axes.plot(*zip(*own, strict=True), **_style(index))
     if min(passed for _, passed in counts):
         axes.set_yscale("log")
     else:  # agents that see nobody pass nothing
@@ -99,8 +97,14 @@ def _line(axes: Axes, analysis: Scaling, evaluator: str, index: int, name: str) 
     value, low, high = np.array(
         [[float(getattr(p.values[name], end)) for p in own] for end in ("value", "low", "high")]
     )
-    colour = COLOURS[index % len(COLOURS)]
-    axes.vlines(robots, low, high, color=colour, linewidth=1.2)
-    axes.plot(
-        robots, value, marker=MARKERS[index % len(MARKERS)], color=colour, markersize=4, lw=1.2
-    )
+    style = _style(index)
+    axes.vlines(robots, low, high, color=style["color"], linewidth=1.2)
+    axes.plot(robots, value, **style)
+
+
+def _style(index: int) -> dict[str, Any]:
+    """Return how the line of an evaluator looks."""
+    return {
+        "color": COLOURS[index % len(COLOURS)], "marker": MARKERS[index % len(MARKERS)],
+        "markersize": 4, "linewidth": 1.2,
+    }  # fmt: skip

@@ -157,7 +157,8 @@ def check(spec: Spec) -> None:
         scenario = _built(condition.settings, where)
         for name, elsewhere in condition.evaluations:
             settings = condition.settings.model_copy(update={"scenario": elsewhere})
-            _check_alike(name, scenario, _built(settings, f" (evaluation {name!r}){where}"))
+            other = _built(settings, f" (evaluation {name!r}){where}")
+            _check_alike(name, scenario, other, where)
     own = getattr(load_study(spec.study), "check", None)
     if own is not None:
         own(spec)
@@ -171,12 +172,12 @@ def _built(settings: ConditionSettings, where: str) -> Scenario:
     return scenario
 
 
-def _check_alike(name: str, scenario: Scenario, other: Scenario) -> None:
+def _check_alike(name: str, scenario: Scenario, other: Scenario, where: str) -> None:
     if (other.agents, other.state_space) != (scenario.agents, scenario.state_space):
         raise SpecError(
             f"evaluations.{name}: a team trained with {len(scenario.agents)} agents over "
             f"{scenario.state_space.name!r} cannot act with {len(other.agents)} over "
-            f"{other.state_space.name!r}"
+            f"{other.state_space.name!r}{where}"
         )
 
 

@@ -43,6 +43,12 @@ class Workers(Protocol):
         ...
 
 
+def check_jobs(jobs: int) -> None:
+    """Refuse a number of processes below one."""
+    if jobs < 1:
+        raise SpecError(f"--jobs {jobs}: must be at least 1")
+
+
 @contextmanager
 def hire(backend: Backend, jobs: int | None, address: str | None) -> Iterator[Workers]:
     """Have workers for as long as the context lasts.
@@ -61,8 +67,8 @@ def hire(backend: Backend, jobs: int | None, address: str | None) -> Iterator[Wo
     SpecError
         If there are none to be had; one line says why.
     """
-    if jobs is not None and jobs < 1:
-        raise SpecError(f"--jobs {jobs}: must be at least 1")
+    if jobs is not None:
+        check_jobs(jobs)
     if backend == "loky":
         from .loky_workers import LokyWorkers
 

@@ -51,9 +51,9 @@ def command(
     from ..cost_table import written
     from ..display import say
     from ..spec_errors import SpecError
+    from ..workers import check_jobs
 
-    if jobs < 1:
-        raise SpecError(f"--jobs {jobs}: must be at least 1")
+    check_jobs(jobs)
     if learning:
         if measured:
             raise SpecError("--measured: is not for --learning, which measures by itself")

@@ -23,9 +23,8 @@ def command(
     from ..presets import PRESETS
 
     if name is None:
-        left = max(map(len, PRESETS)) + 2
+        left, width = max(map(len, PRESETS)) + 2, get_terminal_size().columns
         for key, preset in PRESETS.items():
-            width = get_terminal_size().columns
             print(
                 fill(
                     preset.summary,

@@ -183,3 +183,6 @@ def test_evaluations_are_part_of_what_a_trial_is():
 def test_a_team_is_not_evaluated_where_it_cannot_act(change):
     with pytest.raises(SpecError, match=r"evaluations\.other: a team trained with 4 agents"):
         check(Spec.of(SHORT | {"evaluations": {"other": change}}))
+    several = SHORT | {"sweep": {"learner.ridge": [1.0, 2.0]}, "evaluations": {"other": change}}
+    with pytest.raises(SpecError, match=r"evaluations\.other: .* \(condition '1.0'\)$"):
+        check(Spec.of(several))
