@@ -24,6 +24,7 @@ from .spec_errors import SpecError
 COMMANDS: dict[str, str] = {
     "demo": "demo",
     "run": "run",
+    "table": "table",
     "results": "results",
     "status": "status",
     "retry": "retry",

@@ -15,6 +15,7 @@ from .runner import run_trials
 from .spec import Spec
 from .store import Store
 from .study import load_study
+from .summary_table import tabulate
 from .trial import Trial, check, trials_of
 from .workers import Backend, hire
 
@@ -56,7 +57,7 @@ def conduct(
         replays = _replay(store, trials_of(spec)[0]) if replay and not failed else []
     study = load_study(spec.study)
     analysis = study.analyse(results)
-    display.print_table(analysis.table)
+    display.print_table(tabulate(analysis.table))
     for note in getattr(analysis, "notes", ()):
         print(note)
     figures = directory / "figures"

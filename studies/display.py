@@ -21,7 +21,7 @@ from rich.table import Table
 
 from .runner import Outcome
 from .spec import Spec
-from .summary import Summary, interval, number
+from .summary_table import Table as SummaryTable
 
 PLAIN_SECONDS = 10.0
 """How often a line tells of the progress when there is no terminal."""
@@ -113,19 +113,20 @@ def _failure(outcome: Outcome) -> str:
     return f"failed: {outcome.trial.condition}, seed {outcome.trial.seed}: {last}"
 
 
-def print_table(lines: Sequence[Summary]) -> None:
+def print_table(found: SummaryTable) -> None:
     """Print estimates by condition, each over its 95 % interval."""
-    if not lines:
+    if not found.rows:
         print("no trial has finished")
         return
     table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, header_style="bold")
     table.add_column("", overflow="fold")
-    for title in lines[0].estimates:
+    for title in found.titles:
         table.add_column(escape(title), justify="right", overflow="fold")
-    for line in lines:
-        estimates = line.estimates.values()
-        cells = [f"{number(float(e.value))}\n[dim]{interval(e)}[/]" for e in estimates]
-        table.add_row(f"{escape(line.condition)}\n[dim]{_count(line.seeds, 'seed')}[/]", *cells)
+    for condition, seeds, cells in found.rows:
+        table.add_row(
+            f"{escape(condition)}\n[dim]{_count(seeds, 'seed')}[/]",
+            *(f"{c.value}\n[dim]{c.interval or '–'}[/]" if c else "" for c in cells),
+        )
     Console().print(table)
     print("\nMeans over seeds, and below them their 95 % intervals.")
 

@@ -1,19 +1,21 @@
-"""Results as files for other programs: tidy tables as CSV or Parquet."""
+"""Results as files: tidy tables as CSV or Parquet, or one small JSON file."""
 
 from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
+from . import published
 from .durable import replacing
+from .results import read
 from .row_formats import TRUTHS
 from .spec_errors import SpecError
 from .store import Store
 
-Form = Literal["csv", "parquet"]
+Form = Literal["csv", "parquet", "json"]
 Table = tuple[list[str], list[tuple[Any, ...]]]
 
 
@@ -25,9 +27,10 @@ def export(store: Store, folder: Path, form: Form, *, overwrite: bool = False) -
     store
         An open study.
     folder
-        Where to write ``episodes`` and ``trials``; made if it does not exist.
+        Where to write ``episodes`` and ``trials``, or with JSON ``results``; made if it does not
+        exist.
     form
-        Of the files, and their suffix.
+        Of the files, and their suffix; JSON is the form of `nested_agents.studies.published`.
     overwrite
         Whether files of these names may be replaced.
 
@@ -41,9 +44,8 @@ def export(store: Store, folder: Path, form: Form, *, overwrite: bool = False) -
     SpecError
         If a file is in the way, the extra ``parquet`` is not installed, or the database is damaged.
     """
-    write = _write_csv if form == "csv" else _parquet_writer()
-    tables = {"episodes": store.episodes, "trials": store.trials}
-    paths = {name: folder / f"{name}.{form}" for name in tables}
+    writers = _writers(store, form)
+    paths = {name: folder / f"{name}.{form}" for name in writers}
     for path in paths.values():
         if path.exists() and not overwrite:
             raise SpecError(f"{path}: exists; --overwrite replaces it, --out writes elsewhere")
@@ -52,9 +54,21 @@ def export(store: Store, folder: Path, form: Form, *, overwrite: bool = False) -
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise SpecError(f"--out {folder}: {error.strerror or error}") from None
-    for name, read in tables.items():
-        write(read(), paths[name])
+    for name, write_to in writers.items():
+        write_to(paths[name])
     return list(paths.values())
+
+
+def _writers(store: Store, form: Form) -> dict[str, Callable[[Path], None]]:
+    """Return what writes each file, by its name."""
+    if form == "json":
+        version = int(store.meta("results_version"))
+        return {"results": lambda path: published.write(path, store.spec(), read(store), version)}
+    write_table = _write_csv if form == "csv" else _parquet_writer()
+    return {
+        "episodes": lambda path: write_table(store.episodes(), path),
+        "trials": lambda path: write_table(store.trials(), path),
+    }
 
 
 def _write_csv(table: Table, path: Path) -> None:

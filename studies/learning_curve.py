@@ -48,10 +48,10 @@ METRICS = (
     Metric(f"success last {BLOCK}", "success", "last", is_rate=True),
     Metric("success greedy", "success", "greedy", is_rate=True),
     Metric("stopped greedy", "stopped_at_goal", "greedy", is_rate=True),
+    Metric("steps greedy", "steps", "greedy"),
     Metric("distance [m]", "final_distance_m", "last"),
     Metric("turned [rad]", "final_orientation_rad", "last"),
     Metric("contact", "contact_fraction", "last"),
-    Metric("return", "return", "last"),
 )
 
 CURVES = ("success", "final_distance_m", "final_orientation_rad", "contact_fraction")
@@ -88,7 +88,7 @@ def analyse(results: Results) -> LearningCurves:
         estimates = {}
         for metric in METRICS:
             arrays = evaluation if metric.block == "greedy" else training
-            if arrays is None:
+            if arrays is None or metric.measure not in arrays:  # published results keep a part
                 continue
             block = slice(None, BLOCK) if metric.block == "first" else slice(-BLOCK, None)
             values = arrays[metric.measure]
@@ -99,6 +99,7 @@ def analyse(results: Results) -> LearningCurves:
         condition: {
             name: rates(training[name]) if name == "success" else bootstrap(training[name])
             for name in CURVES
+            if name in training
         }
         for condition, training in results.training.items()
     }

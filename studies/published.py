@@ -1,7 +1,8 @@
-"""Results of a study as one small JSON file: what its claims rest on, with spec and seeds.
+"""Results of a study as one small JSON file, with spec and seeds, fit to be committed or published.
 
-Outcomes are kept as one character an episode, other measures in three decimals. Claims are always
-decided by results in this form, so the committed files give the table that the run gave.
+Outcomes are kept as one character an episode, other measures in three decimals; distances and
+returns are left out. Claims are always decided by results in this form, so the committed files give
+the table that the run gave.
 """
 
 from __future__ import annotations
@@ -13,28 +14,31 @@ from typing import Any
 
 import numpy as np
 
+from . import durable
 from .results import Arrays, Results
 from .spec import Spec
 from .spec_errors import SpecError
 from .trial import RESULTS_VERSION
 
 MEASURES: dict[str, tuple[str, ...]] = {
-    "learning-curve": ("success", "steps", "final_orientation_rad", "contact_fraction"),
+    "learning-curve": (
+        "success", "stopped_at_goal", "steps", "final_orientation_rad", "contact_fraction",
+    ),
     "wheel-failure": ("success", "steps"),
     "scaling": ("success", "steps"),
-}
-"""What is kept of each study beside the outcomes, which is all that is kept of others."""
+}  # fmt: skip
+"""What is kept of each study; of others it is success alone."""
 OUTCOMES = ("success", "stopped_at_goal")
 DECIMALS = 3
 FOLDER = Path(__file__).parent / "published"
 """Where the committed files are."""
 
 
-def dumps(spec: Spec, results: Results) -> str:
-    """Return results and their spec as JSON text."""
+def dumps(spec: Spec, results: Results, version: int = RESULTS_VERSION) -> str:
+    """Return results, their spec and the version that they are of as JSON text."""
     names = MEASURES.get(spec.study, ("success",))
     content = {
-        "results_version": RESULTS_VERSION,
+        "results_version": version,
         "spec": spec.table(),
         "seeds": results.seeds,
         "phases": {
@@ -71,6 +75,11 @@ def loads(text: str) -> tuple[Spec, Results]:
     return spec, Results(training, evaluation, phases, seeds, numbers, usage)
 
 
+def write(path: Path, spec: Spec, results: Results, version: int = RESULTS_VERSION) -> None:
+    """Write the same to a file, which is there whole or not at all."""
+    durable.write(path, dumps(spec, results, version).encode())
+
+
 def read(folder: Path, studies: Iterable[str]) -> dict[str, tuple[Spec, Results]]:
     """Read the files of studies; those that are missing are left out.
 
@@ -79,16 +88,22 @@ def read(folder: Path, studies: Iterable[str]) -> dict[str, tuple[Spec, Results]
     SpecError
         If a file is not what `dumps` writes.
     """
-    found = {}
-    for study in studies:
-        path = folder / f"{study}.json"
-        if not path.exists():
-            continue
-        try:
-            found[study] = loads(path.read_text(encoding="utf-8"))
-        except (KeyError, TypeError, AttributeError, ValueError) as error:
-            raise SpecError(f"{path}: holds no published results: {error}") from None
-    return found
+    paths = {study: folder / f"{study}.json" for study in studies}
+    return {study: load(path) for study, path in paths.items() if path.exists()}
+
+
+def load(path: Path) -> tuple[Spec, Results]:
+    """Read one file.
+
+    Raises
+    ------
+    SpecError
+        If it is not what `dumps` writes.
+    """
+    try:
+        return loads(path.read_text(encoding="utf-8"))
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
+        raise SpecError(f"{path}: holds no published results: {error}") from None
 
 
 def _packed(name: str, values: np.ndarray) -> list[Any]:

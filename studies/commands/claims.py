@@ -53,8 +53,7 @@ def command(
     if publish is not None:
         publish.mkdir(parents=True, exist_ok=True)
         for study, (spec, results) in found.items():
-            text = published.dumps(spec, results)
-            (publish / f"{study}.json").write_text(text, encoding="utf-8")
+            published.write(publish / f"{study}.json", spec, results)
     print_claims(claims.judge({study: results for study, (_, results) in found.items()}), format)
     return 0
 

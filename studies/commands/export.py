@@ -12,18 +12,22 @@ from .options import Directory
 
 def command(
     directory: Directory,
-    format: Literal["csv", "parquet"] = "csv",
+    format: Literal["csv", "parquet", "json"] = "csv",
     out: Annotated[Path | None, tyro.conf.arg(metavar="PATH", help_behavior_hint="")] = None,
     overwrite: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> int:
     """Write one file with a row for every episode, and one with a row for every trial.
+
+    JSON is one small file of spec, seeds and rounded measures, fit to be published with a paper;
+    `nested-agents table` reads it.
 
     Parameters
     ----------
     directory
         Where the study is kept.
     format
-        Of the files; parquet needs the extra nested-agents[parquet].
+        Of the files; parquet needs the extra nested-agents[parquet]. Distances and returns are
+        left out of json.
     out
         Folder of the files; export in the study's own unless said otherwise.
     overwrite

@@ -14,11 +14,11 @@ from ..results import read
 from ..spec_toml import dumps
 from ..store import Store
 from ..study import load_study
+from ..summary_table import tabulate
 from ..trial import RESULTS_VERSION, trials_of
 from . import words
 from .pictures import pictures
 from .replays import replays
-from .tables import tabulate
 
 FOLDER = Path(__file__).parent
 

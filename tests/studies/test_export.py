@@ -119,3 +119,42 @@ def test_a_file_in_the_way_of_the_folder_is_one_line(study, tmp_path, capsys):
     (tmp_path / "file").touch()
     assert main(["export", str(study), "--out", str(tmp_path / "file")]) == 2
     assert f"--out {tmp_path / 'file'}: " in capsys.readouterr().err
+
+
+def test_json_gives_the_table_that_the_study_gives(study, tmp_path, capsys):
+    columns = ["--columns", "success greedy", "contact"]
+    assert main(["table", str(study), "--format", "markdown", *columns]) == 0
+    of_study = capsys.readouterr().out
+    assert of_study.startswith("| condition | seeds | success greedy | contact |\n| --- |")
+    assert main(["export", str(study), "--out", str(tmp_path), "--format", "json"]) == 0
+    path = Path(capsys.readouterr().out.strip())
+    assert path == tmp_path / "results.json"
+    assert main(["table", str(path), "--format", "markdown", *columns]) == 0
+    assert capsys.readouterr().out == of_study
+    assert main(["table", str(path)]) == 0
+    assert "distance" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("form", ["table", "latex", "csv"])
+def test_a_table_in_every_form(study, form, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    assert main(["table", str(study), "--format", form]) == 0
+    out = capsys.readouterr().out
+    assert "success" in out
+    assert "frozen" in out
+    if form == "table":
+        assert max(map(len, out.splitlines())) <= 80
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["{study}", "--columns", "succes"], "--columns 'succes': the table has no such column"),
+        (["{study}/nothing"], "nothing: holds no study"),
+        (["{study}/study.toml"], "study.toml: holds no published results"),
+    ],
+)
+def test_what_has_no_table_is_refused(study, arguments, said, capsys):
+    assert main(["table", *(a.format(study=study) for a in arguments)]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert said in line

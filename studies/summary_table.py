@@ -1,4 +1,4 @@
-"""The table of a study for reading, as CSV with every digit, and as LaTeX."""
+"""The table of a study for reading, as Markdown and LaTeX, and as CSV with every digit."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..statistics import Estimate
-from ..summary import Summary, interval, number
+from .spec_errors import SpecError
+from .statistics import Estimate
+from .summary import Summary, interval, number
 
 LATEX = {
     "\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_",
@@ -29,7 +30,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Table:
-    """A table in its three forms.
+    """A table in its forms.
 
     Attributes
     ----------
@@ -37,7 +38,7 @@ class Table:
         Headings of the estimates.
     rows
         Condition, number of seeds, and a cell per title; none where there is no estimate.
-    csv, latex
+    csv, latex, markdown
         The whole table as text.
     """
 
@@ -45,16 +46,36 @@ class Table:
     rows: tuple[tuple[str, int, tuple[Cell | None, ...]], ...]
     csv: str
     latex: str
+    markdown: str
 
 
-def tabulate(lines: Sequence[Summary]) -> Table:
-    """Return the table of some summaries, whose estimates may differ in their titles."""
+def tabulate(lines: Sequence[Summary], columns: Sequence[str] = ()) -> Table:
+    """Return the table of some summaries, whose estimates may differ in their titles.
+
+    Parameters
+    ----------
+    lines
+        Its lines.
+    columns
+        Titles of the estimates that it has; all of them if none are named.
+
+    Raises
+    ------
+    SpecError
+        If there are no estimates of a title.
+    """
     titles = tuple(dict.fromkeys(title for line in lines for title in line.estimates))
+    for column in columns:
+        if column not in titles:
+            known = ", ".join(titles) or "none"
+            raise SpecError(f"--columns {column!r}: the table has no such column; it has {known}")
+    titles = tuple(columns) or titles
     rows = tuple(
         (s.condition, s.seeds, tuple(_cell(s.estimates.get(title)) for title in titles))
         for s in lines
     )
-    return Table(titles, rows, _csv(lines, titles), _latex(titles, rows))
+    texts = _csv(lines, titles), _latex(titles, rows), _markdown(titles, rows)
+    return Table(titles, rows, *texts)
 
 
 def _cell(estimate: Estimate | None) -> Cell | None:
@@ -83,6 +104,24 @@ def _ends(estimate: Estimate) -> tuple[float, float, float]:
     return float(estimate.value), float(estimate.low), float(estimate.high)
 
 
+def _markdown(
+    titles: Sequence[str], rows: Sequence[tuple[str, int, tuple[Cell | None, ...]]]
+) -> str:
+    lines = [["condition", "seeds", *titles], ["---"] * (2 + len(titles))]
+    for condition, seeds, cells in rows:
+        lines.append([condition, str(seeds), *map(_bracketed, cells)])
+    return "".join(
+        f"| {' | '.join(c.replace('|', chr(92) + '|') for c in line)} |\n" for line in lines
+    )
+
+
+def _bracketed(cell: Cell | None) -> str:
+    if cell is None:
+        return ""
+    around = f" [{cell.interval.replace('–', ', ')}]" if cell.interval else ""
+    return f"{cell.value}{around}"
+
+
 def _latex(titles: Sequence[str], rows: Sequence[tuple[str, int, tuple[Cell | None, ...]]]) -> str:
     lines = [
         "% needs \\usepackage{booktabs}; 95 % intervals in brackets",
@@ -101,8 +140,7 @@ def _latex(titles: Sequence[str], rows: Sequence[tuple[str, int, tuple[Cell | No
 def _maths(cell: Cell | None) -> str:
     if cell is None:
         return "--"
-    around = rf"\;[{cell.interval.replace('–', ', ')}]" if cell.interval else ""
-    return f"${cell.value}{around}$"
+    return f"${_bracketed(cell).replace(' [', chr(92) + ';[')}$"
 
 
 def _escaped(text: str) -> str:

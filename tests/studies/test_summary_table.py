@@ -3,9 +3,9 @@ import io
 
 import numpy as np
 
-from nested_agents.studies.report.tables import tabulate
 from nested_agents.studies.statistics import Estimate
 from nested_agents.studies.summary import Summary
+from nested_agents.studies.summary_table import tabulate
 
 
 def estimate(*numbers: float) -> Estimate:
