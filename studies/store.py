@@ -121,6 +121,11 @@ class Store:
             )
         if found := difference(self.spec(), self._table("conditions"), spec):
             return f"{self.directory}: holds another study: {found}"
+        for condition in spec.conditions():
+            try:
+                condition.settings.topology.check_unchanged()
+            except ValueError as error:
+                return f"{self.directory}: topology of condition {condition.label!r}: {error}"
         return None
 
     def meta(self, key: str) -> str:

@@ -39,20 +39,18 @@ def _teams(settings: Any, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
 
 
 def _file(settings: Any, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
-    files.check_digest(settings.path, files.digest(settings.path), settings.digest)
+    settings.check_unchanged()
     return from_networkx(files.read_graph(settings.path), agents)
 
 
 def _python(settings: Any, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
-    path, _ = files.split_source(settings.source)
-    files.check_digest(path, files.digest(path), settings.digest)
+    settings.check_unchanged()
     function = files.from_python(settings.source)
     return from_networkx(files.called(function, agents, groups), agents)
 
 
 def _package(settings: Any, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
-    found = files.package_digest(settings.name)
-    files.check_digest(f"package {settings.name!r}", found, settings.digest)
+    settings.check_unchanged()
     function = files.from_package(settings.name)
     return from_networkx(files.called(function, agents, groups), agents)
 

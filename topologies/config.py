@@ -33,6 +33,9 @@ class TopologySettings(Settings):
         """Return the settings that ``"kind:argument"`` stands for."""
         raise ValueError(f"takes no argument, received {argument!r}")
 
+    def check_unchanged(self) -> None:
+        """Refuse if a file that the topology is made from is not what it was: one line."""
+
 
 class ChainSettings(TopologySettings):
     """The paper's nested chain, from the first agent of `order` down to the last."""
@@ -167,6 +170,10 @@ class FileSettings(TopologySettings):
         """Read the path."""
         return cls(path=argument)
 
+    def check_unchanged(self) -> None:
+        """Refuse another content than the digest's."""
+        files.check_digest(self.path, files.digest(self.path), self.digest)
+
 
 class PythonSettings(TopologySettings):
     """A user's function in a Python file."""
@@ -189,6 +196,11 @@ class PythonSettings(TopologySettings):
         """Read the source."""
         return cls(source=argument)
 
+    def check_unchanged(self) -> None:
+        """Refuse another content than the digest's."""
+        path, _ = files.split_source(self.source)
+        files.check_digest(path, files.digest(path), self.digest)
+
 
 class PackageSettings(TopologySettings):
     """A user's function in an installed package, by entry point."""
@@ -209,6 +221,11 @@ class PackageSettings(TopologySettings):
     def parsed(cls, argument: str) -> Self:
         """Read the name."""
         return cls(name=argument)
+
+    def check_unchanged(self) -> None:
+        """Refuse another content than the digest's."""
+        found = files.package_digest(self.name)
+        files.check_digest(f"package {self.name!r}", found, self.digest)
 
 
 class SingleAgentSettings(TopologySettings):

@@ -46,6 +46,8 @@ def command(
     plot
         A figure to write: SVG, PNG or PDF by suffix.
     """
+    from inspect import signature
+
     from ...core.cost import Problem
     from ..cost import MOST_OPERATIONS, cost_rows
     from ..cost_table import written
@@ -55,8 +57,13 @@ def command(
 
     check_jobs(jobs)
     if learning:
-        if measured:
-            raise SpecError("--measured: is not for --learning, which measures by itself")
+        fixed = {
+            "agents": agents, "topology": topology, "rules": rules, "actions": actions,
+            "iterations": iterations, "measured": measured,
+        }  # fmt: skip
+        for name, given in fixed.items():
+            if given != signature(command).parameters[name].default:
+                raise SpecError(f"--{name}: is not for --learning, which measures a fixed task")
         return _learning(jobs, format, plot)
     try:
         problem = Problem(rules, actions, iterations)

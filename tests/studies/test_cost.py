@@ -114,6 +114,11 @@ def test_numbers() -> None:
         (("--topology", "--format", "csv"), "topology = none, allowed: one or more"),
         (("--topology", "per-robot"), "what whole robots try is in: nested-agents topology show"),
         (("--format", "xml"), "invalid choice 'xml'"),
+        (
+            ("--learning", "--agents", "3"),
+            "--agents: is not for --learning, which measures a fixed",
+        ),
+        (("--learning", "--measured"), "--measured: is not for --learning"),
         (("--plot", "cost.txt"), "cost.txt: suffix must be"),
     ],
 )
