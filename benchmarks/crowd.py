@@ -17,7 +17,6 @@ from nested_agents.core.team import Team
 from nested_agents.scenarios import ScenarioSettings, build
 from nested_agents.scenarios.rendering import snapshot
 from nested_agents.studies.episodes import EpisodeRecorder, Stopwatch
-from nested_agents.studies.trial import CONTROL_PERIOD
 
 
 def main() -> None:
@@ -40,10 +39,10 @@ def main() -> None:
         recorder.add(record.transition)
         watch.add(record)
         steps += 1
-    dt = settings.hold * CONTROL_PERIOD
-    snapshot(recorder.recording(dt=dt, robot="e-puck", box="square"), steps, options.file)
+    snapshot(recorder.recording(**settings.drawn), steps, options.file)
     spent = ", ".join(f"{name} {1e3 * s / steps:.1f} ms" for name, s in watch.seconds.items())
-    print(f"{len(scenario.agents)} agents, {steps} decisions of {1e3 * dt:.0f} ms each: {spent}")
+    period = f"{1e3 * settings.period:.0f} ms"
+    print(f"{len(scenario.agents)} agents, {steps} decisions of {period} each: {spent}")
 
 
 if __name__ == "__main__":

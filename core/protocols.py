@@ -211,7 +211,6 @@ class Superposition(Protocol):
         ...
 
 
-@runtime_checkable
 class SummedPrediction(Prediction, Protocol):
     """A prediction that can also be had to first order, for any number of groups."""
 

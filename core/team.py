@@ -12,7 +12,15 @@ from .arrays import FloatArray, IntArray
 from .calibration import Calibration
 from .config import Decision
 from .config import Learner as LearnerSettings
-from .evaluators import Evaluator, ExactEnumeration, Extremes, LatinHypercube, Moments, Sampling
+from .evaluators import (
+    MOST_JOINT_ACTIONS,
+    Evaluator,
+    ExactEnumeration,
+    Extremes,
+    LatinHypercube,
+    Moments,
+    Sampling,
+)
 from .exploration import Explorer, Greedy, build_explorer
 from .hierarchy import Hierarchy
 from .learners import Learner, build_learner
@@ -29,8 +37,6 @@ from .protocols import (
 from .rules import RuleBase
 from .self_model import SelfModel
 from .spaces import ActionSet
-
-AnyEvaluator = ExactEnumeration | Sampling | LatinHypercube | Moments | Extremes
 
 
 class Team:
@@ -64,7 +70,7 @@ class Team:
         action_set: ActionSet,
         learner: Learner,
         explorer: Explorer,
-        evaluator: AnyEvaluator | None,
+        evaluator: Evaluator | None,
         seed: np.random.SeedSequence,
         self_model: SelfModel | None = None,
         calibration: Calibration | None = None,
@@ -99,7 +105,7 @@ class Team:
             If the hierarchy is over other agents than the scenario's, or the settings do not fit
             its state space.
         """
-        if hierarchy.agents != scenario.agents:
+        if hierarchy.agents != tuple(scenario.agents):
             raise ValueError(
                 f"topology: agents {', '.join(hierarchy.agents)} are not the scenario's "
                 f"{', '.join(scenario.agents)}"
@@ -291,7 +297,7 @@ def _part(arrays: Mapping[str, FloatArray], prefix: str) -> dict[str, FloatArray
 
 def _build_evaluator(
     decision: Decision, rules: RuleBase, hierarchy: Hierarchy, scenario: Scenario, discount: float
-) -> AnyEvaluator | None:
+) -> Evaluator | None:
     if decision.rule == "random":
         return None
     common = (rules, hierarchy, len(scenario.action_set), decision.rule, decision.others, discount)
@@ -301,7 +307,8 @@ def _build_evaluator(
         free = max(1 + len(hierarchy.below(i)) for i in range(len(hierarchy)))
         summed = superposes and decision.rule == "value"
         kind = "moments" if decision.others != "max" else "extremes"
-        if free <= decision.exact_up_to:
+        countable = len(scenario.action_set) ** free <= MOST_JOINT_ACTIONS
+        if free <= decision.exact_up_to and countable:
             kind = "exact"
         elif free <= decision.sampling_up_to or not summed:
             kind = "sampling"

@@ -16,10 +16,10 @@ from pydantic import TypeAdapter
 from scipy.linalg import expm
 
 from nested_agents.scenarios.boxes import BOXES
-from nested_agents.scenarios.config import Failure
+from nested_agents.scenarios.config import CONTROL_PERIOD, Failure
 from nested_agents.scenarios.failures import Failures
 from nested_agents.scenarios.robots import ROBOTS, RobotSpec, nominal_effect
-from nested_agents.scenarios.world import CONTROL_PERIOD, World
+from nested_agents.scenarios.world import World
 
 PERIODS, SPEED = 40, 0.04
 COLUMN = {"none": 1.0, "seized": 0.0, "weak": 0.3, "reversed": -1.0, "stuck": 0.0}

@@ -23,7 +23,9 @@ __version__: str = version("nested-agents")
 
 _PLACES = {
     "ActionSet": ("core.spaces", "ActionSet"),
+    "AnovaTDSettings": ("core.config", "AnovaTDSettings"),
     "BatchTDSettings": ("core.config", "BatchTDSettings"),
+    "Blocks": ("core.protocols", "Blocks"),
     "BoxPushing": ("scenarios.box_pushing", "BoxPushing"),
     "FittedValueSettings": ("core.config", "FittedValueSettings"),
     "FrozenSettings": ("core.config", "FrozenSettings"),
@@ -37,8 +39,10 @@ _PLACES = {
     "StateSpace": ("core.spaces", "StateSpace"),
     "TDLambdaSettings": ("core.config", "TDLambdaSettings"),
     "Team": ("core.team", "Team"),
+    "Transition": ("core.protocols", "Transition"),
     "Variable": ("core.spaces", "Variable"),
     "build_hierarchy": ("topologies", "build"),
+    "check_scenario": ("scenarios.checker", "check_scenario"),
     "control_loop": ("core.loop", "control_loop"),
     "parse_topology": ("topologies", "parse"),
     "policy_seed": ("core.loop", "policy_seed"),

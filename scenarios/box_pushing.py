@@ -18,7 +18,7 @@ from ..core.protocols import Transition
 from ..core.spaces import ActionSet, StateSpace
 from .belief import APART, CONSTANTS, PushBelief, least_gap
 from .boxes import box_for
-from .config import ScenarioSettings
+from .config import CONTROL_PERIOD, ScenarioSettings
 from .failures import Failures
 from .infrared import InfraredSpec, strongest_reading
 from .prediction import BoxPrediction, Situation, mean_twists
@@ -28,7 +28,7 @@ from .robots import nominal_effect, robot_for
 from .starts import place
 from .state_spaces import state_space_for
 from .view import View
-from .world import CONTROL_PERIOD, World, WorldState
+from .world import World, WorldState
 
 SENSING = 2**32 - 1
 """Key of the stream of sensor noise under the seed of an episode; failures have 0, 1, ..."""
@@ -150,7 +150,7 @@ class BoxPushing:
         self._advance(self._speeds)
         moved = perf_counter()
         states = self._observe(before)
-        period = self.settings.hold * CONTROL_PERIOD
+        period = self.settings.period
         motions = mean_twists(poses, self.world.robot_poses, period)
         pushed = None
         if min(least_gap(poses, radius), least_gap(self.world.robot_poses, radius)) > APART:
@@ -205,16 +205,17 @@ class BoxPushing:
             self.world.robot_poses.copy(), self.world.box_pose.copy(), self._goal,
             self._speeds, tuple(effects), self.groups,
         )  # fmt: skip
-        hold = self.settings.hold
         model = self._model if constants is None else self._belief.believing(constants)
         believed = (
             situation, model, self._belief, self._space, self.action_set, self._task,
-            hold * CONTROL_PERIOD, self.settings.lookahead * CONTROL_PERIOD,
+            self.settings.period, self.settings.lookahead * CONTROL_PERIOD,
             self.settings.speed_increment, self._limits, self.infrared,
         )  # fmt: skip
         if self._playground is None or self._saved is None:
             return BoxPrediction(*believed)
-        future = Future(self._playground, self._saved, self._failures, self._step, hold)
+        future = Future(
+            self._playground, self._saved, self._failures, self._step, self.settings.hold
+        )
         return ExactPrediction(*believed, future)
 
     def _save(self) -> None:

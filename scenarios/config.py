@@ -8,6 +8,9 @@ from pydantic import Field, field_validator, model_validator
 
 from ..core.config import NonNegative, Positive, Settings
 
+CONTROL_PERIOD = 0.064
+"""Time between commands to the wheels [s]; the basic time step of the e-puck in Webots."""
+
 Periods = Annotated[int, Field(ge=1, le=10_000)]
 """Control periods: ten minutes at most."""
 Index = Annotated[int, Field(ge=0)]
@@ -273,3 +276,14 @@ class ScenarioSettings(Settings):
     def onset(self) -> int | None:
         """Episode in which the first wheel fails; none: none does."""
         return min((failure.episode for failure in self.failures), default=None)
+
+    @property
+    def period(self) -> float:
+        """Seconds for which a decision is held."""
+        return self.hold * CONTROL_PERIOD
+
+    @property
+    def drawn(self) -> dict[str, float | str]:
+        """What a recording must tell beside motions, so that it can be drawn."""
+        named = {"robot": self.robot, "box": self.box, "infrared": self.infrared}
+        return {"dt": self.period} | {name: label(thing) for name, thing in named.items()}

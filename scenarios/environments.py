@@ -209,8 +209,11 @@ class WheelsEnv(ParallelEnv):
         Returns
         -------
         tuple of dict
-            Observations, rewards, terminations, truncations and infos by agent.
+            Observations, rewards, terminations, truncations and infos by agent; all empty when the
+            episode is over, as PettingZoo has it.
         """
+        if not self.agents:
+            return {}, {}, {}, {}, {}
         joint = np.empty(len(self.game.scenario.agents), dtype=np.int64)
         for name in self.agents:
             joint[self.seats[name].wheels] = actions[name]

@@ -22,13 +22,13 @@ import numpy as np
 
 from ..core.arrays import FloatArray, IntArray
 from .boxes import BoxSpec
-from .config import BeliefSettings
+from .config import CONTROL_PERIOD, BeliefSettings
 from .failures import Failures
 from .prediction import BoxPrediction
 from .push import PushModel
 from .robots import RobotSpec, compliance
 from .view import View
-from .world import CONTROL_PERIOD, World, WorldState
+from .world import World, WorldState
 
 IMMOBILE = 1e6
 """Ground friction [N] against which nothing moves."""

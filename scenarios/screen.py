@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..core.protocols import Transition
-from .config import ScenarioSettings, label
-from .world import CONTROL_PERIOD
+from .config import ScenarioSettings
 
 SHOWN = ("robot_poses", "box_pose", "wheel_speeds", "contact", "failed")
 
@@ -29,12 +28,7 @@ class Screen:
 
     def __init__(self, settings: ScenarioSettings, mode: str, *, sensors: bool = False) -> None:
         self.mode, self.sensors = mode, sensors
-        self._constants = {
-            "dt": np.array(settings.hold * CONTROL_PERIOD),
-            "robot": np.array(label(settings.robot)),
-            "box": np.array(label(settings.box)),
-            "infrared": np.array(label(settings.infrared)),
-        }
+        self._constants = {name: np.array(value) for name, value in settings.drawn.items()}
         self._frames: dict[str, list[Any]] = {}
         self._rewards: list[float] = []
         self._window: Any = None

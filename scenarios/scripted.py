@@ -21,11 +21,11 @@ from ..core.arrays import FloatArray, IntArray
 from ..core.spaces import ActionSet
 from .box_pushing import BoxPushing
 from .boxes import BoxSpec
-from .push import PushModel, push
-from .robots import RobotSpec, compliance, nominal_effect
+from .predictors import push_model
+from .push import push
+from .robots import RobotSpec, nominal_effect
 from .routes import moved, paths
 from .sides import SPREAD, Side, behind, is_concave, sides_of
-from .world import CONTROL_PERIOD
 
 CLEARANCE = 0.006
 """Least gap [m] to box and other robots on the way to a slot."""
@@ -80,16 +80,7 @@ class ScriptedController:
         self._effects = [nominal_effect(robot) for robot in robots]
         counts = np.cumsum([0] + [len(robot.wheels) for robot in robots])
         self._wheels = [slice(a, b) for a, b in pairwise(counts)]
-        self._model = PushModel(
-            edges=box.outline.edges,
-            rounding=box.outline.rounding,
-            reach=box.reach,
-            radii=self._radii,
-            compliance=np.stack([compliance(robot) for robot in robots]),
-            friction_force=box.friction_force,
-            friction_radius=box.friction_radius,
-            contact_friction=box.contact_friction,
-        )
+        self._model = push_model("push", list(robots), box)
         self._sides = sides_of(box, len(robots), float(self._radii.max()) + CLEARANCE)
         self._hollow = is_concave(box)
         self._backs: dict[tuple[float, float, float], float] = {}
@@ -323,7 +314,7 @@ def decisions_to_goal(scenario: BoxPushing, seed: int, steps: int) -> int | None
     """
     controller = ScriptedController(
         scenario.world.robots, scenario.box, scenario.action_set,
-        scenario.settings.speed_increment, scenario.settings.hold * CONTROL_PERIOD,
+        scenario.settings.speed_increment, scenario.settings.period,
     )  # fmt: skip
     scenario.reset(seed)
     for step in range(1, steps + 1):

@@ -29,13 +29,12 @@ from numba import njit
 
 from ..core.arrays import FloatArray
 from .boxes import BoxSpec
+from .config import CONTROL_PERIOD
 from .geometry import surface
 from .infrared import InfraredSpec, infrared_readings, sensor_directions
 from .robots import RobotSpec
 from .wheels import wheel_model, wheel_wrenches
 
-CONTROL_PERIOD = 0.064
-"""Time between commands to the wheels [s]; the basic time step of the e-puck in Webots."""
 UNIT = 10.0
 """Box2D units per metre."""
 TOUCHING = 0.001

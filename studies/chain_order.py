@@ -12,19 +12,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .comparison import LEVEL
 from .paired_tests import Friedman, friedman, holm, paired_permutation
-from .results import Results
+from .results import Arrays, Results
 from .statistics import bootstrap, rate
 from .summary import Summary
 from .trial import run_trial as measure
-
-LEVEL = 0.05
-"""What p must stay below for a difference to be called one."""
 
 
 @dataclass(frozen=True)
@@ -144,11 +142,10 @@ def _compared(results: Results, conditions: list[str], names: list[str]) -> tupl
         phase = getattr(results, m.phase)
         if any(condition not in phase for condition in conditions):
             continue
-        columns = [phase[condition]["success"].mean(axis=1) for condition in conditions]
-        if len(columns) < 2 or len(set(map(len, columns))) > 1 or len(columns[0]) < 2:
-            continue  # unfinished: seeds cannot be paired
-        values = np.stack(columns, axis=1)
-        against = np.array([paired_permutation(c, columns[0]) for c in columns[1:]])
+        values = _paired(results, phase, conditions)
+        if values.shape[1] < 2 or len(values) < 2:
+            continue
+        against = np.array([paired_permutation(c, values[:, 0]) for c in values.T[1:]])
         found.append((m.title, values, friedman(values), against))
     if not found:
         return ()
@@ -158,6 +155,17 @@ def _compared(results: Results, conditions: list[str], names: list[str]) -> tupl
         Comparison(title, tuple(names), values, test, float(p), ps)
         for (title, values, test, _), p, ps in zip(found, omnibus, adjusted, strict=True)
     )
+
+
+def _paired(results: Results, phase: dict[str, Arrays], conditions: list[str]) -> NDArray[Any]:
+    """Return success ``(n_seeds, n_orders)`` for the seeds that all orders have finished."""
+    seeds = [results.seeds[condition] for condition in conditions]
+    shared = [seed for seed in seeds[0] if all(seed in own for own in seeds)] if seeds else []
+    columns = [
+        phase[condition]["success"].mean(axis=1)[[own.index(seed) for seed in shared]]
+        for condition, own in zip(conditions, seeds, strict=True)
+    ]
+    return np.stack(columns, axis=1) if columns else np.zeros((0, 0))
 
 
 def _verdict(comparisons: tuple[Comparison, ...]) -> list[str]:

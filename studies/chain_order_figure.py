@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from .chain_order import ChainOrders, Comparison
-from .figures import COLOURS, SETTINGS
+from .figures import COLOURS, SETTINGS, save
 from .statistics import bootstrap
 
 
@@ -31,11 +31,7 @@ def draw(analysis: ChainOrders, directory: Path) -> list[Path]:
             _panel(axes, comparison, rank)
         panels[0].set_yticks(range(len(rank)), [labels[i] for i in rank])
         panels[0].invert_yaxis()
-        paths = [directory / f"chain-order.{suffix}" for suffix in ("png", "svg")]
-        for path in paths:
-            metadata = {"Date": None} if path.suffix == ".svg" else {}
-            figure.savefig(path, dpi=150, metadata=metadata)
-    return paths
+        return save(figure, directory / "chain-order")
 
 
 def _panel(axes: Axes, comparison: Comparison, rank: np.ndarray) -> None:

@@ -109,6 +109,8 @@ def _replay(store: Store, trial: Trial) -> list[Path]:
     folder.mkdir(exist_ok=True)
     paths = []
     for name in ("first", "last"):
+        if name not in trial.recorded.values():  # the first of one episode is its last
+            continue
         path = folder / f"{name}-episode.gif"
         if not path.exists():
             animate(store.recording(trial, name), path)

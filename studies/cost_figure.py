@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from .cost import CostRow
-from .figures import COLOURS, SETTINGS
+from .figures import COLOURS, SETTINGS, check_suffix, write
 
 MARKERS = "os^Dvp*"
 
@@ -34,8 +34,7 @@ def draw(rows: Sequence[CostRow], path: Path) -> None:
     ValueError
         If the suffix is none of these.
     """
-    if path.suffix not in (".svg", ".png", ".pdf"):
-        raise ValueError(f"{path}: suffix must be .svg, .png or .pdf")
+    check_suffix(path)
     series = {
         text: [row for row in rows if row.topology == text]
         for text in dict.fromkeys(row.topology for row in rows)
@@ -56,8 +55,7 @@ def draw(rows: Sequence[CostRow], path: Path) -> None:
             axes.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"$10^{{{y:g}}}$"))
             axes.grid(alpha=0.25)
         figure.legend(handles=_legend(list(series), measured), loc="outside lower center", ncols=4)
-        metadata: dict[str, Any] = {"Date": None} if path.suffix == ".svg" else {}
-        figure.savefig(path, dpi=150, metadata=metadata)
+        write(figure, path)
 
 
 def _formulas(axes: Axes, series: dict[str, list[CostRow]]) -> None:

@@ -122,8 +122,7 @@ def _trained(store: Store, trial: Trial) -> tuple[Team, Scenario, Bodies | None]
     except ValueError as error:  # a file that settings name is not what it was
         raise SpecError(f"{store.directory}: {error}") from None
     team, scenario = session.team, session.scenario
-    failures = trial.settings.scenario.failures
-    strikes = min((f.episode for f in failures), default=None)
+    strikes = trial.settings.scenario.onset
     model, bodies = team.self_model, None
     if model is not None:
         bodies = Bodies({}, ())

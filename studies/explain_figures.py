@@ -22,7 +22,7 @@ from .explain import Explained
 from .explain_body import ROWS, Bodies, by_robot
 from .explain_policy import AROUND, MOVES, Field
 from .explain_rules import exponent, labels, percent, strongest_pairs
-from .figures import COLOURS, SETTINGS, STYLES
+from .figures import COLOURS, SETTINGS, STYLES, save
 
 MOST_LINES = 8
 """Agents in one figure of functions."""
@@ -35,13 +35,10 @@ MOVE_COLOURS = dict(zip(MOVES, ("#0072B2", "#D55E00", "#009E73", "#999999"), str
 
 def draw(found: Explained, into: Path) -> list[Path]:
     """Write all figures that there are something for, as PNG and SVG; return their paths."""
-    paths = []
+    paths: list[Path] = []
     with mpl.rc_context(SETTINGS):  # type: ignore[arg-type]
         for name, figure in _figures(found):
-            for suffix in ("png", "svg"):
-                paths.append(into / f"{name}.{suffix}")
-                metadata: dict[str, Any] = {"Date": None} if suffix == "svg" else {}
-                figure.savefig(paths[-1], dpi=130, metadata=metadata)
+            paths += save(figure, into / name)
     return paths
 
 

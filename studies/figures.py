@@ -55,12 +55,34 @@ def draw(analysis: LearningCurves, directory: Path) -> list[Path]:
         for axes in panels[-1]:
             axes.set_xlabel("episode")
         _legend(figure, panels[0][0], analysis)
-        paths = [directory / f"learning-curves.{suffix}" for suffix in ("png", "svg")]
-        for path in paths:
-            # No date in the file: equal results give equal figures.
-            metadata = {"Date": None} if path.suffix == ".svg" else {}
-            figure.savefig(path, dpi=150, metadata=metadata)
+        return save(figure, directory / "learning-curves")
+
+
+def save(figure: Figure, stem: Path) -> list[Path]:
+    """Write a figure as PNG and SVG, whose names begin with `stem`; return the paths."""
+    paths = [stem.with_name(f"{stem.name}.{suffix}") for suffix in ("png", "svg")]
+    for path in paths:
+        write(figure, path)
     return paths
+
+
+def write(figure: Figure, path: Path) -> None:
+    """Write a figure: SVG, PNG or PDF by suffix. Equal figures give equal files: no date in them.
+
+    Raises
+    ------
+    ValueError
+        If the suffix is none of these.
+    """
+    check_suffix(path)
+    metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(path.suffix)
+    figure.savefig(path, dpi=150, metadata=metadata)
+
+
+def check_suffix(path: Path) -> None:
+    """Refuse a path that `write` does not take, before anything is computed for it."""
+    if path.suffix not in (".svg", ".png", ".pdf"):
+        raise ValueError(f"{path}: suffix must be .svg, .png or .pdf")
 
 
 def _curve(axes: Axes, estimate: Estimate, index: int) -> None:

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from .comparison import LEVEL, Difference
-from .figures import COLOURS, SETTINGS
+from .figures import COLOURS, SETTINGS, save
 
 
 @dataclass(frozen=True)
@@ -55,11 +55,7 @@ def draw(panels: Sequence[Panel], stem: Path, unit: str) -> list[Path]:
         all_axes[0].set_yticks(range(len(names)), names)
         all_axes[0].set_ylim(len(names) - 0.4, -0.6)
         _legend(figure, panels)
-        paths = [stem.with_suffix(f".{suffix}") for suffix in ("png", "svg")]
-        for path in paths:
-            metadata = {"Date": None} if path.suffix == ".svg" else {}
-            figure.savefig(path, dpi=150, metadata=metadata)
-    return paths
+        return save(figure, stem)
 
 
 def _panel(axes: Axes, panel: Panel, names: Sequence[str], unit: str) -> None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,6 +24,7 @@ MEASURES: dict[str, tuple[str, ...]] = {
     "learning-curve": (
         "success", "stopped_at_goal", "steps", "final_orientation_rad", "contact_fraction",
     ),
+    "shapes": ("success", "stopped_at_goal", "contact_fraction"),
     "wheel-failure": ("success", "steps"),
     "scaling": ("success", "steps"),
 }  # fmt: skip
@@ -55,8 +56,23 @@ def dumps(spec: Spec, results: Results, version: int = RESULTS_VERSION) -> str:
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
-def loads(text: str) -> tuple[Spec, Results]:
-    """Return the spec and the results that `dumps` has written."""
+class Published(NamedTuple):
+    """Results with their spec, and the version of the code that they are of."""
+
+    spec: Spec
+    results: Results
+    version: int
+
+    @property
+    def note(self) -> str | None:
+        """What must be said of results of another version than this, in one line."""
+        if self.version == RESULTS_VERSION:
+            return None
+        return f"results of version {self.version}, this is version {RESULTS_VERSION}"
+
+
+def loads(text: str) -> Published:
+    """Return what `dumps` has written."""
     content = json.loads(text)
     phases = {
         phase: {
@@ -72,7 +88,9 @@ def loads(text: str) -> tuple[Spec, Results]:
     )
     training, evaluation = phases.get("training", {}), phases.get("evaluation", {})
     spec = Spec.of(content["spec"])
-    return spec, Results(training, evaluation, phases, seeds, numbers, usage)
+    columns = {c.label: c.columns for c in spec.conditions()}
+    results = Results(training, evaluation, phases, seeds, numbers, usage, columns)
+    return Published(spec, results, int(content["results_version"]))
 
 
 def write(path: Path, spec: Spec, results: Results, version: int = RESULTS_VERSION) -> None:
@@ -80,7 +98,7 @@ def write(path: Path, spec: Spec, results: Results, version: int = RESULTS_VERSI
     durable.write(path, dumps(spec, results, version).encode())
 
 
-def read(folder: Path, studies: Iterable[str]) -> dict[str, tuple[Spec, Results]]:
+def read(folder: Path, studies: Iterable[str]) -> dict[str, Published]:
     """Read the files of studies; those that are missing are left out.
 
     Raises
@@ -92,7 +110,7 @@ def read(folder: Path, studies: Iterable[str]) -> dict[str, tuple[Spec, Results]
     return {study: load(path) for study, path in paths.items() if path.exists()}
 
 
-def load(path: Path) -> tuple[Spec, Results]:
+def load(path: Path) -> Published:
     """Read one file.
 
     Raises

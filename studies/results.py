@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -36,6 +36,9 @@ class Results:
     usage
         The same of what differs from run to run: ``decision``, ``learning`` and further parts [s]
         as in `TrialResult.seconds`, and `TrialResult.usage`.
+    columns
+        By condition, what tells it from the others, see
+        `nested_agents.studies.conditions.Condition`.
     """
 
     training: dict[str, Arrays]
@@ -44,6 +47,7 @@ class Results:
     seeds: dict[str, tuple[int, ...]] = field(default_factory=dict)
     numbers: dict[str, Arrays] = field(default_factory=dict)
     usage: dict[str, Arrays] = field(default_factory=dict)
+    columns: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
 
 def read(store: Store) -> Results:
@@ -66,6 +70,7 @@ def read(store: Store) -> Results:
         {condition: tuple(found) for condition, found in seeds.items()},
         _by_name(row[:4] for row in numbers if row[4]),
         _by_name([*seconds, *(row[:4] for row in numbers if not row[4])]),
+        store.columns(),
     )
 
 

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import NullLocator
 
-from .figures import COLOURS, SETTINGS
+from .figures import COLOURS, SETTINGS, save
 from .scaling import DECISION_PERIOD, Scaling
 
 MARKERS = "osD^vP"
@@ -28,7 +28,8 @@ PANELS = (
 def draw(analysis: Scaling, directory: Path) -> list[Path]:
     """Write ``scaling`` as PNG and SVG into an existing directory; return the paths.
 
-    Points are means over seeds, bars their 95 % intervals; evaluators differ by colour and marker.
+    Points are means over seeds, bars their 95 % intervals; evaluators differ by colour and marker,
+    and stand a little beside each other.
     Messages are one black line if all evaluators pass as many.
     """
     evaluators = list(dict.fromkeys(p.evaluator for p in analysis.points))
@@ -38,7 +39,8 @@ def draw(analysis: Scaling, directory: Path) -> list[Path]:
         sizes = sorted({p.robots for p in analysis.points})
         for axes, (name, title, logarithmic) in zip(panels.flat, PANELS, strict=False):
             for index, evaluator in enumerate(evaluators):
-                _line(axes, analysis, evaluator, index, name)
+                beside = 2.0 ** (0.06 * (index - (len(evaluators) - 1) / 2))
+                _line(axes, analysis, evaluator, index, name, beside)
             axes.set_title(title, loc="left")
             if logarithmic:
                 axes.set_yscale("log")
@@ -63,11 +65,7 @@ def draw(analysis: Scaling, directory: Path) -> list[Path]:
         figure.legend(
             handles=handles, title=title, loc="outside upper center", ncols=4, frameon=False
         )
-        paths = [directory / f"scaling.{suffix}" for suffix in ("png", "svg")]
-        for path in paths:
-            metadata = {"Date": None} if path.suffix == ".svg" else {}
-            figure.savefig(path, dpi=150, metadata=metadata)
-    return paths
+        return save(figure, directory / "scaling")
 
 
 def _messages(axes: Axes, analysis: Scaling, evaluators: list[str]) -> None:
@@ -89,11 +87,14 @@ def _messages(axes: Axes, analysis: Scaling, evaluators: list[str]) -> None:
     axes.set_title("messages passed down, per step", loc="left")
 
 
-def _line(axes: Axes, analysis: Scaling, evaluator: str, index: int, name: str) -> None:
+def _line(
+    axes: Axes, analysis: Scaling, evaluator: str, index: int, name: str, beside: float
+) -> None:
+    """Draw an evaluator's points, `beside` times to the right of their numbers of robots."""
     own = [p for p in analysis.points if p.evaluator == evaluator and name in p.values]
     if not own:
         return
-    robots = [p.robots for p in own]
+    robots = [p.robots * beside for p in own]
     value, low, high = np.array(
         [[float(getattr(p.values[name], end)) for p in own] for end in ("value", "low", "high")]
     )

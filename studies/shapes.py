@@ -24,8 +24,6 @@ from .trial import Session, Trial, TrialResult
 TRAINED = "trained on"
 """How the box of training is called among the others."""
 PREFIX = "evaluation:"
-INDIFFERENT = 0.8
-"""The least ratio of success that still counts as indifferent."""
 
 
 def measure(trial: Trial) -> TrialResult:

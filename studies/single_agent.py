@@ -23,6 +23,7 @@ from ..scenarios.line_up import LineUp
 from ..topologies import arrange, parse
 from .cost import LEARNER, RULES
 from .statistics import Estimate, rate
+from .trial import EVALUATION_WORLDS
 
 CONTENDERS = ("nested", "single", "frozen")
 """The chain, the single agent, and a chain that never learns."""
@@ -147,8 +148,8 @@ def run(n: int, contender: str, step_size: float, seed: int, episodes: int) -> R
     greedy = [
         record.transition.terminated
         for record in control_loop(
-            scenario, team, episodes=EVALUATION, steps=STEPS, seed=seed, first_episode=10**6,
-            learn=False,
+            scenario, team, episodes=EVALUATION, steps=STEPS, seed=seed,
+            first_episode=EVALUATION_WORLDS, learn=False,
         )
         if record.last
     ]  # fmt: skip

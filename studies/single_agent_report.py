@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from .cost_table import number
-from .figures import COLOURS, SETTINGS
+from .figures import COLOURS, SETTINGS, write
 from .single_agent import BLOCK, CONTENDERS, Contest
 from .statistics import Estimate
 from .summary import interval
@@ -78,8 +78,7 @@ def draw(contests: Sequence[Contest], path: Path) -> None:
             axes.grid(alpha=0.25)
         handles = [Line2D([], [], color=COLOURS[i], label=c) for i, c in enumerate(CONTENDERS)]
         figure.legend(handles=handles, loc="outside lower center", ncols=3)
-        metadata = {"Date": None} if path.suffix == ".svg" else {}
-        figure.savefig(path, dpi=150, metadata=metadata)
+        write(figure, path)
 
 
 def _rate(estimate: Estimate) -> str:

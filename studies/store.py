@@ -65,11 +65,8 @@ class Store:
             If it cannot be written, holds a study that differs by more than additional seeds, or
             another process is writing to it. Nothing has been changed then.
         """
+        _examined(directory, spec)  # what is refused leaves nothing behind
         path = directory / DATABASE
-        damage = integrity.damage(path) if path.exists() else None
-        refusal = _refusal(directory, spec, damaged=damage is not None)
-        if refusal is not None:
-            raise SpecError(refusal)
         try:
             (directory / "recordings").mkdir(parents=True, exist_ok=True)
             lock = open(directory / LOCK, "w")  # noqa: SIM115 - held until the store is closed
@@ -77,6 +74,7 @@ class Store:
             raise SpecError(f"{directory}: {error.strerror or error}") from None
         with lock:
             _take(lock, directory)
+            damage = _examined(directory, spec)  # again: nobody else writes from here on
             aside = integrity.set_aside(path) if damage is not None else None
             with database.writing(path) as connection:
                 store = cls(directory, connection)
@@ -233,6 +231,12 @@ class Store:
         found = {phase for (phase,) in self._db.execute(query)}
         return sorted(found, key=lambda phase: (phase != "training", phase != "evaluation", phase))
 
+    def columns(self) -> dict[str, dict[str, Any]]:
+        """Return what tells each condition from the others, by label; see `Condition`."""
+        cursor = self._db.execute("SELECT * FROM conditions ORDER BY position")
+        swept = [column[0] for column in cursor.description][2:]
+        return {row[1]: dict(zip(swept, row[2:], strict=True)) for row in cursor}
+
     def rows(self, phase: str = "training") -> tuple[list[str], list[tuple[Any, ...]]]:
         """Return the column names and the rows of a phase, by condition, seed and episode."""
         cursor = self._db.execute("SELECT * FROM results WHERE phase = ?", (phase,))
@@ -249,7 +253,7 @@ class Store:
         After the swept keys and the seed: its state, its identity, the last line of its traceback
         if it failed, the seconds of each part, and its `numbers`; None where there is no such.
         """
-        swept = [r[1] for r in self._db.execute("PRAGMA table_info(conditions)").fetchall()][2:]
+        swept = next(iter(self.columns().values()), {})
         names = [n for (n,) in self._db.execute("SELECT DISTINCT name FROM numbers ORDER BY name")]
         values = {
             (i, n): v for i, n, v in self._db.execute("SELECT identity, name, value FROM numbers")
@@ -292,7 +296,7 @@ class Store:
         return [(*row[:4], bool(row[4])) for row in cursor]
 
     def recording(self, trial: Trial, name: str) -> Recording:
-        """Return a recorded episode of a trial, ``first`` or ``last``; see `durable`."""
+        """Return a recorded episode of a trial, by its name in `Trial.recorded`."""
         return durable.read_recording(self._recordings(trial.identity), name)
 
     def _recordings(self, identity: str) -> Path:
@@ -305,6 +309,16 @@ class Store:
         self._db.execute("DELETE FROM trials WHERE identity = ?", (trial.identity,))
         row = (trial.identity, trial.condition, trial.seed, state, error, digest)
         self._insert("trials", [row])
+
+
+def _examined(directory: Path, spec: Spec) -> str | None:
+    """Return what is wrong with a directory's database, if anything is; refuse another study."""
+    path = directory / DATABASE
+    damage = integrity.damage(path) if path.exists() else None
+    refusal = _refusal(directory, spec, damaged=damage is not None)
+    if refusal is not None:
+        raise SpecError(refusal)
+    return damage
 
 
 def _refusal(directory: Path, spec: Spec, *, damaged: bool) -> str | None:

@@ -16,7 +16,7 @@ from .. import scenarios, topologies
 from ..core.loop import control_loop, policy_seed, world_seed
 from ..core.protocols import Scenario
 from ..core.team import Team
-from ..scenarios.config import ScenarioSettings, label
+from ..scenarios.config import ScenarioSettings
 from .conditions import ConditionSettings
 from .episodes import EpisodeMeter, EpisodeRecorder, EpisodeRow, Recording, Stopwatch
 from .spec import Spec
@@ -27,9 +27,6 @@ RESULTS_VERSION = 3
 
 EVALUATION_WORLDS = 10**6
 """Number of the first evaluation episode's world: after any training, and the same for all."""
-
-CONTROL_PERIOD = 0.064
-"""The paper's time step, Webots' default [s]."""
 
 
 @dataclass(frozen=True)
@@ -225,11 +222,8 @@ class Session:
             if record.last:
                 self._rows.append(meter.row(record.transition))
                 if record.episode in kept:
-                    scenario = self.trial.settings.scenario
                     self._recordings[kept[record.episode]] = recorder.recording(
-                        dt=scenario.hold * CONTROL_PERIOD,
-                        robot=label(scenario.robot),
-                        box=label(scenario.box),
+                        **self.trial.settings.scenario.drawn
                     )
 
     def evaluate(

@@ -17,12 +17,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..core.config import FrozenSettings, LearnerSettings
 from ..core.team import Team
 from .comparison import Array, Difference
+from .conditions import label
 from .paired_tests import holm, paired_permutation
 from .results import Arrays, Results
 from .spec import Spec
@@ -37,8 +39,8 @@ REGAINED = 0.9
 """Share of the level before that counts as recovered."""
 KEPT = "weights kept"
 """The phase of the copied team."""
-SWEPT = ", enabled="
-"""What tells the label of a condition with a self-model from that of its twin without."""
+SWEPT = "learner.self_model.enabled"
+"""What is swept to have every condition with a self-model and without."""
 ADAPTS = {
     ("false", KEPT): "nothing",
     ("false", "training"): "weights",
@@ -96,7 +98,7 @@ class Course:
     Attributes
     ----------
     fault
-        Label of the condition, without its self-model.
+        Label of the condition but for `SWEPT`.
     adapts
         What does, see `ADAPTS`; `training` or `weights kept` if self-models were not swept.
     onset
@@ -197,7 +199,7 @@ def courses_of(results: Results) -> list[Course]:
         if condition not in kept:
             continue
         onset = int(results.numbers[condition]["onset"][0])
-        fault, swept, enabled = condition.rpartition(SWEPT)
+        fault, enabled = _twin(condition, results.columns.get(condition, {}))
         for phase in (KEPT, "training"):
             after = kept[condition] if phase == KEPT else {}
             arrays = {
@@ -206,10 +208,9 @@ def courses_of(results: Results) -> list[Course]:
                 else training[name]
                 for name in ("success", "steps")
             }
-            adapts = ADAPTS[enabled, phase] if swept else phase
             found.append(
                 Course(
-                    fault if swept else condition, adapts, onset,
+                    fault, ADAPTS.get((enabled, phase), phase), onset,
                     arrays["success"].astype(float), arrays["steps"].astype(float),
                     results.seeds[condition],
                 )
@@ -217,6 +218,15 @@ def courses_of(results: Results) -> list[Course]:
     order = {adapts: i for i, adapts in enumerate(ADAPTS.values())}
     faults = list(dict.fromkeys(course.fault for course in found))
     return sorted(found, key=lambda c: (faults.index(c.fault), order.get(c.adapts, 0)))
+
+
+def _twin(condition: str, columns: Mapping[str, Any]) -> tuple[str, str]:
+    """Return what a condition has in common with its twin, as a label, and which of them it is."""
+    enabled = str(columns.get(SWEPT, ""))
+    if not enabled:
+        return condition, ""
+    point = {k: v for k, v in columns.items() if k not in (SWEPT, "name") and v != ""}
+    return label(point, columns.get("name", "")) or "the failure", enabled
 
 
 def _summary(course: Course) -> Summary:

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from .figures import COLOURS, SETTINGS, STYLES
+from .figures import COLOURS, SETTINGS, STYLES, save
 from .statistics import bootstrap
 from .wheel_failure import WheelFailures
 
@@ -66,11 +66,7 @@ def draw(analysis: WheelFailures, directory: Path) -> list[Path]:
             ncols=len(cases),
             frameon=False,
         )
-        paths = [directory / f"wheel-failure.{suffix}" for suffix in ("png", "svg")]
-        for path in paths:
-            metadata = {"Date": None} if path.suffix == ".svg" else {}
-            figure.savefig(path, dpi=150, metadata=metadata)
-    return paths
+        return save(figure, directory / "wheel-failure")
 
 
 def _smoothed(success: np.ndarray, onset: int) -> np.ndarray:

@@ -11,6 +11,7 @@ import hashlib
 import importlib.util
 import inspect
 import json
+import sys
 from collections.abc import Callable, Sequence
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -90,9 +91,11 @@ def from_python(source: str) -> UserTopology:
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # dataclasses look their own module up
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
+        del sys.modules[spec.name]
         raise ValueError(f"{path} cannot be run: {type(error).__name__}: {error}") from None
     function = getattr(module, name, None)
     if not callable(function):

@@ -31,6 +31,9 @@ class Counts:
 class Evaluator(Protocol):
     """Values the actions of one agent."""
 
+    counts: Counts
+    """What has been evaluated so far; the team adds what it learns."""
+
     def values(
         self,
         agent: int,

@@ -22,7 +22,7 @@ import numpy as np
 
 from ..arrays import FloatArray, IntArray
 from ..hierarchy import Hierarchy
-from ..protocols import Prediction, Superposition
+from ..protocols import Prediction, SummedPrediction
 from ..rules import RuleBase
 from .evaluator import Gathering, Others, Rule
 from .grouping import Grouping
@@ -72,7 +72,7 @@ class _Summed(Gathering, ABC):
         rng: np.random.Generator,
     ) -> FloatArray:
         """Return the value ``(A,)`` of each action of `agent`, see `Evaluator.values`."""
-        superposition = cast(Superposition, prediction.superposition)  # type: ignore[attr-defined]
+        superposition = cast(SummedPrediction, prediction).superposition
         shares = self._grouping.shares(agent, joint_action, frequencies)
         mine = self._grouping.of[agent]
         weights = shares[mine].copy()  # of the partners' actions, given each own action

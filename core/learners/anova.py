@@ -53,6 +53,7 @@ class AnovaTD(Replay):
     """
 
     largest = MOST_RULES
+    remedy = "use fewer variables or memberships"
 
     def __init__(self, settings: AnovaTDSettings, rules: RuleBase, n_agents: int) -> None:
         d = len(rules.partitions)

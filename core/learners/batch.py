@@ -54,12 +54,13 @@ class Replay(ABC):
 
     candidates = 0
     largest = 4096
+    remedy = "lower learner.rule_base.order"
 
     def __init__(self, settings: ReplaySettings, rules: RuleBase, n_agents: int) -> None:
         if rules.n_rules > self.largest:
             raise ValueError(
                 f"learner.kind: batch learners solve for all rules at once: {rules.n_rules} rules, "
-                f"allowed up to {self.largest}; lower learner.rule_base.order"
+                f"allowed up to {self.largest}; {self.remedy}"
             )
         self.settings, self.rules = settings, rules
         self.theta: FloatArray = np.zeros((n_agents, rules.n_rules), rules.dtype)

@@ -59,7 +59,7 @@ def _cases(source: str, changes: Changes) -> Iterator[Case]:
     from ..spec import Spec
     from ..spec_errors import SpecError
 
-    if ".py" in source:
+    if ".py:" in source or source.endswith(".py"):
         if changes:
             raise SpecError("set: lays values over a spec, not over a Python file")
         try:

@@ -10,8 +10,7 @@ import tyro
 from .options import MostJobs
 
 if TYPE_CHECKING:
-    from ..results import Results
-    from ..spec import Spec
+    from ..published import Published
 
 
 def command(
@@ -41,6 +40,7 @@ def command(
     """
     from .. import claims, published
     from ..claims_table import print_claims
+    from ..display import say
     from ..spec_errors import SpecError
 
     if out is None:
@@ -50,15 +50,18 @@ def command(
         found = published.read(published.FOLDER, claims.STUDIES_OF_CLAIMS)
     else:
         found = _run(out, quick=quick, jobs=jobs)
+    for study, of_study in found.items():
+        if of_study.note:
+            say(f"{study}: {of_study.note}")
     if publish is not None:
         publish.mkdir(parents=True, exist_ok=True)
-        for study, (spec, results) in found.items():
+        for study, (spec, results, _) in found.items():
             published.write(publish / f"{study}.json", spec, results)
-    print_claims(claims.judge({study: results for study, (_, results) in found.items()}), format)
+    print_claims(claims.judge({study: p.results for study, p in found.items()}), format)
     return 0
 
 
-def _run(out: Path, *, quick: bool, jobs: int | None) -> dict[str, tuple[Spec, Results]]:
+def _run(out: Path, *, quick: bool, jobs: int | None) -> dict[str, Published]:
     """Run the studies of the claims, or what is left of them; return what they found."""
     from .. import STUDIES, claims, published
     from ..conduct import carried_out

@@ -84,14 +84,18 @@ def command(
 
 
 def _learning(jobs: int, format: str, plot: Path | None) -> int:
+    from ..figures import check_suffix
     from ..single_agent import compare
     from ..single_agent_report import draw, table
     from ..spec_errors import SpecError
 
     if format != "table":
         raise SpecError(f"--format {format}: with --learning, allowed: table")
-    if plot is not None and plot.suffix not in (".svg", ".png", ".pdf"):
-        raise SpecError(f"{plot}: suffix must be .svg, .png or .pdf")
+    if plot is not None:
+        try:
+            check_suffix(plot)
+        except ValueError as error:
+            raise SpecError(str(error)) from None
     contests = compare(jobs=jobs)
     if plot is not None:
         draw(contests, plot)

@@ -27,14 +27,17 @@ def command(
         How to print the table; CSV holds every digit.
     """
     from .. import published
-    from ..display import print_table
+    from ..display import print_table, say
     from ..results import read
     from ..store import Store
     from ..study import load_study
     from ..summary_table import tabulate
 
     if source.is_file():
-        spec, results = published.load(source)
+        of_file = published.load(source)
+        spec, results, _ = of_file
+        if of_file.note:
+            say(f"{source}: {of_file.note}")
     else:
         with Store.open(source) as store:
             store.verify()

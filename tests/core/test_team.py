@@ -13,6 +13,7 @@ from pydantic import TypeAdapter
 from nested_agents.core.config import Learner as LearnerSettings
 from nested_agents.core.evaluators import ExactEnumeration, Sampling
 from nested_agents.core.hierarchy import Hierarchy
+from nested_agents.core.robot_agents import per_robot
 from nested_agents.core.team import Team
 
 PAPER = {"kind": "paper", "decay": 0.05, "clock": "episode"}
@@ -262,6 +263,7 @@ def test_counts_of_an_episode(world) -> None:
         ({"exact_up_to": 3}, Sampling),
         ({"evaluator": "sampling"}, Sampling),
         ({"exact_up_to": 3, "evaluator": "exact"}, ExactEnumeration),
+        ({"exact_up_to": 10}, ExactEnumeration),
     ],
 )
 def test_the_evaluator_follows_the_settings(decision: dict, kind: type, world) -> None:
@@ -270,6 +272,21 @@ def test_the_evaluator_follows_the_settings(decision: dict, kind: type, world) -
     )
     team = Team.build(settings, world, chain_of(world.agents), np.random.SeedSequence(1))
     assert isinstance(team.evaluator, kind)
+
+
+def test_what_is_too_much_to_enumerate_is_sampled(line_world) -> None:
+    # 256 joint actions of four wheels each: four agents have four thousand million.
+    scenario = per_robot(line_world(carts=4, wheels=4))
+    learner = TypeAdapter(LearnerSettings).validate_python({"kind": "frozen"})
+    hierarchy = chain_of(scenario.agents)
+    team = Team.build(learner, scenario, hierarchy, np.random.SeedSequence(1))
+    assert isinstance(team.evaluator, Sampling)
+
+
+def test_a_scenario_may_list_its_agents(line_world) -> None:
+    scenario = line_world(carts=2, wheels=2)
+    scenario.agents = list(scenario.agents)
+    assert team_of("frozen", scenario).hierarchy.agents == tuple(scenario.agents)
 
 
 def test_a_hierarchy_over_other_agents_is_refused(world) -> None:

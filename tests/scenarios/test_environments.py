@@ -130,6 +130,15 @@ def test_an_episode_ends_by_the_clock_and_at_the_goal() -> None:
     assert [env.step(np.zeros(4))[3] for _ in range(2)] == [False, True]
 
 
+def test_a_step_after_the_end_is_empty() -> None:
+    env = WheelsEnv(steps=1)
+    env.reset(seed=0)
+    assert env.step(dict.fromkeys(env.agents, 0))[3]["robot1.left"]
+    assert env.agents == []
+    assert env.step({}) == ({}, {}, {}, {}, {})
+    assert env.game.scenario.measure()["robot_poses"].shape == (2, 3)
+
+
 def test_pictures() -> None:
     env = BoxPushingEnv(SETTINGS[2], render_mode="rgb_array")
     with pytest.raises(RuntimeError, match="call reset first"):

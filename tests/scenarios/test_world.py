@@ -7,9 +7,10 @@ import pytest
 
 from nested_agents.core.arrays import FloatArray
 from nested_agents.scenarios.boxes import BOXES, box_for
+from nested_agents.scenarios.config import CONTROL_PERIOD
 from nested_agents.scenarios.robots import ROBOTS, compliance, nominal_effect
 from nested_agents.scenarios.starts import place
-from nested_agents.scenarios.world import CONTROL_PERIOD, World
+from nested_agents.scenarios.world import World
 
 E_PUCK = ROBOTS["e-puck"]
 FULL = 0.13

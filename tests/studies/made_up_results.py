@@ -64,6 +64,7 @@ def wheel_failure(
                 if phase == "weights kept":
                     whole = {name: values[:, onset:] for name, values in whole.items()}
                 base.phases[phase][condition] = whole
+            base.columns[condition] = {"name": fault, "learner.self_model.enabled": enabled}
             base.seeds[condition] = tuple(range(seeds))
             base.numbers[condition] = {"onset": np.full(seeds, float(onset))}
     base.training.update(base.phases["training"])

@@ -1,5 +1,6 @@
 """The chain-order study on made-up results, whose answer is known."""
 
+from dataclasses import replace
 from itertools import permutations
 from pathlib import Path
 
@@ -25,7 +26,8 @@ def made_up(chances: list[float], seeds: int = 20) -> Results:
             for order, chance in zip(ORDERS, chances, strict=True)
         }
 
-    return Results(training=outcomes(15), evaluation=outcomes(10))
+    numbered = dict.fromkeys(ORDERS, tuple(range(seeds)))
+    return Results(training=outcomes(15), evaluation=outcomes(10), seeds=numbered)
 
 
 def test_equal_orders_are_not_told_apart() -> None:
@@ -52,9 +54,22 @@ def test_agents_are_numbered_in_the_first_order() -> None:
     assert "1 = r1.a, 2 = r1.b, 3 = r2.a" in analysis.notes[-1]
 
 
-def test_an_unfinished_study_is_not_compared() -> None:
+def test_orders_are_compared_on_the_seeds_that_all_have_finished() -> None:
     results = made_up([0.5] * 6)
-    results.training[ORDERS[2]]["success"] = results.training[ORDERS[2]]["success"][:-1]
+    whole = np.sort(results.training[ORDERS[0]]["success"], axis=0)
+    for k, order in enumerate(ORDERS):
+        seeds = tuple(seed for seed in range(20) if seed != k)
+        results.seeds[order] = seeds
+        results.training[order]["success"] = whole[list(seeds)]
+    (comparison,) = analyse(replace(results, evaluation={})).comparisons
+    assert comparison.values.tolist() == [[m] * 6 for m in whole[6:].mean(axis=1)]
+    assert comparison.p == 1.0
+
+
+def test_what_no_two_seeds_have_finished_is_not_compared() -> None:
+    results = made_up([0.5] * 6)
+    results.seeds[ORDERS[2]] = (19,)
+    results.training[ORDERS[2]]["success"] = results.training[ORDERS[2]]["success"][-1:]
     results.evaluation.pop(ORDERS[0])
     analysis = analyse(results)
     assert analysis.comparisons == ()

@@ -83,6 +83,14 @@ def test_what_the_user_can_mend(
     assert err.count("\n") == 1
 
 
+def test_a_folder_may_be_named_as_it_likes(spec: Path, tmp_path: Path, capsys) -> None:
+    moved = tmp_path / ".pyenv" / "s.toml"
+    moved.parent.mkdir()
+    moved.write_text(spec.read_text())
+    assert main(["check", str(moved)]) in (0, 1)
+    assert capsys.readouterr().err == ""
+
+
 OWN = """
 import random
 from nested_agents.scenarios.line_up import LineUp

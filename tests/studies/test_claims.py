@@ -130,11 +130,11 @@ def test_published_results_give_the_table_that_the_run_gave() -> None:
         study: published.loads(published.dumps(Spec.load(ROOT / f"{STUDIES[study]}.toml"), found))
         for study, found in results.items()
     }
-    assert [spec.study for spec, _ in again.values()] == list(results)
-    once = {study: found for study, (_, found) in again.items()}
+    assert [p.spec.study for p in again.values()] == list(results)
+    once = {study: p.results for study, p in again.items()}
     twice = {
-        study: published.loads(published.dumps(spec, found))[1]
-        for study, (spec, found) in again.items()
+        study: published.loads(published.dumps(p.spec, p.results)).results
+        for study, p in again.items()
     }
     assert markdown(judge(once)) == markdown(judge(twice))
     assert [f.verdict for f in judge(once)] == [f.verdict for f in judge(results)]
@@ -145,6 +145,25 @@ def test_a_damaged_file_is_named(tmp_path: Path) -> None:
         (tmp_path / "shapes.json").write_text(text)
         with pytest.raises(ValueError, match=r"shapes\.json: holds no published results"):
             published.read(tmp_path, ["shapes"])
+
+
+def test_results_of_another_version_are_told(tmp_path: Path, capsys, monkeypatch) -> None:
+    old = published.FOLDER / "chain-order.json"
+    monkeypatch.setattr(published, "RESULTS_VERSION", 99)
+    assert main(["table", str(old)]) == 0
+    assert "chain-order.json: results of version 3, this is version 99" in capsys.readouterr().err
+    assert main(["claims", "--format", "markdown"]) == 0
+    assert "chain-order: results of version 3, this is version 99" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "path", sorted(published.FOLDER.glob("*.json")), ids=lambda path: path.stem
+)
+def test_every_committed_file_is_of_this_version_and_has_a_table(path: Path, capsys) -> None:
+    assert main(["table", str(path), "--format", "markdown"]) == 0
+    out, err = capsys.readouterr()
+    assert out.count("\n") > 2
+    assert err == ""
 
 
 def test_options_that_run_need_a_directory(capsys) -> None:

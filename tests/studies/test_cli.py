@@ -17,6 +17,7 @@ import pytest
 
 from nested_agents.studies import conduct, learning_curve
 from nested_agents.studies.cli import COMMANDS, main
+from nested_agents.studies.spec import Spec
 from nested_agents.studies.spec_toml import dumps
 from nested_agents.studies.store import DATABASE
 
@@ -227,9 +228,13 @@ def test_a_replay_of_the_first_and_the_last_episode_is_drawn_once(tmp_path, monk
     ]  # fmt: skip
 
 
-def test_the_demos_spec_is_valid_toml(capsys, tmp_path):
-    from nested_agents.studies.spec import Spec
+def test_the_replay_of_one_episode_is_of_the_last(tmp_path):
+    spec = Spec.of({"seeds": 1, "episodes": 1, "steps": 2, "evaluation": 0})
+    assert conduct.conduct(spec, tmp_path, 1, replay=True) == 0
+    assert [p.name for p in (tmp_path / "replay").iterdir()] == ["last-episode.gif"]
 
+
+def test_the_demos_spec_is_valid_toml(capsys, tmp_path):
     assert main(["demo", "--print-spec"]) == 0
     spec = Spec.parse(capsys.readouterr().out)
     assert [c.label for c in spec.conditions()] == ["default", "frozen", "random", "greedy"]

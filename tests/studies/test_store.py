@@ -164,6 +164,26 @@ def test_two_writers_at_a_time_are_refused(finished):
         pass
 
 
+def test_another_study_that_came_first_is_not_overwritten(tmp_path, monkeypatch):
+    take, other = store_module._take, made_up.SPEC.model_copy(update={"steps": 99})
+
+    def late(lock, directory):
+        with monkeypatch.context() as patch:
+            patch.setattr(store_module, "_take", take)
+            with Store.create(directory, other):
+                pass
+        take(lock, directory)
+
+    monkeypatch.setattr(store_module, "_take", late)
+    with (
+        pytest.raises(SpecError, match="holds another study"),
+        Store.create(tmp_path, made_up.SPEC),
+    ):
+        pass
+    with Store.open(tmp_path) as store:
+        assert store.spec() == other
+
+
 def test_one_reads_while_another_writes(finished):
     with Store.create(finished, made_up.SPEC) as writer, Store.open(finished) as reader:
         writer.fail(made_up.TRIALS[0], "Traceback")

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from nested_agents.scenarios.config import InfraredSettings
 from nested_agents.studies import trial as trial_module
 from nested_agents.studies.episodes import RECORDED
 from nested_agents.studies.spec import Spec
@@ -75,6 +76,8 @@ def test_a_recording_has_a_frame_for_every_step_and_the_beginning(result):
     assert (recording["wheel_speeds"][0] == 0.0).all()
     assert recording["reward"].sum() == pytest.approx(result.rows[1].return_)
     assert (str(recording["robot"]), str(recording["box"])) == ("e-puck", "square")
+    infrared = InfraredSettings.model_validate_json(str(recording["infrared"]))
+    assert infrared == InfraredSettings()
     assert float(recording["dt"]) == pytest.approx(0.512)
     final = np.hypot(*(recording["box_pose"][-1] - recording["goal_pose"])[:2])
     assert final == pytest.approx(result.rows[1].final_distance_m)

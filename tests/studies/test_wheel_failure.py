@@ -49,6 +49,35 @@ def test_cases_are_told_apart_by_what_adapts() -> None:
     assert gains["2 wheels, seized, both"].p == 1.0
 
 
+@pytest.mark.parametrize(
+    ("columns", "faults"),
+    [
+        ({"learner.self_model.enabled": "{}"}, ["the failure"]),
+        ({"learner.self_model.enabled": "{}", "scenario.box": "circle"}, ["circle"]),
+        ({"name": "a", "scenario.hold": 4, "learner.self_model.enabled": "{}"}, ["a, hold=4"]),
+        ({"name": "a", "scenario.hold": "", "learner.self_model.enabled": "{}"}, ["a"]),
+        ({"learner.calibration.enabled": "{}"}, None),
+    ],
+)
+def test_twins_are_found_by_what_is_swept(columns: dict, faults: list | None) -> None:
+    results = wheel_failure({"fault": ENDS["4 wheels, seized"]})
+    for condition in results.training:
+        enabled = condition.rpartition("=")[2]
+        results.columns[condition] = {
+            k: v.format(enabled) if v == "{}" else v for k, v in columns.items()
+        }
+    analysis = analyse(results)
+    found = [tuple(line.condition.split(": ")) for line in analysis.table]
+    if faults is None:  # nothing is said of self-models
+        assert {adapts for _, adapts in found} == {"training", KEPT}
+        assert {fault for fault, _ in found} == set(results.training)
+        assert analysis.gains == ()
+    else:
+        cases = ("nothing", "weights", "self-model", "both")
+        assert found == [(fault, adapts) for fault in faults for adapts in cases]
+        assert len(analysis.gains) == 3
+
+
 def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
     paths = draw(analyse(wheel_failure(ENDS)), tmp_path)
     assert [path.name for path in paths] == ["wheel-failure.png", "wheel-failure.svg"]
@@ -105,4 +134,6 @@ def test_the_spec_can_be_run_and_crosses_faults_with_self_models() -> None:
     labels = [condition.label for condition in spec.conditions()]
     assert len(spec.seeds) >= 20
     assert "4 wheels, seized, enabled=true" in labels
-    assert "2 wheels, seized, enabled=false" in labels
+    others = Spec.load(Path(module.__file__).parent / "wheel_faults.toml")
+    check(others)
+    assert "2 wheels, seized, enabled=false" in [c.label for c in others.conditions()]

@@ -53,6 +53,7 @@ def test_pairs_or_a_graph(written, body: str) -> None:
     [
         ("def g(agents, groups): pass", "has no function 'f', it has: g"),
         ("import os\n1 / 0", "cannot be run: ZeroDivisionError"),
+        ("import sys\nsys.exit('bye')", "cannot be run: SystemExit: bye"),
         ("def f(:", "cannot be run: SyntaxError"),
         ("def f(agents): return []", "f raised TypeError"),
         ("def f(agents, groups): return groups[9]", "f raised IndexError"),
@@ -81,6 +82,16 @@ def test_a_file_that_changed_is_refused(written) -> None:
     written("def f(agents, groups): return [('a', 'b')]")
     with pytest.raises(ValueError, match=r"mine\.py has changed"):
         build(settings, AGENTS)
+
+
+def test_a_file_may_have_dataclasses_and_postponed_annotations(written) -> None:
+    text = written(
+        "from __future__ import annotations\nfrom dataclasses import dataclass\n"
+        "@dataclass\nclass Pair:\n    above: str\n    below: str\n"
+        "def f(agents, groups):\n    pair = Pair(*agents[:2])\n"
+        "    return [(pair.above, pair.below)]\n"
+    )
+    assert build(parse(text), AGENTS).edges == ((0, 1),)
 
 
 @pytest.mark.parametrize("text", ["python:mine.py", "python:mine:f", "python:mine.py:2f"])

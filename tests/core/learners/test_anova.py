@@ -197,5 +197,6 @@ def test_other_rule_bases_are_refused(terms: list[tuple[int, ...]]) -> None:
 
 def test_too_many_rules_are_refused() -> None:
     rules = RuleBase([Partition((0.0, 1.0), "triangular")] * 21, [tuple(range(21))])
-    with pytest.raises(ValueError, match=f"2097152 rules, allowed up to {MOST_RULES}"):
+    said = f"2097152 rules, allowed up to {MOST_RULES}; use fewer variables or memberships"
+    with pytest.raises(ValueError, match=said):
         AnovaTD(AnovaTDSettings(), rules, 1)
