@@ -6,7 +6,6 @@ argument may be.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from difflib import get_close_matches
 from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 
@@ -150,82 +149,81 @@ class RandomSettings(TopologySettings):
         return cls(seed=_integer(argument, "seed"))
 
 
-class FileSettings(TopologySettings):
-    """A graph from a GraphML or JSON file."""
+class _OfAFile(TopologySettings):
+    """What a file defines: results belong to the content that it has."""
 
-    kind: Literal["file"] = "file"
-    path: str
     digest: str = ""
-    """Hash of the file's content, filled in when missing: results belong to that content."""
+    """Hash of the file's content, filled in when missing."""
 
-    argument: ClassVar[str] = "PATH.graphml|PATH.json"
+    key: ClassVar[str]
+    """The setting that names the file."""
+
+    @classmethod
+    def digest_of(cls, named: str) -> str:
+        """Return the hash of the present content of what is named."""
+        return files.digest(named)
 
     @model_validator(mode="before")
     @classmethod
     def _fill_digest(cls, table: Any) -> Any:
-        return _with_digest(table, "path", files.digest)
+        named = table.get(cls.key) if isinstance(table, dict) else None
+        if isinstance(named, str) and not table.get("digest"):
+            return {**table, "digest": cls.digest_of(named)}
+        return table
 
     @classmethod
     def parsed(cls, argument: str) -> Self:
-        """Read the path."""
-        return cls(path=argument)
+        """Read what is named."""
+        return cls.model_validate({cls.key: argument})
 
     def check_unchanged(self) -> None:
         """Refuse another content than the digest's."""
-        files.check_digest(self.path, files.digest(self.path), self.digest)
+        named = getattr(self, self.key)
+        if (found := self.digest_of(named)) != self.digest:
+            raise ValueError(
+                f"{named} has changed: its digest is {found}, the settings say {self.digest}"
+            )
 
 
-class PythonSettings(TopologySettings):
+class FileSettings(_OfAFile):
+    """A graph from a GraphML or JSON file."""
+
+    kind: Literal["file"] = "file"
+    path: str
+
+    argument: ClassVar[str] = "PATH.graphml|PATH.json"
+    key: ClassVar[str] = "path"
+
+
+class PythonSettings(_OfAFile):
     """A user's function in a Python file."""
 
     kind: Literal["python"] = "python"
     source: str
     """``path/to/file.py:function``, see `nested_agents.topologies.files`."""
-    digest: str = ""
-    """Hash of the file's content, filled in when missing: results belong to that content."""
 
     argument: ClassVar[str] = "PATH.py:FUNCTION"
-
-    @model_validator(mode="before")
-    @classmethod
-    def _fill_digest(cls, table: Any) -> Any:
-        return _with_digest(table, "source", lambda s: files.digest(files.split_source(s)[0]))
+    key: ClassVar[str] = "source"
 
     @classmethod
-    def parsed(cls, argument: str) -> Self:
-        """Read the source."""
-        return cls(source=argument)
-
-    def check_unchanged(self) -> None:
-        """Refuse another content than the digest's."""
-        path, _ = files.split_source(self.source)
-        files.check_digest(path, files.digest(path), self.digest)
+    def digest_of(cls, named: str) -> str:
+        """Return the hash of the file that holds the function."""
+        return files.digest(files.split_source(named)[0])
 
 
-class PackageSettings(TopologySettings):
+class PackageSettings(_OfAFile):
     """A user's function in an installed package, by entry point."""
 
     kind: Literal["package"] = "package"
     name: str
-    digest: str = ""
-    """Hash of the file that defines it, filled in when missing: results belong to that content."""
 
     argument: ClassVar[str] = "NAME"
-
-    @model_validator(mode="before")
-    @classmethod
-    def _fill_digest(cls, table: Any) -> Any:
-        return _with_digest(table, "name", files.package_digest)
+    key: ClassVar[str] = "name"
 
     @classmethod
-    def parsed(cls, argument: str) -> Self:
-        """Read the name."""
-        return cls(name=argument)
-
-    def check_unchanged(self) -> None:
-        """Refuse another content than the digest's."""
-        found = files.package_digest(self.name)
-        files.check_digest(f"package {self.name!r}", found, self.digest)
+    def digest_of(cls, named: str) -> str:
+        """Return the hash of the file in which the package defines it."""
+        return files.package_digest(named)
 
 
 class SingleAgentSettings(TopologySettings):
@@ -316,12 +314,6 @@ def _integer(text: str, what: str) -> int:
         return int(text)
     except ValueError:
         raise ValueError(f"{what} = {text!r}: must be a whole number") from None
-
-
-def _with_digest(table: Any, key: str, digest_of: Callable[[str], str]) -> Any:
-    if isinstance(table, dict) and isinstance(table.get(key), str) and not table.get("digest"):
-        return {**table, "digest": digest_of(table[key])}
-    return table
 
 
 def _one_line(error: ValidationError) -> str:

@@ -45,12 +45,6 @@ def package_digest(name: str) -> str:
     return digest(path) if path else ""
 
 
-def check_digest(what: str, found: str, expected: str) -> None:
-    """Refuse what has changed since its settings were written."""
-    if found != expected:
-        raise ValueError(f"{what} has changed: its digest is {found}, the settings say {expected}")
-
-
 def read_graph(path: str) -> nx.DiGraph:
     """Read a graph from GraphML or JSON, told apart by suffix.
 
