@@ -15,7 +15,6 @@ from ..core.cost import Problem
 from .chain_order import analyse as analyse_orders
 from .comparison import difference, paired, ratio
 from .results import Results
-from .scaling import DECISION_PERIOD
 from .shapes import least_ratio, ratios_of
 from .statistics import Estimate, bootstrap, rate
 from .wheel_failure import courses_of
@@ -160,10 +159,12 @@ def decision_share(results: Results) -> Measured | None:
     if not sizes:
         return None
     most = max(sizes)
-    times = [results.usage[condition]["decision_median"] for condition in sizes[most]]
-    fastest = min(times, key=lambda t: float(t.mean()))
-    estimate = bootstrap(fastest / DECISION_PERIOD)
-    return Measured(estimate, len(fastest), note=f"{most} robots")
+    shares = [
+        results.usage[condition]["decision_median"] / results.numbers[condition]["period_s"]
+        for condition in sizes[most]
+    ]
+    fastest = min(shares, key=lambda share: float(share.mean()))
+    return Measured(bootstrap(fastest), len(fastest), note=f"{most} robots")
 
 
 def success_by_size(results: Results) -> Measured | None:

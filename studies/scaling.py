@@ -24,8 +24,6 @@ from .statistics import Estimate, bootstrap, rate
 from .summary import Summary
 from .trial import Session, Trial, TrialResult
 
-DECISION_PERIOD = 0.512
-"""What a decision of the default may take to keep up with the robots: 8 control periods [s]."""
 COLUMNS = (
     "success", "greedy", "all touch", "decide [ms]", "learn [ms]", "team [MB]", "process [MB]",
 )  # fmt: skip
@@ -45,6 +43,7 @@ def measure(trial: Trial) -> TrialResult:
     tried = team.evaluator.counts.joint_actions if team.evaluator is not None else 0
     numbers = {
         "robots": float(trial.settings.scenario.robots),
+        "period_s": trial.settings.scenario.period,
         "agents": float(len(hierarchy)),
         "messages": float(messages(hierarchy.below(i) for i in range(len(hierarchy)))),
         "joint_actions": tried / len(session.deciding),
@@ -111,6 +110,8 @@ class Point:
         Its label without the number of robots: the evaluator, and whatever else differs.
     robots, agents, messages
         Sizes.
+    period
+        What a decision may take to keep up with the robots [s].
     values
         Estimates by name, see `analyse`.
     """
@@ -119,6 +120,7 @@ class Point:
     robots: int
     agents: int
     messages: int
+    period: float
     values: dict[str, Estimate]
 
 
@@ -168,7 +170,8 @@ def analyse(results: Results) -> Scaling:
             values["all touch"] = bootstrap(numbers["all_touching"])
         agents, passed = (int(numbers[n][0]) for n in ("agents", "messages"))
         evaluator = _without_robots(condition, sizes)
-        points.append(Point(evaluator, sizes[condition], agents, passed, values))
+        period = float(numbers["period_s"][0])
+        points.append(Point(evaluator, sizes[condition], agents, passed, period, values))
         shown = {name: values[name] for name in COLUMNS if name in values}
         table.append(Summary(condition, len(steps), shown))
     exponents = _exponents(points)

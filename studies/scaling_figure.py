@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import NullLocator
 
 from .figures import COLOURS, SETTINGS, save
-from .scaling import DECISION_PERIOD, Scaling
+from .scaling import Scaling
 
 MARKERS = "osD^vP"
 PANELS = (
@@ -46,7 +46,8 @@ def draw(analysis: Scaling, directory: Path) -> list[Path]:
                 axes.set_yscale("log")
             else:
                 axes.set_ylim(*((-0.03, 1.03) if name == "greedy" else (0.0, None)))
-        panels[0][1].axhline(1e3 * DECISION_PERIOD, color="#888888", linewidth=0.8, ls=":")
+        for period in {p.period for p in analysis.points}:
+            panels[0][1].axhline(1e3 * period, color="#888888", linewidth=0.8, ls=":")
         _messages(panels[1][2], analysis, evaluators)
         for axes in panels.flat:
             axes.set_xscale("log", base=2)

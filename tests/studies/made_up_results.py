@@ -87,6 +87,7 @@ def scaling(success: dict[int, float], seconds_per_agent: float = 1e-4) -> Resul
         spread = rng.uniform(0.9, 1.1, SEEDS)
         base.numbers[condition] = {
             "robots": np.full(SEEDS, agents / 2),
+            "period_s": np.full(SEEDS, 0.512),
             "agents": np.full(SEEDS, float(agents)),
             "messages": np.full(SEEDS, agents * (agents - 1) / 2),
             "team_bytes": np.full(SEEDS, 1e5 * agents),
