@@ -82,7 +82,10 @@ def carried_out(
     """Run what is left of a study, and open its store; parameters as those of `conduct`."""
     check(spec)
     study, trials = load_study(spec.study), trials_of(spec)
-    with hire(backend, jobs, address) as workers, Store.create(directory, spec) as store:
+    with (
+        hire(backend, jobs, address, len(trials)) as workers,
+        Store.create(directory, spec) as store,
+    ):
         if retry_failed:
             store.forget_failed()
         pending = store.pending(trials)

@@ -50,7 +50,7 @@ def check_jobs(jobs: int) -> None:
 
 
 @contextmanager
-def hire(backend: Backend, jobs: int | None, address: str | None) -> Iterator[Workers]:
+def hire(backend: Backend, jobs: int | None, address: str | None, trials: int) -> Iterator[Workers]:
     """Have workers for as long as the context lasts.
 
     Parameters
@@ -61,6 +61,8 @@ def hire(backend: Backend, jobs: int | None, address: str | None) -> Iterator[Wo
         Most trials at a time; None: one for every core, or for every worker at `address`.
     address
         Of the scheduler of a running Dask cluster; None: workers of this machine are started.
+    trials
+        How many trials there are; no more workers are started.
 
     Raises
     ------
@@ -69,12 +71,13 @@ def hire(backend: Backend, jobs: int | None, address: str | None) -> Iterator[Wo
     """
     if jobs is not None:
         check_jobs(jobs)
+    wanted = max(1, min(jobs or CORES, trials))
     if backend == "loky":
         from .loky_workers import LokyWorkers
 
         if address is not None:
             raise SpecError(f"--address {address}: is for --backend dask only")
-        yield LokyWorkers(jobs or CORES)
+        yield LokyWorkers(wanted)
         return
     try:
         from .dask_workers import DaskWorkers
@@ -85,7 +88,7 @@ def hire(backend: Backend, jobs: int | None, address: str | None) -> Iterator[Wo
             f"--backend dask: {error.name} is not installed; pip install 'nested-agents[dask]'"
         ) from None
     if address is None:
-        with DaskWorkers.local(jobs or CORES) as workers:
+        with DaskWorkers.local(wanted) as workers:
             yield workers
     else:
         with DaskWorkers.at(address, jobs) as workers:

@@ -12,6 +12,7 @@ from joblib.externals.loky import get_reusable_executor
 from nested_agents.studies.loky_workers import LokyWorkers
 from nested_agents.studies.runner import ATTEMPTS, run_trials
 from nested_agents.studies.store import Store
+from nested_agents.studies.workers import hire
 
 
 def content(store):
@@ -142,3 +143,9 @@ def test_never_more_trials_are_said_to_run_than_there_are_processes():
         running = [trial for trial in started if trial in left]
         assert len(running) == min(2, len(left))
     assert len(started) == len(set(started)) == len(made_up.TRIALS)
+
+
+@pytest.mark.parametrize(("jobs", "trials", "expected"), [(512, 3, 3), (1, 3, 1), (2, 0, 1)])
+def test_no_more_workers_than_trials(jobs, trials, expected):
+    with hire("loky", jobs, None, trials) as workers:
+        assert workers.processes == expected

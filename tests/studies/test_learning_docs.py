@@ -1,0 +1,20 @@
+"""docs/learning.md holds the tables that the committed results give."""
+
+from pathlib import Path
+
+import pytest
+
+from nested_agents.studies import published
+from nested_agents.studies.cli import main
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = ROOT / "docs" / "learning.md"
+COLUMNS = ("success last 5", "success greedy", "steps greedy")
+
+
+@pytest.mark.parametrize("name", ["learning-curve", "tasks", "four-robots", "learners"])
+def test_tables(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    path = published.FOLDER / f"{name}.json"
+    assert main(["table", str(path), "--columns", *COLUMNS, "--format", "markdown"]) == 0
+    table = capsys.readouterr().out
+    assert table in PAGE.read_text(encoding="utf-8"), f"docs/learning.md: put in\n{table}"
