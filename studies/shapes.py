@@ -17,6 +17,8 @@ import numpy as np
 from .comparison import Difference, ratio
 from .paired_tests import holm, paired_permutation
 from .results import Arrays, Results
+from .spec import Spec
+from .spec_errors import SpecError
 from .statistics import bootstrap, rate
 from .summary import Summary
 from .trial import Session, Trial, TrialResult
@@ -24,6 +26,12 @@ from .trial import Session, Trial, TrialResult
 TRAINED = "trained on"
 """How the box of training is called among the others."""
 PREFIX = "evaluation:"
+
+
+def check(spec: Spec) -> None:
+    """Raise `SpecError` unless there is another box to compare with."""
+    if not spec.evaluations:
+        raise SpecError('evaluations: missing; shapes needs one at least, as circle.box = "circle"')
 
 
 def measure(trial: Trial) -> TrialResult:
@@ -72,7 +80,8 @@ def analyse(results: Results) -> Shapes:
         for box, arrays in boxes.items():
             label = box if len(results.evaluation) == 1 else f"{condition}: {box}"
             estimates = {"success": rate(arrays["success"])}
-            estimates["ratio"] = by_box[box].estimate if box in by_box else bootstrap([1.0])
+            own = 1.0 if trained["success"].any() else np.nan
+            estimates["ratio"] = by_box[box].estimate if box in by_box else bootstrap([own])
             estimates |= _further(arrays, results.numbers.get(condition, {}), box)
             table.append(Summary(label, len(arrays["success"]), estimates))
     notes = [line for condition, found in ratios.items() for line in _verdict(condition, found)]

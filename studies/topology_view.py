@@ -27,6 +27,10 @@ from ..topologies.config import (
 Form = Literal["table", "json"]
 
 
+MOST_AGENTS = 1000
+"""Beyond, the table has more lines than anybody reads, and takes minutes."""
+
+
 @dataclass(frozen=True)
 class Team:
     """Agents by name, and their groups: what a topology is built over."""
@@ -143,6 +147,8 @@ def team_of(
         if value is not None and value < 1:
             raise ValueError(f"{name} = {value}, allowed: 1 or more")
     n = agents or (robots * (wheels or 2) if robots else 2 * wheels if wheels else len(named) or 4)
+    if n > MOST_AGENTS:
+        raise ValueError(f"agents = {n}, allowed: up to {MOST_AGENTS:,}, to be looked at")
     if wheels is None:
         wheels = n // robots if robots and n % robots == 0 else 1 if n % 2 else 2
     robots = n // wheels if robots is None else robots

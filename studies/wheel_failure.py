@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -71,6 +71,11 @@ def check(spec: Spec) -> None:
         if onset is None:
             raise SpecError(
                 f"scenario.failures = []: wheel-failure needs one (condition {condition.label!r})"
+            )
+        if spec.episodes < 2 * BLOCK:
+            raise SpecError(
+                f"episodes = {spec.episodes}: wheel-failure needs {2 * BLOCK} or more, {BLOCK} "
+                f"before the failure and {BLOCK} with it"
             )
         if not BLOCK <= onset <= spec.episodes - BLOCK:
             raise SpecError(
@@ -178,6 +183,7 @@ class WheelFailures:
     curves: tuple[Estimate, ...]
     gains: tuple[Difference, ...]
     notes: tuple[str, ...]
+    headline: ClassVar[str] = "end"
 
 
 def analyse(results: Results) -> WheelFailures:
@@ -235,11 +241,14 @@ def _summary(course: Course) -> Summary:
         "before": rate(course.before),
         "just after": rate(course.after),
         "end": rate(course.end),
-        "recovered": rate(recovered[:, None]),
-        "episodes": bootstrap(episodes),
-        "steps": bootstrap(steps),
-        "area lost": bootstrap(course.lost),
     }
+    if course.before.any():  # else there is nothing to lose or to come back to
+        estimates |= {
+            "recovered": rate(recovered[:, None]),
+            "episodes": bootstrap(episodes),
+            "steps": bootstrap(steps),
+            "area lost": bootstrap(course.lost),
+        }
     return Summary(f"{course.fault}: {course.adapts}", len(course.success), estimates)
 
 

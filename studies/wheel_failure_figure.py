@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from textwrap import wrap
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 
 from .figures import COLOURS, SETTINGS, STYLES, save
 from .statistics import bootstrap
@@ -28,7 +30,7 @@ def draw(analysis: WheelFailures, directory: Path) -> list[Path]:
     columns = min(3, len(faults))
     rows = -(-len(faults) // columns)
     with mpl.rc_context(SETTINGS):  # type: ignore[arg-type]
-        size = (1.0 + 2.6 * columns, 1.0 + 2.1 * rows)
+        size = (max(5.6, 1.0 + 2.6 * columns), 1.2 + 2.1 * rows)
         figure = Figure(figsize=size, layout="constrained")
         panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
         for axes, fault in zip(panels.flat, faults, strict=False):
@@ -43,7 +45,7 @@ def draw(analysis: WheelFailures, directory: Path) -> list[Path]:
                     episodes, estimate.low, estimate.high, color=colour, alpha=0.1, lw=0
                 )
                 axes.plot(episodes, estimate.value, color=colour, ls=style, lw=1.6)
-            axes.set_title(fault, loc="left")
+            axes.set_title("\n".join(wrap(fault, round(60 / columns))), loc="left")
             axes.set_ylim(-0.03, 1.03)
             axes.grid(axis="y", alpha=0.25)
         for axes in list(panels.flat)[len(faults) :]:
@@ -52,6 +54,7 @@ def draw(analysis: WheelFailures, directory: Path) -> list[Path]:
             axes.set_ylabel("success")
         for axes in list(panels.flat)[max(0, len(faults) - columns) : len(faults)]:
             axes.set_xlabel("episode")
+            axes.xaxis.set_major_locator(MaxNLocator(integer=True))
             axes.tick_params(labelbottom=True)
         handles = [
             Line2D([], [], color=COLOURS[i], ls=STYLES[i % len(STYLES)], label=case)
@@ -61,7 +64,7 @@ def draw(analysis: WheelFailures, directory: Path) -> list[Path]:
         counted = f"{seeds[0]}" if len(seeds) == 1 else f"{seeds[0]} to {seeds[-1]}"
         figure.legend(
             handles=handles,
-            title=f"what adapts (means over {counted} seeds and {SMOOTHED} episodes, 95 % bands)",
+            title=f"what adapts\nmeans over {counted} seeds and {SMOOTHED} episodes, 95 % bands",
             loc="outside upper center",
             ncols=len(cases),
             frameon=False,

@@ -7,6 +7,9 @@ from typing import Literal
 
 from .options import CORES, Figure, Jobs
 
+MOST_AGENTS = 10_000
+"""Of one row: its integers have some fifty thousand digits."""
+
 
 def command(
     agents: str = "4",
@@ -117,6 +120,8 @@ def numbers(text: str) -> range:
         found = range(first, last + 1, *parts[2:])
     except (ValueError, TypeError):
         found = range(0)
-    if not found or found[0] < 1:
-        raise ValueError(f"agents = {text!r}, allowed: 4, 1:16 or 2:64:2, from 1 upwards")
+    if not found or found[0] < 1 or found[-1] > MOST_AGENTS:
+        raise ValueError(
+            f"agents = {text!r}, allowed: 4, 1:16 or 2:64:2, from 1 to {MOST_AGENTS:,}"
+        )
     return found

@@ -11,8 +11,8 @@ from .options import Directory
 
 def command(
     directory: Directory,
-    condition: Annotated[str | None, tyro.conf.arg(metavar="LABEL")] = None,
-    seed: Annotated[int | None, tyro.conf.arg(metavar="SEED")] = None,
+    condition: Annotated[str | None, tyro.conf.arg(metavar="LABEL", help_behavior_hint="")] = None,
+    seed: Annotated[int | None, tyro.conf.arg(metavar="SEED", help_behavior_hint="")] = None,
 ) -> int:
     """Explain a trained team: its rules in words, its policy around the box, its self-model.
 

@@ -8,7 +8,11 @@ import tyro
 
 
 def command(
-    name: Annotated[str | None, tyro.conf.Positional, tyro.conf.arg(metavar="[NAME]")] = None,
+    name: Annotated[
+        str | None,
+        tyro.conf.Positional,
+        tyro.conf.arg(metavar="[NAME]", help_behavior_hint=""),
+    ] = None,
 ) -> int:
     """List the presets, or print one in full.
 

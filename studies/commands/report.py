@@ -12,7 +12,7 @@ from .options import Directory
 
 def command(
     directory: Directory,
-    out: Annotated[Path | None, tyro.conf.arg(metavar="FILE.html")] = None,
+    out: Annotated[Path | None, tyro.conf.arg(metavar="FILE.html", help_behavior_hint="")] = None,
 ) -> int:
     """Write a study as one self-contained HTML file: verdict, table, figures, replays, spec.
 
@@ -30,6 +30,8 @@ def command(
     path = directory / "report.html" if out is None else out
     if path.is_dir() or not path.name:
         raise SpecError(f"--out {path}: is a directory")
+    if path.suffix not in (".html", ".htm"):
+        raise SpecError(f"--out {path}: suffix must be .html or .htm")
     content = page(directory).encode()
     if not path.parent.is_dir():
         raise SpecError(f"--out {path}: there is no directory {path.parent}")

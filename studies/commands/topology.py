@@ -11,7 +11,11 @@ from .options import Figure, Number
 
 def command(
     action: Annotated[Literal["list", "show"], tyro.conf.Positional],
-    topology: Annotated[str | None, tyro.conf.Positional, tyro.conf.arg(metavar="[SPEC]")] = None,
+    topology: Annotated[
+        str | None,
+        tyro.conf.Positional,
+        tyro.conf.arg(metavar="[SPEC]", help_behavior_hint=""),
+    ] = None,
     agents: Number = None,
     robots: Number = None,
     wheels: Number = None,

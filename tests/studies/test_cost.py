@@ -107,6 +107,7 @@ def test_numbers() -> None:
         (("--agents", "0"), "agents = '0', allowed: 4, 1:16 or 2:64:2"),
         (("--agents", "four"), "agents = 'four'"),
         (("--agents", "5:2"), "agents = '5:2'"),
+        (("--agents", "1:10001"), "from 1 to 10,000"),
         (("--actions", "1"), "actions = 1, allowed: 2 or more"),
         (("--rules", "0"), "rules = 0, allowed: 1 or more"),
         (("--topology", "ring"), "topology 'ring': known: chain,"),

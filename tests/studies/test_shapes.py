@@ -1,12 +1,14 @@
 from pathlib import Path
 
+import pytest
 from made_up_results import shapes
 
 from nested_agents.studies import shapes as module
 from nested_agents.studies.results import Results
 from nested_agents.studies.shapes import analyse, draw, least_ratio, measure
 from nested_agents.studies.spec import Spec
-from nested_agents.studies.trial import run_trial, trials_of
+from nested_agents.studies.spec_errors import SpecError
+from nested_agents.studies.trial import check, run_trial, trials_of
 
 CHANCES = {"circle": 0.95, "hexagon": 0.9, "L": 0.3}
 
@@ -28,6 +30,11 @@ def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
     paths = draw(analyse(shapes(CHANCES)), tmp_path)
     assert [path.name for path in paths] == ["shapes.png", "shapes.svg"]
     assert draw(analyse(Results({}, {})), tmp_path) == []
+
+
+def test_a_spec_without_another_box_is_refused() -> None:
+    with pytest.raises(SpecError, match="evaluations: missing; shapes needs one at least"):
+        check(Spec.of({"study": "shapes"}))
 
 
 def test_one_team_is_evaluated_with_every_box() -> None:

@@ -116,6 +116,7 @@ def test_a_plot_is_written(said, tmp_path: Path) -> None:
         (("show", "edges:a>b,b>a"), "topology 'edges': cycle a -> b -> a"),
         (("show", "chian"), "did you mean 'chain'?"),
         (("show", "chain", "--agents", "0"), "agents = 0, allowed: 1 or more"),
+        (("show", "chain", "--agents", "1001"), "agents = 1001, allowed: up to 1,000"),
         (("show", "chain", "--actions", "1"), "actions = 1, allowed: 2 or more"),
         (("show", "chain", "--agents", "5", "--robots", "2"), "agents = 5 cannot be divided"),
         (("show", "chain", "--agents", "4", "--robots", "2", "--wheels", "3"), "are not robots"),

@@ -49,6 +49,15 @@ def test_cases_are_told_apart_by_what_adapts() -> None:
     assert gains["2 wheels, seized, both"].p == 1.0
 
 
+def test_what_never_succeeded_has_nothing_to_recover() -> None:
+    results = wheel_failure({"fault": dict.fromkeys(ENDS["4 wheels, seized"], 0.0)})
+    for phase in results.phases.values():
+        for arrays in phase.values():
+            arrays["success"][:] = 0
+    for line in analyse(results).table:
+        assert list(line.estimates) == ["before", "just after", "end"]
+
+
 @pytest.mark.parametrize(
     ("columns", "faults"),
     [
@@ -120,6 +129,11 @@ def test_the_copy_keeps_weights_but_not_its_model_of_itself() -> None:
 def test_a_spec_without_a_failure_in_the_midst_is_refused(failures: list, said: str) -> None:
     with pytest.raises(SpecError, match=said):
         check(Spec.of(SHORT | {"scenario": {"failures": failures}}))
+
+
+def test_too_few_episodes_for_the_two_levels_are_refused() -> None:
+    with pytest.raises(SpecError, match=r"episodes = 9: wheel-failure needs 10 or more"):
+        check(Spec.of(SHORT | {"episodes": 9}))
 
 
 def test_an_unfinished_condition_is_left_out() -> None:

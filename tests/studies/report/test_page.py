@@ -90,6 +90,7 @@ def test_the_command_writes_it_whole(finished, tmp_path, capsys):
     [
         (["nowhere"], f"nowhere: holds no study (no {DATABASE})"),
         (["STUDY", "--out", "OUT"], "--out OUT: is a directory"),
+        (["STUDY", "--out", "OUT/spec.toml"], "--out OUT/spec.toml: suffix must be .html or .htm"),
         (["STUDY", "--out", "OUT/deep/a.html"], "--out OUT/deep/a.html: there is no directory"),
     ],
 )
