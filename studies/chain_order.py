@@ -124,9 +124,12 @@ def shortened(orders: Sequence[str]) -> list[str]:
     --------
     >>> shortened(("chain:r1.a,r1.b", "chain:r1.b,r1.a"))
     ['1 2', '2 1']
+    >>> shortened(("chain", "chain:reversed"))
+    ['chain', 'reversed']
     """
     named = [order.removeprefix("chain:").split(",") for order in orders]
-    number = {name: str(k + 1) for k, name in enumerate(named[0])} if named else {}
+    first = named[0] if named and len(named[0]) > 1 else []  # else it does not name them
+    number = {name: str(k + 1) for k, name in enumerate(first)}
     return [" ".join(number.get(name, name) for name in names) for names in named]
 
 

@@ -123,7 +123,8 @@ class Store:
             try:
                 condition.settings.topology.check_unchanged()
             except ValueError as error:
-                return f"{self.directory}: topology of condition {condition.label!r}: {error}"
+                title = condition.settings.topology.title
+                return f"{self.directory}: topology {title!r}: {error}"
         return None
 
     def meta(self, key: str) -> str:

@@ -111,7 +111,8 @@ def build(
         named = [(a,) for a in agents] if groups is None else _named(agents, groups)
         return Hierarchy(agents, BUILDERS[kind](settings, agents, named).edges)
     except ValueError as error:
-        raise ValueError(f"topology {kind!r}: {str(error).removeprefix('hierarchy: ')}") from None
+        said = str(error).removeprefix("hierarchy: ").removeprefix(f"{settings.title}: ")
+        raise ValueError(f"topology {settings.title!r}: {said}") from None
 
 
 def _named(agents: Sequence[str], groups: Sequence[Any]) -> Groups:

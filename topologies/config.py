@@ -32,6 +32,11 @@ class TopologySettings(Settings):
         """Return the settings that ``"kind:argument"`` stands for."""
         raise ValueError(f"takes no argument, received {argument!r}")
 
+    @property
+    def title(self) -> str:
+        """What it is called in complaints."""
+        return str(getattr(self, "kind", None))
+
     def check_unchanged(self) -> None:
         """Refuse if a file that the topology is made from is not what it was: one line."""
 
@@ -176,13 +181,15 @@ class _OfAFile(TopologySettings):
         """Read what is named."""
         return cls.model_validate({cls.key: argument})
 
+    @property
+    def title(self) -> str:
+        """What is named."""
+        return str(getattr(self, self.key))
+
     def check_unchanged(self) -> None:
         """Refuse another content than the digest's."""
-        named = getattr(self, self.key)
-        if (found := self.digest_of(named)) != self.digest:
-            raise ValueError(
-                f"{named} has changed: its digest is {found}, the settings say {self.digest}"
-            )
+        if (found := self.digest_of(self.title)) != self.digest:
+            raise ValueError(f"has changed: its digest is {found}, the settings say {self.digest}")
 
 
 class FileSettings(_OfAFile):

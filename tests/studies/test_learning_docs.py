@@ -12,7 +12,7 @@ PAGE = ROOT / "docs" / "learning.md"
 COLUMNS = ("success last 5", "success greedy", "steps greedy")
 
 
-@pytest.mark.parametrize("name", ["learning-curve", "tasks", "four-robots", "learners"])
+@pytest.mark.parametrize("name", ["learning-curve", "tasks", "told"])
 def test_tables(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     path = published.FOLDER / f"{name}.json"
     assert main(["table", str(path), "--columns", *COLUMNS, "--format", "markdown"]) == 0

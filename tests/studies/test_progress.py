@@ -121,4 +121,4 @@ def test_a_topology_that_is_drawn_otherwise_is_told(tmp_path, capsys):
     assert "nothing can be added" not in capsys.readouterr().out
     source.write_text("def line(agents, groups):\n    return []\n")
     assert main(["status", str(tmp_path / "out")]) == 0
-    assert "mine.py:line has changed: its digest is" in capsys.readouterr().out
+    assert "mine.py:line': has changed: its digest is" in capsys.readouterr().out
