@@ -18,6 +18,7 @@ LATEX = {
     "{": r"\{", "}": r"\}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
 }  # fmt: skip
 """What LaTeX reads otherwise, and how it is written instead."""
+MATHS_SPACE = r"\;"
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,15 @@ class Cell:
 
     value: str
     interval: str
+
+    def bracketed(self, between: str) -> str:
+        """Return the value, and its interval in brackets."""
+        around = f"{between}[{self.interval.replace('–', ', ')}]" if self.interval else ""
+        return self.value + around
+
+
+Row = tuple[str, int, tuple[Cell | None, ...]]
+"""Condition, number of seeds, and a cell per title; none where there is no estimate."""
 
 
 @dataclass(frozen=True)
@@ -37,13 +47,13 @@ class Table:
     titles
         Headings of the estimates.
     rows
-        Condition, number of seeds, and a cell per title; none where there is no estimate.
+        Its lines.
     csv, latex, markdown
         The whole table as text.
     """
 
     titles: tuple[str, ...]
-    rows: tuple[tuple[str, int, tuple[Cell | None, ...]], ...]
+    rows: tuple[Row, ...]
     csv: str
     latex: str
     markdown: str
@@ -104,25 +114,15 @@ def _ends(estimate: Estimate) -> tuple[float, float, float]:
     return float(estimate.value), float(estimate.low), float(estimate.high)
 
 
-def _markdown(
-    titles: Sequence[str], rows: Sequence[tuple[str, int, tuple[Cell | None, ...]]]
-) -> str:
+def _markdown(titles: Sequence[str], rows: Sequence[Row]) -> str:
     lines = [["condition", "seeds", *titles], ["---"] * (2 + len(titles))]
     for condition, seeds, cells in rows:
-        lines.append([condition, str(seeds), *map(_bracketed, cells)])
-    return "".join(
-        f"| {' | '.join(c.replace('|', chr(92) + '|') for c in line)} |\n" for line in lines
-    )
+        lines.append([condition, str(seeds), *(c.bracketed(" ") if c else "" for c in cells)])
+    escaped = [[text.replace("|", r"\|") for text in line] for line in lines]
+    return "".join(f"| {' | '.join(line)} |\n" for line in escaped)
 
 
-def _bracketed(cell: Cell | None) -> str:
-    if cell is None:
-        return ""
-    around = f" [{cell.interval.replace('–', ', ')}]" if cell.interval else ""
-    return f"{cell.value}{around}"
-
-
-def _latex(titles: Sequence[str], rows: Sequence[tuple[str, int, tuple[Cell | None, ...]]]) -> str:
+def _latex(titles: Sequence[str], rows: Sequence[Row]) -> str:
     lines = [
         "% needs \\usepackage{booktabs}; 95 % intervals in brackets",
         rf"\begin{{tabular}}{{lr{'r' * len(titles)}}}",
@@ -133,14 +133,9 @@ def _latex(titles: Sequence[str], rows: Sequence[tuple[str, int, tuple[Cell | No
     for condition, seeds, cells in rows:
         # After a line's end LaTeX would take a leading bracket for an option.
         name = "{}" * condition.startswith(("[", "*")) + _escaped(condition)
-        lines.append(" & ".join([name, str(seeds), *map(_maths, cells)]) + r" \\")
+        numbers = (f"${c.bracketed(MATHS_SPACE)}$" if c else "--" for c in cells)
+        lines.append(" & ".join([name, str(seeds), *numbers]) + r" \\")
     return "\n".join([*lines, r"\bottomrule", r"\end{tabular}"]) + "\n"
-
-
-def _maths(cell: Cell | None) -> str:
-    if cell is None:
-        return "--"
-    return f"${_bracketed(cell).replace(' [', chr(92) + ';[')}$"
 
 
 def _escaped(text: str) -> str:

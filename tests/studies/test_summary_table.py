@@ -39,6 +39,17 @@ def test_latex_escapes_and_has_as_many_cells_in_every_row():
     assert rows[2] == r"{}[a \& b] & 1 & $0$ & -- \\"
 
 
+def test_markdown_has_chosen_columns_and_keeps_bars_out_of_cells():
+    lines = [*LINES, Summary("a|b", 2, {})]
+    assert tabulate(lines, ["success"]).markdown.splitlines() == [
+        "| condition | seeds | success |",
+        "| --- | --- | --- |",
+        "| order=1, 50 % | 8 | .33 [.20, .50] |",
+        "| [a & b] | 1 | 0 |",
+        r"| a\|b | 2 |  |",
+    ]
+
+
 def test_cells_are_as_in_the_terminal():
     table = tabulate(LINES)
     assert table.titles == ("success", "x_1 [m]")
