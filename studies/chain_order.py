@@ -12,14 +12,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .comparison import LEVEL
+from .comparison import LEVEL, aligned
 from .paired_tests import Friedman, friedman, holm, paired_permutation
-from .results import Arrays, Results
+from .results import Results
 from .statistics import bootstrap, rate
 from .summary import Summary
 from .trial import run_trial as measure
@@ -31,6 +31,11 @@ class Measure:
 
     title: str
     phase: Literal["training", "evaluation"]
+
+    def of(self, results: Results, condition: str) -> NDArray[np.float64]:
+        """Return the values ``(n_seeds,)`` of an order."""
+        success = getattr(results, self.phase)[condition]["success"]
+        return np.asarray(success.mean(axis=1))
 
 
 MEASURES = (
@@ -141,12 +146,12 @@ def _legend(orders: Sequence[str]) -> list[str]:
 
 def _compared(results: Results, conditions: list[str], names: list[str]) -> tuple[Comparison, ...]:
     found = []
-    for m in MEASURES:
+    for m in MEASURES if len(conditions) > 1 else ():
         phase = getattr(results, m.phase)
         if any(condition not in phase for condition in conditions):
             continue
-        values = _paired(results, phase, conditions)
-        if values.shape[1] < 2 or len(values) < 2:
+        values = np.stack(aligned(results, conditions, m.of), axis=1)
+        if len(values) < 2:
             continue
         against = np.array([paired_permutation(c, values[:, 0]) for c in values.T[1:]])
         found.append((m.title, values, friedman(values), against))
@@ -158,17 +163,6 @@ def _compared(results: Results, conditions: list[str], names: list[str]) -> tupl
         Comparison(title, tuple(names), values, test, float(p), ps)
         for (title, values, test, _), p, ps in zip(found, omnibus, adjusted, strict=True)
     )
-
-
-def _paired(results: Results, phase: dict[str, Arrays], conditions: list[str]) -> NDArray[Any]:
-    """Return success ``(n_seeds, n_orders)`` for the seeds that all orders have finished."""
-    seeds = [results.seeds[condition] for condition in conditions]
-    shared = [seed for seed in seeds[0] if all(seed in own for own in seeds)] if seeds else []
-    columns = [
-        phase[condition]["success"].mean(axis=1)[[own.index(seed) for seed in shared]]
-        for condition, own in zip(conditions, seeds, strict=True)
-    ]
-    return np.stack(columns, axis=1) if columns else np.zeros((0, 0))
 
 
 def _verdict(comparisons: tuple[Comparison, ...]) -> list[str]:

@@ -86,16 +86,22 @@ def paired(
     values: Callable[[Results, str], ArrayLike],
 ) -> tuple[Array, Array]:
     """Return the values ``(n_seeds, ...)`` of two conditions for the seeds that both have."""
-    seeds = [results.seeds.get(condition, ()) for condition in (first, second)]
-    shared = [seed for seed in seeds[0] if seed in seeds[1]]
-    if not shared:
-        return np.zeros(0), np.zeros(0)
-    columns = [np.asarray(values(results, condition)) for condition in (first, second)]
-    one, other = (
-        column[[own.index(seed) for seed in shared]]
-        for column, own in zip(columns, seeds, strict=True)
-    )
+    one, other = aligned(results, (first, second), values)
     return one, other
+
+
+def aligned(
+    results: Results, conditions: Sequence[str], values: Callable[[Results, str], ArrayLike]
+) -> list[Array]:
+    """Return the values ``(n_seeds, ...)`` of conditions for the seeds that all of them have."""
+    seeds = [results.seeds.get(condition, ()) for condition in conditions]
+    shared = [seed for seed in seeds[0] if all(seed in own for own in seeds)]
+    if not shared:
+        return [np.zeros(0) for _ in conditions]
+    return [
+        np.asarray(values(results, condition))[[own.index(seed) for seed in shared]]
+        for condition, own in zip(conditions, seeds, strict=True)
+    ]
 
 
 def difference(first: ArrayLike, second: ArrayLike, level: float = 0.95) -> Estimate:
