@@ -23,11 +23,11 @@ from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from nested_agents.studies.running import MARK
-from nested_agents.studies.spec import Spec
-from nested_agents.studies.spec_errors import SpecError
-from nested_agents.studies.spec_toml import dumps
-from nested_agents.studies.store import Store
+from nested_agents.studies.spec.errors import SpecError
+from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.spec.toml import dumps
+from nested_agents.studies.store.running import MARK
+from nested_agents.studies.store.store import Store
 
 SPEC = Spec.of(
     {"seeds": 20, "episodes": 2, "steps": 100, "evaluation": 1,

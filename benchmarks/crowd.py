@@ -10,13 +10,13 @@ import argparse
 from itertools import pairwise
 from pathlib import Path
 
-from nested_agents.core.config import Decision, TDLambdaSettings
 from nested_agents.core.hierarchy import Hierarchy
 from nested_agents.core.loop import control_loop, policy_seed, world_seed
+from nested_agents.core.settings import Decision, TDLambdaSettings
 from nested_agents.core.team import Team
 from nested_agents.scenarios import ScenarioSettings, build
-from nested_agents.scenarios.rendering import snapshot
-from nested_agents.studies.episodes import EpisodeRecorder, Stopwatch
+from nested_agents.scenarios.box_pushing.pictures.rendering import snapshot
+from nested_agents.studies.trials.episodes import EpisodeRecorder, Stopwatch
 
 
 def main() -> None:

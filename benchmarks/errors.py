@@ -24,7 +24,6 @@ from rich.console import Console
 from rich.table import Table
 
 from nested_agents.core.arrays import FloatArray
-from nested_agents.core.config import BatchTDSettings, Decision
 from nested_agents.core.evaluators import (
     Evaluator,
     ExactEnumeration,
@@ -35,6 +34,7 @@ from nested_agents.core.evaluators import (
 )
 from nested_agents.core.hierarchy import Hierarchy
 from nested_agents.core.loop import control_loop, policy_seed
+from nested_agents.core.settings import BatchTDSettings, Decision
 from nested_agents.core.team import Team
 from nested_agents.scenarios import ScenarioSettings, build
 

@@ -122,7 +122,7 @@ def import_seconds(repeats: int = 3) -> Row:
         "interpreter": "pass",
         "nested_agents": "import nested_agents",
         "core.team": "import nested_agents.core.team",
-        "studies.cli": "import nested_agents.studies.cli",
+        "studies.cli": "import nested_agents.studies.cli.main",
     }.items():
         taken = []
         for _ in range(repeats):

@@ -14,7 +14,7 @@ import Box2D
 import numpy as np
 
 from nested_agents.core.arrays import FloatArray
-from nested_agents.scenarios.world import (
+from nested_agents.scenarios.box_pushing.world.world import (
     POSITION_ITERATIONS,
     UNIT,
     VELOCITY_ITERATIONS,
@@ -70,7 +70,7 @@ class NaiveWorld(World):
         self.contact_time = touched / periods
 
     def _drive(self, r: int, speeds: list[float]) -> None:
-        """Apply the forces of a robot's wheels, see `nested_agents.scenarios.wheels`."""
+        """Apply the forces of a robot's wheels, see `nested_agents.scenarios.box_pushing.world.wheels`."""
         body, model = self._bodies[r], self._wheels
         vx, vy = body.linearVelocity
         omega = body.angularVelocity

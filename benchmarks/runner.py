@@ -24,11 +24,11 @@ from statistics import median
 
 from joblib.externals.loky import get_reusable_executor
 
-from nested_agents.studies.loky_workers import LokyWorkers
-from nested_agents.studies.runner import run_trials
-from nested_agents.studies.spec import Spec
-from nested_agents.studies.store import Store
-from nested_agents.studies.trial import Trial, TrialResult, run_trial, trials_of
+from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.store.store import Store
+from nested_agents.studies.trials.trial import Trial, TrialResult, run_trial, trials_of
+from nested_agents.studies.workers.loky import LokyWorkers
+from nested_agents.studies.workers.runner import run_trials
 
 TICK = os.sysconf("SC_CLK_TCK")
 

@@ -14,8 +14,8 @@ from rich.console import Console
 from rich.table import Table
 
 from nested_agents.scenarios import ScenarioSettings, build
-from nested_agents.scenarios.boxes import BOXES
-from nested_agents.scenarios.scripted import decisions_to_goal
+from nested_agents.scenarios.box_pushing.scripted.controller import decisions_to_goal
+from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 
 STARTS = ("easy", "medium", "hard")
 STEPS = 200

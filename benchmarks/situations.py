@@ -11,10 +11,10 @@ import numpy as np
 from pydantic import TypeAdapter
 
 from nested_agents.core.arrays import FloatArray, IntArray
-from nested_agents.core.config import Learner as LearnerSettings
 from nested_agents.core.hierarchy import Hierarchy
 from nested_agents.core.learners import TDLambda
 from nested_agents.core.protocols import Prediction
+from nested_agents.core.settings import Learner as LearnerSettings
 from nested_agents.core.team import Team
 from nested_agents.scenarios import BoxPushing, ScenarioSettings, build
 

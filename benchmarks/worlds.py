@@ -23,11 +23,11 @@ from typing import Any
 import numpy as np
 from rich.console import Console
 
-from nested_agents.scenarios.boxes import box_for
-from nested_agents.scenarios.environments import WheelsEnv
-from nested_agents.scenarios.robots import ROBOTS
-from nested_agents.scenarios.starts import place
-from nested_agents.scenarios.world import World
+from nested_agents.scenarios.box_pushing.environments import WheelsEnv
+from nested_agents.scenarios.box_pushing.starts import place
+from nested_agents.scenarios.box_pushing.world.boxes import box_for
+from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
+from nested_agents.scenarios.box_pushing.world.world import World
 
 from .naive_world import NaiveWorld
 from .tables import Row, show

@@ -21,7 +21,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from .arrays import FloatArray
-from .config import CalibrationSettings
+from .settings import CalibrationSettings
 
 
 class Calibration:

@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from .arrays import FloatArray
-from .config import BurstExploration, PaperExploration
+from .settings import BurstExploration, PaperExploration
 
 
 def boltzmann(values: FloatArray, temperature: float) -> FloatArray:

@@ -47,7 +47,7 @@ class Blocks:
         `Prediction.states` gives; if so, of the shared variables only.
 
     Compiled kernels read the tables without looking at their sizes.
-    `nested_agents.scenarios.checker` does look.
+    `nested_agents.scenarios.checking.checker` does look.
     """
 
     own: FloatArray

@@ -23,7 +23,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from .arrays import FloatArray
-from .config import SelfModelSettings
+from .settings import SelfModelSettings
 
 MEMORY = 100
 """Decisions over which the size of innovations is averaged."""

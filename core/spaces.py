@@ -33,7 +33,7 @@ class Variable:
         Whether `low` and `high` are the same point (an angle).
     centres
         Default centres of the membership functions, increasing, within the range. Empty: spread
-        evenly, see `nested_agents.core.fuzzy.Partition.of`.
+        evenly, see `core.rules.fuzzy.Partition.of`.
     labels
         Words for the membership functions, in the order of `centres`; empty: numbered.
 

@@ -10,8 +10,6 @@ import numpy as np
 
 from .arrays import FloatArray, IntArray
 from .calibration import Calibration
-from .config import Decision
-from .config import Learner as LearnerSettings
 from .evaluators import (
     MOST_JOINT_ACTIONS,
     Evaluator,
@@ -34,8 +32,10 @@ from .protocols import (
     SummedScenario,
     Transition,
 )
-from .rules import RuleBase
+from .rules.rule_base import RuleBase
 from .self_model import SelfModel
+from .settings import Decision
+from .settings import Learner as LearnerSettings
 from .spaces import ActionSet
 
 

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from nested_agents.core.config import BatchTDSettings, CalibrationSettings, SelfModelSettings
 from nested_agents.core.loop import policy_seed, world_seed
+from nested_agents.core.settings import BatchTDSettings, CalibrationSettings, SelfModelSettings
 from nested_agents.core.team import Team
 from nested_agents.scenarios import BoxPushing, ScenarioSettings
 from nested_agents.topologies import build, parse

@@ -15,9 +15,9 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
 from nested_agents.scenarios import BoxPushing, ScenarioSettings
-from nested_agents.scenarios.boxes import BOXES
-from nested_agents.scenarios.rendering import AXES, SIDES
-from nested_agents.scenarios.screen import Screen
+from nested_agents.scenarios.box_pushing.pictures.rendering import AXES, SIDES
+from nested_agents.scenarios.box_pushing.pictures.screen import Screen
+from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 
 ROBOTS = (2, 4, 8)
 

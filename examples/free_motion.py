@@ -15,11 +15,15 @@ import numpy as np
 from pydantic import TypeAdapter
 from scipy.linalg import expm
 
-from nested_agents.scenarios.boxes import BOXES
-from nested_agents.scenarios.config import CONTROL_PERIOD, Failure
-from nested_agents.scenarios.failures import Failures
-from nested_agents.scenarios.robots import ROBOTS, RobotSpec, nominal_effect
-from nested_agents.scenarios.world import World
+from nested_agents.scenarios.box_pushing.config import CONTROL_PERIOD, Failure
+from nested_agents.scenarios.box_pushing.world.boxes import BOXES
+from nested_agents.scenarios.box_pushing.world.failures import Failures
+from nested_agents.scenarios.box_pushing.world.robots import (
+    ROBOTS,
+    RobotSpec,
+    nominal_effect,
+)
+from nested_agents.scenarios.box_pushing.world.world import World
 
 PERIODS, SPEED = 40, 0.04
 COLUMN = {"none": 1.0, "seized": 0.0, "weak": 0.3, "reversed": -1.0, "stuck": 0.0}

@@ -10,8 +10,8 @@ import sys
 
 import imageio.v3 as imageio
 
-from nested_agents.scenarios.environments import BoxPushingEnv
-from nested_agents.scenarios.scripted import ScriptedController
+from nested_agents.scenarios.box_pushing.environments import BoxPushingEnv
+from nested_agents.scenarios.box_pushing.scripted.controller import ScriptedController
 
 BOX = {
     "vertices": [[0, 0], [0.3, 0], [0.3, 0.24], [0, 0.24]],

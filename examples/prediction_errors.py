@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from nested_agents.scenarios import BoxPushing, ScenarioSettings
-from nested_agents.scenarios.boxes import BOXES
-from nested_agents.scenarios.predictors import push_model
-from nested_agents.scenarios.scripted import ScriptedController
+from nested_agents.scenarios.box_pushing.prediction.predictors import push_model
+from nested_agents.scenarios.box_pushing.scripted.controller import ScriptedController
+from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 
 PREDICTORS = ("push", "rigid", "static")
 SEEDS, STEPS = range(4), 40

@@ -15,7 +15,7 @@ from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import DummyVecEnv, VecNormalize
 
-from nested_agents.scenarios.environments import BoxPushingEnv
+from nested_agents.scenarios.box_pushing.environments import BoxPushingEnv
 
 STEPS = int(sys.argv[1]) if len(sys.argv) > 1 else 20_000
 EPISODES = 20

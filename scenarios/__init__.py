@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from .config import ScenarioSettings
+from .box_pushing.config import ScenarioSettings
 
 if TYPE_CHECKING:
-    from .box_pushing import BoxPushing
+    from .box_pushing.scenario import BoxPushing
 
 __all__ = ["BoxPushing", "ScenarioSettings", "build"]
 
@@ -15,7 +15,7 @@ __all__ = ["BoxPushing", "ScenarioSettings", "build"]
 def __getattr__(name: str) -> Any:
     # Box2D and numba take a second to import: only when a world is wanted, not to check a spec.
     if name == "BoxPushing":
-        from .box_pushing import BoxPushing
+        from .box_pushing.scenario import BoxPushing
 
         return BoxPushing
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
@@ -23,6 +23,6 @@ def __getattr__(name: str) -> Any:
 
 def build(settings: ScenarioSettings) -> BoxPushing:
     """Build the scenario that `settings` describe."""
-    from .box_pushing import BoxPushing
+    from .box_pushing.scenario import BoxPushing
 
     return BoxPushing(settings)

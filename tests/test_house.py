@@ -91,7 +91,10 @@ def test_a_forbidden_import_is_found(module: str, source: str) -> None:
         ("nested_agents.core.team", "import numpy as np\nfrom .rules import RuleBase"),
         ("nested_agents.topologies.chain", "from ..core.hierarchy import Hierarchy"),
         ("nested_agents.topologies.chain", "from ..core import Hierarchy\nfrom . import tree"),
-        ("nested_agents.studies.cli", "from ..scenarios import Box\nfrom ..topologies import tree"),
+        (
+            "nested_agents.studies.cli.main",
+            "from ..scenarios import Box\nfrom ..topologies import tree",
+        ),
     ],
 )
 def test_an_allowed_import_is_not(module: str, source: str) -> None:

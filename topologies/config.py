@@ -12,8 +12,8 @@ from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 from typing_extensions import TypeAliasType
 
-from ..core.config import Fraction, Settings
 from ..core.refusals import rule
+from ..core.settings import Fraction, Settings
 from . import files
 
 Count = Annotated[int, Field(ge=1)]

@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import FloatArray, IntArray
 from ..hierarchy import Hierarchy
 from ..protocols import Prediction
-from ..rules import RuleBase
+from ..rules.rule_base import RuleBase
 
 Rule = Literal["value", "reward", "reward-and-value"]
 Others = Literal["max", "mean", "observed"]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import FloatArray, IntArray
-from ..kernels import Tried
 from ..protocols import Prediction
+from ..rules.kernels import Tried
 from .evaluator import Gathering, combinations, weights_of
 
 MOST_JOINT_ACTIONS = 4**12

@@ -25,7 +25,7 @@ import numpy as np
 from ..arrays import FloatArray, IntArray
 from ..hierarchy import Hierarchy
 from ..protocols import MergingPrediction, Prediction
-from ..rules import RuleBase
+from ..rules.rule_base import RuleBase
 from .evaluator import Gathering, Others, Rule
 from .grouping import Grouping
 
@@ -68,7 +68,7 @@ class LatinHypercube(Gathering):
         Actions A of every agent.
     rule, others
         By what a joint action is valued, and what the agents below are expected to do; see
-        `nested_agents.core.config.Decision`.
+        `nested_agents.core.settings.Decision`.
     discount
         Of the value, where it is added to the reward.
     """

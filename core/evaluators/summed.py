@@ -23,7 +23,7 @@ import numpy as np
 from ..arrays import FloatArray, IntArray
 from ..hierarchy import Hierarchy
 from ..protocols import Prediction, SummedPrediction
-from ..rules import RuleBase
+from ..rules.rule_base import RuleBase
 from .evaluator import Gathering, Others, Rule
 from .grouping import Grouping
 

@@ -8,7 +8,8 @@ R(s) / (1 - discount). Siblings differ where their mathematics differs.
 
 from __future__ import annotations
 
-from ..config import (
+from ..rules.rule_base import RuleBase
+from ..settings import (
     AnovaTDSettings,
     BatchTDSettings,
     FittedValueSettings,
@@ -16,8 +17,7 @@ from ..config import (
     GradientTDSettings,
     TDLambdaSettings,
 )
-from ..config import Learner as LearnerSettings
-from ..rules import RuleBase
+from ..settings import Learner as LearnerSettings
 from .anova import AnovaTD
 from .batch import BatchTD, FittedValue
 from .gradient import GradientTD

@@ -34,8 +34,8 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
 from ..arrays import FloatArray, IntArray
-from ..config import AnovaTDSettings
-from ..rules import RuleBase
+from ..rules.rule_base import RuleBase
+from ..settings import AnovaTDSettings
 from .batch import REWARD_SCALE, Replay, _lambda_returns, _moment
 from .dictionary import Dictionary
 

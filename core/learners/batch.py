@@ -19,8 +19,8 @@ from numba import njit
 from scipy.linalg import cho_factor, cho_solve
 
 from ..arrays import FloatArray, IntArray
-from ..config import BatchTDSettings, FittedValueSettings, ReplaySettings
-from ..rules import RuleBase
+from ..rules.rule_base import RuleBase
+from ..settings import BatchTDSettings, FittedValueSettings, ReplaySettings
 
 REWARD_SCALE = 100.0
 """Rewards are of the order of 0.01; the ridge weighs against rewards times this."""

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from .. import kernels
 from ..arrays import FloatArray
-from ..config import GradientTDSettings
-from ..rules import RuleBase
+from ..rules import kernels
+from ..rules.rule_base import RuleBase
+from ..settings import GradientTDSettings
 from .online import Online
 
 

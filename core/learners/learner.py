@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from ..arrays import FloatArray
-from ..rules import RuleBase
+from ..rules.rule_base import RuleBase
 
 
 class Learner(Protocol):

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..arrays import FloatArray
-from ..rules import RuleBase
+from ..rules.rule_base import RuleBase
 
 
 class Online(ABC):

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import FloatArray
-from ..config import TDLambdaSettings
-from ..rules import RuleBase
+from ..rules.rule_base import RuleBase
+from ..settings import TDLambdaSettings
 from .online import Online
 
 

@@ -8,14 +8,14 @@ from pathlib import Path
 import jinja2
 from markupsafe import Markup
 
-from ..claims import judge
-from ..claims_table import result
-from ..results import read
-from ..spec_toml import dumps
-from ..store import Store
-from ..study import load_study
-from ..summary_table import tabulate
-from ..trial import RESULTS_VERSION, trials_of
+from ..analysis.results import read
+from ..catalogue.study import load_study
+from ..claims.claims import judge
+from ..claims.table import result
+from ..presentation.tables import tabulate
+from ..spec.toml import dumps
+from ..store.store import Store
+from ..trials.trial import RESULTS_VERSION, trials_of
 from . import words
 from .pictures import pictures
 from .replays import replays
@@ -57,7 +57,7 @@ def page(directory: Path) -> str:
             for finding in judge({spec.study: results})
             if finding.claim.study == spec.study and finding.measured is not None
         ],
-        pictures=pictures(study, analysis) if analysis.table else [],
+        pictures=pictures(study.draw(analysis)) if analysis.table else [],
         replays=packed,
         failed=failed,
         seeds=words.runs(spec.seeds),

@@ -19,12 +19,12 @@ from typing import Any
 import numpy as np
 
 from ...core.arrays import FloatArray
-from ...scenarios.boxes import box_for
-from ...scenarios.robots import robot_for
-from ..episodes import RECORDED, Recording
-from ..spec_errors import SpecError
-from ..store import Store
-from ..trial import Trial
+from ...scenarios.box_pushing.world.boxes import box_for
+from ...scenarios.box_pushing.world.robots import robot_for
+from ..spec.errors import SpecError
+from ..store.store import Store
+from ..trials.episodes import RECORDED, Recording
+from ..trials.trial import Trial
 from .words import runs
 
 NEEDED = (*RECORDED, "goal_pose", "dt", "robot", "box")

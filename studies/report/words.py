@@ -9,8 +9,8 @@ from importlib.metadata import version
 
 import numpy as np
 
-from ..spec import Spec
-from ..summary import Summary, interval, number
+from ..analysis.summary import Summary, interval, number
+from ..spec.spec import Spec
 
 PACKAGES = (
     "nested-agents",
@@ -89,7 +89,7 @@ def contest(table: Sequence[Summary], headline: str | None) -> str:
 
     Examples
     --------
-    >>> from nested_agents.studies.statistics import Estimate
+    >>> from nested_agents.studies.analysis.statistics import Estimate
     >>> e = {"ours": (0.9, 0.8, 0.95), "frozen": (0.1, 0.0, 0.3), "other": (0.85, 0.7, 0.9)}
     >>> table = [Summary(k, 8, {"success": Estimate(*map(np.asarray, v))}) for k, v in e.items()]
     >>> contest(table, "success")

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from nested_agents.core.config import BurstExploration, PaperExploration
 from nested_agents.core.exploration import (
     Bursts,
     EpsilonDecreasingBoltzmann,
@@ -15,6 +14,7 @@ from nested_agents.core.exploration import (
     build_explorer,
     greatest,
 )
+from nested_agents.core.settings import BurstExploration, PaperExploration
 
 VALUES = np.array([0.0, 3.0, 1.0, 2.0])
 

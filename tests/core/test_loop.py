@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nested_agents.core.config import (
+from nested_agents.core.hierarchy import Hierarchy
+from nested_agents.core.loop import StepRecord, control_loop, policy_seed, world_seed
+from nested_agents.core.settings import (
     BatchTDSettings,
     BurstExploration,
     Decision,
@@ -16,8 +18,6 @@ from nested_agents.core.config import (
     RuleBaseSettings,
     TDLambdaSettings,
 )
-from nested_agents.core.hierarchy import Hierarchy
-from nested_agents.core.loop import StepRecord, control_loop, policy_seed, world_seed
 from nested_agents.core.team import Team
 
 LEARNING = TDLambdaSettings(step_size=0.1)

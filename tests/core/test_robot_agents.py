@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from nested_agents.core.config import BatchTDSettings, Decision, SelfModelSettings
 from nested_agents.core.loop import control_loop, policy_seed
 from nested_agents.core.protocols import EmbodiedScenario
 from nested_agents.core.robot_agents import RobotAgents, per_robot
+from nested_agents.core.settings import BatchTDSettings, Decision, SelfModelSettings
 from nested_agents.core.team import Team
-from nested_agents.scenarios.box_pushing import BoxPushing
-from nested_agents.scenarios.checker import CHECKS, check_scenario
-from nested_agents.scenarios.config import ScenarioSettings
+from nested_agents.scenarios.box_pushing.config import ScenarioSettings
+from nested_agents.scenarios.box_pushing.scenario import BoxPushing
+from nested_agents.scenarios.checking.checker import CHECKS, check_scenario
 from nested_agents.topologies import arrange, parse
 
 

@@ -5,9 +5,9 @@ from itertools import product
 import numpy as np
 import pytest
 
-from nested_agents.core.config import RuleBaseSettings, TDLambdaSettings
 from nested_agents.core.hierarchy import Hierarchy
 from nested_agents.core.loop import control_loop
+from nested_agents.core.settings import RuleBaseSettings, TDLambdaSettings
 from nested_agents.core.single_agent import SingleAgent
 from nested_agents.core.team import Team
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
-from nested_agents.core.config import Learner as LearnerSettings
 from nested_agents.core.evaluators import ExactEnumeration, Sampling
 from nested_agents.core.hierarchy import Hierarchy
 from nested_agents.core.robot_agents import per_robot
+from nested_agents.core.settings import Learner as LearnerSettings
 from nested_agents.core.team import Team
 
 PAPER = {"kind": "paper", "decay": 0.05, "clock": "episode"}

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from nested_agents.scenarios.boxes import BOXES
-from nested_agents.scenarios.checked_predictions import MOST_CODES
-from nested_agents.studies.cli import main
-from nested_agents.studies.spec import Spec
-from nested_agents.studies.spec_errors import SpecError
-from nested_agents.studies.trial import check
+from nested_agents.scenarios.box_pushing.world.boxes import BOXES
+from nested_agents.scenarios.checking.predictions import MOST_CODES
+from nested_agents.studies.cli.main import main
+from nested_agents.studies.spec.errors import SpecError
+from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.trials.trial import check
 
 TEXT = (Path(__file__).resolve().parents[2] / "docs" / "worlds.md").read_text(encoding="utf-8")
 

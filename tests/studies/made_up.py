@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from nested_agents.studies.episodes import EpisodeRow
-from nested_agents.studies.spec import Spec
-from nested_agents.studies.trial import TrialResult, trials_of
+from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.trials.episodes import EpisodeRow
+from nested_agents.studies.trials.trial import TrialResult, trials_of
 
 SPEC = Spec.of({"seeds": 3, "episodes": 4, "steps": 5, "evaluation": 2,
                 "sweep": {"preset": ["default", "frozen"]}})  # fmt: skip

@@ -4,8 +4,9 @@ import sys
 
 import made_up
 
-from nested_agents.studies import conduct, learning_curve
-from nested_agents.studies.cli import main
+from nested_agents.studies.catalogue.learning_curve import analysis as learning_curve
+from nested_agents.studies.cli import conduct
+from nested_agents.studies.cli.main import main
 
 if __name__ == "__main__":
     learning_curve.measure = getattr(made_up, sys.argv[1])

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from nested_agents.studies.results import Results
+from nested_agents.studies.analysis.results import Results
 
 SEEDS = 20
 

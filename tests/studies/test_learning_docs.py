@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from nested_agents.studies import published
-from nested_agents.studies.cli import main
+from nested_agents.studies.cli.main import main
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "learning.md"
@@ -14,7 +13,7 @@ COLUMNS = ("success last 5", "success greedy", "steps greedy")
 
 @pytest.mark.parametrize("name", ["learning-curve", "tasks", "told"])
 def test_tables(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    path = published.FOLDER / f"{name}.json"
+    path = claims.PUBLISHED / f"{name}.json"
     assert main(["table", str(path), "--columns", *COLUMNS, "--format", "markdown"]) == 0
     table = capsys.readouterr().out
     assert table in PAGE.read_text(encoding="utf-8"), f"docs/learning.md: put in\n{table}"

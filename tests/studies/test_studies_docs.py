@@ -4,8 +4,8 @@ import re
 from pathlib import Path
 
 from nested_agents import studies
-from nested_agents.studies.spec import Spec
-from nested_agents.studies.trial import check
+from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.trials.trial import check
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "docs" / "studies.md").read_text(encoding="utf-8")

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
-from nested_agents.core.config import Decision, RuleBaseSettings, TDLambdaSettings
 from nested_agents.core.hierarchy import Hierarchy
 from nested_agents.core.loop import control_loop, policy_seed
+from nested_agents.core.settings import Decision, RuleBaseSettings, TDLambdaSettings
 from nested_agents.core.team import Team
 from nested_agents.scenarios.line_up import LineUp
 from nested_agents.topologies import BUILDERS, KINDS, Topology, arrange, build

@@ -5,12 +5,12 @@ from functools import reduce
 import numpy as np
 import pytest
 
-from nested_agents.core.config import AnovaTDSettings, BatchTDSettings
-from nested_agents.core.fuzzy import Partition
 from nested_agents.core.learners.anova import MOST_RULES, AnovaTD, spread
 from nested_agents.core.learners.batch import REWARD_SCALE, BatchTD
 from nested_agents.core.learners.dictionary import Dictionary, kernel
-from nested_agents.core.rules import RuleBase
+from nested_agents.core.rules.fuzzy import Partition
+from nested_agents.core.rules.rule_base import RuleBase
+from nested_agents.core.settings import AnovaTDSettings, BatchTDSettings
 
 EXACT = 1e-9
 """A tolerance at which every after-state that differs enters the dictionary."""

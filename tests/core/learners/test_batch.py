@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from nested_agents.core.config import BatchTDSettings, FittedValueSettings
-from nested_agents.core.fuzzy import Partition
 from nested_agents.core.learners.batch import REWARD_SCALE, BatchTD, FittedValue
-from nested_agents.core.rules import RuleBase
+from nested_agents.core.rules.fuzzy import Partition
+from nested_agents.core.rules.rule_base import RuleBase
+from nested_agents.core.settings import BatchTDSettings, FittedValueSettings
 
 TABLE = RuleBase([Partition((0.0, 1.0, 2.0, 3.0, 4.0), "triangular")], [(0,)])
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from nested_agents.core.config import GradientTDSettings, TDLambdaSettings
-from nested_agents.core.fuzzy import Partition
 from nested_agents.core.learners.gradient import GradientTD
 from nested_agents.core.learners.td import TDLambda
-from nested_agents.core.rules import RuleBase
+from nested_agents.core.rules.fuzzy import Partition
+from nested_agents.core.rules.rule_base import RuleBase
+from nested_agents.core.settings import GradientTDSettings, TDLambdaSettings
 
 CORRECTIONS = ("tdc", "gtd2")
 FUZZY = RuleBase(

@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nested_agents.core import twins
-from nested_agents.core.config import TDLambdaSettings
-from nested_agents.core.fuzzy import Partition
 from nested_agents.core.learners.td import TDLambda
-from nested_agents.core.rules import RuleBase
+from nested_agents.core.rules import reference as twins
+from nested_agents.core.rules.fuzzy import Partition
+from nested_agents.core.rules.rule_base import RuleBase
+from nested_agents.core.settings import TDLambdaSettings
 
 LOW_HIGH = Partition((0.0, 1.0), "triangular")
 EIGHT_RULES = RuleBase([LOW_HIGH] * 3, [(0, 1, 2)])

@@ -6,10 +6,10 @@ import made_up
 import numpy as np
 import pytest
 
-from nested_agents.scenarios.config import BoxSettings, label
-from nested_agents.studies.spec import Spec
-from nested_agents.studies.store import Store
-from nested_agents.studies.trial import trials_of
+from nested_agents.scenarios.box_pushing.config import BoxSettings, label
+from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.store.store import Store
+from nested_agents.studies.trials.trial import trials_of
 
 SPEC = Spec.of({"seeds": 3, "episodes": 4, "steps": 5, "evaluation": 2,
                 "sweep": {"preset": ["default", "frozen"]}})  # fmt: skip

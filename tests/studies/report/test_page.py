@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 from nested_agents import studies
-from nested_agents.studies.cli import main
+from nested_agents.studies.cli.main import main
 from nested_agents.studies.report.page import page
-from nested_agents.studies.spec import Spec
-from nested_agents.studies.store import DATABASE
+from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.store.store import DATABASE
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,8 @@ import pytest
 
 from nested_agents.studies.report import replays as module
 from nested_agents.studies.report.replays import body, pack, replays
-from nested_agents.studies.store import Store
-from nested_agents.studies.trial import trials_of
+from nested_agents.studies.store.store import Store
+from nested_agents.studies.trials.trial import trials_of
 
 
 def unpack(packed):

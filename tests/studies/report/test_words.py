@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
+from nested_agents.studies.analysis.statistics import Estimate
+from nested_agents.studies.analysis.summary import Summary
 from nested_agents.studies.report import words
-from nested_agents.studies.statistics import Estimate
-from nested_agents.studies.summary import Summary
 
 
 def line(condition, *numbers):

@@ -1,0 +1,295 @@
+"""Registries: everything that a user would vary, by name.
+
+Each kind of thing has one registry. A thing gets in
+
+1. by a line in the registry's own table (built in);
+2. by an entry point of an installed package, in the group ``nested_agents.KIND``;
+3. by a name such as ``"arm.py:Arm"``, relative to the spec that says it;
+4. as the object itself, from Python: it becomes the name of where it is defined.
+
+What has settings is known to a registry by its *settings model*, whose method `build` makes the
+thing. A class with a nested ``Settings`` stands for the model that builds it.
+"""
+
+from __future__ import annotations
+
+import difflib
+import inspect
+import os
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from importlib import import_module
+from importlib.metadata import entry_points
+from pathlib import Path
+from typing import Any, Literal, cast
+
+from pydantic import create_model
+from pydantic_core import PydanticCustomError, core_schema
+
+from . import sources
+from .settings import Settings
+
+
+def closest(name: object, known: Iterable[str]) -> str:
+    """Return "did you mean ...?" if a known name is near, and the known names in any case.
+
+    Examples
+    --------
+    >>> closest("chian", ["chain", "tree"])
+    "did you mean 'chain'? known: chain, tree"
+    """
+    known = sorted(known)
+    near = difflib.get_close_matches(str(name), known, n=1)
+    hint = f"did you mean {near[0]!r}? " if near else ""
+    return f"{hint}known: {', '.join(known) or 'none'}"
+
+
+class Registry:
+    """The things of one kind, by name.
+
+    Parameters
+    ----------
+    kind
+        What they are called in messages, and in the name of the entry-point group.
+    built_in
+        By name where each is, as ``"package.module:Name"``; imported when it is asked for.
+
+    Examples
+    --------
+    >>> numbers = Registry("number", {"pi": "math:pi"})
+    >>> numbers.find("pi"), numbers.names()
+    (3.141592653589793, ['pi'])
+    """
+
+    def __init__(self, kind: str, built_in: Mapping[str, str]) -> None:
+        self.kind = kind
+        self.built_in = dict(built_in)
+
+    @property
+    def group(self) -> str:
+        """The entry-point group under which installed packages offer things of this kind.
+
+        >>> Registry("state variable", {}).group
+        'nested_agents.state_variables'
+        """
+        plural = self.kind[:-1] + "ies" if self.kind.endswith("y") else self.kind + "s"
+        return f"nested_agents.{plural.replace(' ', '_')}"
+
+    def installed(self) -> dict[str, str]:
+        """Return what installed packages offer: by name where it is.
+
+        Raises
+        ------
+        ValueError
+            If a name is offered twice, or is a built-in one.
+        """
+        found: dict[str, str] = {}
+        for point in entry_points(group=self.group):
+            known = self.built_in.get(point.name) or found.get(point.name)
+            if known is not None and known != point.value:
+                raise ValueError(
+                    f"{self.kind} {point.name!r} is offered twice: {known}, {point.value}"
+                )
+            found[point.name] = point.value
+        return found
+
+    def names(self) -> list[str]:
+        """Return the names of all that is built in or installed."""
+        return [*self.built_in, *self.installed()]
+
+    def find(self, name: str) -> Any:
+        """Return a thing by its name, or by where it is.
+
+        Raises
+        ------
+        ValueError
+            If there is none, or it cannot be loaded; one line.
+        """
+        if sources.is_reference(name):
+            return sources.active().load(name)
+        place = self.built_in.get(name) or self.installed().get(name)
+        if place is None and ":" in name and "." in name.partition(":")[0]:
+            place = name
+        if place is None:
+            raise ValueError(f"{closest(name, self.names())}, or one of your own as file.py:NAME")
+        module, _, attribute = place.partition(":")
+        try:
+            found: Any = import_module(module)
+            for part in filter(None, attribute.split(".")):
+                found = getattr(found, part)
+        except Exception as error:
+            if name in self.built_in:
+                raise
+            raise ValueError(f"cannot be loaded: {type(error).__name__}: {error}") from None
+        return found
+
+    def reference_to(self, thing: Any) -> str:
+        """Return the name of an object: the registered one, or where it is defined.
+
+        Raises
+        ------
+        ValueError
+            If it is defined in no file, as in an interactive session.
+        """
+        defined = getattr(thing, "function", thing)
+        module = sys.modules.get(getattr(defined, "__module__", ""))
+        name = str(getattr(defined, "__qualname__", ""))
+        if module is None or not name or "<" in name:
+            raise ValueError(f"{thing!r} has no name at the top of a file: write it to one")
+        if "__source_name__" in vars(module):
+            return f"{vars(module)['__source_name__']}:{name}"
+        place = f"{module.__name__}:{name}"
+        for known, where in {**self.built_in, **self.installed()}.items():
+            if where == place:
+                return known
+        path = getattr(module, "__file__", None)
+        if path is None:
+            raise ValueError(f"{name} is defined in no file: write it to one")
+        if module.__package__ or "site-packages" in Path(path).parts:
+            return place
+        return f"{_relative(path)}:{name}"
+
+
+class SettingsRegistry(Registry):
+    """The things of a kind that have settings, told apart by ``kind`` in a table.
+
+    Parameters
+    ----------
+    kind, built_in
+        As of `Registry`.
+    base
+        What the settings of all things of the kind inherit.
+
+    Examples
+    --------
+    A class of one's own needs a nested model, and gets its instance:
+
+    >>> class Cart:
+    ...     class Settings(Settings):
+    ...         wheels: int = 2
+    ...     def __init__(self, settings):
+    ...         self.wheels = settings.wheels
+    >>> carts = SettingsRegistry("cart", {}, Settings)
+    >>> model = carts.adapted("cart.py:Cart", Cart)
+    >>> model(wheels=4).build().wheels
+    4
+    """
+
+    def __init__(self, kind: str, built_in: Mapping[str, str], base: type[Settings]) -> None:
+        super().__init__(kind, built_in)
+        self.base = base
+        self._adapted: dict[tuple[str, int], tuple[Any, type[Settings]]] = {}
+
+    def model(self, name: str) -> type[Settings]:
+        """Return the settings model of a thing, by name or by where it is.
+
+        Raises
+        ------
+        ValueError
+            If there is none, or it is not of this kind; one line.
+        """
+        return self.adapted(name, self.find(name))
+
+    def adapted(self, name: str, thing: Any) -> type[Settings]:
+        """Return the settings model that stands for a thing, whose ``kind`` is `name`.
+
+        Raises
+        ------
+        ValueError
+            If its settings are not of this kind, or it cannot be called.
+        """
+        if name in self.built_in:
+            return cast(type[Settings], thing)
+        key = name, id(thing)
+        if key not in self._adapted:
+            self._adapted[key] = thing, self._derived(name, thing)
+        return self._adapted[key][1]
+
+    def _derived(self, name: str, thing: Any) -> type[Settings]:
+        is_model = isinstance(thing, type) and issubclass(thing, Settings)
+        own = thing if is_model else getattr(thing, "Settings", self.base)
+        if not (isinstance(own, type) and issubclass(own, self.base)):
+            base = f"{self.base.__module__}.{self.base.__qualname__}"
+            raise ValueError(f"the settings of a {self.kind} must inherit {base}")
+        if not callable(thing):
+            raise ValueError(f"is no {self.kind}, but a {type(thing).__name__}")
+        model = create_model(
+            getattr(own, "__qualname__", "Settings"),
+            __base__=own,
+            __module__=own.__module__,
+            kind=(Literal[name], name),
+        )
+        if not is_model:
+            has_own = hasattr(thing, "Settings")
+
+            def build(settings: Settings, *given: Any) -> Any:
+                return thing(settings, *given) if has_own else thing(*given)
+
+            model.build = build  # type: ignore[attr-defined]
+        return model
+
+    def parsed(self, text: str) -> Settings:
+        """Return the settings that a name alone stands for.
+
+        Raises
+        ------
+        ValueError
+            If there is no such thing, or it has settings that must be given.
+        """
+        return self.model(text)()
+
+
+class Plugged:
+    """Marks a field that holds the settings of any thing of a registry.
+
+    A table is validated by the model that its ``kind`` names; a text is what `shorthand` makes of
+    it; settings stand for themselves.
+
+    Parameters
+    ----------
+    registry
+        Which things.
+    shorthand
+        What a text stands for; none: a table is needed.
+    """
+
+    def __init__(
+        self, registry: SettingsRegistry, shorthand: Callable[[str], Settings] | None = None
+    ) -> None:
+        self.registry, self.shorthand = registry, shorthand
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> core_schema.CoreSchema:
+        """Return how pydantic validates and writes the field."""
+        return core_schema.with_info_plain_validator_function(
+            self._validated,
+            serialization=core_schema.plain_serializer_function_ser_schema(
+                lambda value, info: value.model_dump(mode=info.mode), info_arg=True
+            ),
+        )
+
+    def _validated(self, value: Any, info: Any) -> Settings:
+        if isinstance(value, Settings):
+            return value
+        if isinstance(value, str) and self.shorthand is not None:
+            return self.shorthand(value)
+        if not isinstance(value, Mapping):
+            words = "a name or a table" if self.shorthand is not None else "a table"
+            raise PydanticCustomError("table", cast(Any, f"must be {words}"))
+        kind = value.get("kind")
+        if not isinstance(kind, str):
+            known = closest(kind, self.registry.names())
+            raise PydanticCustomError("plugged_kind", cast(Any, "{said}"), {"said": known})
+        try:
+            model = self.registry.model(kind)
+        except ValueError as error:
+            raise PydanticCustomError(
+                "plugged_kind", cast(Any, "{said}"), {"said": str(error)}
+            ) from None
+        return model.model_validate(dict(value), strict=True, context=info.context)
+
+
+def _relative(path: str) -> str:
+    """Return a path as it is written from the working directory."""
+    here = os.path.realpath(os.getcwd())
+    there = os.path.realpath(inspect.getsourcefile(sys.modules["__main__"]) or path) if not path else os.path.realpath(path)
+    return os.path.relpath(there, here) if there.startswith(here + os.sep) else there

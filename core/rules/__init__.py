@@ -1,0 +1,1 @@
+"""Fuzzy rule bases: partitions, rules, their reference implementation and compiled kernels."""

@@ -1,0 +1,134 @@
+"""Values where every membership function may be active."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from ...arrays import FloatArray, IntArray
+from .contraction import contract, total_width
+from .folding import fold
+from .layout import Layout, Packed, unpack
+from .pairs import pairs
+from .strengths import LANES, many_strengths
+
+CHUNK = 64
+"""States whose own blocks are compared with each other."""
+
+
+@njit(cache=True)
+def _shared_strengths(shared, lay: Layout):  # type: ignore[no-untyped-def]
+    """Return the strengths ``(d - n_own, most memberships, R)`` of shared blocks."""
+    out = np.zeros((shared.shape[1], lay.counts.max(), len(shared)))
+    for j in range(shared.shape[1]):
+        many_strengths(lay.n_own + j, shared[:, j], lay, out[j])
+    return out
+
+
+@njit(cache=True)
+def _peaks(strengths, lay: Layout):  # type: ignore[no-untyped-def]
+    """Return the greatest strengths ``(d, most memberships)`` of shared variables, own ones 0."""
+    out = np.zeros((len(lay.counts), strengths.shape[1]))
+    for j in range(len(strengths)):
+        for s in range(lay.counts[lay.n_own + j]):
+            out[lay.n_own + j, s] = strengths[j, s].max()
+    return out
+
+
+@njit(cache=True)
+def _scratch(theta, lay: Layout):  # type: ignore[no-untyped-def]
+    """Return room for lanes of strengths, two folds, and values."""
+    n_shared, most = len(lay.counts) - lay.n_own, lay.counts.max()
+    room = np.zeros((n_shared, most, LANES), theta.dtype)
+    one = np.empty((lay.shared_sizes.max(), LANES), theta.dtype)
+    return room, one, np.empty_like(one), np.empty(LANES, theta.dtype)
+
+
+@njit(cache=True)
+def _fill(strengths, row, lane, lay: Layout, room) -> None:  # type: ignore[no-untyped-def]
+    """Put the strengths of one shared block into a lane."""
+    for j in range(len(room)):
+        for s in range(lay.counts[lay.n_own + j]):
+            room[j, s, lane] = strengths[j, s, row]
+
+
+@njit(cache=True)
+def values_dense(theta: FloatArray, states: FloatArray, packed: Packed) -> FloatArray:
+    """Return f ``(m,)`` of states ``(m, d)``, all membership functions active."""
+    lay = unpack(packed)
+    out = np.empty(len(states))
+    room, one, two, found = _scratch(theta, lay)
+    which = np.empty(CHUNK, np.int64)
+    own = np.empty((CHUNK, lay.n_own))
+    rows = np.empty(LANES, np.int64)
+    partial = np.empty((min(CHUNK, len(states)), total_width(lay)), theta.dtype)
+    for begin in range(0, len(states), CHUNK):
+        chunk = states[begin : begin + CHUNK]
+        # States of one own block share its contraction.
+        count = 0
+        for s in range(len(chunk)):
+            which[s] = -1
+            for b in range(count):
+                if (own[b] == chunk[s, : lay.n_own]).all():
+                    which[s] = b
+                    break
+            if which[s] < 0:
+                which[s] = count
+                own[count] = chunk[s, : lay.n_own]
+                count += 1
+        strengths = _shared_strengths(chunk[:, lay.n_own :], lay)
+        contract(theta, own[:count], _peaks(strengths, lay), lay, partial[:count])
+        for b in range(count):
+            lane = 0
+            for s in range(len(chunk)):
+                if which[s] == b:
+                    rows[lane] = s
+                    _fill(strengths, s, lane, lay, room)
+                    lane += 1
+                if lane and (lane == LANES or s == len(chunk) - 1):
+                    fold(partial[b], room, lay, one, two, found, lane)
+                    for k in range(lane):
+                        out[begin + rows[k]] = found[k]
+                    lane = 0
+    return out
+
+
+@njit(cache=True)
+def folded(  # type: ignore[no-untyped-def]
+    theta, own, own_rows, shared, shared_rows, divisor: int, codes: IntArray, lay: Layout
+) -> FloatArray:
+    """Return f of joint-action codes from block tables, all membership functions active.
+
+    Contracts theta with each own block that occurs, once; each distinct pair of own and shared
+    block is then folded, once, whatever the number of codes that lead to it.
+    """
+    used, slot_of, row_of, wanted = pairs(own, own_rows, shared, shared_rows, divisor, codes)
+    count, n_rows = wanted.shape
+    met = np.empty(n_rows, np.int64)  # rows of shared blocks that occur
+    n_met = 0
+    for row in range(n_rows):
+        if wanted[:, row].any():
+            met[n_met] = row
+            n_met += 1
+    strengths = _shared_strengths(shared[met[:n_met]], lay)
+    partial = np.empty((count, total_width(lay)), theta.dtype)
+    contract(theta, own[used], _peaks(strengths, lay), lay, partial)
+    room, one, two, found = _scratch(theta, lay)
+    rows = np.empty(LANES, np.int64)
+    values = np.empty((count, n_rows))
+    for b in range(count):
+        lane = 0
+        for k in range(n_met):
+            if wanted[b, met[k]]:
+                rows[lane] = met[k]
+                _fill(strengths, k, lane, lay, room)
+                lane += 1
+            if lane and (lane == LANES or k == n_met - 1):
+                fold(partial[b], room, lay, one, two, found, lane)
+                for i in range(lane):
+                    values[b, rows[i]] = found[i]
+                lane = 0
+    out = np.empty(len(codes))
+    for c in range(len(codes)):
+        out[c] = values[slot_of[c], row_of[c]]
+    return out

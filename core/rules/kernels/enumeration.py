@@ -1,0 +1,137 @@
+"""Values of an agent's own actions over the joint actions of the agents below, in one call.
+
+There is one kernel for every way of valuing, so that none is compiled that is not used.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from ...arrays import FloatArray, IntArray
+from .compact import contracted, looked_up
+from .dense import folded
+from .layout import Packed, unpack
+
+
+class Tried(NamedTuple):
+    """The joint actions that an agent tries: given ones above, all below.
+
+    Attributes
+    ----------
+    codes
+        ``(A, m)`` codes of own action and joint action of the agents below, the first of which
+        varies most slowly; the others take action 0.
+    places
+        ``(n,)`` what an action of each of these others adds to a code, 0 for the rest.
+    below
+        ``(k,)`` the agents below.
+    """
+
+    codes: IntArray
+    places: IntArray
+    below: IntArray
+
+
+@njit(cache=True)
+def _codes(tried, places, joint_action):  # type: ignore[no-untyped-def]
+    given = 0
+    for i in range(len(joint_action)):
+        given += places[i] * joint_action[i]
+    return (tried + given).ravel()
+
+
+@njit(cache=True)
+def _gather(values, n_own: int, below, chances):  # type: ignore[no-untyped-def]
+    """Return per own action the mean by chances ``(n, A)``, or the maximum if there are none."""
+    m = len(values) // n_own
+    out = np.empty(n_own)
+    if not len(chances):
+        for a in range(n_own):
+            out[a] = values[a * m : (a + 1) * m].max()
+        return out
+    weights, size = np.ones(m), 1
+    for agent in below:
+        n_actions = chances.shape[1]
+        for c in range(size - 1, -1, -1):
+            weight = weights[c]
+            for a in range(n_actions):
+                weights[c * n_actions + a] = weight * chances[agent, a]
+        size *= n_actions
+    total = weights.sum()
+    for a in range(n_own):
+        mean = 0.0
+        for c in range(m):
+            mean += weights[c] * values[a * m + c]
+        out[a] = mean / total
+    return out
+
+
+@njit(cache=True)
+def _learned(theta) -> bool:  # type: ignore[no-untyped-def]
+    """Return whether any weight is not zero."""
+    for weight in theta:  # noqa: SIM110
+        if weight != 0.0:
+            return True
+    return False
+
+
+@njit(cache=True)
+def enumerate_looked_up(  # type: ignore[no-untyped-def]
+    theta, own, own_rows, shared, shared_rows, divisor: int,
+    tried: IntArray, places: IntArray, below: IntArray, joint_action: IntArray,
+    chances: FloatArray, packed: Packed,
+) -> FloatArray:  # fmt: skip
+    """Value the own actions ``(A,)`` by looking up every active rule, triangular partitions.
+
+    Parameters
+    ----------
+    theta
+        ``(n_rules,)`` the agent's consequent weights.
+    own, own_rows, shared, shared_rows, divisor
+        As in `nested_agents.core.protocols.Blocks`.
+    tried, places, below
+        Which joint actions: the parts of a `Tried`.
+    joint_action
+        ``(n,)`` the actions that are given.
+    chances
+        ``(n, A)`` probabilities of the actions of the agents below, which are averaged over; none:
+        the maximum is taken.
+    packed
+        Layout of the rule base.
+    """
+    if not _learned(theta):
+        return np.zeros(len(tried))
+    codes, lay = _codes(tried, places, joint_action), unpack(packed)
+    values = looked_up(theta, own, own_rows, shared, shared_rows, divisor, codes, lay)
+    return _gather(values, len(tried), below, chances)
+
+
+@njit(cache=True)
+def enumerate_contracted(  # type: ignore[no-untyped-def]
+    theta, own, own_rows, shared, shared_rows, divisor: int,
+    tried: IntArray, places: IntArray, below: IntArray, joint_action: IntArray,
+    chances: FloatArray, packed: Packed,
+) -> FloatArray:  # fmt: skip
+    """Do what `enumerate_looked_up` does, by summing up the active own rules first."""
+    if not _learned(theta):
+        return np.zeros(len(tried))
+    codes, lay = _codes(tried, places, joint_action), unpack(packed)
+    values = contracted(theta, own, own_rows, shared, shared_rows, divisor, codes, lay)
+    return _gather(values, len(tried), below, chances)
+
+
+@njit(cache=True)
+def enumerate_dense(  # type: ignore[no-untyped-def]
+    theta, own, own_rows, shared, shared_rows, divisor: int,
+    tried: IntArray, places: IntArray, below: IntArray, joint_action: IntArray,
+    chances: FloatArray, packed: Packed,
+) -> FloatArray:  # fmt: skip
+    """Do what `enumerate_looked_up` does, for any partitions."""
+    if not _learned(theta):
+        return np.zeros(len(tried))
+    codes, lay = _codes(tried, places, joint_action), unpack(packed)
+    values = folded(theta, own, own_rows, shared, shared_rows, divisor, codes, lay)
+    return _gather(values, len(tried), below, chances)

@@ -1,0 +1,37 @@
+"""The paper's equations as plain NumPy over explicit feature vectors: the oracle of the kernels.
+
+Slow on purpose: 5^7 rules cost a 78,125-element feature vector per joint action here. Tests hold
+the kernels against these functions, benchmarks take them as the literal baseline.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import FloatArray, IntArray
+from ..protocols import Blocks
+from .rule_base import RuleBase
+
+
+def values(rules: RuleBase, theta: FloatArray, states: FloatArray) -> FloatArray:
+    """Return f ``(m,)`` of states ``(m, d)`` as phi times theta (Eq. 9)."""
+    return rules.features(states) @ theta
+
+
+def block_values(rules: RuleBase, theta: FloatArray, blocks: Blocks, codes: IntArray) -> FloatArray:
+    """Return f of joint-action codes, every next state written out."""
+    return values(rules, theta, blocks.states(codes))
+
+
+def td_update(
+    rules: RuleBase,
+    theta: FloatArray,
+    trace: FloatArray,
+    states: FloatArray,
+    steps: FloatArray,
+    decay: float,
+) -> None:
+    """Update traces and weights of all agents in place (Eq. 12, 13)."""
+    trace *= decay
+    trace += rules.features(states)
+    theta += np.asarray(steps)[:, None] * trace

@@ -1,0 +1,297 @@
+"""Fuzzy rule bases as linear value functions (Section IV-B, Eq. 9).
+
+A rule base is a sum of *terms*. A term is a set of state variables; it holds one rule for every
+combination of their membership functions, whose firing strength is the product of the membership
+degrees. Since each partition sums to one, so do the firing strengths of a term. Order d (one term
+over all variables, 5^7 rules) is the paper's rule base; order 1 (one term per variable, 35 rules)
+is a sum of one-variable functions.
+
+The consequent weights theta of one agent are a flat array ``(n_rules,)``: the terms one after the
+other, each in C order of its variables. The feature vector phi is the concatenation of the firing
+strengths; it is built explicitly by `RuleBase.features` only, for tests and tables.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+
+from ..arrays import FloatArray, IntArray
+from ..protocols import Blocks
+from ..settings import RuleBaseSettings
+from ..spaces import StateSpace
+from . import kernels
+from .fuzzy import Partition
+
+
+class RuleBase:
+    """A sum of fuzzy rule bases over subsets of the state variables.
+
+    Parameters
+    ----------
+    partitions
+        One partition per state variable, all of one membership shape.
+    terms
+        Index tuples into the variables, each increasing, all distinct.
+    n_own
+        How many leading variables form the own block (see `nested_agents.core.spaces`).
+    dtype
+        Type of the consequent weights that learners keep; states are double precision always.
+
+    Examples
+    --------
+    The paper's example (Section IV-B): three variables with LOW and HIGH give eight rules.
+
+    >>> low_high = Partition((0.0, 1.0), "triangular")
+    >>> base = RuleBase([low_high] * 3, [(0, 1, 2)])
+    >>> base.n_rules, base.features(np.array([[0.0, 0.0, 0.25]])).round(2).tolist()
+    (8, [[0.75, 0.25, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]])
+    """
+
+    def __init__(
+        self,
+        partitions: Sequence[Partition],
+        terms: Sequence[tuple[int, ...]],
+        n_own: int = 0,
+        dtype: str = "float64",
+    ) -> None:
+        d = len(partitions)
+        for term in terms:
+            if not term or list(term) != sorted(set(term)) or not 0 <= term[0] <= term[-1] < d:
+                raise ValueError(f"rule base: term {term} must increase within 0 to {d - 1}")
+        if not terms or len(set(terms)) != len(terms):
+            raise ValueError(f"rule base: terms {list(terms)} must be distinct and at least one")
+        if len({p.membership for p in partitions}) > 1:
+            raise ValueError("rule base: all partitions must have one membership shape")
+        if not 0 <= n_own <= d:
+            raise ValueError(f"rule base: n_own = {n_own}, allowed 0 to {d}")
+        self.partitions = tuple(partitions)
+        self.terms = tuple(terms)
+        self.n_own = n_own
+        self.sizes = tuple(
+            int(np.prod([self.partitions[j].size for j in term])) for term in self.terms
+        )
+        self.n_rules = sum(self.sizes)
+        self.layout = kernels.layout(self.partitions, self.terms, n_own)
+        lay = kernels.unpack.py_func(self.layout)
+        self.n_parts = int(lay.row_sizes @ lay.part_sizes)
+        self.dtype = np.dtype(dtype)
+        self.compact = self.partitions[0].membership == "triangular"
+        self._enumerate = kernels.enumerate_dense
+        self._td_update = kernels.td_compact if self.compact else kernels.td_dense
+        if self.compact:
+            # Looking up 2 ** order corners is cheaper than contracting theta, unless the order is
+            # high and most variables are own ones, contracted once for many joint actions.
+            looks_up = all(
+                len(term) <= 3 or 2 ** len(term) <= size
+                for term, size in zip(self.terms, lay.shared_sizes, strict=True)
+            )
+            kind = kernels.enumerate_looked_up if looks_up else kernels.enumerate_contracted
+            self._enumerate = kind
+
+    @classmethod
+    def build(cls, space: StateSpace, settings: RuleBaseSettings) -> RuleBase:
+        """Build the rule base of `settings` over a state space.
+
+        Raises
+        ------
+        ValueError
+            If the order exceeds the number of variables or a product names an unknown variable,
+            one twice, or none.
+        """
+        names = [v.name for v in space.variables]
+        if settings.order > len(names):
+            raise ValueError(
+                f"learner.rule_base.order = {settings.order}, allowed 1 to {len(names)} in state "
+                f"space {space.name!r}"
+            )
+        terms = list(combinations(range(len(names)), settings.order))
+        for product in settings.products:
+            unknown = [name for name in product if name not in names]
+            if unknown:
+                raise ValueError(
+                    f"learner.rule_base.products: unknown variable {unknown[0]!r}, known: "
+                    f"{', '.join(names)}"
+                )
+            if not product or len(set(product)) < len(product):
+                raise ValueError(
+                    f"learner.rule_base.products: {list(product)} must name at least one variable, "
+                    "each once"
+                )
+            terms.append(tuple(sorted(names.index(name) for name in product)))
+        partitions = [
+            Partition.of(v, settings.membership, settings.memberships, settings.steepness)
+            for v in space.variables
+        ]
+        return cls(partitions, list(dict.fromkeys(terms)), space.n_own, settings.precision)
+
+    def features(self, states: FloatArray) -> FloatArray:
+        """Return phi ``(m, n_rules)`` of states ``(m, d)`` explicitly: the twin of every kernel.
+
+        Raises
+        ------
+        ValueError
+            If the states have another shape.
+        """
+        self._check_states(states)
+        strengths = [p.strengths(states[:, j]) for j, p in enumerate(self.partitions)]
+        parts = []
+        for term in self.terms:
+            product = np.ones((len(states), 1))
+            for j in term:
+                product = (product[:, :, None] * strengths[j][:, None, :]).reshape(len(states), -1)
+            parts.append(product)
+        return np.concatenate(parts, axis=1)
+
+    def values(self, theta: FloatArray, states: FloatArray) -> FloatArray:
+        """Return f ``(m,)`` of states ``(m, d)`` for one agent's weights ``(n_rules,)`` (Eq. 9).
+
+        Raises
+        ------
+        ValueError
+            If theta or the states have another shape.
+        """
+        states = np.ascontiguousarray(states, dtype=float)
+        self._check_states(states)
+        self._check_theta(theta)
+        if self.compact:
+            return kernels.values_compact(theta, states, self.layout)
+        return kernels.values_dense(theta, states, self.layout)
+
+    def each(self, theta: FloatArray, states: FloatArray) -> FloatArray:
+        """Return f ``(n, s)`` of states ``(n, s, d)``, by the rows of theta ``(n, n_rules)``.
+
+        Raises
+        ------
+        ValueError
+            If theta or the states have another shape.
+        """
+        states = np.ascontiguousarray(states, dtype=float)
+        if states.shape[2:] != (len(self.partitions),):
+            raise ValueError(
+                f"rule base: states of shape {states.shape}, must be (n, s, {len(self.partitions)})"
+            )
+        if theta.shape != (len(states), self.n_rules):
+            raise ValueError(
+                f"rule base: theta of shape {theta.shape}, must be {(len(states), self.n_rules)}"
+            )
+        if self.compact:
+            return kernels.each_compact(theta, states, self.layout)
+        return kernels.each_dense(theta, states, self.layout)
+
+    def td_update(
+        self,
+        theta: FloatArray,
+        trace: FloatArray,
+        reach: FloatArray,
+        states: FloatArray,
+        entered: FloatArray,
+        reward: float,
+        discount: float,
+        step_size: float,
+        lengths: FloatArray,
+        decay: float,
+    ) -> None:
+        """Make one TD(lambda) update of all agents, see `core.rules.kernels.td_dense`.
+
+        Shapes are trusted: a learner calls this at every step.
+        """
+        self._td_update(
+            theta, trace, reach, states, entered, reward, discount, step_size, lengths, decay,
+            self.layout,
+        )  # fmt: skip
+
+    def squared_lengths(self, states: FloatArray) -> FloatArray:
+        """Return the squared length ``(m,)`` of phi of states ``(m, d)``.
+
+        A product's is the product of its variables' squared lengths.
+
+        Raises
+        ------
+        ValueError
+            If the states have another shape.
+        """
+        self._check_states(states)
+        squares = [
+            (p.strengths(states[:, j]) ** 2).sum(axis=1) for j, p in enumerate(self.partitions)
+        ]
+        return np.sum([np.prod([squares[j] for j in term], axis=0) for term in self.terms], axis=0)
+
+    def active(self, states: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Return rules ``(m, k)`` and their firing strengths ``(m, k)``; the others are zero.
+
+        For triangular partitions ``k`` is the sum of ``2 ** len(term)`` over the terms; for
+        sigmoid ones all rules are active.
+
+        Raises
+        ------
+        ValueError
+            If the states have another shape.
+        """
+        states = np.ascontiguousarray(states, dtype=float)
+        self._check_states(states)
+        if self.compact:
+            return kernels.active_compact(states, self.layout)
+        strengths = self.features(states)
+        return np.broadcast_to(np.arange(self.n_rules), strengths.shape), strengths
+
+    def block_values(self, theta: FloatArray, blocks: Blocks, codes: IntArray) -> FloatArray:
+        """Return f ``(len(codes),)`` of the next states that joint-action `codes` lead to.
+
+        The own part of theta is contracted once per distinct own block, or the few active rules
+        are looked up; the feature vector of a joint action is never built. Blocks are trusted, as
+        in `enumerate`.
+
+        Raises
+        ------
+        ValueError
+            If theta is not ``(n_rules,)``.
+        """
+        self._check_theta(theta)
+        none = np.zeros(0, dtype=np.int64)
+        tried = kernels.Tried(np.ascontiguousarray(codes)[:, None], none, none)
+        return self.enumerate(theta, blocks, tried, none, np.zeros((0, 0)))
+
+    def enumerate(
+        self,
+        theta: FloatArray,
+        blocks: Blocks,
+        tried: kernels.Tried,
+        joint_action: IntArray,
+        chances: FloatArray,
+    ) -> FloatArray:
+        """Return the value ``(A,)`` of each own action over the joint actions `tried`.
+
+        Shapes are trusted: an evaluator calls this at every decision. Whether the blocks of a
+        scenario are sound, `nested_agents.scenarios.checking.checker` finds out.
+
+        Parameters
+        ----------
+        theta
+            ``(n_rules,)`` consequent weights.
+        blocks
+            Where joint actions lead.
+        tried
+            Which ones.
+        joint_action
+            ``(n,)`` actions of the agents that are given.
+        chances
+            ``(n, A)`` probabilities of the actions of the agents below, to average over; with
+            ``(0, 0)`` the maximum is taken.
+        """
+        return self._enumerate(
+            theta, blocks.own, blocks.own_rows, blocks.shared, blocks.shared_rows, blocks.divisor,
+            tried.codes, tried.places, tried.below, joint_action, chances, self.layout,
+        )  # fmt: skip
+
+    def _check_states(self, states: FloatArray) -> None:
+        if states.shape[1:] != (len(self.partitions),):
+            raise ValueError(
+                f"rule base: states of shape {states.shape}, must be (m, {len(self.partitions)})"
+            )
+
+    def _check_theta(self, theta: FloatArray) -> None:
+        if theta.shape != (self.n_rules,):
+            raise ValueError(f"rule base: theta of shape {theta.shape}, must be {(self.n_rules,)}")

@@ -1,0 +1,289 @@
+"""The settings of a scenario, as they stand in the ``[scenario]`` table of a spec."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, field_validator, model_validator
+
+from ...core.settings import NonNegative, Positive, Settings
+
+CONTROL_PERIOD = 0.064
+"""Time between commands to the wheels [s]; the basic time step of the e-puck in Webots."""
+
+Periods = Annotated[int, Field(ge=1, le=10_000)]
+"""Control periods: ten minutes at most."""
+Index = Annotated[int, Field(ge=0)]
+
+
+class RewardSettings(Settings):
+    """The constants of the reward (Eq. 15-17); distances in metres, angles in radians."""
+
+    c1: NonNegative = 0.01
+    r1: NonNegative = 1.5
+    """Per metre of the box's distance to the goal."""
+    c2: NonNegative = 0.0007
+    r2: NonNegative = 5.0
+    """Per unit of infrared reading of a robot (R2 and R3 of Eq. 16 for any number of robots)."""
+    c4: NonNegative = 0.0003
+    """Per radian of the box's orientation error."""
+    least_approach: NonNegative = 0.001
+    """By how much the box must have come nearer in a decision period for a negative Delta D [m];
+    with 0 a box that creeps by rounding errors is paid as one that is pushed."""
+    receding: float = 0.000001
+    """Reward under Condition 2."""
+    some_out_of_range: float = -0.0015
+    """Reward under Condition 4."""
+    all_out_of_range: float = -0.002
+    """Reward under Condition 5."""
+    pays_at_goal: bool = True
+    """Whether reaching the goal pays c1, even if a robot has lost touch of the box; otherwise the
+    conditions hold there as anywhere."""
+    attraction_without_contact: bool = False
+    """Whether R1 counts under Condition 3 as printed; without it robots do not hover."""
+
+
+class FailureSettings(Settings):
+    """What fails, and from when to when; see `box_pushing.world.failures`.
+
+    A failure begins at its step of its episode and lasts, from episode to episode, until its end;
+    evaluation comes after all training.
+    """
+
+    wheels: Annotated[tuple[str, ...], Field(min_length=1)]
+    """Wheels by agent name or pattern: ``robot1.left``, ``robot1.*``, ``*.left``; one or a list."""
+    episode: Index = 0
+    """Episode in which it begins, counted from 0."""
+    step: Index = 0
+    """Step of that episode at which it begins."""
+    end_episode: Index | None = None
+    """Episode in which it ends; none: it lasts."""
+    end_step: Index = 0
+    """Step of that episode at which it ends."""
+
+    @field_validator("wheels", mode="before")
+    @classmethod
+    def _one(cls, value: object) -> object:
+        return (value,) if isinstance(value, str) else value
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if self.end_episode is None and self.end_step:
+            raise ValueError("end_step needs an end_episode")
+        end = self.end_episode, self.end_step
+        if end[0] is not None and end <= (self.episode, self.step):
+            raise ValueError(f"its end {end} must come after its begin {self.episode, self.step}")
+        return self
+
+
+class SeizedSettings(FailureSettings):
+    """The wheel does not turn."""
+
+    kind: Literal["seized"] = "seized"
+
+
+class FreeSettings(FailureSettings):
+    """The wheel has no drive and turns freely."""
+
+    kind: Literal["free"] = "free"
+
+
+class WeakSettings(FailureSettings):
+    """The wheel turns at a fraction of its command."""
+
+    kind: Literal["weak"] = "weak"
+    gain: Annotated[float, Field(gt=0, lt=1)] = 0.3
+    """That fraction."""
+
+
+class ReversedSettings(FailureSettings):
+    """The wheel turns against its command."""
+
+    kind: Literal["reversed"] = "reversed"
+
+
+class StuckSettings(FailureSettings):
+    """The wheel turns at one speed whatever its command."""
+
+    kind: Literal["stuck"] = "stuck"
+    speed: Annotated[float, Field(ge=-1, le=1)] = 0.5
+    """That speed, as a fraction of the greatest."""
+
+
+class DelayedSettings(FailureSettings):
+    """The wheel carries out its commands too late."""
+
+    kind: Literal["delayed"] = "delayed"
+    periods: Annotated[int, Field(ge=1, le=1000)] = 8
+    """By how many control periods of 64 ms."""
+
+
+class NoisySettings(FailureSettings):
+    """The wheel turns at its command plus noise."""
+
+    kind: Literal["noisy"] = "noisy"
+    deviation: Annotated[float, Field(gt=0, le=1)] = 0.3
+    """Standard deviation of the noise, as a fraction of the greatest speed."""
+
+
+Failure = Annotated[
+    SeizedSettings
+    | FreeSettings
+    | WeakSettings
+    | ReversedSettings
+    | StuckSettings
+    | DelayedSettings
+    | NoisySettings,
+    Field(discriminator="kind"),
+]
+"""Any failure's settings, told apart by `kind`."""
+
+
+Vertices = Annotated[tuple[tuple[float, float], ...], Field(min_length=3)]
+
+
+class BoxSettings(Settings):
+    """A box of one's own: ``box = { vertices = [[0, 0], [0.2, 0], [0.2, 0.1]] }``."""
+
+    vertices: Vertices
+    """Outline, counter-clockwise [m]; concave outlines are allowed."""
+    holes: tuple[Vertices, ...] = ()
+    """Outlines of holes [m]."""
+    mass: Positive = 0.4
+    """[kg]."""
+    friction: NonNegative = 0.2
+    """Coefficient of friction with the ground."""
+    contact_friction: NonNegative = 0.3
+    """Coefficient of friction with robots."""
+    grows: bool = False
+    """Whether it grows with the number of robots, as the boxes known by name do."""
+
+
+class WheelSettings(Settings):
+    """A wheel of a robot of one's own."""
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")]
+    x: float
+    """Ahead of the centre [m]."""
+    y: float
+    """To the left of the centre [m]."""
+
+
+class RobotSettings(Settings):
+    """A robot of one's own; what is not given is the e-Puck's."""
+
+    wheels: Annotated[tuple[WheelSettings, ...], Field(min_length=1)]
+    radius: Positive = 0.037
+    """Of the round body [m]."""
+    mass: Positive = 0.15
+    """[kg]."""
+    max_speed: Positive = 0.13
+    """Greatest wheel speed [m/s]; state spaces lay the memberships of wheel speeds over it."""
+    stiffness: Positive = 6.5
+    """Of one wheel's servo [N per m/s]."""
+    lateral_stiffness: Positive = 20.0
+    """Of one wheel's grip sideways [N per m/s]."""
+    traction: Positive = 0.8
+    """Coefficient of friction between wheels and ground."""
+    sensors: tuple[float, ...] | None = None
+    """Directions of the infrared sensors [rad]; none: those of the e-Puck."""
+
+
+class InfraredSettings(Settings):
+    """How the infrared sensors of all robots read; the default is the e-Puck's."""
+
+    reach: Positive = 0.06
+    """Distance beyond which they read 0 [m]; the e-Puck's are useful up to about 6 cm."""
+    normalisation: Literal["exponential", "linear", "binary"] = "exponential"
+    """How a distance within reach becomes a reading in [0, 1], 1 when touching: exp(-distance /
+    decay), 1 - distance / reach, or 1."""
+    decay: Positive = 0.015
+    """Distance over which an exponential reading falls to 1/e [m]."""
+    noise: Annotated[float, Field(ge=0, le=1)] = 0.0
+    """Standard deviation of a normal error, as a fraction of the reading (as in lookup tables of
+    Webots); drawn anew for every sensor and decision, the result cut to [0, 1]."""
+
+    @model_validator(mode="after")
+    def _decays(self) -> Self:
+        default = type(self).model_fields["decay"].default
+        if self.normalisation != "exponential" and self.decay != default:
+            raise ValueError(
+                f"decay = {self.decay} is for normalisation = 'exponential', "
+                f"received {self.normalisation!r}"
+            )
+        return self
+
+
+class BeliefSettings(Settings):
+    """By what factors the push predictor takes constants for other than the world has them."""
+
+    stiffness: Positive = 1.0
+    """Of the wheels, ahead and sideways."""
+    load: Positive = 1.0
+    """Of the ground friction of the box."""
+    contact_friction: Positive = 1.0
+    """Of the friction between robots and box."""
+
+
+def label(thing: str | Settings) -> str:
+    """Return the name of a thing, or what it consists of, as text that can be read back."""
+    return thing if isinstance(thing, str) else thing.model_dump_json()
+
+
+class ScenarioSettings(Settings):
+    """The box-pushing scenario (Section IX)."""
+
+    kind: Literal["box-pushing"] = "box-pushing"
+    robots: Annotated[int, Field(ge=1, le=64)] = 2
+    """Number of robots."""
+    robot: str | RobotSettings = "e-puck"
+    """Robot by name, or a table that describes one."""
+    box: str | BoxSettings = "square"
+    """Box by name, or a table that describes one."""
+    infrared: InfraredSettings = InfraredSettings()
+    start: Literal["easy", "medium", "hard"] = "medium"
+    """Start distribution."""
+    failures: tuple[Failure, ...] = ()
+    """Failures of wheels, as ``[[scenario.failures]]`` tables."""
+    state_space: Literal["paper", "relational", "pose"] | tuple[str, ...] = "relational"
+    """Eq. 1, the relational variables, those and the orientation of the box, or relational
+    variables by name, see `box_pushing.states.relational`."""
+    predictor: Literal["push", "rigid", "static", "exact"] = "push"
+    """What predictions take the world for, see `box_pushing.prediction.predictors`."""
+    belief: BeliefSettings = BeliefSettings()
+    """What the predictor `push` is told of constants that robots cannot see."""
+    reward: RewardSettings = RewardSettings()
+    hold: Periods = 8
+    """Control periods of 64 ms for which a decision is held."""
+    lookahead: Periods = 24
+    """Control periods that predictions look ahead, the decision being held for all of them."""
+    speed_increment: Annotated[float, Field(gt=0, le=1)] = 0.5
+    """What increase and decrease change, as a fraction of the greatest wheel speed."""
+    tolerance: Positive = 0.05
+    """Distance of the box from the goal that counts as reached [m]."""
+    arena: Positive = 1.5
+    """Distance of the box from the goal [m] beyond which an episode is broken off."""
+    orientation_tolerance: Positive | None = None
+    """Orientation error that still counts as reached [rad]; none: any."""
+
+    @model_validator(mode="after")
+    def _believes(self) -> Self:
+        if self.predictor != "push" and self.belief != BeliefSettings():
+            raise ValueError(f"belief is for predictor = 'push', received {self.predictor!r}")
+        return self
+
+    @property
+    def onset(self) -> int | None:
+        """Episode in which the first wheel fails; none: none does."""
+        return min((failure.episode for failure in self.failures), default=None)
+
+    @property
+    def period(self) -> float:
+        """Seconds for which a decision is held."""
+        return self.hold * CONTROL_PERIOD
+
+    @property
+    def drawn(self) -> dict[str, float | str]:
+        """What a recording must tell beside motions, so that it can be drawn."""
+        named = {"robot": self.robot, "box": self.box, "infrared": self.infrared}
+        return {"dt": self.period} | {name: label(thing) for name, thing in named.items()}

@@ -1,0 +1,319 @@
+"""Box pushing for other people's learners: PettingZoo and Gymnasium environments.
+
+Three views of one scenario: `WheelsEnv` (every wheel an agent), `RobotsEnv` (every robot an agent)
+and `BoxPushingEnv` (one agent for all). Observations are the states of the paper's agents, what
+wheels of a robot share being given once; bounds are those that physics keeps, infinite where robots
+may leave for good. All agents get the team's reward. Episodes end when the box is at the goal
+(terminated), when it is beyond the arena or after `steps` steps (truncated).
+
+Importing this module registers ``NestedAgents/BoxPushing-v0`` with Gymnasium::
+
+    gymnasium.make("nested_agents.scenarios.box_pushing.environments:NestedAgents/BoxPushing-v0", steps=200)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+from gymnasium.spaces import Box, Discrete, MultiDiscrete
+from pettingzoo import ParallelEnv
+
+from ...core.arrays import FloatArray, IntArray
+from ...core.protocols import Transition
+from .config import ScenarioSettings
+from .pictures.screen import Screen
+from .scenario import BoxPushing
+
+ENV_ID = "NestedAgents/BoxPushing-v0"
+RENDER_MODES = ["rgb_array", "human"]
+
+SettingsLike = ScenarioSettings | Mapping[str, Any] | None
+
+
+class Seat:
+    """The wheels that one outside agent drives, and what it observes.
+
+    Parameters
+    ----------
+    scenario
+        What is played.
+    wheels
+        Indices of the wheels.
+    """
+
+    def __init__(self, scenario: BoxPushing, wheels: Sequence[int]) -> None:
+        self.wheels = list(wheels)
+        space, bounds = scenario.state_space, scenario.bounds
+        d, own = space.n_variables, space.n_own
+        places: list[int] = []
+        for group in scenario.groups:
+            mine = [wheel for wheel in group if wheel in self.wheels]
+            places += [wheel * d + i for wheel in mine for i in range(own)]
+            places += [wheel * d + i for wheel in mine[:1] for i in range(own, d)]
+        self.places: IntArray = np.array(places)
+        self.names = tuple(
+            f"{scenario.agents[place // d]}.{space.variables[place % d].name}" for place in places
+        )
+        low, high = bounds[self.places % d].T.astype(np.float32)
+        self.observation_space = Box(low, high, dtype=np.float32)
+        actions = len(scenario.action_set)
+        self.action_space = (
+            Discrete(actions) if len(self.wheels) == 1 else MultiDiscrete([actions] * len(wheels))
+        )
+
+    def observe(self, states: FloatArray) -> FloatArray:
+        """Return the observation in the states ``(n, d)`` of all wheels."""
+        seen: FloatArray = states.ravel()[self.places].astype(np.float32)
+        return seen
+
+
+class Game:
+    """A scenario with a clock, a stream of seeds and a screen.
+
+    Parameters
+    ----------
+    settings
+        Of the scenario; a mapping is read as a ``[scenario]`` table.
+    steps
+        Most steps of an episode.
+    render_mode
+        ``None``, ``"rgb_array"`` or ``"human"``.
+    sensors
+        Whether pictures show the rays of the infrared sensors.
+
+    Raises
+    ------
+    ValueError
+        If one of them is out of range.
+    """
+
+    def __init__(
+        self, settings: SettingsLike, steps: int, render_mode: str | None, *, sensors: bool
+    ) -> None:
+        if steps < 1:
+            raise ValueError(f"steps = {steps}, must be at least 1")
+        if render_mode not in (None, *RENDER_MODES):
+            raise ValueError(f"render_mode = {render_mode!r}, allowed None, {RENDER_MODES}")
+        if not isinstance(settings, ScenarioSettings):
+            settings = ScenarioSettings.model_validate(settings or {})
+        self.scenario = BoxPushing(settings)
+        self.steps = steps
+        self.screen = Screen(settings, render_mode, sensors=sensors) if render_mode else None
+        self._seeds = np.random.default_rng()
+        self._episode, self._step = -1, 0
+
+    def reset(self, seed: int | None, options: Mapping[str, Any] | None) -> FloatArray:
+        """Start the next episode; a seed starts the stream of worlds and their count afresh.
+
+        The option ``episode`` sets the number of the episode, by which failures are scheduled.
+        """
+        if seed is not None:
+            self._seeds, self._episode = np.random.default_rng(seed), -1
+        self._episode = int((options or {}).get("episode", self._episode + 1))
+        self._step = 0
+        states = self.scenario.reset(int(self._seeds.integers(2**63)), self._episode)
+        if self.screen is not None:
+            self.screen.begin(self.scenario.measure())
+        return states
+
+    def step(self, joint_action: IntArray) -> tuple[Transition, bool]:
+        """Return what a joint action ``(n,)`` leads to, and whether the episode is truncated."""
+        transition = self.scenario.step(joint_action)
+        self._step += 1
+        if self.screen is not None:
+            self.screen.add(transition)
+        late = self._step >= self.steps and not transition.terminated
+        return transition, transition.truncated or late
+
+    def info(self, measured: Mapping[str, Any]) -> dict[str, Any]:
+        """Return a copy of measurements, without the times, which differ from run to run."""
+        return {
+            name: value.copy() if isinstance(value, np.ndarray) else value
+            for name, value in measured.items()
+            if name != "seconds"
+        }
+
+    def render(self) -> Any:
+        """Return a picture, or show it."""
+        return None if self.screen is None else self.screen.render()
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self.screen is not None:
+            self.screen.close()
+
+
+class WheelsEnv(ParallelEnv):
+    """Box pushing as a PettingZoo environment whose agents are the wheels.
+
+    Parameters
+    ----------
+    settings, steps, render_mode, sensors
+        As in `Game`.
+
+    Examples
+    --------
+    >>> env = WheelsEnv({"robots": 1}, steps=3)
+    >>> observations, _ = env.reset(seed=0)
+    >>> sorted(observations), env.action_space("robot1.left")
+    (['robot1.left', 'robot1.right'], Discrete(4))
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {
+        "name": "box_pushing_wheels_v0",
+        "render_modes": RENDER_MODES,
+        "render_fps": 2,
+        "is_parallelizable": True,
+    }
+
+    def __init__(
+        self,
+        settings: SettingsLike = None,
+        *,
+        steps: int = 450,
+        render_mode: str | None = None,
+        sensors: bool = False,
+    ) -> None:
+        self.game = Game(settings, steps, render_mode, sensors=sensors)
+        self.render_mode = render_mode
+        self.seats = self._seats(self.game.scenario)
+        self.possible_agents = list(self.seats)
+        self.agents: list[str] = []
+
+    @staticmethod
+    def _seats(scenario: BoxPushing) -> dict[str, Seat]:
+        return {name: Seat(scenario, [i]) for i, name in enumerate(scenario.agents)}
+
+    def observation_space(self, agent: str) -> Box:
+        """Return the space of an agent's observations."""
+        return self.seats[agent].observation_space
+
+    def action_space(self, agent: str) -> Discrete | MultiDiscrete:
+        """Return the space of an agent's actions."""
+        return self.seats[agent].action_space
+
+    def reset(
+        self, seed: int | None = None, options: Mapping[str, Any] | None = None
+    ) -> tuple[dict[str, FloatArray], dict[str, dict[str, Any]]]:
+        """Start an episode, see `Game.reset`; return observations and infos by agent."""
+        states = self.game.reset(seed, options)
+        self.agents = list(self.possible_agents)
+        return self._told(states, self.game.scenario.measure())
+
+    def step(self, actions: Mapping[str, Any]) -> tuple[dict[str, Any], ...]:
+        """Carry out one action of every agent.
+
+        Returns
+        -------
+        tuple of dict
+            Observations, rewards, terminations, truncations and infos by agent; all empty when the
+            episode is over, as PettingZoo has it.
+        """
+        if not self.agents:
+            return {}, {}, {}, {}, {}
+        joint = np.empty(len(self.game.scenario.agents), dtype=np.int64)
+        for name in self.agents:
+            joint[self.seats[name].wheels] = actions[name]
+        transition, truncated = self.game.step(joint)
+        observations, infos = self._told(transition.states, transition.info)
+        rewards, ends, breaks = (
+            dict.fromkeys(self.agents, value)
+            for value in (transition.reward, transition.terminated, truncated)
+        )
+        if transition.terminated or truncated:
+            self.agents = []
+        return observations, rewards, ends, breaks, infos
+
+    def _told(
+        self, states: FloatArray, measured: Mapping[str, Any]
+    ) -> tuple[dict[str, FloatArray], dict[str, dict[str, Any]]]:
+        return (
+            {name: self.seats[name].observe(states) for name in self.agents},
+            {name: self.game.info(measured) for name in self.agents},
+        )
+
+    def render(self) -> Any:
+        """Return a picture ``(height, width, 3)`` of the present, or show it."""
+        return self.game.render()
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        self.game.close()
+
+
+class RobotsEnv(WheelsEnv):
+    """Box pushing as a PettingZoo environment whose agents are the robots.
+
+    Examples
+    --------
+    >>> env = RobotsEnv(steps=3)
+    >>> env.possible_agents, env.action_space("robot1")
+    (['robot1', 'robot2'], MultiDiscrete([4 4]))
+    """
+
+    metadata: ClassVar[dict[str, Any]] = WheelsEnv.metadata | {"name": "box_pushing_robots_v0"}
+
+    @staticmethod
+    def _seats(scenario: BoxPushing) -> dict[str, Seat]:
+        return {f"robot{r + 1}": Seat(scenario, group) for r, group in enumerate(scenario.groups)}
+
+
+class BoxPushingEnv(gymnasium.Env):
+    """Box pushing as a Gymnasium environment: one agent drives all wheels.
+
+    Parameters
+    ----------
+    settings, steps, render_mode, sensors
+        As in `Game`.
+
+    Examples
+    --------
+    >>> env = BoxPushingEnv(steps=3)
+    >>> env.action_space, env.observation_space.shape
+    (MultiDiscrete([4 4 4 4]), (18,))
+    """
+
+    metadata: dict[str, Any] = {"render_modes": RENDER_MODES, "render_fps": 2}  # noqa: RUF012
+
+    def __init__(
+        self,
+        settings: SettingsLike = None,
+        *,
+        steps: int = 450,
+        render_mode: str | None = None,
+        sensors: bool = False,
+    ) -> None:
+        self.game = Game(settings, steps, render_mode, sensors=sensors)
+        self.render_mode = render_mode
+        self.seat = Seat(self.game.scenario, range(len(self.game.scenario.agents)))
+        self.observation_space = self.seat.observation_space
+        self.action_space = self.seat.action_space
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[FloatArray, dict[str, Any]]:
+        """Start an episode, see `Game.reset`; return observation and info."""
+        super().reset(seed=seed)
+        states = self.game.reset(seed, options)
+        return self.seat.observe(states), self.game.info(self.game.scenario.measure())
+
+    def step(self, action: Any) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
+        """Return observation, reward, terminated, truncated and info after an action ``(n,)``."""
+        transition, truncated = self.game.step(np.asarray(action, dtype=np.int64))
+        seen, info = self.seat.observe(transition.states), self.game.info(transition.info)
+        return seen, transition.reward, transition.terminated, truncated, info
+
+    def render(self) -> Any:
+        """Return a picture ``(height, width, 3)`` of the present, or show it."""
+        return self.game.render()
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        self.game.close()
+
+
+if ENV_ID not in gymnasium.registry:
+    gymnasium.register(ENV_ID, entry_point=f"{__name__}:BoxPushingEnv")

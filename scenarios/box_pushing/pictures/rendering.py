@@ -1,0 +1,287 @@
+"""Pictures of box pushing, drawn from recordings: one moment, or an episode as GIF or MP4.
+
+A recording is a mapping of arrays: ``robot_poses (T + 1, M, 3)``, ``box_pose (T + 1, 3)``,
+``goal_pose (3,)``, ``wheel_speeds (T + 1, n)``, ``contact (T + 1, M)``, ``reward (T,)``, optionally
+``failed (T + 1, n)``; and constants of no dimension: ``robot`` and ``box`` by name or described,
+``dt`` [s], optionally ``infrared`` described.
+
+Robots show their heading by a white nose, their wheels with the speed commanded, and turn solid in
+contact; failed wheels are crossed out. The dashed outline is the goal pose; it and the box point
+ahead. Trails show where all have been. With ``sensors`` rays are drawn as far as infrared sensors
+see; those that meet something are violet and end there, the wider the stronger the reading. Robots
+too small to show wheels show a line ahead, and are never drawn smaller than a few pixels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import imageio.v2 as imageio
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection
+from matplotlib.colors import to_rgba
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Patch, PathPatch, Polygon, Rectangle
+from matplotlib.path import Path as Curve
+from matplotlib.transforms import Affine2D
+from numpy.typing import NDArray
+from PIL import Image
+
+from ....core.arrays import FloatArray
+from ..config import InfraredSettings
+from ..world.boxes import BoxSpec, box_for
+from ..world.infrared import InfraredSpec, infrared_readings, sensor_directions
+from ..world.robots import RobotSpec, robot_for
+
+Recording = Mapping[str, FloatArray]
+Pixels = NDArray[np.uint8]
+
+SIDES = (800, 480)
+"""Width and height of a picture in pixels: multiples of 16, as video codecs want them."""
+AXES = (0.09, 0.11, 0.89, 0.81)
+"""Left, bottom, width and height of the axes as fractions of the picture."""
+DPI = 100
+MOST_FRAMES = 120
+"""Longer episodes are thinned out to this many frames."""
+LEAST_RADIUS, WHEELS_FROM = 3.0, 6.0
+"""Radius of a robot in pixels, at least, and from which on its wheels are drawn."""
+MARGIN = 0.04
+"""Around what is drawn, as a fraction of it."""
+# Colour-blind-safe (Okabe and Ito 2008).
+ROBOT_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
+BOX_COLOUR, GOAL_COLOUR, FAILED_COLOUR = "#E69F00", "#555555", "#B00020"
+RAY_COLOUR, HIT_COLOUR = "#BBBBBB", "#6A3D9A"
+
+
+def _rings(box: BoxSpec) -> list[FloatArray]:
+    """Return the closed outline ``(k, 2)`` of a box in its frame [m], then its holes."""
+    if box.polygon is None:
+        angles = np.linspace(0, 2 * np.pi, 65)
+        return [box.radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)]
+    return [np.array(ring.coords) for ring in (box.polygon.exterior, *box.polygon.interiors)]
+
+
+def _pointer(box: BoxSpec) -> FloatArray:
+    """Return an arrow ``(k, 2)`` from the centre of a box ahead, in its frame [m]."""
+    size = 0.3 * np.sqrt(box.area)
+    return size * np.array([[-0.6, 0.0], [0.6, 0.0], [0.3, 0.2], [0.6, 0.0], [0.3, -0.2]])
+
+
+class _Stage:
+    """A figure on which any moment of a recording can be drawn."""
+
+    def __init__(self, recording: Recording, *, sensors: bool = False) -> None:
+        self.recording = recording
+        self.robot: RobotSpec = robot_for(str(recording["robot"]))
+        robots = recording["robot_poses"].shape[1]
+        self.box = box_for(str(recording["box"]), robots)
+        self.rings = _rings(self.box)
+        self.infrared: InfraredSpec | None = None
+        if sensors:
+            described = str(recording.get("infrared", "{}"))
+            settings = InfraredSettings.model_validate_json(described)
+            self.infrared = InfraredSpec(**settings.model_dump())
+        self.figure = Figure(figsize=(SIDES[0] / DPI, SIDES[1] / DPI), dpi=DPI)
+        self.canvas = FigureCanvasAgg(self.figure)
+        self.axes = self.figure.add_axes(AXES)
+        self.axes.set_aspect("equal")
+        low, high = self._extent()
+        # One metre is as long both ways: widen what is too narrow for the picture.
+        room = np.array([SIDES[0] * AXES[2], SIDES[1] * AXES[3]])
+        metres_per_pixel = float(((high - low) / room).max()) * (1 + 2 * MARGIN)
+        half, middle = 0.5 * metres_per_pixel * room, 0.5 * (low + high)
+        self.axes.set_xlim(middle[0] - half[0], middle[0] + half[0])
+        self.axes.set_ylim(middle[1] - half[1], middle[1] + half[1])
+        self.axes.set_xlabel("x [m]")
+        self.axes.set_ylabel("y [m]")
+        self.axes.grid(color="#eeeeee")
+        self.axes.set_axisbelow(True)
+        # Robots that would be dots are drawn larger than they are.
+        self.pixels_of_robot = max(self.robot.radius / metres_per_pixel, LEAST_RADIUS)
+        self.radius = self.pixels_of_robot * metres_per_pixel
+        self._moving: list[Artist] = []
+        goal = recording["goal_pose"]
+        line = {"fill": False, "lw": 1.5, "ec": GOAL_COLOUR, "zorder": 3}
+        self._patch(PathPatch(_curve(self.rings), ls="--", **line), goal)
+        self._patch(Polygon(_pointer(self.box), closed=False, **line), goal)
+        self._moving = []  # these stay
+
+    def _extent(self) -> tuple[FloatArray, FloatArray]:
+        """Return the least and the greatest coordinates ``(2,)`` of all that is ever drawn."""
+        poses = np.vstack([self.recording["box_pose"], self.recording["goal_pose"]])
+        cos, sin = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+        turns = np.array([[cos, -sin], [sin, cos]])
+        corners = np.einsum("ijt,kj->tki", turns, self.rings[0]) + poses[:, None, :2]
+        robots = self.recording["robot_poses"][..., :2].reshape(-1, 2)
+        places = np.vstack(
+            [corners.reshape(-1, 2), robots - self.robot.radius, robots + self.robot.radius]
+        )
+        return places.min(axis=0), places.max(axis=0)
+
+    def draw(self, step: int) -> None:
+        """Draw the moment after `step` steps."""
+        for artist in self._moving:
+            artist.remove()
+        self._moving = []
+        box = self.recording["box_pose"]
+        fill = to_rgba(BOX_COLOUR, 0.75)
+        self._patch(PathPatch(_curve(self.rings), fc=fill, ec="black", zorder=1), box[step])
+        pointer = Polygon(_pointer(self.box), closed=False, fill=False, lw=1.5, zorder=1)
+        self._patch(pointer, box[step])
+        self._trail(box, step, BOX_COLOUR)
+        if self.infrared is not None:
+            self._rays(step, self.infrared)
+        wheels = len(self.robot.wheels)
+        for r in range(self.recording["robot_poses"].shape[1]):
+            self._robot(r, step, slice(r * wheels, (r + 1) * wheels))
+        goal = self.recording["goal_pose"]
+        gap = float(np.hypot(*(box[step, :2] - goal[:2])))
+        self.axes.set_title(
+            f"step {step}, {step * float(self.recording['dt']):.1f} s: box {100 * gap:.0f} cm "
+            "from the goal",
+            loc="left",
+            fontsize=11,
+        )
+
+    def _robot(self, r: int, step: int, wheels: slice) -> None:
+        poses = self.recording["robot_poses"][:, r]
+        colour = ROBOT_COLOURS[r % len(ROBOT_COLOURS)]
+        touching = bool(self.recording["contact"][step, r])
+        speeds = self.recording["wheel_speeds"][step, wheels]
+        failed: FloatArray = np.zeros(len(speeds))
+        if "failed" in self.recording:
+            failed = self.recording["failed"][step, wheels]
+        radius, scale = self.radius, min(1.0, self.pixels_of_robot / 20)
+        self._trail(poses, step, colour)
+        fill = to_rgba(colour, 0.9 if touching else 0.4)
+        self._patch(Circle((0, 0), radius, fc=fill, ec=colour, lw=scale), poses[step])
+        if self.pixels_of_robot < WHEELS_FROM:
+            edge = FAILED_COLOUR if failed.any() else "black"
+            line = [(0.0, 0.0), (1.8 * radius, 0.0)]
+            self._patch(Polygon(line, closed=False, fill=False, ec=edge), poses[step])
+            return
+        nose = Polygon([(radius, 0), (0.4 * radius, 0.35 * radius), (0.4 * radius, -0.35 * radius)])
+        nose.set(facecolor="white", edgecolor=colour, lw=scale)
+        self._patch(nose, poses[step])
+        length, width = 0.5 * radius, 0.16 * radius
+        for wheel, speed, broken in zip(self.robot.wheels, speeds, failed, strict=True):
+            corner = (wheel.x - length / 2, wheel.y - width / 2)
+            paint = FAILED_COLOUR if broken else "black"
+            self._patch(Rectangle(corner, length, width, fc=paint, ec="none"), poses[step])
+            ahead = wheel.x + 1.2 * radius * float(speed) / self.robot.max_speed
+            shaft = [(wheel.x, wheel.y), (ahead, wheel.y)]
+            self._patch(Polygon(shaft, closed=False, fill=False, ec=paint, lw=scale), poses[step])
+            if broken:
+                ends = _at(poses[step]).transform([(wheel.x, wheel.y)])
+                self._moving += self.axes.plot(
+                    *ends.T, "x", color=FAILED_COLOUR, ms=9 * scale, mew=2 * scale
+                )
+
+    def _rays(self, step: int, infrared: InfraredSpec) -> None:
+        poses, box = self.recording["robot_poses"][step], self.recording["box_pose"][step]
+        outline, radius = self.box.outline, self.robot.radius
+        sensors = sensor_directions([self.robot] * len(poses))
+        linear = infrared_readings(
+            poses, np.full(len(poses), radius), sensors, box, outline.edges, outline.rounding,
+            infrared.reach, infrared.decay, 1,
+        ).max(axis=0)  # fmt: skip
+        distances = infrared.reach * (1.0 - linear)
+        angles = poses[:, 2:] + sensors
+        along = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+        eyes = poses[:, None, :2] + radius * along
+        segments = np.stack([eyes, eyes + distances[..., None] * along], axis=2)
+        hits = linear > 0
+        grey = LineCollection(segments[~hits], colors=RAY_COLOUR, linewidths=0.6, zorder=1.5)
+        readings = infrared.reading(distances[hits])
+        violet = LineCollection(
+            segments[hits], colors=HIT_COLOUR, linewidths=0.8 + 2.2 * readings, zorder=1.5
+        )
+        self._moving += [self.axes.add_collection(lines, autolim=False) for lines in (grey, violet)]
+
+    def _patch(self, patch: Patch, pose: FloatArray) -> None:
+        patch.set_transform(_at(pose) + self.axes.transData)
+        self._moving.append(self.axes.add_patch(patch))
+
+    def _trail(self, poses: FloatArray, step: int, colour: str) -> None:
+        past = poses[: step + 1, :2].T
+        self._moving += self.axes.plot(*past, color=colour, lw=1, alpha=0.7, zorder=0.9)
+
+    def pixels(self) -> Pixels:
+        """Return what is drawn as ``(height, width, 3)`` bytes."""
+        self.canvas.draw()
+        return np.asarray(self.canvas.buffer_rgba())[..., :3].copy()
+
+
+def _at(pose: FloatArray) -> Affine2D:
+    return Affine2D().rotate(float(pose[2])).translate(float(pose[0]), float(pose[1]))
+
+
+def _curve(rings: list[FloatArray]) -> Curve:
+    """Return a path along rings, oriented against each other, so that holes stay open."""
+    return Curve.make_compound_path(*(Curve(ring, closed=True) for ring in rings))
+
+
+def picture(recording: Recording, step: int, *, sensors: bool = False) -> Pixels:
+    """Return the moment after `step` steps as ``(height, width, 3)`` bytes."""
+    stage = _Stage(recording, sensors=sensors)
+    stage.draw(step)
+    return stage.pixels()
+
+
+def snapshot(recording: Recording, step: int, path: Path, *, sensors: bool = False) -> None:
+    """Draw the moment after `step` steps (negative: from the end) to a picture file."""
+    stage = _Stage(recording, sensors=sensors)
+    stage.draw(range(len(recording["box_pose"]))[step])
+    stage.figure.savefig(path, dpi=DPI)
+
+
+def animate(recording: Recording, path: Path, speed: float = 4.0, *, sensors: bool = False) -> None:
+    """Draw an episode as an animation, GIF or MP4 by the suffix of `path`.
+
+    Parameters
+    ----------
+    recording
+        The episode.
+    path
+        Where to write; an unfinished animation never bears this name.
+    speed
+        How many times faster than real time it plays; thinned-out episodes play faster still.
+    sensors
+        Whether rays of infrared sensors are drawn.
+
+    Raises
+    ------
+    ValueError
+        If the suffix is neither ``.gif`` nor ``.mp4``.
+    """
+    if path.suffix not in (".gif", ".mp4"):
+        raise ValueError(f"animation: suffix {path.suffix!r} of {path.name}, allowed .gif or .mp4")
+    stage = _Stage(recording, sensors=sensors)
+    last = len(recording["box_pose"]) - 1
+    steps = np.unique(np.linspace(0, last, min(last + 1, MOST_FRAMES)).round().astype(int))
+    frames = []
+    for step in steps:
+        stage.draw(int(step))
+        frames.append(stage.pixels())
+    seconds = float(recording["dt"]) / speed
+    partial = path.with_name(f".{path.stem}.partial{path.suffix}")
+    write = _write_gif if path.suffix == ".gif" else _write_mp4
+    write(partial, frames, seconds)
+    partial.replace(path)
+
+
+def _write_gif(path: Path, frames: list[Pixels], seconds: float) -> None:
+    # One palette for all frames: colours do not flicker, and it is found only once.
+    palette = Image.fromarray(frames[-1]).quantize(128)
+    images = [
+        Image.fromarray(f).quantize(palette=palette, dither=Image.Dither.NONE) for f in frames
+    ]
+    durations = [round(1000 * seconds)] * (len(images) - 1) + [1500]
+    images[0].save(path, save_all=True, append_images=images[1:], duration=durations, loop=0)
+
+
+def _write_mp4(path: Path, frames: list[Pixels], seconds: float) -> None:
+    imageio.mimwrite(path, frames, fps=1 / seconds, macro_block_size=16)  # type: ignore[arg-type]

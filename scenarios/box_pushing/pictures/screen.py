@@ -1,0 +1,94 @@
+"""What an environment shows of the episode that is being played: pixels, or a window."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ....core.protocols import Transition
+from ..config import ScenarioSettings
+
+SHOWN = ("robot_poses", "box_pose", "wheel_speeds", "contact", "failed")
+
+
+class Screen:
+    """Remembers an episode and draws its present.
+
+    Parameters
+    ----------
+    settings
+        Of the scenario.
+    mode
+        ``"rgb_array"``: `render` returns a picture. ``"human"``: a window is kept up to date.
+    sensors
+        Whether rays of infrared sensors are drawn.
+    """
+
+    def __init__(self, settings: ScenarioSettings, mode: str, *, sensors: bool = False) -> None:
+        self.mode, self.sensors = mode, sensors
+        self._constants = {name: np.array(value) for name, value in settings.drawn.items()}
+        self._frames: dict[str, list[Any]] = {}
+        self._rewards: list[float] = []
+        self._window: Any = None
+
+    def begin(self, measured: Mapping[str, Any]) -> None:
+        """Forget the past and take in the start of an episode."""
+        self._constants["goal_pose"] = np.array(measured["goal_pose"])
+        self._frames = {name: [np.array(measured[name])] for name in SHOWN}
+        self._rewards = []
+        if self.mode == "human":
+            self._show()
+
+    def add(self, transition: Transition) -> None:
+        """Take in a step."""
+        for name, frames in self._frames.items():
+            frames.append(np.array(transition.info[name]))
+        self._rewards.append(transition.reward)
+        if self.mode == "human":
+            self._show()
+
+    def render(self) -> np.ndarray | None:
+        """Return the present as ``(height, width, 3)`` bytes; with a window, nothing.
+
+        Raises
+        ------
+        RuntimeError
+            If no episode has begun.
+        """
+        if not self._frames:
+            raise RuntimeError("render: no episode has begun, call reset first")
+        return None if self.mode == "human" else self._picture()
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._window is not None:
+            import pygame
+
+            pygame.display.quit()
+            self._window = None
+
+    def _picture(self) -> np.ndarray:
+        from .rendering import picture
+
+        recording = {name: np.stack(frames) for name, frames in self._frames.items()}
+        recording |= self._constants
+        recording["reward"] = np.array(self._rewards)
+        return picture(recording, len(self._rewards), sensors=self.sensors)
+
+    def _show(self) -> None:
+        try:
+            import pygame
+        except ImportError:
+            raise ImportError(
+                'render_mode = "human" needs pygame: pip install "nested-agents[human]"'
+            ) from None
+        pixels = self._picture()
+        if self._window is None:
+            pygame.display.init()
+            pygame.display.set_caption("nested-agents")
+            self._window = pygame.display.set_mode(pixels.shape[1::-1])
+        pygame.event.pump()
+        self._window.blit(pygame.surfarray.make_surface(pixels.transpose(1, 0, 2)), (0, 0))
+        pygame.display.flip()

@@ -1,0 +1,112 @@
+"""Predictors of box pushing by name: what they take the world for.
+
+push
+    Compliant quasi-static pushing, see `box_pushing.prediction.push`; the default.
+rigid
+    The same without compliance and contact friction: the kinematic push.
+static
+    The box does not move; robots are stopped by it.
+exact
+    The world itself, saved, played ahead and restored. It knows all that is to come, failures and
+    their noise too, and takes no notice of a self-model: a bound on what prediction can give, some
+    thousand times slower than the others.
+"""
+
+from __future__ import annotations
+
+from copy import deepcopy
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from ....core.arrays import FloatArray, IntArray
+from ..config import CONTROL_PERIOD, BeliefSettings
+from ..states.view import View
+from ..world.boxes import BoxSpec
+from ..world.failures import Failures
+from ..world.robots import RobotSpec, compliance
+from ..world.world import World, WorldState
+from .prediction import BoxPrediction
+from .push import PushModel
+
+IMMOBILE = 1e6
+"""Ground friction [N] against which nothing moves."""
+
+
+def push_model(
+    predictor: str,
+    robots: list[RobotSpec],
+    box: BoxSpec,
+    belief: BeliefSettings = BeliefSettings(),  # noqa: B008 - frozen
+) -> PushModel:
+    """Return what a predictor believes of robots and box, the constants being off as told."""
+    model = PushModel(
+        edges=box.outline.edges,
+        rounding=box.outline.rounding,
+        reach=box.reach,
+        radii=np.array([robot.radius for robot in robots]),
+        compliance=np.stack([compliance(robot) for robot in robots]) / belief.stiffness,
+        friction_force=box.friction_force * belief.load,
+        friction_radius=box.friction_radius,
+        contact_friction=box.contact_friction * belief.contact_friction,
+    )
+    if predictor == "rigid":
+        return model._replace(compliance=np.zeros_like(model.compliance), contact_friction=0.0)
+    return model._replace(friction_force=IMMOBILE) if predictor == "static" else model
+
+
+@dataclass(frozen=True)
+class Future:
+    """Where a world goes from a saved state.
+
+    Attributes
+    ----------
+    world
+        A world built alike, to play in; modified.
+    state
+        The present.
+    failures
+        Those of the scenario; left as they are.
+    step, hold
+        Number of the step to come, and control periods in one.
+    """
+
+    world: World
+    state: WorldState
+    failures: Failures | None
+    step: int
+    hold: int
+
+    def after(self, commands: FloatArray, periods: int) -> tuple[FloatArray, FloatArray]:
+        """Return poses ``(M + 1, 3)``, the box first, and gaps ``(M,)`` under held commands."""
+        self.world.restore(self.state)
+        failures = deepcopy(self.failures)
+        if failures is None:
+            self.world.advance(commands, periods)
+        else:
+            self.world.set_grip(failures.grip)
+            for number, past in enumerate(range(0, periods, self.hold), self.step):
+                failures.advance(self.world, commands, number, min(self.hold, periods - past))
+        return np.vstack([self.world.box_pose, self.world.robot_poses]), self.world.gaps.copy()
+
+
+@dataclass(frozen=True)
+class ExactPrediction(BoxPrediction):
+    """Predicts by playing; but for the own block, which is that of a robot pushing alone."""
+
+    future: Future
+
+    merges: ClassVar[bool] = False  # wheels that command one twist may yet slip differently
+
+    def _after(self, choices: IntArray, seconds: float) -> View:
+        periods = round(seconds / CONTROL_PERIOD)
+        rows, which = np.unique(choices, axis=0, return_inverse=True)
+        poses, gaps = [], []
+        for row in rows:
+            commands = self.drives.speeds[np.arange(len(row)), row].ravel()
+            pose, gap = self.future.after(commands, periods)
+            poses.append(pose)
+            gaps.append(gap)
+        pose, gap = np.array(poses)[which], np.array(gaps)[which]
+        return self.seen(pose[:, 1:], pose[:, 0], gap, seconds)

@@ -1,0 +1,155 @@
+"""Where robots and box will be after a decision period: quasi-static pushing.
+
+Robots are soft velocity servos: a robot whose wheels ask for the twist v* and that pushes with the
+wrench w moves with v* - W w, where W is its compliance. The box rests on distributed Coulomb
+friction, described by the limit surface (Goyal, Ruina & Papadopoulos 1991) taken as an ellipsoid:
+under sliding its wrench is F D v / sqrt(v' D v) with D = diag(1, 1, rho^2), F the greatest
+friction force and rho the mean distance of the friction from the centre. At a contact the robot
+does not enter the box, and sticks to it within the friction cone. The contact forces are found by
+a few Gauss-Seidel sweeps, in which the friction is replaced by the viscous one that equals it at
+the last sweep's velocity. Without compliance and contact friction the robots are rigid: the
+kinematic push.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from ....core.arrays import FloatArray, IntArray
+from . import push_lanes as lanes
+from .push_lanes import BODY_ROWS, BOX_ROWS, LANES, MARGIN
+
+SUBSTEPS = 4
+SWEEPS = 4
+
+
+class PushModel(NamedTuple):
+    """What the push predictor believes of robots and box; ``M`` robots.
+
+    Attributes
+    ----------
+    edges, rounding
+        Outline of the box, see `box_pushing.world.geometry.Outline`.
+    reach
+        Distance from the centre of the box within which all of it lies [m].
+    radii
+        ``(M,)`` robot radii [m].
+    compliance
+        ``(M, 3, 3)`` twist per wrench in the robot frame [m/s, rad/s per N, Nm]; zero: rigid.
+    friction_force
+        Greatest ground friction of the box, F [N].
+    friction_radius
+        rho [m].
+    contact_friction
+        Coefficient of friction between robot and box.
+    """
+
+    edges: FloatArray
+    rounding: float
+    reach: float
+    radii: FloatArray
+    compliance: FloatArray
+    friction_force: float
+    friction_radius: float
+    contact_friction: float
+
+
+@njit(cache=True, error_model="numpy")
+def push(  # type: ignore[no-untyped-def]
+    robots: FloatArray,
+    box: FloatArray,
+    twists: FloatArray,
+    choices: IntArray,
+    seconds: float,
+    model: PushModel,
+):
+    """Predict poses after `seconds` for many combinations of robot twists.
+
+    Parameters
+    ----------
+    robots
+        ``(M, 3)`` present poses.
+    box
+        ``(3,)`` present pose.
+    twists
+        ``(M, K, 3)`` twists that each robot may be asked for, in its own frame [m/s, m/s, rad/s].
+    choices
+        ``(m, M)`` which of its twists each robot takes.
+    seconds
+        Decision period [s].
+    model
+        What is believed of robots and box.
+
+    Returns
+    -------
+    tuple
+        Robot poses ``(m, M, 3)``, box poses ``(m, 3)`` and gaps ``(m, M)`` [m]; in memory the
+        combinations stand next to each other.
+    """
+    m, n = choices.shape
+    out_robots, out_box, out_gaps = np.empty((n, 3, m)), np.empty((3, m)), np.empty((n, m))
+    dt = seconds / SUBSTEPS
+    reach = np.empty(n)  # how far from the centre of the box a robot may be and still touch it
+    for r in range(n):
+        fastest = 0.0
+        for k in range(twists.shape[1]):
+            fastest = max(fastest, np.hypot(twists[r, k, 0], twists[r, k, 1]))
+        reach[r] = model.reach + model.radii[r] + 2.0 * dt * fastest + MARGIN
+    bodies, shared = np.zeros((n, BODY_ROWS * LANES)), np.zeros(BOX_ROWS * LANES)
+    near = np.zeros(n, np.bool_)
+    for first in range(0, m, LANES):
+        used = min(LANES, m - first)
+        # Whole vectors are faster than their ends: lanes beyond repeat the last one.
+        width = (used + 7) // 8 * 8
+        for k in range(width):
+            c = first + min(k, used - 1)
+            for j in range(3):
+                shared[j * LANES + k] = box[j]
+                for r in range(n):
+                    bodies[r, j * LANES + k] = robots[r, j]
+                    bodies[r, (lanes.AHEAD + j) * LANES + k] = twists[r, choices[c, r], j]
+        for _ in range(SUBSTEPS):
+            _substep(bodies, shared, near, reach, dt, model, width)
+        lanes.head(shared, width)
+        for r in range(n):
+            lanes.localise(bodies[r], shared, reach[r], width)
+            lanes.approach(model.edges, shared, width)
+            for k in range(used):
+                gap = np.sqrt(shared[lanes.SQUARE * LANES + k]) * shared[lanes.SIDE * LANES + k]
+                out_gaps[r, first + k] = gap - model.rounding - model.radii[r]
+                for j in range(3):
+                    out_robots[r, j, first + k] = bodies[r, j * LANES + k]
+        for j in range(3):
+            out_box[j, first : first + used] = shared[j * LANES : j * LANES + used]
+    return out_robots.transpose(2, 0, 1), out_box.T, out_gaps.T
+
+
+@njit(cache=True, error_model="numpy")
+def _substep(bodies, box, near, reach, dt, model, width) -> None:  # type: ignore[no-untyped-def]
+    """Find the contacts of all robots, their forces, and move everything for `dt` seconds."""
+    rho2 = model.friction_radius**2
+    lanes.head(box, width)
+    lanes.rest(box, model.friction_force, width)
+    touching = False
+    for r in range(len(bodies)):
+        body = bodies[r]
+        lanes.head(body, width)
+        lanes.release(body, width)
+        near[r] = False
+        if lanes.localise(body, box, reach[r], width) > 0:
+            lanes.approach(model.edges, box, width)
+            radius, compliance = model.radii[r], model.compliance[r]
+            near[r] = lanes.touch(body, box, radius, model.rounding, compliance, dt, width) > 0
+            touching = touching or near[r]
+    if touching:
+        for _ in range(SWEEPS):
+            for r in range(len(bodies)):
+                if near[r]:
+                    lanes.answer(bodies[r], box, rho2, model.contact_friction, width)
+            lanes.drag(box, rho2, model.friction_force, width)
+    for r in range(len(bodies)):
+        lanes.move(bodies[r], model.radii[r], model.compliance[r], dt, width)
+    lanes.carry(box, dt, width)

@@ -1,0 +1,289 @@
+"""Box pushing: wheels that learn to bring a box to a goal (Section IX-A).
+
+The scenario joins the world (robots, box, ground), the task (goal pose, reward, end of an
+episode), the sensing (states) and the servo layer, which turns actions into wheel speeds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import pi
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from ...core.arrays import BoolArray, FloatArray, IntArray
+from ...core.protocols import Transition
+from ...core.spaces import ActionSet, StateSpace
+from .config import CONTROL_PERIOD, ScenarioSettings
+from .prediction.belief import APART, CONSTANTS, PushBelief, least_gap
+from .prediction.prediction import BoxPrediction, mean_twists
+from .prediction.predictors import ExactPrediction, Future, push_model
+from .prediction.situation import Situation
+from .reward import Task, reward
+from .starts import place
+from .states.state_spaces import state_space_for
+from .states.view import View
+from .world.boxes import box_for
+from .world.failures import Failures
+from .world.infrared import InfraredSpec, strongest_reading
+from .world.robots import nominal_effect, robot_for
+from .world.world import World, WorldState
+
+SENSING = 2**32 - 1
+"""Key of the stream of sensor noise under the seed of an episode; failures have 0, 1, ..."""
+
+
+class BoxPushing:
+    """A box, a goal, and robots whose wheels are the agents.
+
+    Fulfils `nested_agents.core.protocols.Scenario`.
+
+    Parameters
+    ----------
+    settings
+        See `ScenarioSettings`.
+
+    Raises
+    ------
+    ValueError
+        If a robot, box or start is unknown, or the robots do not fit around the box.
+
+    Examples
+    --------
+    >>> scenario = BoxPushing(ScenarioSettings())
+    >>> scenario.agents
+    ('robot1.left', 'robot1.right', 'robot2.left', 'robot2.right')
+    >>> scenario.reset(0).shape
+    (4, 8)
+    """
+
+    def __init__(self, settings: ScenarioSettings) -> None:
+        self.settings = settings
+        self.robot = robot_for(settings.robot)
+        self.box = box_for(settings.box, settings.robots)
+        # Whether they fit is better known now than in the middle of a study.
+        place(settings.start, np.random.default_rng(0), [self.robot] * settings.robots, self.box)
+        wheels = len(self.robot.wheels)
+        self.groups = tuple(
+            tuple(range(r * wheels, (r + 1) * wheels)) for r in range(settings.robots)
+        )
+        self.agents = tuple(
+            f"robot{r + 1}.{name}"
+            for r in range(settings.robots)
+            for name in self.robot.wheel_names
+        )
+        self.action_set = ActionSet()
+        self.infrared = InfraredSpec(**settings.infrared.model_dump())
+        self.world = World([self.robot] * settings.robots, self.box, infrared=self.infrared)
+        self._space = state_space_for(settings.state_space, self.robot.max_speed)
+        self._limits: FloatArray = np.full(len(self.agents), self.robot.max_speed)
+        self._effects = (nominal_effect(self.robot),) * settings.robots
+        robots = [self.robot] * settings.robots
+        self._model = push_model(settings.predictor, robots, self.box, settings.belief)
+        self._belief = PushBelief.of(self._model, robots, settings.belief.stiffness)
+        self._playground = World(robots, self.box) if settings.predictor == "exact" else None
+        self._failures = (
+            Failures(settings.failures, self.agents, self._limits) if settings.failures else None
+        )
+        self._task = Task(settings.reward, settings.tolerance, settings.orientation_tolerance)
+        self._goal: FloatArray = np.zeros(3)
+        self._sensing = np.random.default_rng(0)  # until reset
+        self._speeds: FloatArray = np.zeros(len(self.agents))
+        self._step = 0
+        self._saved: WorldState | None = None
+
+    @property
+    def superposes(self) -> bool:
+        """Whether predictions can be had to first order: all but exact ones."""
+        return self.settings.predictor != "exact"
+
+    @property
+    def state_space(self) -> StateSpace:
+        """The state variables of every agent."""
+        return self._space.space
+
+    @property
+    def bounds(self) -> FloatArray:
+        """What the state variables cannot leave, ``(d, 2)``; infinite where there is no limit."""
+        depth = self.robot.radius + self.box.reach
+        limits = []
+        for variable in self.state_space.variables:
+            if variable.periodic:
+                limits.append((variable.low, variable.high))
+            elif variable.unit == "m/s":
+                limits.append((-self.robot.max_speed, self.robot.max_speed))
+            else:
+                low = -depth if variable.name.endswith("gap") else 0.0
+                limits.append((-np.inf if variable.low < 0.0 else low, np.inf))
+        return np.array(limits)
+
+    def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
+        """Place robots, box and goal by the start distribution; return states ``(n, d)``.
+
+        Failures are scheduled by the number of the `episode`.
+        """
+        root = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
+        self._sensing = np.random.default_rng(
+            np.random.SeedSequence(root.entropy, spawn_key=(*root.spawn_key, SENSING))
+        )
+        rng = np.random.default_rng(seed)
+        robots, box, self._goal = place(
+            self.settings.start, rng, [self.robot] * self.settings.robots, self.box
+        )
+        self.world.place(robots, box)
+        self._speeds = np.zeros(len(self.agents))
+        self._step = 0
+        if self._failures is not None:
+            self._failures.begin(seed, episode)
+            self.world.set_grip(self._failures.grip)
+        self._save()
+        return self._observe(self._distance())
+
+    def step(self, joint_action: IntArray) -> Transition:
+        """Command the wheels, let the world go on for one decision period, observe and reward."""
+        unit = self.settings.speed_increment * self._limits
+        self._speeds = self.action_set.apply(self._speeds, joint_action, unit, self._limits)
+        before, poses = self._distance(), self.world.robot_poses.copy()
+        box, radius = self.world.box_pose.copy(), self.robot.radius
+        begin = perf_counter()
+        self._advance(self._speeds)
+        moved = perf_counter()
+        states = self._observe(before)
+        period = self.settings.period
+        motions = mean_twists(poses, self.world.robot_poses, period)
+        pushed = None
+        if min(least_gap(poses, radius), least_gap(self.world.robot_poses, radius)) > APART:
+            pushed = mean_twists(box[None], self.world.box_pose[None], period)[0]
+        measured = self.measure()
+        readings = strongest_reading(self.world, self._sensing)
+        terminated = self._reached()
+        gained = reward(
+            self._task,
+            np.array([measured["distance_m"]]),
+            np.array([measured["distance_m"] - before]),
+            np.array([measured["orientation_rad"]]),
+            self.world.contact[None],
+            readings[None],
+        )
+        sensed = perf_counter()
+        if terminated:
+            measured["stopped_at_goal"] = self._stays()
+        self._step += 1
+        self._save()
+        measured["seconds"] = {"physics": moved - begin, "sensors": sensed - moved}
+        truncated = not terminated and measured["distance_m"] > self.settings.arena
+        return Transition(
+            states, float(gained[0]), terminated, truncated, measured, motions, pushed
+        )
+
+    @property
+    def nominal_effects(self) -> tuple[FloatArray, ...]:
+        """Per robot the ``(3, w + 1)`` effect of its wheel speeds on its twist."""
+        return self._effects
+
+    def predict(self) -> BoxPrediction:
+        """Predict from the present state, every robot taken as nominal."""
+        return self.predict_with(self._effects)
+
+    @property
+    def constants(self) -> tuple[str, ...]:
+        """Names of what the push predictor can calibrate; the other predictors have none."""
+        return CONSTANTS if self.settings.predictor == "push" else ()
+
+    @property
+    def levers(self) -> FloatArray:
+        """Speed per turning rate of the box and of every robot ``(M + 1,)`` [m]."""
+        radii = [self.robot.radius] * self.settings.robots
+        return np.array([self.box.friction_radius, *radii])
+
+    def predict_with(
+        self, effects: Sequence[FloatArray], constants: FloatArray | None = None
+    ) -> BoxPrediction:
+        """Predict, believing in these effects of the wheels and constants of the push."""
+        situation = Situation(
+            self.world.robot_poses.copy(), self.world.box_pose.copy(), self._goal,
+            self._speeds, tuple(effects), self.groups,
+        )  # fmt: skip
+        model = self._model if constants is None else self._belief.believing(constants)
+        believed = (
+            situation, model, self._belief, self._space, self.action_set, self._task,
+            self.settings.period, self.settings.lookahead * CONTROL_PERIOD,
+            self.settings.speed_increment, self._limits, self.infrared,
+        )  # fmt: skip
+        if self._playground is None or self._saved is None:
+            return BoxPrediction(*believed)
+        future = Future(
+            self._playground, self._saved, self._failures, self._step, self.settings.hold
+        )
+        return ExactPrediction(*believed, future)
+
+    def _save(self) -> None:
+        # After every step, asked for or not, as saving costs the world its order of contacts.
+        self._saved = None if self._playground is None else self.world.state()
+
+    def measure(self) -> dict[str, Any]:
+        """Return poses, speeds, contact and errors of the present state.
+
+        Keys: ``robot_poses`` (M, 3), ``box_pose``, ``goal_pose`` [m, m, rad], ``wheel_speeds``
+        (n,) as commanded [m/s], ``contact`` (M,) now, ``contact_time`` (M,) as a fraction of the
+        last decision period, ``failed`` (n,) wheels, ``distance_m``, ``orientation_rad`` of the box
+        from the goal pose.
+        """
+        return {
+            "robot_poses": self.world.robot_poses.copy(),
+            "box_pose": self.world.box_pose.copy(),
+            "goal_pose": self._goal,
+            "wheel_speeds": self._speeds,
+            "contact": self.world.contact.copy(),
+            "contact_time": self.world.contact_time.copy(),
+            "failed": self.failed,
+            "distance_m": self._distance(),
+            "orientation_rad": self._orientation(),
+        }
+
+    @property
+    def failed(self) -> BoolArray:
+        """Whether each wheel is under a failure now, ``(n,)``."""
+        if self._failures is None:
+            return np.zeros(len(self.agents), dtype=bool)
+        return self._failures.failed.copy()
+
+    def _advance(self, commands: FloatArray) -> None:
+        """Let the world go on for one decision period, the wheels being told `commands`."""
+        if self._failures is None:
+            self.world.advance(commands, self.settings.hold)
+        else:
+            self._failures.advance(self.world, commands, self._step, self.settings.hold)
+
+    def _distance(self) -> float:
+        ahead = self._goal[:2] - self.world.box_pose[:2]
+        return float(np.hypot(ahead[0], ahead[1]))
+
+    def _orientation(self) -> float:
+        return float((self.world.box_pose[2] - self._goal[2] + pi) % (2.0 * pi) - pi)
+
+    def _reached(self) -> bool:
+        distance, orientation = np.array([self._distance()]), np.array([self._orientation()])
+        return bool(self._task.reached(distance, orientation)[0])
+
+    def _stays(self) -> bool:
+        """Stop all wheels and tell whether the box comes to rest within the tolerance."""
+        self._advance(np.zeros(len(self.agents)))
+        return self._reached()
+
+    def _observe(self, before: float) -> FloatArray:
+        """Return the states ``(n, d)`` of all agents: the error observation layer.
+
+        `before` is the distance of the box from the goal one decision period ago [m].
+        """
+        world, poses = self.world, self.world.robot_poses
+        view = View(poses[None], world.box_pose[None], world.gaps[None], self._goal, before, 1.0)
+        rows = []
+        for r, group in enumerate(self.groups):
+            shared = self._space.shared(view, r)[0]
+            for agent in group:
+                own = self._space.own(poses[r : r + 1], self._speeds[agent : agent + 1], self._goal)
+                rows.append(np.concatenate([own[0], shared]))
+        return np.array(rows)

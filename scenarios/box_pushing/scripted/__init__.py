@@ -1,0 +1,1 @@
+"""A scripted controller: the proof that the task can be solved."""

@@ -1,0 +1,336 @@
+"""A scripted controller: the proof that box pushing can be solved with the agents' own actions.
+
+It picks a side at which to push the box towards the goal, gives every robot a slot along it, drives
+the robots that are not at their slot there (a short search over sequences of actions of one robot,
+around the box and clear of the others), and once all are, pushes: it tries the joint actions on the
+push predictor and takes the one after which the box is nearest to the goal and best aligned, with
+the robots still at their slots. It knows the whole situation and remembers nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise, product
+from math import atan2, cos, pi, sin
+from typing import Any
+
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from ....core.arrays import FloatArray, IntArray
+from ....core.spaces import ActionSet
+from ..prediction.predictors import push_model
+from ..prediction.push import push
+from ..scenario import BoxPushing
+from ..world.boxes import BoxSpec
+from ..world.robots import RobotSpec, nominal_effect
+from .routes import moved, paths
+from .sides import SPREAD, Side, behind, is_concave, sides_of
+
+CLEARANCE = 0.006
+"""Least gap [m] to box and other robots on the way to a slot."""
+SLOT_GAP = 0.015
+"""Gap to the box at which a robot waits at its slot [m]."""
+LONGEST_SEARCH = 5000
+"""Action sequences tried per robot and decision."""
+WIDEST_JOINT = 300
+"""Joint actions tried at once; above, robots choose in turn."""
+
+
+class ScriptedController:
+    """Drives robots to push a box to its goal.
+
+    Parameters
+    ----------
+    robots, box
+        What is in the world.
+    action_set, increment, seconds
+        As in the scenario: actions, what an increment changes as a fraction of the greatest
+        speed, and the decision period [s].
+
+    Examples
+    --------
+    >>> from nested_agents.scenarios import ScenarioSettings, build
+    >>> scenario = build(ScenarioSettings(start="easy"))
+    >>> _ = scenario.reset(1)
+    >>> controller = ScriptedController(scenario.world.robots, scenario.box)
+    >>> for step in range(60):
+    ...     transition = scenario.step(controller.act(scenario.measure()))
+    ...     if transition.terminated:
+    ...         break
+    >>> transition.terminated
+    True
+    """
+
+    def __init__(
+        self,
+        robots: Sequence[RobotSpec],
+        box: BoxSpec,
+        action_set: ActionSet | None = None,
+        increment: float = 0.5,
+        seconds: float = 0.512,
+    ) -> None:
+        self.robots = tuple(robots)
+        self.box = box
+        self.actions = action_set or ActionSet()
+        self.increment = increment
+        self.seconds = seconds
+        self._radii: FloatArray = np.array([robot.radius for robot in robots])
+        self._choices = [_local_actions(robot, len(self.actions)) for robot in robots]
+        self._effects = [nominal_effect(robot) for robot in robots]
+        counts = np.cumsum([0] + [len(robot.wheels) for robot in robots])
+        self._wheels = [slice(a, b) for a, b in pairwise(counts)]
+        self._model = push_model("push", list(robots), box)
+        self._sides = sides_of(box, len(robots), float(self._radii.max()) + CLEARANCE)
+        self._hollow = is_concave(box)
+        self._backs: dict[tuple[float, float, float], float] = {}
+
+    def act(self, measurements: Mapping[str, Any]) -> IntArray:
+        """Return the joint action ``(n,)`` in a situation.
+
+        Parameters
+        ----------
+        measurements
+            ``robot_poses`` (M, 3), ``box_pose`` (3,), ``goal_pose`` (3,) and commanded
+            ``wheel_speeds`` (n,), as `BoxPushing.measure` returns them.
+        """
+        robots, box = measurements["robot_poses"], measurements["box_pose"]
+        goal, speeds = measurements["goal_pose"], measurements["wheel_speeds"]
+        side, slots = self._plan(robots, box, goal)
+        heading = box[2] + side.direction
+        away = [r for r, pose in enumerate(robots) if not self._at_slot(pose, slots[r], heading)]
+        local = [
+            self._drive(r, robots, box, speeds, np.array([*slots[r], heading]), wait=r not in away)
+            for r in range(len(robots))
+        ]
+        # With steps as coarse as the actions' a robot may find no better place than it has.
+        stuck = not any(speeds) and not any(
+            self._next(r, speeds[w][None])[0][0, k].any()
+            for r, (w, k) in enumerate(zip(self._wheels, local, strict=True))
+        )
+        if stuck or not away:
+            local = self._push(robots, box, goal, speeds, side, slots)
+        return np.concatenate([choices[k] for choices, k in zip(self._choices, local, strict=True)])
+
+    def _plan(
+        self, robots: FloatArray, box: FloatArray, goal: FloatArray
+    ) -> tuple[Side, FloatArray]:
+        """Return the side to push at and each robot's slot ``(M, 2)`` in the world."""
+        course = atan2(goal[1] - box[1], goal[0] - box[0]) - box[2]
+        sides = self._sides or [Side(course, self.box.reach, 0.0, 0.6 * self.box.reach)]
+        best = None
+        for side in sides:
+            error = float(_wrap(course - side.direction))
+            slots = self._slots(side, box, error)
+            costs = np.array(
+                [
+                    paths(
+                        np.ascontiguousarray(pose[None]), slot, box, self._model.edges,
+                        self._model.rounding, radius + CLEARANCE, self.box.reach,
+                    )[0]
+                    for pose, radius in zip(robots, self._radii, strict=True)
+                    for slot in slots
+                ]
+            ).reshape(len(robots), -1)  # fmt: skip
+            rows, columns = linear_sum_assignment(costs)
+            # Past a right angle pushing leads away from the goal.
+            steer = abs(error) + 4.0 * max(abs(error) - 1.2, 0.0)
+            cost = steer + costs[rows, columns].mean() / 0.3
+            if best is None or cost < best[0]:
+                best = cost, side, slots[columns]
+        assert best is not None
+        return best[1], best[2]
+
+    def _spread(self, side: Side) -> float:
+        """Return how far from the middle of a side the outermost slots are [m]."""
+        least = (len(self.robots) - 1) * (float(self._radii.max()) + CLEARANCE)
+        return max(SPREAD * side.half, least)
+
+    def _slots(self, side: Side, box: FloatArray, error: float) -> FloatArray:
+        """Return the slots ``(M, 2)`` along a side, evenly spread, in the world.
+
+        `error` is the angle from the side's direction to the goal [rad].
+        """
+        n = len(self.robots)
+        offsets = np.linspace(1, -1, n) * self._spread(side)
+        if n == 1:  # steers by where it pushes
+            offsets = -0.5 * side.half * np.clip([2.0 * error], -1, 1)
+        angle = box[2] + side.direction
+        ahead, left = np.array([cos(angle), sin(angle)]), np.array([-sin(angle), cos(angle)])
+        slots = []
+        for offset, radius in zip(offsets, self._radii, strict=True):
+            back = self._back(side, float(side.middle + offset), float(radius))
+            if not self._sides:
+                back = np.sqrt((self.box.reach + radius + SLOT_GAP) ** 2 - offset**2)
+            slots.append(box[:2] - back * ahead + (side.middle + offset) * left)
+        return np.array(slots)
+
+    def _back(self, side: Side, aside: float, radius: float) -> float:
+        """Return how far behind the box's centre a robot waits [m]."""
+        if not self._hollow:
+            return side.depth + radius + SLOT_GAP
+        key = side.direction, aside, radius + SLOT_GAP
+        if key not in self._backs:
+            self._backs[key] = behind(self.box, *key)[0]
+        return self._backs[key]
+
+    def _at_slot(self, pose: FloatArray, slot: FloatArray, heading: float) -> bool:
+        dx, dy = pose[:2] - slot
+        along, aside = cos(heading) * dx + sin(heading) * dy, cos(heading) * dy - sin(heading) * dx
+        allowed = 0.03 if along < 0 else 0.045  # once it pushes, it is left alone for longer
+        turn = abs(_wrap(pose[2] - heading))
+        return bool(-0.05 < along < 0.04 and abs(aside) < allowed and turn < 0.7)
+
+    def _next(self, robot: int, speeds: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return wheel speeds ``(m, k, w)`` and twists ``(m, k, 3)`` after the k local actions.
+
+        `speeds` is ``(m, w)``.
+        """
+        limit = np.full(speeds.shape[-1], self.robots[robot].max_speed)
+        after = self.actions.apply(
+            speeds[:, None], self._choices[robot][None], self.increment * limit, limit
+        )
+        effect = self._effects[robot]
+        return after, after @ effect[:, :-1].T + effect[:, -1]
+
+    def _drive(
+        self,
+        robot: int,
+        robots: FloatArray,
+        box: FloatArray,
+        speeds: FloatArray,
+        target: FloatArray,
+        *,
+        wait: bool,
+    ) -> int:
+        """Return the local action that leads a robot towards a pose, or stops it if it waits."""
+        now = speeds[self._wheels[robot]][None]
+        if wait:
+            after, _ = self._next(robot, now)
+            return int(np.abs(after[0]).sum(axis=1).argmin())
+        others = np.delete(robots[:, :2], robot, axis=0)
+        spans = self._radii[robot] + np.delete(self._radii, robot) + CLEARANCE
+        poses, first = robots[robot][None], None
+        cost = np.zeros(1)
+        while len(poses) * len(self._choices[robot]) <= LONGEST_SEARCH:
+            after, twists = self._next(robot, now)
+            options = twists.shape[1]
+            poses = np.repeat(poses, options, axis=0)
+            cost = np.repeat(cost, options)
+            first = np.arange(options) if first is None else np.repeat(first, options)
+            now = after.reshape(-1, now.shape[1])
+            twists = twists.reshape(-1, 3)
+            for _ in range(2):
+                poses = moved(poses, twists, self.seconds / 2)
+                apart = np.hypot(*(poses[:, None, :2] - others).transpose(2, 0, 1))
+                cost = cost + 10.0 * np.maximum(spans - apart, 0.0).sum(axis=1)
+                path = paths(
+                    poses, target[:2], box, self._model.edges, self._model.rounding,
+                    self._radii[robot] + CLEARANCE, self.box.reach,
+                )  # fmt: skip
+                turn = np.abs(_wrap(poses[:, 2] - target[2]))
+                cost = cost + 0.1 * (path + 0.06 * turn * np.exp(-path / 0.05))
+            arrived = path + 0.06 * turn * np.exp(-path / 0.05)
+        assert first is not None
+        return int(first[(cost + arrived).argmin()])
+
+    def _push(
+        self,
+        robots: FloatArray,
+        box: FloatArray,
+        goal: FloatArray,
+        speeds: FloatArray,
+        side: Side,
+        slots: FloatArray,
+    ) -> list[int]:
+        """Return the local actions that push best, as far as the push predictor can tell."""
+        tables = [self._next(r, speeds[w][None])[1][0] for r, w in enumerate(self._wheels)]
+        twists = np.zeros((len(tables), max(map(len, tables)), 3))
+        for r, table in enumerate(tables):
+            twists[r, : len(table)] = table
+        cos_, sin_ = cos(box[2] + side.direction), sin(box[2] + side.direction)
+        aside = cos_ * (slots[:, 1] - box[1]) - sin_ * (slots[:, 0] - box[0])
+
+        def best(options: IntArray) -> IntArray:
+            after, boxes, gaps = push(robots, box, twists, options, self.seconds, self._model)
+            costs = self._cost(after, boxes, gaps, goal, side, aside)
+            costs[[not twists[range(len(o)), o].any() for o in options]] += 1.0  # never rest
+            return options[int(costs.argmin())]
+
+        sizes = [range(len(table)) for table in tables]
+        if np.prod([len(size) for size in sizes]) <= WIDEST_JOINT:
+            return list(best(np.array(list(product(*sizes)))))
+        # Coordinate ascent: everyone ahead at first, then each improves on the others' choice.
+        choice = np.array([int(table[:, 0].argmax()) for table in tables])
+        for _ in range(3):
+            for r, size in enumerate(sizes):
+                options = np.repeat(choice[None], len(size), axis=0)
+                options[:, r] = size
+                choice = best(options)
+        return list(choice)
+
+    def _cost(
+        self,
+        robots: FloatArray,
+        box: FloatArray,
+        gaps: FloatArray,
+        goal: FloatArray,
+        side: Side,
+        aside: FloatArray,
+    ) -> FloatArray:
+        """Return how bad ``m`` predicted situations are [m]."""
+        ahead = goal[:2] - box[:, :2]
+        distance = np.hypot(ahead[:, 0], ahead[:, 1])
+        heading = box[:, 2] + side.direction
+        cost = distance.copy()
+        if self._sides:
+            error = _wrap(np.arctan2(ahead[:, 1], ahead[:, 0]) - heading)
+            steer = 2.2 * self._spread(side) * np.abs(error)
+            cost += steer * np.minimum(1.0, distance / 0.2)
+        for r in range(robots.shape[1]):
+            dx, dy = robots[:, r, 0] - box[:, 0], robots[:, r, 1] - box[:, 1]
+            off = np.cos(heading) * dy - np.sin(heading) * dx - aside[r]
+            cost += 0.3 * np.maximum(gaps[:, r], 0.0) + 3.0 * off**2
+            cost += 0.02 * _wrap(robots[:, r, 2] - heading) ** 2
+        return cost
+
+
+def decisions_to_goal(scenario: BoxPushing, seed: int, steps: int) -> int | None:
+    """Return after how many decisions the controller has the box at the goal.
+
+    Parameters
+    ----------
+    scenario
+        What is played; modified.
+    seed
+        Of the world.
+    steps
+        Most decisions.
+
+    Returns
+    -------
+    int or None
+        None if the episode ends otherwise.
+    """
+    controller = ScriptedController(
+        scenario.world.robots, scenario.box, scenario.action_set,
+        scenario.settings.speed_increment, scenario.settings.period,
+    )  # fmt: skip
+    scenario.reset(seed)
+    for step in range(1, steps + 1):
+        transition = scenario.step(controller.act(scenario.measure()))
+        if transition.terminated or transition.truncated:
+            return step if transition.terminated else None
+    return None
+
+
+def _local_actions(robot: RobotSpec, n_actions: int) -> IntArray:
+    """Return the combinations ``(k, w)`` of actions to try: wheels of one side act alike."""
+    sides = [int(np.sign(wheel.y)) for wheel in robot.wheels]
+    groups = sorted(set(sides))
+    rows = product(range(n_actions), repeat=len(groups))
+    return np.array([[row[groups.index(side)] for side in sides] for row in rows])
+
+
+def _wrap(angle: Any) -> Any:
+    return (angle + pi) % (2 * pi) - pi

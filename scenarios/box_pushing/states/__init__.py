@@ -1,0 +1,1 @@
+"""What a wheel agent perceives: state variables and state spaces."""

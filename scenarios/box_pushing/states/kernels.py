@@ -1,0 +1,172 @@
+"""Shared blocks of many predicted situations, compiled: those of `relational`, only faster.
+
+Situations stand side by side in flat scratch rows, as in `push_lanes`, and all loops over them are
+free of branches. The NumPy functions of `relational` are the definition and the test oracle;
+they also serve sensing, where there is one situation only.
+"""
+
+from __future__ import annotations
+
+from math import pi
+
+import numpy as np
+from numba import njit
+
+from ....core.arrays import FloatArray, IntArray
+
+LANES = 32
+"""Situations side by side."""
+_EXACT = {"contract", "nsz"}
+
+# Columns, in the order of `relational.VARIABLES`: a row of scratch each.
+GAP, BEARING, SIDE, OTHERS, PUSH, MISS, DISTANCE, APPROACH, TURN, BEND = (
+    0,
+    1,
+    2,
+    3,
+    4,
+    5,
+    6,
+    7,
+    8,
+    9,
+)
+_COURSE, _X, _Y = 10, 11, 12
+_ROWS = 13
+
+
+@njit(cache=True, error_model="numpy", fastmath=_EXACT)
+def angle_of(x, y):  # type: ignore[no-untyped-def]
+    """Return the angle of a vector, as ``arctan2(y, x)`` to its last bits.
+
+    The angle with the nearer axis or diagonal is below pi / 8; there the rational function of
+    Moshier's Cephes library holds.
+    """
+    ax, ay = abs(x), abs(y)
+    low, high = min(ax, ay), max(ax, ay)
+    diagonal = low > 0.41421356237309503 * high
+    top = low - high if diagonal else low
+    bottom = low + high if diagonal else high
+    t = top / (bottom if bottom > 0.0 else 1.0)
+    z = t * t
+    p = -8.750608600031904122785e-1
+    p = p * z - 1.615753718733365076637e1
+    p = p * z - 7.500855792314704667340e1
+    p = p * z - 1.228866684490136173410e2
+    p = p * z - 6.485021904942025371773e1
+    q = z + 2.485846490142306297962e1
+    q = q * z + 1.650270098316988542046e2
+    q = q * z + 4.328810604912902668951e2
+    q = q * z + 4.853903996359136964868e2
+    q = q * z + 1.945506571482613964425e2
+    angle = t + t * (z * p / q)
+    angle = 0.25 * pi + angle if diagonal else angle
+    angle = 0.5 * pi - angle if ay > ax else angle
+    angle = pi - angle if x < 0.0 else angle
+    return -angle if y < 0.0 else angle
+
+
+@njit(cache=True, error_model="numpy", fastmath=_EXACT)
+def wrapped(angle):  # type: ignore[no-untyped-def]
+    """Map an angle to [-pi, pi)."""
+    return angle - 2.0 * pi * np.floor((angle + pi) / (2.0 * pi))
+
+
+@njit(cache=True, error_model="numpy", fastmath=_EXACT)
+def _of_box(box, goal, before, periods, first, count, work):  # type: ignore[no-untyped-def]
+    """Write how far the box has to go and has come, and how it is turned."""
+    gx, gy, turned = goal[0], goal[1], goal[2]
+    bx, by, psi = (
+        box[0, first : first + count], box[1, first : first + count], box[2, first : first + count],
+    )  # fmt: skip
+    for k in range(count):
+        dx, dy = gx - bx[k], gy - by[k]
+        course, distance = angle_of(dx, dy), np.sqrt(dx * dx + dy * dy)
+        work[_COURSE * LANES + k] = course
+        work[DISTANCE * LANES + k] = distance
+        work[APPROACH * LANES + k] = (before - distance) / periods
+        turn = wrapped(psi[k] - turned)
+        work[TURN * LANES + k] = turn
+        work[BEND * LANES + k] = wrapped(turn - 2.0 * wrapped(course - turned))
+
+
+@njit(cache=True, error_model="numpy", fastmath=_EXACT)
+def _of_push(robots, box, goal, first, count, work):  # type: ignore[no-untyped-def]
+    """Write where the robots' middle would push the box, and by how much it would miss."""
+    n, gx, gy = len(robots), goal[0], goal[1]
+    for k in range(count):
+        work[_X * LANES + k] = work[_Y * LANES + k] = 0.0
+    for r in range(n):
+        x, y = robots[r, 0, first : first + count], robots[r, 1, first : first + count]
+        for k in range(count):
+            work[_X * LANES + k] += x[k]
+            work[_Y * LANES + k] += y[k]
+    bx, by = box[0, first : first + count], box[1, first : first + count]
+    for k in range(count):
+        dx, dy = bx[k] - work[_X * LANES + k] / n, by[k] - work[_Y * LANES + k] / n
+        ahead, left = gx - bx[k], gy - by[k]
+        work[PUSH * LANES + k] = wrapped(angle_of(dx, dy) - work[_COURSE * LANES + k])
+        length = np.sqrt(dx * dx + dy * dy)
+        across = (ahead * dy - left * dx) / (length if length > 0.0 else 1.0)
+        beyond = np.copysign(work[DISTANCE * LANES + k], across)
+        work[MISS * LANES + k] = across if ahead * dx + left * dy >= 0.0 else beyond
+
+
+@njit(cache=True, error_model="numpy", fastmath=_EXACT)
+def _of_robot(robot, gap, box, first, count, work):  # type: ignore[no-untyped-def]
+    """Write the gap of a robot, the bearing of the box from it, and on which side it stands."""
+    x, y = robot[0, first : first + count], robot[1, first : first + count]
+    bx, by = box[0, first : first + count], box[1, first : first + count]
+    psi, apart = robot[2, first : first + count], gap[first : first + count]
+    for k in range(count):
+        azimuth = angle_of(bx[k] - x[k], by[k] - y[k])
+        work[GAP * LANES + k] = apart[k]
+        work[BEARING * LANES + k] = wrapped(azimuth - psi[k])
+        work[SIDE * LANES + k] = wrapped(azimuth - work[_COURSE * LANES + k])
+
+
+@njit(cache=True, error_model="numpy", fastmath=_EXACT)
+def _of_others(gaps, robot, first, count, work):  # type: ignore[no-untyped-def]
+    """Write the greatest gap of the other robots; of the robot itself if it is alone."""
+    n = len(gaps)
+    for k in range(count):
+        work[OTHERS * LANES + k] = -np.inf
+    for r in range(n):
+        if r != robot or n == 1:
+            gap = gaps[r, first : first + count]
+            for k in range(count):
+                work[OTHERS * LANES + k] = max(work[OTHERS * LANES + k], gap[k])
+
+
+@njit(cache=True)
+def relational(  # type: ignore[no-untyped-def]
+    robots, box, gaps, goal, before: float, periods: float, wanted: IntArray, columns: IntArray
+) -> FloatArray:
+    """Return relational shared blocks ``(robots wanted, m, columns)``.
+
+    Parameters
+    ----------
+    robots, box, gaps
+        ``(M, 3, m)``, ``(3, m)`` and ``(M, m)``: a `View`, its situations last.
+    goal, before, periods
+        Of the view.
+    wanted
+        Indices of robots.
+    columns
+        Indices of variables.
+    """
+    m = box.shape[1]
+    out, work = np.empty((len(wanted), m, len(columns))), np.empty(_ROWS * LANES)
+    for first in range(0, m, LANES):
+        count = min(LANES, m - first)
+        _of_box(box, goal, before, periods, first, count, work)
+        _of_push(robots, box, goal, first, count, work)
+        for i in range(len(wanted)):
+            r = wanted[i]
+            _of_robot(robots[r], gaps[r], box, first, count, work)
+            _of_others(gaps, r, first, count, work)
+            for k in range(count):
+                row = out[i, first + k]
+                for c in range(len(columns)):
+                    row[c] = work[columns[c] * LANES + k]
+    return out

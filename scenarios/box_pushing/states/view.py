@@ -1,0 +1,86 @@
+"""What state variables are computed from: situations of robots, box and goal, many at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import pi
+
+import numpy as np
+
+from ....core.arrays import FloatArray
+
+
+@dataclass(frozen=True)
+class View:
+    """Situations to be described, ``m`` at once.
+
+    Attributes
+    ----------
+    robots
+        ``(m, M, 3)`` poses [m, m, rad].
+    box
+        ``(m, 3)`` poses of the box.
+    gaps
+        ``(m, M)`` distances between robot and box surfaces [m]; slightly negative in contact.
+    goal
+        ``(3,)`` goal pose of the box.
+    before
+        Distance of the box from the goal before the motion that led here [m].
+    periods
+        How many decision periods that motion took.
+    """
+
+    robots: FloatArray
+    box: FloatArray
+    gaps: FloatArray
+    goal: FloatArray
+    before: float
+    periods: float
+
+    # What all robots share is computed once.
+
+    @cached_property
+    def distance(self) -> FloatArray:
+        """Distance ``(m,)`` of the box from the goal [m]."""
+        ahead = self.goal[:2] - self.box[:, :2]
+        return np.hypot(ahead[:, 0], ahead[:, 1])
+
+    @property
+    def approach(self) -> FloatArray:
+        """How much nearer ``(m,)`` the box comes to the goal in a decision period [m]."""
+        return (self.before - self.distance) / self.periods
+
+    @cached_property
+    def course(self) -> FloatArray:
+        """Direction ``(m,)`` from the box to the goal [rad]."""
+        return np.arctan2(self.goal[1] - self.box[:, 1], self.goal[0] - self.box[:, 0])
+
+    @cached_property
+    def push(self) -> FloatArray:
+        """Direction ``(m,)`` in which the robots' middle would push the box [rad]."""
+        middle = self.robots[:, :, :2].mean(axis=1)
+        return np.arctan2(self.box[:, 1] - middle[:, 1], self.box[:, 0] - middle[:, 0])
+
+    @cached_property
+    def turn(self) -> FloatArray:
+        """Turn ``(m,)`` of the box from the goal pose [rad]."""
+        return wrap(self.box[:, 2] - self.goal[2])
+
+    def azimuth(self, robot: int) -> FloatArray:
+        """Direction ``(m,)`` from a robot to the box [rad]."""
+        pose = self.robots[:, robot]
+        return np.arctan2(self.box[:, 1] - pose[:, 1], self.box[:, 0] - pose[:, 0])
+
+
+_TURN = 2.0 * pi
+_TURN_HIGH = 6.283185243606567
+"""The leading 26 bits of a turn: products with a few thousand turns are exact."""
+_TURN_LOW = _TURN - _TURN_HIGH
+
+
+def wrap(angle: FloatArray) -> FloatArray:
+    """Map angles to [-pi, pi): ``(angle + pi) % (2 pi) - pi`` to the last bit, but faster."""
+    shifted = angle + pi
+    turns = np.floor(shifted / _TURN)
+    return shifted - turns * _TURN_HIGH - turns * _TURN_LOW - pi

@@ -1,0 +1,1 @@
+"""The physical world: robots on wheels, boxes, failures, infrared sensors."""

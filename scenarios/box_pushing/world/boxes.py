@@ -1,0 +1,271 @@
+"""Boxes: what robots push over the ground.
+
+The frame of a box has its centre of mass at the origin and its back, where robots start in the
+easier start distributions, towards -x. Its weight rests on the ground as a distributed friction,
+stood for by four points, so that sliding and turning share one friction budget as they do for a
+real box. A further box, concave or with holes, is one `BoxSpec` and one line in `BOXES`; a spec may
+also describe one by its vertices, and `BoxSpec.of` takes a shapely geometry.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import cos, isfinite, pi, sin, sqrt
+
+import numpy as np
+from shapely.geometry import Polygon
+from shapely.geometry.polygon import orient
+
+from ....core.arrays import FloatArray
+from ..config import BoxSettings
+from .geometry import Outline
+from .polygons import Moments, Vertices, centred, convex_pieces, moments, polygon_edges
+from .robots import GRAVITY
+
+AREA = 0.04
+"""Of every box in the table [m2]: that of a square of 20 cm."""
+ROBOTS_PER_BOX = 2
+"""Robots for which the boxes of the table are made."""
+
+
+@dataclass(frozen=True)
+class BoxSpec:
+    """A box: a polygon, or a disc if it has a radius instead of vertices.
+
+    Attributes
+    ----------
+    name
+        The name under which specs know it.
+    vertices
+        Outline [m], anywhere in the plane; the frame of the box is centred afterwards.
+    holes
+        Outlines of holes [m].
+    radius
+        Of a disc [m]; 0 for a polygon.
+    mass
+        [kg].
+    friction
+        Coefficient of friction with the ground.
+    contact_friction
+        Coefficient of friction with robots.
+
+    Raises
+    ------
+    ValueError
+        If the outline is not a simple polygon, or a quantity out of range.
+
+    Examples
+    --------
+    >>> box = BOXES["square"]
+    >>> round(box.area, 12), round(box.friction_force, 3), round(box.friction_radius, 4)
+    (0.04, 0.785, 0.0765)
+    """
+
+    name: str
+    vertices: Vertices = ()
+    holes: tuple[Vertices, ...] = ()
+    radius: float = 0.0
+    mass: float = 0.4
+    friction: float = 0.2
+    contact_friction: float = 0.3
+
+    def __post_init__(self) -> None:
+        for field in ("mass", "friction", "contact_friction", "radius"):
+            value = getattr(self, field)
+            if not (isfinite(value) and (value > 0 or (value == 0 and field != "mass"))):
+                raise ValueError(f"box {self.name!r}: {field} = {value}, out of range")
+        if bool(self.vertices) == bool(self.radius):
+            raise ValueError(f"box {self.name!r}: needs either vertices or a radius")
+        if self.vertices:
+            self.__dict__["polygon"] = centred(self.name, self.vertices, self.holes)
+
+    @classmethod
+    def of(cls, name: str, geometry: Polygon, **quantities: float) -> BoxSpec:
+        """Return a box from a shapely polygon [m]; `quantities` as of the class.
+
+        Examples
+        --------
+        >>> from shapely.geometry import Point
+        >>> ring = Point(0, 0).buffer(0.1) - Point(0, 0).buffer(0.05)
+        >>> round(BoxSpec.of("ring", ring, mass=0.2).area, 4)
+        0.0235
+        """
+        if not isinstance(geometry, Polygon):
+            raise ValueError(f"box {name!r}: a {geometry.geom_type}, must be one Polygon")
+        polygon = orient(geometry)
+        outline, *holes = [
+            tuple((float(x), float(y)) for x, y in ring.coords[:-1])
+            for ring in (polygon.exterior, *polygon.interiors)
+        ]
+        return cls(name, outline, tuple(holes), **quantities)
+
+    @cached_property
+    def polygon(self) -> Polygon | None:
+        """The centred polygon; None for a disc."""
+        return None
+
+    @cached_property
+    def outline(self) -> Outline:
+        """The surface, in the frame of the box."""
+        if self.polygon is None:
+            return Outline(np.zeros((1, 4)), self.radius)
+        return Outline(polygon_edges(self.polygon))
+
+    @cached_property
+    def fixtures(self) -> tuple[FloatArray, ...]:
+        """Convex pieces ``(<= 8, 2)`` [m]; empty for a disc."""
+        return () if self.polygon is None else convex_pieces(self.polygon)
+
+    @cached_property
+    def moments(self) -> Moments:
+        """Moments of the area."""
+        if self.polygon is None:
+            area, quarter = pi * self.radius**2, pi * self.radius**4 / 4
+            return Moments(area, np.zeros(2), quarter * np.eye(2), area * self.radius * 2 / 3)
+        return moments(self.outline.edges)
+
+    @property
+    def area(self) -> float:
+        """[m2]."""
+        return self.moments.area
+
+    @property
+    def inertia(self) -> float:
+        """Moment of inertia about the centre of mass [kg m2]."""
+        return float(self.mass * np.trace(self.moments.second) / self.area)
+
+    @cached_property
+    def reach(self) -> float:
+        """Distance from the centre within which all of the box lies [m]."""
+        return self.outline.radius
+
+    @property
+    def friction_force(self) -> float:
+        """Ground friction of the sliding box [N]."""
+        return self.friction * self.mass * GRAVITY
+
+    @property
+    def friction_radius(self) -> float:
+        """Mean distance of the area from the centre [m].
+
+        Ground friction resists pure turning with `friction_force` times this lever.
+        """
+        return self.moments.radial / self.area
+
+    @cached_property
+    def friction_points(self) -> FloatArray:
+        """Four points ``(4, 2)`` that rub on the ground with a quarter of `friction_force` each.
+
+        At the corners of a rectangle with the axes and the proportions of the ellipse of inertia,
+        scaled such that the greatest friction torque is that of evenly spread friction.
+        """
+        spread, axes = np.linalg.eigh(self.moments.second / self.area)
+        half = np.sqrt(spread) * self.friction_radius / sqrt(spread.sum())
+        corners = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]]) * half
+        return corners @ axes.T
+
+    @cached_property
+    def width(self) -> tuple[float, float]:
+        """Least and greatest y of the box [m]: how broad it looks from behind."""
+        ends = self.outline.edges.reshape(-1, 2)[:, 1]
+        return float(ends.min()) - self.outline.rounding, float(ends.max()) + self.outline.rounding
+
+    def scaled(self, factor: float) -> BoxSpec:
+        """Return the box with lengths and mass multiplied by `factor`."""
+        rings = [
+            tuple((factor * x, factor * y) for x, y in ring)
+            for ring in (self.vertices, *self.holes)
+        ]
+        return replace(
+            self,
+            vertices=rings[0],
+            holes=tuple(rings[1:]),
+            radius=factor * self.radius,
+            mass=factor * self.mass,
+        )
+
+
+def box_for(box: str | BoxSettings, robots: int) -> BoxSpec:
+    """Return the box that a spec names or describes, or that `label` has written.
+
+    Up to two robots push the box as it stands in the table. For more, its lengths and its mass
+    grow in proportion to their number: each has the same room along the back and the same share
+    of the friction as one of two. A box that is described grows only if it says so.
+
+    Raises
+    ------
+    ValueError
+        If no box has that name, or there can be none as described; one line.
+
+    Examples
+    --------
+    >>> box = box_for("square", 4)
+    >>> round(box.area, 12), box.mass
+    (0.16, 0.8)
+    """
+    if isinstance(box, str) and box.startswith("{"):
+        box = BoxSettings.model_validate_json(box)
+    if isinstance(box, BoxSettings):
+        described = BoxSpec(
+            "own", box.vertices, box.holes,
+            mass=box.mass, friction=box.friction, contact_friction=box.contact_friction,
+        )  # fmt: skip
+        grows = box.grows
+    elif box in BOXES:
+        described, grows = BOXES[box], True
+    else:
+        raise ValueError(f"scenario.box = {box!r}, allowed {', '.join(sorted(BOXES))}")
+    crowded = grows and robots > ROBOTS_PER_BOX
+    return described.scaled(robots / ROBOTS_PER_BOX) if crowded else described
+
+
+def _rectangle(name: str, depth: float, width: float) -> BoxSpec:
+    x, y = depth / 2, width / 2
+    return BoxSpec(name, ((-x, -y), (x, -y), (x, y), (-x, y)))
+
+
+def _regular(name: str, sides: int) -> BoxSpec:
+    """Return a regular polygon of area `AREA` with a side towards -x."""
+    radius = sqrt(2 * AREA / (sides * sin(2 * pi / sides)))
+    angles = [pi + pi / sides + 2 * pi * i / sides for i in range(sides)]
+    return BoxSpec(name, tuple((radius * cos(a), radius * sin(a)) for a in angles))
+
+
+def _shape(name: str, *vertices: tuple[float, float]) -> BoxSpec:
+    """Return a polygon scaled to `AREA`."""
+    unit = sqrt(AREA / Polygon(vertices).area)
+    return BoxSpec(name, tuple((unit * x, unit * y) for x, y in vertices))
+
+
+def _star(name: str, points: int, depth: float) -> BoxSpec:
+    """Return a star with a point ahead whose hollows reach `depth` of the way to the centre."""
+    corners = [(1.0, 2 * pi * i / points) for i in range(points)]
+    hollows = [(1.0 - depth, angle + pi / points) for _, angle in corners]
+    ring = [corner for pair in zip(corners, hollows, strict=True) for corner in pair]
+    return _shape(name, *((radius * cos(angle), radius * sin(angle)) for radius, angle in ring))
+
+
+PLUS = (
+    (-3, -1), (-1, -1), (-1, -3), (1, -3), (1, -1), (3, -1),
+    (3, 1), (1, 1), (1, 3), (-1, 3), (-1, 1), (-3, 1),
+)  # fmt: skip
+
+BOXES: dict[str, BoxSpec] = {
+    box.name: box
+    for box in (
+        _rectangle("square", 0.2, 0.2),
+        _rectangle("rectangle", 0.16, 0.25),
+        _rectangle("bar", 0.08, 0.5),
+        BoxSpec("circle", radius=sqrt(AREA / pi)),
+        _regular("triangle", 3),
+        _regular("pentagon", 5),
+        _regular("hexagon", 6),
+        _shape("L", (0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)),
+        _shape("T", (0, -3), (2, -3), (2, -1), (5, -1), (5, 1), (2, 1), (2, 3), (0, 3)),
+        _shape("U", (0, -2), (3, -2), (3, -1), (1, -1), (1, 1), (3, 1), (3, 2), (0, 2)),
+        _shape("plus", *PLUS),
+        _star("star", 5, 0.5),
+    )
+}
+"""Boxes by the name that specs use; every one has the area of the square."""

@@ -1,0 +1,151 @@
+"""Polygons as bodies: checked, centred on their centre of mass, cut into convex pieces.
+
+Box2D takes convex polygons of at most 8 vertices and silently gets others wrong, so that any simple
+polygon, concave or with holes, goes through here first.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from shapely.affinity import translate
+from shapely.geometry import Polygon
+from shapely.geometry.polygon import orient
+from shapely.validation import explain_validity
+
+from ....core.arrays import FloatArray
+from .geometry import ring_edges
+
+Vertices = Sequence[tuple[float, float]]
+
+MAX_VERTICES = 8
+"""Of a convex piece; b2_maxPolygonVertices."""
+STRAIGHT = 1e-9
+"""Sine of the angle between edges that counts as straight on."""
+
+
+class Moments(NamedTuple):
+    """Area and its moments about the origin.
+
+    Attributes
+    ----------
+    area
+        [m2].
+    first
+        ``(2,)`` integrals of x and y [m3].
+    second
+        ``(2, 2)`` integrals of the products of coordinates [m4].
+    radial
+        Integral of the distance from the origin [m3].
+    """
+
+    area: float
+    first: FloatArray
+    second: FloatArray
+    radial: float
+
+
+def moments(edges: FloatArray) -> Moments:
+    """Return the moments of the area within directed edges ``(n, 4)``, material on the left.
+
+    Sums over the signed triangles between the origin and each edge; exact but for `radial`, which
+    is a 64-point Gauss-Legendre quadrature along each edge.
+    """
+    a, b = edges[:, :2], edges[:, 2:]
+    cross = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    area = cross.sum() / 2
+    first = (cross[:, None] * (a + b)).sum(axis=0) / 6
+    ends = a + b
+    outer = (
+        np.einsum("n,ni,nj->ij", cross, a, a)
+        + np.einsum("n,ni,nj->ij", cross, b, b)
+        + np.einsum("n,ni,nj->ij", cross, ends, ends)
+    ) / 24
+    nodes, weights = np.polynomial.legendre.leggauss(64)
+    t = (nodes + 1) / 2
+    points = a[:, None] + t[:, None] * (b - a)[:, None]
+    mean_distance = np.hypot(points[..., 0], points[..., 1]) @ weights / 2
+    return Moments(float(area), first, outer, float((cross * mean_distance).sum() / 3))
+
+
+def polygon_edges(polygon: Polygon) -> FloatArray:
+    """Return the edges ``(n, 4)`` of an oriented polygon and its holes, material on the left."""
+    rings = [polygon.exterior, *polygon.interiors]
+    return np.vstack([ring_edges(np.asarray(ring.coords)[:-1]) for ring in rings])
+
+
+def centred(name: str, vertices: Vertices, holes: Sequence[Vertices] = ()) -> Polygon:
+    """Return a checked polygon, counter-clockwise, with its centre of mass at the origin.
+
+    A clockwise outline is turned around with a warning.
+
+    Raises
+    ------
+    ValueError
+        If the polygon has fewer than 3 vertices, is not finite, crosses or touches itself, or has
+        no area.
+    """
+    if len(vertices) < 3 or any(len(hole) < 3 for hole in holes):
+        raise ValueError(f"box {name!r}: an outline needs at least 3 vertices")
+    if not all(np.isfinite(np.asarray(ring)).all() for ring in (vertices, *holes)):
+        raise ValueError(f"box {name!r}: vertices must be finite")
+    polygon = Polygon(vertices, holes)
+    if not polygon.is_valid:
+        raise ValueError(f"box {name!r}: not a simple polygon: {explain_validity(polygon)}")
+    if not polygon.area > 1e-6 * polygon.length**2:
+        raise ValueError(
+            f"box {name!r}: area {polygon.area:.3g} m2 within {polygon.length:.3g} m of outline, "
+            "degenerate"
+        )
+    if not polygon.exterior.is_ccw:
+        warnings.warn(f"box {name!r}: clockwise outline turned around", stacklevel=2)
+    polygon = orient(polygon)
+    whole = moments(polygon_edges(polygon))
+    return translate(polygon, *(-whole.first / whole.area))
+
+
+def _merged(first: FloatArray, second: FloatArray) -> FloatArray | None:
+    """Return the union of two convex rings that share an edge, or None unless it is convex."""
+    union = shapely.union(Polygon(first), Polygon(second))
+    if not isinstance(union, Polygon) or union.interiors:
+        return None
+    ring = np.asarray(orient(union).exterior.coords)[:-1]
+    ring = ring[np.abs(_turns(ring)) > STRAIGHT]
+    return ring if len(ring) <= MAX_VERTICES and (_turns(ring) > 0).all() else None
+
+
+def _turns(ring: FloatArray) -> FloatArray:
+    """Return the sine of the turn at every vertex of a ring ``(n, 2)``."""
+    into, out = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
+    cross = into[:, 0] * out[:, 1] - into[:, 1] * out[:, 0]
+    scale: FloatArray = np.linalg.norm(into, axis=1) * np.linalg.norm(out, axis=1)
+    return cross / scale
+
+
+def convex_pieces(polygon: Polygon) -> tuple[FloatArray, ...]:
+    """Return convex counter-clockwise pieces ``(<= 8, 2)`` that together are the polygon.
+
+    Constrained Delaunay triangles, merged greedily as long as the union of two is convex.
+    """
+    ring = np.asarray(polygon.exterior.coords)[:-1]
+    if not polygon.interiors and len(ring) <= MAX_VERTICES and (_turns(ring) > 0).all():
+        return (ring,)
+    triangles = shapely.constrained_delaunay_triangles(polygon).geoms
+    pieces = [np.asarray(orient(t).exterior.coords)[:-1] for t in triangles if t.area > 0]
+    merged = True
+    while merged:
+        merged = False
+        for i, j in combinations(range(len(pieces)), 2):
+            shared = {tuple(p) for p in pieces[i]} & {tuple(p) for p in pieces[j]}
+            union = _merged(pieces[i], pieces[j]) if len(shared) >= 2 else None
+            if union is not None:
+                pieces[i] = union
+                del pieces[j]
+                merged = True
+                break
+    return tuple(pieces)

@@ -1,0 +1,322 @@
+"""The physical world: robots and a box on a plane, seen from above, in Box2D.
+
+The rest of the package speaks SI; Box2D wants bodies of 0.1 to 10 units, so that this module, and
+nothing else, talks to it in decimetres. A control period is a whole number of physics steps. One
+physics step is one compiled call for the forces of all wheels, one force and one torque per robot
+handed to Box2D, and one step of Box2D. Box2D itself takes a few microseconds a step; what costs
+time are the calls from Python into it, mostly to find the C++ object behind a Python one. The inner
+loop therefore calls the functions of SWIG's flat interface on the bare handles (`.this`), which is
+more than 10 times faster than the same methods of the Python classes.
+
+Box2D keeps impulses from step to step to start its solver from ("warm starting"); that is switched
+off, so that the future depends on poses and velocities alone and a saved world can be restored.
+
+The box rubs on the ground by one friction joint at each of its friction points. Such a joint cuts
+its force to the limit after weighting it with the box's mass as seen from the joint, which leaves
+force not quite against the motion: sliding along its axes, a square meets 4 % less than its
+`friction_force`; along its diagonals and in turning, all of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import Box2D
+import numpy as np
+from Box2D import _Box2D
+from numba import njit
+
+from ....core.arrays import FloatArray
+from ..config import CONTROL_PERIOD
+from .boxes import BoxSpec
+from .geometry import surface
+from .infrared import InfraredSpec, infrared_readings, sensor_directions
+from .robots import RobotSpec
+from .wheels import wheel_model, wheel_wrenches
+
+UNIT = 10.0
+"""Box2D units per metre."""
+TOUCHING = 0.001
+"""Gap [m] below which a robot counts as touching: Box2D keeps polygons `SKIN` apart, up to a slop
+of 0.5 mm."""
+SKIN = 0.005
+"""Rounding of polygons in Box2D [dm]; its default is twice that."""
+VELOCITY_ITERATIONS = 8
+POSITION_ITERATIONS = 3
+
+# SWIG's flat interface.
+get_x, get_y = _Box2D.b2Vec2_x_get, _Box2D.b2Vec2_y_get
+get_angle, get_omega = _Box2D.b2Body___GetAngle, _Box2D.b2Body___GetAngularVelocity
+push, twist = _Box2D.b2Body_ApplyForceToCenter, _Box2D.b2Body_ApplyTorque
+step = _Box2D.b2World_Step
+
+
+class WorldState(NamedTuple):
+    """All that the future of a `World` depends on, besides the wheel speeds to come.
+
+    Attributes
+    ----------
+    poses, twists
+        ``(M + 1, 3)`` of the box and the robots, world frame.
+    last, wrenches
+        ``(M, 3)`` what the wheel model remembers of the last step, in units of Box2D.
+    contact_time
+        As in `World`.
+    """
+
+    poses: FloatArray
+    twists: FloatArray
+    last: FloatArray
+    wrenches: FloatArray
+    contact_time: FloatArray
+
+
+class World:
+    """Robots, a box and the ground.
+
+    Parameters
+    ----------
+    robots
+        The robots; their wheels, in this order, are the actuators.
+    box
+        The box.
+    substeps
+        Physics steps per control period.
+    infrared
+        Response of the infrared sensors; none: the e-Puck's. The world adds no noise to it.
+
+    Attributes
+    ----------
+    robot_poses
+        ``(M, 3)`` [m, m, rad].
+    box_pose
+        ``(3,)`` [m, m, rad].
+    gaps
+        ``(M,)`` distance between the surfaces of robot and box [m].
+    contact
+        ``(M,)`` whether each robot touches the box.
+    contact_time
+        ``(M,)`` fraction of the control periods of the last `advance` that ended in contact.
+
+    Examples
+    --------
+    >>> from nested_agents.scenarios.box_pushing.world.boxes import BOXES
+    >>> from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
+    >>> world = World([ROBOTS["e-puck"]], BOXES["square"])
+    >>> world.place(np.array([[-0.2, 0.0, 0.0]]), np.zeros(3))
+    >>> world.advance(np.array([0.13, 0.13]), periods=30)
+    >>> bool(world.contact[0]), bool(world.box_pose[0] > 0.02)
+    (True, True)
+    """
+
+    def __init__(
+        self,
+        robots: Sequence[RobotSpec],
+        box: BoxSpec,
+        *,
+        substeps: int = 4,
+        infrared: InfraredSpec | None = None,
+    ) -> None:
+        if not robots:
+            raise ValueError("robots: none, must be at least one")
+        if substeps < 1:
+            raise ValueError(f"substeps = {substeps}, must be at least 1")
+        self.robots = tuple(robots)
+        self.box = box
+        self.substeps = substeps
+        self.sensor = infrared or InfraredSpec()
+        self.n_wheels = sum(len(robot.wheels) for robot in robots)
+        self.dt = CONTROL_PERIOD / substeps
+        self._radii: FloatArray = np.array([robot.radius for robot in robots])
+        self._sensors = sensor_directions(robots)
+        self.set_grip(np.ones(self.n_wheels))
+        around = 2.0 * box.reach * np.arange(1, len(robots) + 1)
+        self.place(np.stack([-around, 0 * around, 0 * around], axis=1), np.zeros(3))
+
+    def set_grip(self, grip: FloatArray) -> None:
+        """Multiply the drive stiffness of every wheel by ``(n_wheels,)``; 0 lets a wheel run free.
+
+        A free wheel still resists sideways motion. Holds until set again.
+        """
+        self._grip: FloatArray = np.array(grip, dtype=float)
+        if self._grip.shape != (self.n_wheels,) or not (self._grip >= 0).all():
+            raise ValueError(f"grip: {grip}, must be {self.n_wheels} numbers >= 0")
+        self._wheels = wheel_model(self.robots, self.dt, self._grip, UNIT)
+
+    def place(self, robot_poses: FloatArray, box_pose: FloatArray) -> None:
+        """Start afresh, everything at rest: robots ``(M, 3)`` and the box ``(3,)``."""
+        n = len(self.robots)
+        if np.shape(robot_poses) != (n, 3) or np.shape(box_pose) != (3,):
+            raise ValueError(
+                f"poses of shapes {np.shape(robot_poses)} and {np.shape(box_pose)}, "
+                f"must be ({n}, 3) and (3,)"
+            )
+        poses = np.vstack([box_pose, robot_poses])
+        rest = np.zeros((n, 3))
+        self.restore(WorldState(poses, np.zeros((n + 1, 3)), rest, rest, np.zeros(n)))
+
+    def state(self) -> WorldState:
+        """Return all that the future depends on.
+
+        The world itself goes on from the saved state as a restored one does, so that both have the
+        same future to the last bit. (Otherwise Box2D might visit contacts in another order.)
+        """
+        state = WorldState(
+            np.vstack([self.box_pose, self.robot_poses]),
+            np.vstack([self.box_twist, self.robot_twists]),
+            self._last.copy(),
+            self._wrenches.copy(),
+            self.contact_time.copy(),
+        )
+        self.restore(state)
+        return state
+
+    def restore(self, state: WorldState) -> None:
+        """Go back to a saved state (of this world or of one built alike)."""
+        self._world = Box2D.b2World(
+            gravity=(0, 0), doSleep=False, warmStarting=False, continuousPhysics=False
+        )
+        ground = self._world.CreateStaticBody()
+        self._box, *self._bodies = [
+            self._world.CreateDynamicBody(
+                position=(x * UNIT, y * UNIT),
+                angle=heading,
+                linearVelocity=(vx * UNIT, vy * UNIT),
+                angularVelocity=omega,
+            )
+            for (x, y, heading), (vx, vy, omega) in zip(
+                state.poses.tolist(), state.twists.tolist(), strict=True
+            )
+        ]
+        self._add_box(ground)
+        for body, robot in zip(self._bodies, self.robots, strict=True):
+            body.CreateCircleFixture(
+                radius=robot.radius * UNIT, density=1.0, friction=self.box.contact_friction
+            )
+            body.massData = Box2D.b2MassData(
+                mass=robot.mass, center=(0, 0), I=robot.inertia * UNIT**2
+            )
+        for body in (self._box, *self._bodies):
+            # Box2D frees bodies with their world; touching one that is gone crashes Python. Whoever
+            # takes a body out of here keeps its world by it.
+            body.world_kept = self._world
+        self._handles = [_handles(body) for body in (self._box, *self._bodies)]
+        self._last, self._wrenches = state.last.copy(), state.wrenches.copy()
+        self._motion: FloatArray = np.empty((len(self.robots), 4))
+        self._motion_flat = self._motion.reshape(-1)
+        self._observe()
+        self.contact_time = state.contact_time.copy()
+
+    def advance(self, wheel_speeds: FloatArray, periods: int) -> None:
+        """Let control periods pass with held wheel speeds ``(n_wheels,)`` [m/s]."""
+        speeds = np.asarray(wheel_speeds, dtype=float) * UNIT
+        touched = np.zeros(len(self.robots))
+        for _ in range(periods):
+            for _ in range(self.substeps):
+                self._step(speeds)
+            self._observe()
+            touched += self.contact
+        self.contact_time = touched / periods
+
+    @property
+    def robot_twists(self) -> FloatArray:
+        """Velocities (vx, vy, omega) of the robots ``(M, 3)`` in the world frame [m/s, rad/s]."""
+        return np.array([_twist(handles) for handles in self._handles[1:]])
+
+    @property
+    def box_twist(self) -> FloatArray:
+        """Velocity (vx, vy, omega) of the box ``(3,)`` in the world frame [m/s, rad/s]."""
+        return np.array(_twist(self._handles[0]))
+
+    def infrared(self) -> FloatArray:
+        """Return what the infrared sensors read, ``(M, S)`` in [0, 1], of box and robots.
+
+        Free of noise.
+        """
+        return self._readings().max(axis=0)
+
+    def infrared_of_box(self) -> FloatArray:
+        """Return what the sensors would read ``(M, S)`` if there were no other robots."""
+        readings: FloatArray = self._readings()[0]
+        return readings
+
+    def _readings(self) -> FloatArray:
+        outline = self.box.outline
+        return infrared_readings(
+            self.robot_poses, self._radii, self._sensors, self.box_pose,
+            outline.edges, outline.rounding, self.sensor.reach, self.sensor.decay,
+            self.sensor.kind,
+        )  # fmt: skip
+
+    def _step(self, speeds: FloatArray) -> None:
+        """Advance by one physics step; the inner loop."""
+        motion: list[float] = []
+        for body, _, velocity in self._handles[1:]:
+            motion += (get_angle(body), get_x(velocity), get_y(velocity), get_omega(body))
+        self._motion_flat[:] = motion
+        wheel_wrenches(self._motion, speeds, self.dt, self._wheels, self._last, self._wrenches)
+        wrenches = self._wrenches.tolist()
+        for (body, _, _), (fx, fy, torque) in zip(self._handles[1:], wrenches, strict=True):
+            push(body, (fx, fy), True)
+            twist(body, torque, True)
+        step(self._world.this, self.dt, VELOCITY_ITERATIONS, POSITION_ITERATIONS)
+
+    def _observe(self) -> None:
+        """Read poses and find contacts."""
+        outline = self.box.outline
+        poses = np.array(
+            [
+                (get_x(position) / UNIT, get_y(position) / UNIT, get_angle(body))
+                for body, position, _ in self._handles
+            ]
+        )
+        self.gaps = _gaps(poses, self._radii, outline.edges, outline.rounding)
+        self.contact = self.gaps < TOUCHING
+        self.box_pose, self.robot_poses = poses[0], poses[1:]
+
+    def _add_box(self, ground: Any) -> None:
+        """Give the box its shape, its mass and its friction on the ground."""
+        box = self.box
+        shapes: list[Any] = [
+            Box2D.b2PolygonShape(vertices=(piece * UNIT).tolist()) for piece in box.fixtures
+        ]
+        for shape in shapes:
+            shape.radius = SKIN
+        if not shapes:
+            shapes = [Box2D.b2CircleShape(radius=box.radius * UNIT)]
+        for shape in shapes:
+            self._box.CreateFixture(shape=shape, density=1.0, friction=box.contact_friction)
+        # Set after the fixtures, which would bring masses of their own.
+        self._box.massData = Box2D.b2MassData(mass=box.mass, center=(0, 0), I=box.inertia * UNIT**2)
+        for point in (box.friction_points * UNIT).tolist():
+            self._world.CreateFrictionJoint(
+                bodyA=ground,
+                bodyB=self._box,
+                localAnchorB=point,
+                maxForce=box.friction_force * UNIT / len(box.friction_points),
+                maxTorque=0.0,
+                collideConnected=True,
+            )
+
+
+def _handles(body: Any) -> tuple[Any, Any, Any]:
+    """Return the handles of a body, its position and its velocity; all show the present."""
+    return body.this, body.position.this, body.linearVelocity.this
+
+
+def _twist(handles: tuple[Any, Any, Any]) -> tuple[float, float, float]:
+    body, _, velocity = handles
+    return get_x(velocity) / UNIT, get_y(velocity) / UNIT, get_omega(body)
+
+
+@njit(cache=True)
+def _gaps(poses: FloatArray, radii: FloatArray, edges: FloatArray, rounding: float) -> FloatArray:
+    """Return the gaps ``(M,)`` of robots to the box; poses ``(M + 1, 3)``, the box first."""
+    out = np.empty(len(radii))
+    cos, sin = np.cos(poses[0, 2]), np.sin(poses[0, 2])
+    for r in range(len(radii)):
+        dx, dy = poses[r + 1, 0] - poses[0, 0], poses[r + 1, 1] - poses[0, 1]
+        distance = surface(edges, rounding, cos * dx + sin * dy, cos * dy - sin * dx)[0]
+        out[r] = distance - radii[r]
+    return out

@@ -1,0 +1,348 @@
+"""A check that a scenario keeps the promises on which learning and its measurement rest.
+
+Whole episodes of random actions are played and compared to the last bit: states, reward, end of the
+episode, motions and measurements of every step. Not compared are the measured times, ``seconds``.
+Predictions are held against each other (see `checked_predictions`), not against what comes true:
+how good they are is not checked. A further check is one function and one line in `CHECKS`; it
+returns what is wrong, in one line, or nothing. What a scenario raises is what is wrong with it.
+"""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import zip_longest
+from pathlib import Path
+from traceback import extract_tb
+from typing import Any
+
+import numpy as np
+
+from ...core.arrays import IntArray
+from ...core.protocols import Scenario
+from .frames import (
+    FIELDS,
+    Frame,
+    at,
+    bits,
+    difference,
+    ended,
+    fields,
+    opening,
+    play,
+    random_actions,
+    stepped,
+)
+from .predictions import fault_of_prediction
+
+MEMBERS = (
+    "agents", "groups", "state_space", "action_set", "reset", "step", "predict", "measure",
+)  # fmt: skip
+"""Of the protocol `Scenario`."""
+LEAST_STEPS = 2
+"""Steps of the shortest episodes by which equal and different seeds can be told."""
+
+
+class ScenarioError(ValueError):
+    """What is wrong with a scenario: one line."""
+
+
+@dataclass(frozen=True)
+class Examination:
+    """What is played.
+
+    Attributes
+    ----------
+    factory
+        Makes a new instance of the scenario.
+    steps
+        Most steps of an episode.
+    seeds
+        At least two seeds of worlds.
+    episodes
+        Numbers under which episodes are played: failures may be scheduled by them.
+    """
+
+    factory: Callable[[], Scenario]
+    steps: int
+    seeds: tuple[int, ...]
+    episodes: tuple[int, ...]
+
+    def actions(self, scenario: Scenario, seed: int) -> IntArray:
+        """Return the actions that are tried in the world of a seed."""
+        return random_actions(scenario, self.steps, seed)
+
+    def play(
+        self, scenario: Scenario, seed: int, episode: int, *, predicting: bool = False
+    ) -> Iterator[Frame]:
+        """Yield the frames of an episode, the opening first."""
+        return play(scenario, seed, episode, self.actions(scenario, seed), predicting=predicting)
+
+
+def check_scenario(
+    factory: Callable[[], Scenario],
+    *,
+    steps: int = 40,
+    seeds: Sequence[int] = (0, 1),
+    episodes: Sequence[int] = (0, 1),
+) -> tuple[str, ...]:
+    """Check a scenario and return the names of the checks that it passed.
+
+    Parameters
+    ----------
+    factory
+        Makes a new instance of the scenario, the same each time.
+    steps
+        Most steps of the episodes played, about twenty of them.
+    seeds
+        Seeds of worlds, at least two.
+    episodes
+        Numbers of the episodes played.
+
+    Raises
+    ------
+    ScenarioError
+        If it breaks a promise, or raises; the message is one line.
+
+    Examples
+    --------
+    >>> from nested_agents.scenarios.line_up import LineUp
+    >>> len(check_scenario(lambda: LineUp(2))) == len(CHECKS)
+    True
+    """
+    if steps < LEAST_STEPS:
+        raise ValueError(f"steps = {steps}: must be at least {LEAST_STEPS}")
+    for name, numbers, least in (("seeds", seeds, 2), ("episodes", episodes, 1)):
+        if len(numbers) < least:
+            raise ValueError(f"{name} = {list(numbers)}: must hold at least {least}")
+    examination = Examination(factory, steps, tuple(seeds), tuple(episodes))
+    for name, check in CHECKS.items():
+        try:
+            fault = check(examination)
+        except Exception as error:
+            fault = _raised(error)
+        if fault is not None:
+            raise ScenarioError(f"{name}: {fault}")
+    return tuple(CHECKS)
+
+
+def _raised(error: Exception) -> str:
+    """Return in one line what was raised, and where."""
+    where = extract_tb(error.__traceback__)[-1]
+    place = f"{where.name}, {Path(where.filename).name}:{where.lineno}"
+    return f"{type(error).__name__} in {place}: {' '.join(str(error).split())}"
+
+
+def _form(of: Examination) -> str | None:
+    """Check names, groups, shapes and types."""
+    scenario: Any = of.factory()
+    if not isinstance(scenario, Scenario):
+        missing = [name for name in MEMBERS if not hasattr(scenario, name)]
+        return f"{type(scenario).__name__} lacks {', '.join(missing)}"
+    n, d = len(scenario.agents), scenario.state_space.n_variables
+    if not n or len(set(scenario.agents)) != n:
+        return f"agents {scenario.agents} must be at least one, of different names"
+    if [i for group in scenario.groups for i in group] != list(range(n)):
+        return f"groups {scenario.groups} must hold the {n} agents once each, in order"
+    opening(scenario, of.seeds[0], of.episodes[0])
+    transition = scenario.step(of.actions(scenario, of.seeds[0])[0])
+    missing = [field for field in FIELDS if not hasattr(transition, field)]
+    if missing:
+        return f"step returns {type(transition).__name__}, must be Transition: no {missing[0]}"
+    for step, frame in enumerate(of.play(scenario, of.seeds[0], of.episodes[0])):
+        if np.shape(frame["states"]) != (n, d):
+            return f"states of shape {np.shape(frame['states'])} {at(step)}, must be {(n, d)}"
+        if step and np.shape(frame["reward"]) != ():
+            return f"reward of shape {np.shape(frame['reward'])} {at(step)}, must be one number"
+        if step and not all(isinstance(frame[e], bool) for e in ("terminated", "truncated")):
+            return f"terminated and truncated must be bool, {at(step)} they are not"
+        motions = frame.get("motions")
+        if motions is not None and np.shape(motions) != (len(scenario.groups), 3):
+            return f"motions of shape {np.shape(motions)}, must be {(len(scenario.groups), 3)}"
+        pushed = frame.get("pushed")
+        if pushed is not None and np.shape(pushed) != (3,):
+            return f"pushed of shape {np.shape(pushed)}, must be (3,)"
+    return None
+
+
+def _finite(of: Examination) -> str | None:
+    """Check that all numbers are finite."""
+    for seed, episode in _all(of):
+        for step, frame in enumerate(of.play(of.factory(), seed, episode)):
+            for name, value in frame.items():
+                array = np.asarray(value)
+                if array.dtype.kind == "f" and not np.isfinite(array).all():
+                    return f"{name} is not finite {at(step)} of seed {seed}"
+    return None
+
+
+def _bounds(of: Examination) -> str | None:
+    """Check that variables stay within their period, and within `bounds` if a scenario has them."""
+    for seed, episode in _all(of):
+        scenario = of.factory()
+        limits = [
+            (v.low, v.high) if v.periodic else (-np.inf, np.inf)
+            for v in scenario.state_space.variables
+        ]
+        low, high = np.array(getattr(scenario, "bounds", limits)).T
+        for step, frame in enumerate(of.play(scenario, seed, episode)):
+            states = np.asarray(frame["states"])
+            outside = np.argwhere((states < low) | (states > high))
+            if len(outside):
+                i = outside[0, 1]
+                return (
+                    f"{scenario.state_space.variables[i].name} leaves [{low[i]}, {high[i]}] "
+                    f"{at(step)} of seed {seed}"
+                )
+    return None
+
+
+def _repeats(of: Examination) -> str | None:
+    """Check that equal seeds give equal bits, also in an instance that has played before."""
+    used = of.factory()
+    for seed, episode in _all(of):
+        first = list(of.play(of.factory(), seed, episode))
+        again = difference(first, of.play(of.factory(), seed, episode))
+        if again is not None:
+            return f"two runs with seed {seed} differ {again}"
+        list(of.play(used, of.seeds[-1], of.episodes[0]))
+        again = difference(first, of.play(used, seed, episode))
+        if again is not None:
+            return f"seed {seed} after another episode differs {again}"
+    return None
+
+
+def _varies(of: Examination) -> str | None:
+    """Check that different seeds give different worlds."""
+    actions = of.actions(of.factory(), of.seeds[0])
+    runs = [list(play(of.factory(), seed, of.episodes[0], actions)) for seed in of.seeds]
+    if any(difference(runs[0], run) for run in runs[1:]):
+        return None
+    return f"seeds {', '.join(map(str, of.seeds))} give one and the same episode"
+
+
+def _keeps_apart(of: Examination) -> str | None:
+    """Check that two instances played in turns do not notice each other."""
+    one, other = of.seeds[0], of.seeds[1]
+    for episode in of.episodes:
+        alone = [list(of.play(of.factory(), seed, episode)) for seed in (one, other)]
+        runs = [of.play(of.factory(), seed, episode) for seed in (one, other)]
+        frames = list(zip_longest(*runs))
+        for seed, expected, found in zip(
+            (one, other), alone, zip(*frames, strict=True), strict=True
+        ):
+            here = difference(expected, [frame for frame in found if frame is not None])
+            if here is not None:
+                return f"an instance with seed {seed} played in turns with another differs {here}"
+    return None
+
+
+def _only_looks(of: Examination) -> str | None:
+    """Check that predicting and measuring change nothing."""
+    for seed, episode in _all(of):
+        silent = list(of.play(of.factory(), seed, episode))
+        here = difference(silent, of.play(of.factory(), seed, episode, predicting=True))
+        if here is not None:
+            return f"an episode in which predictions are asked for differs {here}"
+    return None
+
+
+def _predicts(of: Examination) -> str | None:
+    """Check that predictions have their shapes, are finite, and that their tables agree."""
+    scenario, rng = of.factory(), np.random.default_rng(of.seeds[0])
+    opening(scenario, of.seeds[0], of.episodes[0])
+    actions = of.actions(scenario, of.seeds[0])
+    for action in actions[:5]:
+        fault = fault_of_prediction(scenario, actions, rng)
+        if fault is not None:
+            return fault
+        scenario.step(action)
+    return None
+
+
+def _leaves_alone(of: Examination) -> str | None:
+    """Check that returned arrays stay as they are, and seeds and actions, too."""
+    scenario = of.factory()
+    seed = np.random.SeedSequence(of.seeds[0])
+    given: list[tuple[str, Any, Any]] = []
+    states = scenario.reset(seed, of.episodes[0])
+    if seed.n_children_spawned:
+        return "reset spawns from the seed it is given, so that using it twice gives two worlds"
+    given.append(("states at the start", states, np.array(states)))
+    for step, action in enumerate(of.actions(scenario, of.seeds[0])):
+        joint = action.copy()
+        transition = scenario.step(joint)
+        if not np.array_equal(joint, action):
+            return f"step changes the joint action it is given, {at(step + 1)}"
+        for name, value in fields(transition):
+            if isinstance(value, np.ndarray):
+                given.append((f"{name} {at(step + 1)}", value, value.copy()))
+        if transition.terminated or transition.truncated:
+            break
+    for name, now, then in given:
+        if bits(now) != bits(then):
+            return f"{name}: the returned array was changed later"
+    return None
+
+
+def _keeps_off_globals(of: Examination) -> str | None:
+    """Check that the global random numbers of Python and NumPy are neither drawn nor set."""
+    before = random.getstate(), np.random.get_state()  # noqa: NPY002
+    try:
+        # From a state that no scenario sets, lest one that always sets the same goes unnoticed.
+        random.seed(2**40 + 1)
+        np.random.seed(2**31 + 1)  # noqa: NPY002
+        python, numpy = random.getstate(), np.random.get_state()  # noqa: NPY002
+        list(of.play(of.factory(), of.seeds[0], of.episodes[0], predicting=True))
+        changed = [] if random.getstate() == python else ["random"]
+        now = np.random.get_state()  # noqa: NPY002
+        if not all(np.array_equal(a, b) for a, b in zip(now, numpy, strict=True)):
+            changed.append("numpy.random")
+    finally:
+        random.setstate(before[0])
+        np.random.set_state(before[1])  # noqa: NPY002
+    return f"the global state of {' and '.join(changed)} is changed" if changed else None
+
+
+def _restores(of: Examination) -> str | None:
+    """Check that a scenario with `save` and `restore` goes on from what it saved."""
+    scenario: Any = of.factory()
+    if not (hasattr(scenario, "save") and hasattr(scenario, "restore")):
+        return None
+    for seed, episode in _all(of):
+        opening(scenario, seed, episode)
+        actions = of.actions(scenario, seed)
+        half = len(actions) // 2
+        for action in actions[:half]:
+            if ended(stepped(scenario, action)):
+                break
+        else:
+            saved = scenario.save()
+            expected = [stepped(scenario, action) for action in actions[half:]]
+            scenario.restore(saved)
+            found = [stepped(scenario, action) for action in actions[half:]]
+            here = difference(expected, found, half + 1)
+            if here is not None:
+                return f"the future of a restored scenario differs {here} of seed {seed}"
+    return None
+
+
+CHECKS: dict[str, Callable[[Examination], str | None]] = {
+    "form": _form,
+    "finite numbers": _finite,
+    "bounds": _bounds,
+    "equal seeds": _repeats,
+    "different seeds": _varies,
+    "two instances": _keeps_apart,
+    "predicting": _only_looks,
+    "predictions": _predicts,
+    "returned arrays": _leaves_alone,
+    "global random numbers": _keeps_off_globals,
+    "save and restore": _restores,
+}
+"""The checks by name, in their order: later ones rely on earlier ones."""
+
+
+def _all(of: Examination) -> Iterator[tuple[int, int]]:
+    return ((seed, episode) for seed in of.seeds for episode in of.episodes)

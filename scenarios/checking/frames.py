@@ -1,0 +1,145 @@
+"""Episodes played as frames: what every step gave, copied, and compared to the last bit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import zip_longest
+from typing import Any
+
+import numpy as np
+
+from ...core.arrays import IntArray
+from ...core.loop import world_seed
+from ...core.protocols import Scenario, Transition
+
+Frame = dict[str, Any]
+"""What one step gave, by dotted name; without the measured times."""
+
+FIELDS = ("states", "reward", "terminated", "truncated", "motions", "pushed", "info")
+
+
+def random_actions(scenario: Scenario, steps: int, seed: int) -> IntArray:
+    """Return joint actions ``(steps, n)``, most of them held for some steps."""
+    rng = np.random.default_rng(seed)
+    shape = steps, len(scenario.agents)
+    actions = rng.integers(len(scenario.action_set), size=shape)
+    held = rng.random(shape) < 0.7
+    for step in range(1, steps):
+        actions[step, held[step]] = actions[step - 1, held[step]]
+    return actions
+
+
+def play(
+    scenario: Scenario, seed: int, episode: int, actions: IntArray, *, predicting: bool = False
+) -> Iterator[Frame]:
+    """Yield the frames of an episode, the opening first.
+
+    Parameters
+    ----------
+    scenario
+        What is played; modified.
+    seed, episode
+        As in the control loop.
+    actions
+        ``(steps, n)`` joint actions; the episode may end earlier.
+    predicting
+        Whether predictions and measurements are asked for before every step.
+    """
+    yield opening(scenario, seed, episode)
+    for action in actions:
+        if predicting:
+            _look_ahead(scenario)
+        frame = stepped(scenario, action)
+        yield frame
+        if ended(frame):
+            return
+
+
+def opening(scenario: Scenario, seed: int, episode: int) -> Frame:
+    """Reset a scenario and return the frame of the start."""
+    states = scenario.reset(world_seed(seed, episode), episode)
+    return _copied({"states": states, "info": scenario.measure()})
+
+
+def stepped(scenario: Scenario, action: IntArray) -> Frame:
+    """Step a scenario and return the frame."""
+    return _copied(dict(fields(scenario.step(action))))
+
+
+def ended(frame: Frame) -> bool:
+    """Return whether an episode ends with a frame."""
+    return bool(frame["terminated"] or frame["truncated"])
+
+
+def fields(transition: Transition) -> Iterator[tuple[str, Any]]:
+    """Yield what a transition holds, by dotted name, not copied."""
+    return _flat({name: getattr(transition, name) for name in FIELDS})
+
+
+def difference(expected: Iterable[Frame], found: Iterable[Frame], first: int = 0) -> str | None:
+    """Return from which step on two runs differ and in what, or None if in no bit.
+
+    Parameters
+    ----------
+    expected, found
+        The frames of the two runs.
+    first
+        Number of the first frame; 0 is the start of an episode.
+    """
+    for step, (one, other) in enumerate(zip_longest(expected, found), first):
+        if one is None or other is None:
+            return f"{at(step)}: one of them has ended"
+        if one.keys() != other.keys():
+            return f"{at(step)}: one of them has no {min(one.keys() ^ other.keys())}"
+        for name in one:
+            if bits(one[name]) != bits(other[name]):
+                return f"{at(step)}: {name}{_contrast(one[name], other[name])}"
+    return None
+
+
+def bits(value: Any) -> tuple[Any, ...]:
+    """Return what equal values share, to the last bit."""
+    array = np.asarray(value)
+    content = repr(value) if array.dtype == object else array.tobytes()
+    return array.shape, array.dtype.str, content
+
+
+def at(step: int) -> str:
+    """Return where in an episode a step is, in words."""
+    return "at the start" if step == 0 else f"at step {step}"
+
+
+def _contrast(one: Any, other: Any) -> str:
+    one, other = np.asarray(one), np.asarray(other)
+    if one.shape != other.shape or one.dtype != other.dtype:
+        return f" of shapes {one.shape} and {other.shape}, types {one.dtype} and {other.dtype}"
+    if not one.ndim:
+        return f" = {one} and {other}"
+    where = next(i for i in np.ndindex(one.shape) if bits(one[i]) != bits(other[i]))
+    return f"{list(where)} = {one[where]} and {other[where]}"
+
+
+def _look_ahead(scenario: Scenario) -> None:
+    prediction = scenario.predict()
+    some = np.zeros((2, len(scenario.agents)), dtype=np.int64)
+    some[1] = len(scenario.action_set) - 1
+    for agent in range(len(scenario.agents)):
+        prediction.states(agent, some)
+    prediction.rewards(some)
+    scenario.measure()
+
+
+def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in table.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{name}.")
+        else:
+            yield prefix + name, value
+
+
+def _copied(table: Mapping[str, Any]) -> Frame:
+    return {
+        name: value.copy() if isinstance(value, np.ndarray) else value
+        for name, value in _flat(table)
+        if not name.startswith("info.seconds")
+    }

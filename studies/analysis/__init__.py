@@ -1,0 +1,1 @@
+"""From rows to estimates: statistics and comparisons; nothing is drawn or printed here."""

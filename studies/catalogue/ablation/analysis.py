@@ -1,0 +1,77 @@
+"""The ablation study: what each ingredient of the default contributes.
+
+The first condition is the reference; every other one differs from it in one ingredient, removed or
+replaced. All meet the same worlds, seed by seed. Two measures were fixed beforehand: how fast a
+team learns (success over all of training) and how well it ends (success greedy, after training).
+The differences are tested by permutation of signs, and p is adjusted by Holm's method over all
+conditions and both measures.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...analysis.comparison import LEVEL, Difference, differences
+from ...analysis.results import Results
+from ...analysis.statistics import Estimate, rate
+from ...analysis.summary import Summary
+
+PHASES = {"training": "training", "greedy": "evaluation"}
+"""The measures, each the success rate in a phase."""
+
+
+@dataclass(frozen=True)
+class Ablation:
+    """The analysis.
+
+    Attributes
+    ----------
+    table
+        One line per condition, the reference first.
+    differences
+        Of every other condition from the reference, by each measure.
+    notes
+        What was found to matter, for printing.
+    """
+
+    table: tuple[Summary, ...]
+    differences: tuple[Difference, ...]
+    notes: tuple[str, ...]
+
+
+def analyse(results: Results) -> Ablation:
+    """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
+    conditions = list(results.training)
+    measures = {
+        title: lambda r, condition, phase=phase: r.phases[phase][condition]["success"].mean(axis=1)
+        for title, phase in PHASES.items()
+        if phase in results.phases
+    }
+    found = differences(results, conditions[0], conditions[1:], measures) if conditions else ()
+    by_place = {(d.condition, d.measure): d.estimate for d in found}
+    unknown = Estimate(*(np.asarray(value) for value in (0.0, np.nan, np.nan)))
+    table = []
+    for condition in conditions:
+        estimates = {}
+        for title in measures:
+            estimates[title] = rate(results.phases[PHASES[title]][condition]["success"])
+            estimates[f"{title}, difference"] = by_place.get((condition, title), unknown)
+        table.append(Summary(condition, len(results.seeds[condition]), estimates))
+    return Ablation(tuple(table), found, tuple(_notes(found)))
+
+
+def _notes(found: tuple[Difference, ...]) -> list[str]:
+    lines = []
+    for title in dict.fromkeys(d.measure for d in found):
+        own = sorted(
+            (d for d in found if d.measure == title), key=lambda d: float(d.estimate.value)
+        )
+        lines.append(f"\nsuccess {title}, p adjusted over {len(found)} comparisons:")
+        for word, sign in (("worse", -1), ("better", 1)):
+            told = [d for d in own if d.p < LEVEL and d.estimate.value * sign > 0]
+            lines += [f"  {word}: {d.condition}, {d.shown}" for d in told]
+        others = [d.condition for d in own if d.p >= LEVEL]
+        lines += [f"  not told apart: {name}" for name in others]
+    return lines

@@ -1,0 +1,219 @@
+"""The scaling study: how the number of robots bears on success, time, memory and messages.
+
+Conditions differ in the number of robots and in how joint actions are evaluated; those of a spec of
+one's own may differ in anything. Of every trial it keeps, besides the episodes: numbers that are a
+function of it, and what it took, which is not.
+
+Messages of a step are counted as Section V has agents talk: every agent passes the action it has
+decided to each agent below it, so there is one message for every edge of the hierarchy's transitive
+closure; n (n - 1) / 2 in a chain of n agents.
+"""
+
+from __future__ import annotations
+
+import re
+import tracemalloc
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ...analysis.results import Results
+from ...analysis.statistics import Estimate, bootstrap, rate
+from ...analysis.summary import Summary
+from ...trials.trial import Session, Trial, TrialResult
+
+COLUMNS = (
+    "success", "greedy", "all touch", "decide [ms]", "learn [ms]", "team [MB]", "process [MB]",
+)  # fmt: skip
+"""What the table shows."""
+MEMORY = Path("/proc/self/status")
+CLEAR = Path("/proc/self/clear_refs")
+
+
+def measure(trial: Trial) -> TrialResult:
+    """Train and evaluate a team, and note what it takes; imported by name in workers."""
+    Session(replace(trial, episodes=1, steps=2)).train(1)  # compiles, once a process
+    session = Session(trial)
+    _forget_peak()
+    session.train(trial.episodes)
+    peak = _peak()
+    hierarchy, team = session.team.hierarchy, session.team
+    tried = team.evaluator.counts.joint_actions if team.evaluator is not None else 0
+    numbers = {
+        "robots": float(trial.settings.scenario.robots),
+        "period_s": trial.settings.scenario.period,
+        "agents": float(len(hierarchy)),
+        "messages": float(messages(hierarchy.below(i) for i in range(len(hierarchy)))),
+        "joint_actions": tried / len(session.deciding),
+        "team_bytes": float(sum(array.nbytes for array in team.arrays().values())),
+        "weight_bytes": float(team.learner.theta.nbytes),
+    }
+    shares = session.evaluate()
+    if len(shares):
+        numbers["least_touching"] = float(shares.min(axis=1).mean())
+        numbers["all_touching"] = float((shares.min(axis=1) >= 0.5).mean())
+    usage = {
+        "decision_median": float(np.median(session.deciding)),
+        "decision_99": float(np.quantile(session.deciding, 0.99)),
+        "step_bytes": float(_of_a_step(session)),
+    }
+    if peak is not None:
+        usage["process_bytes"] = float(peak)
+    return session.result(numbers, usage)
+
+
+def messages(below: Iterable[tuple[int, ...]]) -> int:
+    """Return how many decided actions are passed down in a step, given whom each agent sees.
+
+    Examples
+    --------
+    A chain of four agents, and a leader with three subordinates:
+
+    >>> messages([(1, 2, 3), (2, 3), (3,), ()]), messages([(1, 2, 3), (), (), ()])
+    (6, 3)
+    """
+    return sum(map(len, below))
+
+
+def _of_a_step(session: Session) -> int:
+    """Return the most memory that one decision holds beside what is held already [bytes]."""
+    prediction = session.team.predict(session.scenario)
+    tracemalloc.start()
+    try:
+        session.team.act(prediction, explore=False)
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def _forget_peak() -> None:
+    """Let the peak of this process's memory be counted from now on, where Linux allows."""
+    if CLEAR.exists():
+        CLEAR.write_text("5")
+
+
+def _peak() -> int | None:
+    """Return the peak of this process's resident memory [bytes], where Linux tells it."""
+    found = re.search(r"VmHWM:\s+(\d+) kB", MEMORY.read_text()) if MEMORY.exists() else None
+    return None if found is None else 1024 * int(found[1])
+
+
+@dataclass(frozen=True)
+class Point:
+    """One condition.
+
+    Attributes
+    ----------
+    evaluator
+        Its label without the number of robots: the evaluator, and whatever else differs.
+    robots, agents, messages
+        Sizes.
+    period
+        What a decision may take to keep up with the robots [s].
+    values
+        Estimates by name, see `analyse`.
+    """
+
+    evaluator: str
+    robots: int
+    agents: int
+    messages: int
+    period: float
+    values: dict[str, Estimate]
+
+
+@dataclass(frozen=True)
+class Scaling:
+    """The analysis.
+
+    Attributes
+    ----------
+    table
+        One line per condition.
+    points
+        The same for figures.
+    exponents
+        By evaluator, how decision and learning time grow with the number of agents: the slope of
+        their logarithms over all sizes.
+    notes
+        Those, for printing.
+    """
+
+    table: tuple[Summary, ...]
+    points: tuple[Point, ...]
+    exponents: dict[str, dict[str, float]]
+    notes: tuple[str, ...]
+
+
+def analyse(results: Results) -> Scaling:
+    """Estimate; 95 % intervals, seeds as the unit of sampling. Times are per step."""
+    points, table = [], []
+    sizes = {c: int(results.numbers[c]["robots"][0]) for c in results.training}
+    for condition, training in results.training.items():
+        numbers, usage = results.numbers[condition], results.usage[condition]
+        steps = training["steps"].sum(axis=1)
+        values = {
+            "success": rate(training["success"][:, -5:]),
+            "decide [ms]": bootstrap(1e3 * usage["decision_median"]),
+            "learn [ms]": bootstrap(1e3 * usage["learning"] / steps),
+            "world [ms]": bootstrap(1e3 * (usage["physics"] + usage["sensors"]) / steps),
+            "team [MB]": bootstrap(1e-6 * numbers["team_bytes"]),
+            "step [MB]": bootstrap(1e-6 * usage["step_bytes"]),
+        }
+        if "process_bytes" in usage:
+            values["process [MB]"] = bootstrap(1e-6 * usage["process_bytes"])
+        if condition in results.evaluation:
+            greedy = rate(results.evaluation[condition]["success"])
+            values = {"success": values.pop("success"), "greedy": greedy} | values
+            values["all touch"] = bootstrap(numbers["all_touching"])
+        agents, passed = (int(numbers[n][0]) for n in ("agents", "messages"))
+        evaluator = _without_robots(condition, sizes)
+        period = float(numbers["period_s"][0])
+        points.append(Point(evaluator, sizes[condition], agents, passed, period, values))
+        shown = {name: values[name] for name in COLUMNS if name in values}
+        table.append(Summary(condition, len(steps), shown))
+    exponents = _exponents(points)
+    notes = [
+        f"\n{evaluator}: " + ", ".join(f"{what} ~ n^{power:.2f}" for what, power in by_what.items())
+        for evaluator, by_what in exponents.items()
+    ]
+    notes += _passed(points)
+    return Scaling(tuple(table), tuple(points), exponents, tuple(notes))
+
+
+def _without_robots(condition: str, sizes: dict[str, int]) -> str:
+    """Return a condition's label without its number of robots, which may be all it says."""
+    if all(label == str(robots) for label, robots in sizes.items()):
+        return "default"
+    parts = condition.split(", ")
+    return ", ".join(part for part in parts if part != f"robots={sizes[condition]}")
+
+
+def _passed(points: list[Point]) -> list[str]:
+    """Return lines that say how many messages are passed, one per number where all agree."""
+    lines = []
+    for robots in dict.fromkeys(p.robots for p in points):
+        labels: dict[tuple[int, int], list[str]] = {}
+        for p in points:
+            if p.robots == robots:
+                labels.setdefault((p.agents, p.messages), []).append(p.evaluator)
+        for (agents, passed), own in labels.items():
+            whose = f" ({'; '.join(own)})" if len(labels) > 1 else ""
+            lines.append(f"{robots} robots{whose}: {agents} agents, {passed} messages a step")
+    return lines
+
+
+def _exponents(points: list[Point]) -> dict[str, dict[str, float]]:
+    found: dict[str, dict[str, float]] = {}
+    for evaluator in dict.fromkeys(p.evaluator for p in points):
+        own = [p for p in points if p.evaluator == evaluator]
+        if len({p.agents for p in own}) < 2:
+            continue
+        sizes = np.log([p.agents for p in own])
+        found[evaluator] = {
+            what: float(np.polyfit(sizes, np.log([p.values[title].value for p in own]), 1)[0])
+            for what, title in (("deciding", "decide [ms]"), ("learning", "learn [ms]"))
+        }
+    return found

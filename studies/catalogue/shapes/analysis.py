@@ -1,0 +1,149 @@
+"""The shapes study: whether the shape of the box is indifferent, as the paper has it.
+
+A team is trained with one box, and then acts greedily, without any further learning, with every box
+that the spec lists under ``[evaluations]``, on the same worlds. What is reported of each box is its
+success rate, the ratio to the rate with the box of training, and how much of the time in which any
+robot pushes each of them does. The agents' state holds nothing of the shape; the predictor by which
+they look ahead is given it (see docs/predictors.md).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...analysis.comparison import Difference, ratio
+from ...analysis.paired_tests import holm, paired_permutation
+from ...analysis.results import Arrays, Results
+from ...analysis.statistics import bootstrap, rate
+from ...analysis.summary import Summary
+from ...spec.errors import SpecError
+from ...spec.spec import Spec
+from ...trials.trial import Session, Trial, TrialResult
+
+TRAINED = "trained on"
+"""How the box of training is called among the others."""
+PREFIX = "evaluation:"
+
+
+def check(spec: Spec) -> None:
+    """Raise `SpecError` unless there is another box to compare with."""
+    if not spec.evaluations:
+        raise SpecError('evaluations: missing; shapes needs one at least, as circle.box = "circle"')
+
+
+def measure(trial: Trial) -> TrialResult:
+    """Train a team with its own box, evaluate it with all; imported by name in workers."""
+    session = Session(trial)
+    session.train(trial.episodes)
+    shares = {TRAINED: session.evaluate()}
+    shares |= session.evaluate_elsewhere()
+    numbers = {
+        f"touching.{name}.robot{r + 1}": float(share)
+        for name, by_episode in shares.items()
+        if len(by_episode)
+        for r, share in enumerate(by_episode.mean(axis=0))
+    }
+    return session.result(numbers)
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """The analysis.
+
+    Attributes
+    ----------
+    table
+        One line per condition and box, the box of training first.
+    ratios
+        By condition, success with each other box over that with the box of training, with p of no
+        difference, adjusted over all boxes of the condition.
+    notes
+        Verdicts, for printing.
+    """
+
+    table: tuple[Summary, ...]
+    ratios: dict[str, tuple[Difference, ...]]
+    notes: tuple[str, ...]
+
+
+def analyse(results: Results) -> Shapes:
+    """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
+    table: list[Summary] = []
+    ratios: dict[str, tuple[Difference, ...]] = {}
+    for condition, trained in results.evaluation.items():
+        boxes = {TRAINED: trained} | _other_boxes(results, condition)
+        found = ratios[condition] = ratios_of(results, condition)
+        by_box = {d.condition: d for d in found}
+        for box, arrays in boxes.items():
+            label = box if len(results.evaluation) == 1 else f"{condition}: {box}"
+            estimates = {"success": rate(arrays["success"])}
+            own = 1.0 if trained["success"].any() else np.nan
+            estimates["ratio"] = by_box[box].estimate if box in by_box else bootstrap([own])
+            estimates |= _further(arrays, results.numbers.get(condition, {}), box)
+            table.append(Summary(label, len(arrays["success"]), estimates))
+    notes = [line for condition, found in ratios.items() for line in _verdict(condition, found)]
+    return Shapes(tuple(table), ratios, tuple(notes))
+
+
+def _other_boxes(results: Results, condition: str) -> dict[str, Arrays]:
+    return {
+        phase.removeprefix(PREFIX): arrays[condition]
+        for phase, arrays in results.phases.items()
+        if phase.startswith(PREFIX) and condition in arrays
+    }
+
+
+def ratios_of(results: Results, condition: str) -> tuple[Difference, ...]:
+    """Return the ratios of a condition, box by box; none if it has not been evaluated."""
+    if condition not in results.evaluation:
+        return ()
+    base = results.evaluation[condition]["success"]
+    others = {box: arrays["success"] for box, arrays in _other_boxes(results, condition).items()}
+    adjusted = holm([_p(outcomes, base) for outcomes in others.values()])
+    return tuple(
+        Difference(box, "ratio", len(base), ratio(outcomes, base), float(p))
+        for (box, outcomes), p in zip(others.items(), adjusted, strict=True)
+    )
+
+
+def _p(outcomes: np.ndarray, base: np.ndarray) -> float:
+    return paired_permutation(outcomes.mean(axis=1), base.mean(axis=1))
+
+
+def _further(arrays: Arrays, numbers: Arrays, box: str) -> dict:
+    start = f"touching.{box}.robot"
+    robots = {
+        f"touches {n.removeprefix(start)}": v for n, v in numbers.items() if n.startswith(start)
+    }
+    return {
+        "stopped": rate(arrays["stopped_at_goal"]),
+        "contact": bootstrap(arrays["contact_fraction"].mean(axis=1)),
+        **{title: bootstrap(values) for title, values in robots.items()},
+    }
+
+
+def least_ratio(found: tuple[Difference, ...]) -> Difference:
+    """Return the ratio of the box that comes off worst.
+
+    Raises
+    ------
+    ValueError
+        If there is none.
+    """
+    if not found:
+        raise ValueError("shapes: no further box has been evaluated")
+    return min(found, key=lambda d: float(np.nan_to_num(d.estimate.value)))
+
+
+def _verdict(condition: str, found: tuple[Difference, ...]) -> list[str]:
+    if not found:
+        return []
+    lines = [f"\n{condition}, ratio to the box of training:"]
+    for d in found:
+        e = d.estimate
+        lines.append(
+            f"  {d.condition}: {e.value:.2f} [{e.low:.2f}, {e.high:.2f}], p = {d.p:.2g} (adjusted)"
+        )
+    return lines

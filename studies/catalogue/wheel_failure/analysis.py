@@ -1,0 +1,273 @@
+"""The wheel-failure study: what a failing wheel costs, and how a team comes back.
+
+Training goes on through the failure. At its onset the team is also copied: the copy meets the same
+worlds under the same exploration with its weights kept as they are. Conditions that are swept over
+``learner.self_model.enabled`` give all four cases, told apart by what adapts: nothing, the weights,
+the self-model (by which predictions know the wheel has changed), or both.
+
+Levels are success rates over `BLOCK` episodes: before the failure, just after it, and at the end
+of training. A seed has recovered at the first episode from which on `BLOCK` episodes reach
+`REGAINED` of the level before (its mean over seeds); seeds that never do count with the episodes
+and steps that were run, so that those columns are lower bounds. Area lost is the sum of what the
+episodes after the onset fall short of the level before, in episodes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ....core.settings import FrozenSettings, LearnerSettings
+from ....core.team import Team
+from ...analysis.comparison import Array, Difference
+from ...analysis.paired_tests import holm, paired_permutation
+from ...analysis.results import Arrays, Results
+from ...analysis.statistics import Estimate, bootstrap, rate, rates
+from ...analysis.summary import Summary
+from ...spec.conditions import label
+from ...spec.errors import SpecError
+from ...spec.spec import Spec
+from ...trials.trial import Session, Trial, TrialResult, build
+
+BLOCK = 5
+"""Episodes that a level is measured over."""
+REGAINED = 0.9
+"""Share of the level before that counts as recovered."""
+KEPT = "weights kept"
+"""The phase of the copied team."""
+SWEPT = "learner.self_model.enabled"
+"""What is swept to have every condition with a self-model and without."""
+ADAPTS = {
+    ("false", KEPT): "nothing",
+    ("false", "training"): "weights",
+    ("true", KEPT): "self-model",
+    ("true", "training"): "both",
+}
+"""What adapts, by whether the self-model is enabled, and phase."""
+
+
+def measure(trial: Trial) -> TrialResult:
+    """Train a team through a failure, and a copy that keeps its weights from there on."""
+    onset = trial.settings.scenario.onset
+    assert onset is not None, "see check"
+    session = Session(trial)
+    session.train(onset)
+    kept = _keeping_weights(session)
+    session.train(trial.episodes - onset, onset)
+    session.train(trial.episodes - onset, onset, phase=KEPT, team=kept)
+    session.evaluate()
+    session.evaluate_elsewhere()
+    return session.result({"onset": float(onset)})
+
+
+def check(spec: Spec) -> None:
+    """Raise `SpecError` unless a wheel fails in every condition, after and before some training."""
+    for condition in spec.conditions():
+        onset = condition.settings.scenario.onset
+        if onset is None:
+            raise SpecError(
+                f"scenario.failures = []: wheel-failure needs one (condition {condition.label!r})"
+            )
+        if spec.episodes < 2 * BLOCK:
+            raise SpecError(
+                f"episodes = {spec.episodes}: wheel-failure needs {2 * BLOCK} or more, {BLOCK} "
+                f"before the failure and {BLOCK} with it"
+            )
+        if not BLOCK <= onset <= spec.episodes - BLOCK:
+            raise SpecError(
+                f"scenario.failures: the first begins in episode {onset}, allowed {BLOCK} to "
+                f"{spec.episodes - BLOCK} of {spec.episodes} episodes "
+                f"(condition {condition.label!r})"
+            )
+
+
+def _keeping_weights(session: Session) -> Team:
+    """Return a copy of the session's team that explores and models itself but keeps its weights."""
+    settings = session.trial.settings
+    common = {name: getattr(settings.learner, name) for name in LearnerSettings.model_fields}
+    frozen = settings.model_copy(update={"learner": FrozenSettings(**common)})
+    _, team = build(frozen, session.trial.seed)
+    arrays = session.team.arrays()
+    team.restore({name: arrays[name] for name in team.arrays()})
+    return team
+
+
+@dataclass(frozen=True)
+class Course:
+    """One case: what happened to a fault, given what adapts.
+
+    Attributes
+    ----------
+    fault
+        Label of the condition but for `SWEPT`.
+    adapts
+        What does, see `ADAPTS`; `training` or `weights kept` if self-models were not swept.
+    onset
+        Episode in which the wheel fails.
+    success
+        ``(n_seeds, n_episodes)`` from the start of training.
+    seeds
+        The seeds, in that order.
+    """
+
+    fault: str
+    adapts: str
+    onset: int
+    success: Array
+    steps: Array
+    seeds: tuple[int, ...]
+
+    @property
+    def before(self) -> Array:
+        """Outcomes ``(n_seeds, BLOCK)`` of the last episodes before the failure."""
+        return self.success[:, self.onset - BLOCK : self.onset]
+
+    @property
+    def after(self) -> Array:
+        """Outcomes of the first episodes with the failure."""
+        return self.success[:, self.onset : self.onset + BLOCK]
+
+    @property
+    def end(self) -> Array:
+        """Outcomes of the last episodes."""
+        return self.success[:, -BLOCK:]
+
+    @property
+    def lost(self) -> Array:
+        """Area lost ``(n_seeds,)`` [episodes]."""
+        short = self.before.mean() - self.success[:, self.onset :]
+        return np.asarray(short.sum(axis=1))
+
+    def recovery(self) -> tuple[Array, Array, Array]:
+        """Return per seed whether it recovered, after how many episodes and steps."""
+        level = REGAINED * self.before.mean()
+        followed = np.lib.stride_tricks.sliding_window_view(
+            self.success[:, self.onset :], BLOCK, axis=1
+        ).mean(axis=2)
+        regained = followed >= level - 1e-12
+        recovered = regained.any(axis=1)
+        ran = self.success.shape[1] - self.onset
+        episodes = np.where(recovered, regained.argmax(axis=1), ran)
+        steps = [
+            run[self.onset : self.onset + count].sum()
+            for run, count in zip(self.steps, episodes, strict=True)
+        ]
+        return recovered.astype(float), episodes.astype(float), np.array(steps, dtype=float)
+
+
+@dataclass(frozen=True)
+class WheelFailures:
+    """The analysis.
+
+    Attributes
+    ----------
+    table
+        One line per case.
+    courses
+        The cases, fault by fault.
+    curves
+        By case, success from episode to episode.
+    gains
+        Success at the end of every case over that of the same fault when nothing adapts; p
+        adjusted over all.
+    notes
+        Those gains, for printing.
+    """
+
+    table: tuple[Summary, ...]
+    courses: tuple[Course, ...]
+    curves: tuple[Estimate, ...]
+    gains: tuple[Difference, ...]
+    notes: tuple[str, ...]
+    headline: ClassVar[str] = "end"
+
+
+def analyse(results: Results) -> WheelFailures:
+    """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
+    courses = tuple(courses_of(results))
+    gains = _gains(courses)
+    notes = ["Named after the colon is what adapts to the failure."] if courses else []
+    notes += ["\nsuccess at the end against nothing adapting (p adjusted):"] if gains else []
+    notes += [f"  {gain.condition}: {gain.shown}" for gain in gains]
+    curves = tuple(rates(course.success) for course in courses)
+    return WheelFailures(tuple(map(_summary, courses)), courses, curves, gains, tuple(notes))
+
+
+def courses_of(results: Results) -> list[Course]:
+    """Return the cases of all conditions, fault by fault."""
+    kept: Mapping[str, Arrays] = results.phases.get(KEPT, {})
+    found = []
+    for condition, training in results.training.items():
+        if condition not in kept:
+            continue
+        onset = int(results.numbers[condition]["onset"][0])
+        fault, enabled = _twin(condition, results.columns.get(condition, {}))
+        for phase in (KEPT, "training"):
+            after = kept[condition] if phase == KEPT else {}
+            arrays = {
+                name: np.concatenate([training[name][:, :onset], after[name]], axis=1)
+                if after
+                else training[name]
+                for name in ("success", "steps")
+            }
+            found.append(
+                Course(
+                    fault, ADAPTS.get((enabled, phase), phase), onset,
+                    arrays["success"].astype(float), arrays["steps"].astype(float),
+                    results.seeds[condition],
+                )
+            )  # fmt: skip
+    order = {adapts: i for i, adapts in enumerate(ADAPTS.values())}
+    faults = list(dict.fromkeys(course.fault for course in found))
+    return sorted(found, key=lambda c: (faults.index(c.fault), order.get(c.adapts, 0)))
+
+
+def _twin(condition: str, columns: Mapping[str, Any]) -> tuple[str, str]:
+    """Return what a condition has in common with its twin, as a label, and which of them it is."""
+    enabled = str(columns.get(SWEPT, ""))
+    if not enabled:
+        return condition, ""
+    point = {k: v for k, v in columns.items() if k not in (SWEPT, "name") and v != ""}
+    return label(point, columns.get("name", "")) or "the failure", enabled
+
+
+def _summary(course: Course) -> Summary:
+    recovered, episodes, steps = course.recovery()
+    estimates = {
+        "before": rate(course.before),
+        "just after": rate(course.after),
+        "end": rate(course.end),
+    }
+    if course.before.any():  # else there is nothing to lose or to come back to
+        estimates |= {
+            "recovered": rate(recovered[:, None]),
+            "episodes": bootstrap(episodes),
+            "steps": bootstrap(steps),
+            "area lost": bootstrap(course.lost),
+        }
+    return Summary(f"{course.fault}: {course.adapts}", len(course.success), estimates)
+
+
+def _gains(courses: tuple[Course, ...]) -> tuple[Difference, ...]:
+    bases = {course.fault: course for course in courses if course.adapts == "nothing"}
+    found = []
+    for course in courses:
+        base = bases.get(course.fault)
+        if base is None or base is course:
+            continue
+        shared = [seed for seed in course.seeds if seed in base.seeds]
+        if len(shared) < 2:
+            continue
+        ends = [
+            c.end.mean(axis=1)[[c.seeds.index(seed) for seed in shared]] for c in (course, base)
+        ]
+        raw = paired_permutation(*ends)
+        found.append((course, len(shared), bootstrap(ends[0] - ends[1]), raw))
+    adjusted = holm([raw for *_, raw in found])
+    return tuple(
+        Difference(f"{course.fault}, {course.adapts}", "end", seeds, estimate, float(p))
+        for (course, seeds, estimate, _), p in zip(found, adjusted, strict=True)
+    )

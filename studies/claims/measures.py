@@ -1,0 +1,228 @@
+"""What is measured of the paper's claims, from the results of a study.
+
+Each function returns an estimate with its 95 % interval over seeds, or None where the results have
+not what it takes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...core.cost import Problem
+from ..analysis.comparison import difference, paired, ratio
+from ..analysis.results import Results
+from ..analysis.statistics import Estimate, bootstrap, rate
+from ..catalogue.chain_order.analysis import analyse as analyse_orders
+from ..catalogue.shapes.analysis import least_ratio, ratios_of
+from ..catalogue.wheel_failure.analysis import courses_of
+
+Measure = Callable[[Results], "Measured | None"]
+
+LAST = slice(-5, None)
+FIRST = slice(None, 5)
+UNTOLD = ("frozen", "random")
+"""Controls that know no more of the task than a learner does before its first reward."""
+TOLD = "greedy"
+"""The control that is told the reward and plans by it."""
+PAPER_NESTED, PAPER_SINGLE = 2.45e12, 1.1e27
+"""What the paper prints in Section VII."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """An estimate of what a claim is about.
+
+    Attributes
+    ----------
+    estimate
+        The value and its interval.
+    seeds
+        How many seeds it rests on; 0: it is computed.
+    p
+        Of a test, if there is one.
+    note
+        What the value is of, if that is part of the result.
+    """
+
+    estimate: Estimate
+    seeds: int
+    p: float | None = None
+    note: str = ""
+
+
+def learned(condition: str, known: tuple[str, ...] = UNTOLD) -> Measure:
+    """Return what measures success at the end of training, less that of the better control."""
+
+    def outcomes(r: Results, name: str) -> np.ndarray:
+        return np.asarray(r.training[name]["success"][:, LAST])
+
+    def compute(results: Results) -> Measured | None:
+        controls = [c for c in known if c in results.training]
+        if condition not in results.training or not controls:
+            return None
+        best = max(controls, key=lambda c: float(outcomes(results, c).mean()))
+        base, own = paired(results, best, condition, outcomes)
+        return (
+            Measured(difference(own, base), len(own), note=f"against {best}") if len(own) else None
+        )
+
+    return compute
+
+
+def sooner_than_told(results: Results) -> Measured | None:
+    """Measure the default's decisions in an episode after training, over greedy's, seed by seed."""
+    if not {"default", TOLD} <= results.evaluation.keys():
+        return None
+    base, own = paired(results, TOLD, "default", lambda r, c: r.evaluation[c]["steps"].mean(axis=1))
+    return Measured(bootstrap(own / base), len(own)) if len(own) else None
+
+
+def success(episodes: slice) -> Measure:
+    """Return what measures the default's success in some episodes of training."""
+
+    def compute(results: Results) -> Measured | None:
+        if "default" not in results.training:
+            return None
+        outcomes = results.training["default"]["success"][:, episodes]
+        return Measured(rate(outcomes), len(outcomes)) if outcomes.size else None
+
+    return compute
+
+
+def oriented(results: Results) -> Measured | None:
+    """Measure how often preset pose, which asks for it, brings the box to the goal pose."""
+    if "pose" not in results.training:
+        return None
+    outcomes = results.training["pose"]["success"][:, LAST]
+    return Measured(rate(outcomes), len(outcomes), note="preset pose")
+
+
+def contact_gained(results: Results) -> Measured | None:
+    """Measure by how much more the default's time in contact grows than the greedy control's.
+
+    That of any agent grows in training, since fewer and fewer actions are random.
+    """
+
+    def gained(r: Results, name: str) -> np.ndarray:
+        contact = r.training[name]["contact_fraction"]
+        return np.asarray(contact[:, LAST].mean(axis=1) - contact[:, FIRST].mean(axis=1))
+
+    if not {"default", TOLD} <= results.training.keys():
+        return None
+    base, own = paired(results, TOLD, "default", gained)
+    return Measured(bootstrap(own - base), len(own)) if len(own) else None
+
+
+def cost_error(results: Results) -> Measured:
+    """Compute how far the paper's two costs are from its formulas."""
+    problem = Problem()
+    errors = [
+        problem.nested(range(4)) / PAPER_NESTED - 1.0,
+        problem.single_agent(4) / PAPER_SINGLE - 1.0,
+    ]
+    worst = np.asarray(max(errors, key=abs))
+    return Measured(Estimate(worst, worst, worst), 0)
+
+
+def order_matters(results: Results) -> Measured | None:
+    """Measure the order of the chain that differs most from the first, over all intervals.
+
+    Intervals of the differences are simultaneous (Bonferroni); p is that of Friedman's test.
+    """
+    found = [c for c in analyse_orders(results).comparisons if c.title.endswith("greedy")]
+    if not found:
+        return None
+    first, *others = (arrays["success"] for arrays in results.evaluation.values())
+    level = 1.0 - 0.05 / len(others)
+    shifts = [difference(other, first, level) for other in others]
+    most = max(shifts, key=lambda e: abs(float(e.value)))
+    low, high = min(float(e.low) for e in shifts), max(float(e.high) for e in shifts)
+    widest = Estimate(most.value, np.asarray(low), np.asarray(high))
+    return Measured(widest, len(first), found[0].p, f"{1 + len(others)} orders")
+
+
+def _sizes(results: Results) -> dict[int, list[str]]:
+    """Return the conditions by number of robots."""
+    found: dict[int, list[str]] = {}
+    for condition, numbers in results.numbers.items():
+        if "robots" in numbers:
+            found.setdefault(int(numbers["robots"][0]), []).append(condition)
+    return found
+
+
+def decision_share(results: Results) -> Measured | None:
+    """Measure what share of its period a decision takes with most robots, fastest evaluator."""
+    sizes = _sizes(results)
+    if not sizes:
+        return None
+    most = max(sizes)
+    shares = [
+        results.usage[condition]["decision_median"] / results.numbers[condition]["period_s"]
+        for condition in sizes[most]
+    ]
+    fastest = min(shares, key=lambda share: float(share.mean()))
+    return Measured(bootstrap(fastest), len(fastest), note=f"{most} robots")
+
+
+def success_by_size(results: Results) -> Measured | None:
+    """Measure the success of most robots relative to fewest, each by its best evaluator."""
+    sizes = {
+        robots: [c for c in conditions if c in results.evaluation]
+        for robots, conditions in _sizes(results).items()
+    }
+    if len(sizes) < 2 or not all(sizes.values()):
+        return None
+
+    fewest, most = (
+        max(sizes[robots], key=lambda c: float(_greedy(results, c).mean()))
+        for robots in (min(sizes), max(sizes))
+    )
+    base, own = paired(results, fewest, most, _greedy)
+    note = f"{max(sizes)} against {min(sizes)} robots"
+    return Measured(ratio(own, base), len(own), note=note) if len(own) else None
+
+
+def _greedy(results: Results, condition: str) -> np.ndarray:
+    return np.asarray(results.evaluation[condition]["success"])
+
+
+FAULTS = ("4 wheels, seized", "4 wheels, reversed")
+"""The faults that count: feedback alone absorbs the milder ones, and two wheels leave no remedy."""
+
+
+def recovered(adapts: str) -> Measure:
+    """Return what measures success at the end relative to before the failure, worst fault."""
+
+    def compute(results: Results) -> Measured | None:
+        found = [c for c in courses_of(results) if c.fault in FAULTS and c.adapts == adapts]
+        ratios = {c.fault: ratio(c.end, c.before) for c in found}
+        if not ratios:
+            return None
+        worst = min(ratios, key=lambda fault: float(np.nan_to_num(ratios[fault].value)))
+        return Measured(ratios[worst], len(found[0].success), note=worst)
+
+    return compute
+
+
+def worst_shape(results: Results) -> Measured | None:
+    """Measure the success with the worst shape relative to that with the box of training."""
+    ratios = ratios_of(results, "default")
+    if not ratios:
+        return None
+    worst = least_ratio(ratios)
+    return Measured(worst.estimate, worst.seeds, note=worst.condition)
+
+
+def without(condition: str) -> Measure:
+    """Return what measures the greedy success of a condition relative to the default's."""
+
+    def compute(results: Results) -> Measured | None:
+        if not {condition, "default"} <= results.evaluation.keys():
+            return None
+        base, own = paired(results, "default", condition, _greedy)
+        return Measured(ratio(own, base), len(own)) if len(own) else None
+
+    return compute

@@ -1,0 +1,98 @@
+"""The table of claims, for the terminal, for programs and for the documentation."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from .claims import Finding
+from .measures import Measured
+
+Format = Literal["table", "json", "markdown"]
+
+COLOURS = {"holds": "green", "does not hold": "red", "not decided": "yellow"}
+
+
+def print_claims(findings: Sequence[Finding], form: Format) -> None:
+    """Print the findings."""
+    if form == "json":
+        print(json.dumps([_record(finding) for finding in findings], indent=1, allow_nan=False))
+    elif form == "markdown":
+        print(markdown(findings))
+    else:
+        _print_table(findings)
+
+
+def _print_table(findings: Sequence[Finding]) -> None:
+    table = Table(box=None, padding=(0, 1, 1, 0), pad_edge=False, header_style="bold")
+    for title, ratio in (("claim", 4), ("measure, criterion", 5), ("result", 3), ("verdict", 2)):
+        table.add_column(title, ratio=ratio)
+    for finding in findings:
+        claim, colour = finding.claim, COLOURS[finding.verdict]
+        table.add_row(
+            f"{claim.text} [dim]({claim.place})[/]",
+            f"{claim.measure}: [dim]{claim.criterion}[/]",
+            result(finding),
+            f"[{colour}]{finding.verdict}[/]",
+        )
+    Console().print(table)
+    print("Values with their 95 % intervals. A claim holds if the whole interval meets the")
+    print("criterion, does not if none of it does, and is not decided in between.")
+
+
+def result(finding: Finding) -> str:
+    """Return the value with its interval and number of seeds as text."""
+    if finding.measured is None:
+        return "no results"
+    found = finding.measured
+    value, low, high = _ends(found)
+    text = f"{value:.2f}" if found.seeds else f"{value:.2g}"
+    if found.seeds:
+        text += f" ({low:.2f} to {high:.2f}), {found.seeds} seeds"
+    else:
+        text += ", computed"
+    if found.p is not None:
+        text += f", p = {found.p:.2g}"
+    return text + (f", {found.note}" if found.note else "")
+
+
+def markdown(findings: Sequence[Finding]) -> str:
+    """Return the table as Markdown."""
+    lines = ["| claim | in the paper | study | measure | criterion | result | verdict |"]
+    lines.append("|---" * 7 + "|")
+    for finding in findings:
+        c = finding.claim
+        cells = (
+            c.text, c.place, c.study, c.measure, c.criterion, result(finding),
+            f"**{finding.verdict}**",
+        )  # fmt: skip
+        lines.append("| " + " | ".join(str(cell) for cell in cells) + " |")
+    return "\n".join(lines)
+
+
+def _ends(found: Measured) -> tuple[float, float, float]:
+    e = found.estimate
+    return float(e.value), float(e.low), float(e.high)
+
+
+def _record(finding: Finding) -> dict[str, Any]:
+    claim, found = finding.claim, finding.measured
+    record: dict[str, Any] = {
+        "name": claim.name,
+        "claim": claim.text,
+        "place": claim.place,
+        "study": claim.study,
+        "measure": claim.measure,
+        "criterion": str(claim.criterion),
+        "verdict": finding.verdict,
+    }
+    if found is not None:
+        value, low, high = (v if np.isfinite(v) else None for v in _ends(found))
+        record |= {"value": value, "low": low, "high": high, "seeds": found.seeds}
+        record |= {"p": found.p, "note": found.note}
+    return record

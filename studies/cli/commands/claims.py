@@ -1,0 +1,86 @@
+"""``nested-agents claims``: what the paper claims, and what was found of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+
+from .options import MostJobs
+
+if TYPE_CHECKING:
+    from ...analysis.published import Published
+
+
+def command(
+    out: Annotated[Path | None, tyro.conf.arg(metavar="DIR", help_behavior_hint="")] = None,
+    quick: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    jobs: MostJobs = None,
+    format: Literal["table", "json", "markdown"] = "table",
+    publish: Annotated[Path | None, tyro.conf.arg(metavar="DIR", help_behavior_hint="")] = None,
+) -> int:
+    """Print one table: each claim of the paper, its measure, the result, the verdict.
+
+    Without --out the table is made from the results that come with the program.
+
+    Parameters
+    ----------
+    out
+        Run the studies that the claims rest on, each in a directory of its own below this one;
+        what has been run before is read.
+    quick
+        Small versions of the studies: six minutes on two cores, and wide intervals.
+    jobs
+        Trials at a time; one for every core unless said otherwise.
+    format
+        How to print the table.
+    publish
+        Also write the results that it rests on, as one small JSON file a study.
+    """
+    from ...analysis import published
+    from ...claims import claims
+    from ...claims.table import print_claims
+    from ...spec.errors import SpecError
+    from ..display import say
+
+    if out is None:
+        for option, given in (("--quick", quick), ("--publish", publish), ("--jobs", jobs)):
+            if given is not None and given is not False:
+                raise SpecError(f"{option}: needs --out, the directory of the studies")
+        found = published.read(claims.PUBLISHED, claims.STUDIES_OF_CLAIMS)
+    else:
+        found = _run(out, quick=quick, jobs=jobs)
+    for study, of_study in found.items():
+        if of_study.note:
+            say(f"{study}: {of_study.note}")
+    if publish is not None:
+        publish.mkdir(parents=True, exist_ok=True)
+        for study, (spec, results, _) in found.items():
+            published.write(publish / f"{study}.json", spec, results)
+    print_claims(claims.judge({study: p.results for study, p in found.items()}), format)
+    return 0
+
+
+def _run(out: Path, *, quick: bool, jobs: int | None) -> dict[str, Published]:
+    """Run the studies of the claims, or what is left of them; return what they found."""
+    from ...analysis import published
+    from ...analysis.results import read
+    from ...claims import claims
+    from ...spec.errors import SpecError
+    from ...spec.spec import Spec
+    from ..conduct import carried_out
+
+    found = {}
+    for study in claims.STUDIES_OF_CLAIMS:
+        name = study.replace("-", "_")
+        folder = claims.QUICK if quick else claims.SPECS / name
+        spec = Spec.load(folder / f"{name}.toml")
+        with carried_out(spec, out / study, jobs) as store:
+            if failed := store.failed():
+                raise SpecError(
+                    f"{out / study}: {len(failed)} trials failed: nested-agents status "
+                    f"{out / study}"
+                )
+            found[study] = published.loads(published.dumps(spec, read(store)))
+    return found

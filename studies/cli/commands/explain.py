@@ -1,0 +1,51 @@
+"""``nested-agents explain``: what a trained team has learned, in words and figures."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import tyro
+
+from .options import Directory
+
+
+def command(
+    directory: Directory,
+    condition: Annotated[str | None, tyro.conf.arg(metavar="LABEL", help_behavior_hint="")] = None,
+    seed: Annotated[int | None, tyro.conf.arg(metavar="SEED", help_behavior_hint="")] = None,
+) -> int:
+    """Explain a trained team: its rules in words, its policy around the box, its self-model.
+
+    Training is run again for it, which takes seconds, and must give the episodes that are kept.
+
+    Parameters
+    ----------
+    directory
+        Where the study is kept. Text and figures go into its folder explain.
+    condition
+        Label of the condition; the first one unless said otherwise.
+    seed
+        The seed; the first one unless said otherwise.
+    """
+    from ...explain import team as explain
+    from ...explain.figures import draw
+    from ...explain.text import MOST_AGENTS, text
+    from ...presentation.figures import save
+    from ...store import durable
+    from ...store.store import Store
+    from ..display import say
+
+    with Store.open(directory) as store:
+        trial = explain.choose(store, condition, seed)
+        conditions = [c.label for c in store.spec().conditions()]
+        say(f"training {trial.condition}, seed {trial.seed} again: {trial.episodes} episodes")
+        found = explain.explained(store, trial)
+    folder = explain.folder(directory, trial, conditions)
+    folder.mkdir(parents=True, exist_ok=True)
+    written = folder / "explanation.txt"
+    durable.write(written, ("\n".join(text(found)).rstrip() + "\n").encode())
+    figures = save(draw(found), folder)
+    print("\n".join(text(found, MOST_AGENTS)).rstrip() + "\n")
+    for path in (written, *figures):
+        print(path)
+    return 0

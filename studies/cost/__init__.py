@@ -1,0 +1,1 @@
+"""What hierarchies cost: by formula, counted and timed."""

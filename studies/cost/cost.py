@@ -1,0 +1,277 @@
+"""The cost of a topology, three times: by formula, counted in the running system, timed.
+
+The formulas (Eq. 18-23) count operations of a sweep over all states; the running system visits one
+state a step. What they share is the number of joint actions that every agent tries,
+``|A| ** (1 + |below|)``, and the number of rules that value each: these are counted, and compared.
+
+Counting and timing use the line-up scenario, whose prediction costs next to nothing, and sigmoid
+membership functions, with which every rule does fire.
+"""
+
+from __future__ import annotations
+
+import tracemalloc
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cache
+from math import log
+from statistics import median
+from typing import Literal
+
+import numpy as np
+from scipy import stats
+
+from ...core.cost import Problem, below_counts, is_chain
+from ...core.loop import control_loop, policy_seed
+from ...core.protocols import Scenario
+from ...core.settings import Decision, RuleBaseSettings, TDLambdaSettings
+from ...core.team import Team
+from ...scenarios.line_up import LineUp
+from ...topologies import arrange, build, parse
+from ...topologies.config import (
+    ChainSettings,
+    IndependentSettings,
+    PerRobotSettings,
+    SingleAgentSettings,
+)
+from ...topologies.view import team_of
+from ..analysis.statistics import Estimate
+
+MEMBERSHIPS = 5
+RULES = MEMBERSHIPS**2
+"""|S| of an agent in what is counted and timed."""
+LEARNER = TDLambdaSettings(
+    rule_base=RuleBaseSettings(membership="sigmoid", memberships=MEMBERSHIPS, order=2),
+    decision=Decision(rule="value", evaluator="exact"),
+)
+"""The learner that is counted and timed: the paper's, over the two variables of line-up."""
+MOST_OPERATIONS = 4 * 10**8
+"""Rule evaluations a step beyond which nothing is measured: about a second a step."""
+LEAST_SECONDS, MOST_TIMES = 0.3, 100
+"""How long each case is timed at least, but no more times than that."""
+LEAST_ROWS = 5
+"""The fewest numbers of agents that an exponent is fitted over."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What one step was found to cost, beside what the formula says.
+
+    Attributes
+    ----------
+    joint_actions_formula, joint_actions
+        Joint actions tried.
+    rule_evaluations_formula, rule_evaluations
+        The same times the rules of a rule base.
+    weight_updates_formula, weight_updates
+        Consequent weights changed.
+    deciding, learning
+        Median time [s].
+    memory
+        Greatest memory held by team and step [bytes].
+    """
+
+    joint_actions_formula: int
+    joint_actions: int
+    rule_evaluations_formula: int
+    rule_evaluations: int
+    weight_updates_formula: int
+    weight_updates: int
+    deciding: float
+    learning: float
+    memory: int
+
+    @property
+    def agrees(self) -> bool:
+        """Whether all counts are what the formulas say."""
+        return (
+            self.joint_actions == self.joint_actions_formula
+            and self.rule_evaluations == self.rule_evaluations_formula
+            and self.weight_updates == self.weight_updates_formula
+        )
+
+
+@dataclass(frozen=True)
+class CostRow:
+    """The cost of one topology over n agents; Eq. 19 and 21 are of chains only."""
+
+    agents: int
+    topology: str
+    nested_exact: int | None
+    nested_closed_form: int | None
+    nested_asymptotic: Fraction | None
+    single_agent: int
+    measured: Measured | None = None
+
+    @property
+    def ratio(self) -> Fraction | None:
+        """How many times costlier the single agent is."""
+        return None if self.nested_exact is None else Fraction(self.single_agent, self.nested_exact)
+
+
+def cost_rows(
+    topologies: Sequence[str], agents: Sequence[int], problem: Problem, *, measured: bool = False
+) -> Iterator[CostRow]:
+    """Yield the cost of every topology for every number of agents.
+
+    Raises
+    ------
+    ValueError
+        If there is no topology, or one is refused.
+    """
+    if not topologies:
+        raise ValueError("topology = none, allowed: one or more, such as chain or tree:2")
+    for text in topologies:
+        for n in agents:
+            found = measure(text, n) if measured else None
+            single = problem.single_agent(n)
+            if isinstance(parse(text), SingleAgentSettings):
+                yield CostRow(n, text, None, None, None, single, found)
+                continue
+            below = agents_below(text, n)
+            chain = is_chain(below)
+            yield CostRow(
+                n,
+                text,
+                problem.nested(below),
+                problem.chain_closed_form(n) if chain else None,
+                problem.chain_asymptotic(n) if chain else None,
+                single,
+                found,
+            )
+
+
+def agents_below(text: str, n: int) -> Sequence[int]:
+    """Return how many agents are below each of n agents in the topology written as `text`.
+
+    Raises
+    ------
+    ValueError
+        If the topology is refused; so is that of whole robots, for which there is no one |A|.
+    """
+    settings = parse(text)
+    if isinstance(settings, PerRobotSettings):
+        raise ValueError(
+            f"topology {text!r}: the cost formulas are of an agent per wheel; what whole robots "
+            f"try is in: nested-agents topology show {text}"
+        )
+    if isinstance(settings, ChainSettings) and isinstance(settings.order, str):
+        return range(n)  # a thousand hierarchies of a thousand agents take their time
+    return below_counts(build(settings, team_of(n, None, None).agents, pairs(n)))
+
+
+def pairs(n: int) -> tuple[tuple[int, ...], ...]:
+    """Return n agents as robots of two wheels; of an odd number, the last has one.
+
+    Examples
+    --------
+    >>> pairs(5)
+    ((0, 1), (2, 3), (4,))
+    """
+    return tuple(tuple(range(i, min(i + 2, n))) for i in range(0, n, 2))
+
+
+def measure(text: str, n: int) -> Measured | None:
+    """Count and time a step of n agents; none where it would take too long or too much memory."""
+    settings = parse(text)
+    line_up, rules = LineUp(n), RULES
+    actions = len(line_up.action_set)
+    if isinstance(settings, SingleAgentSettings):
+        joint, rules, updates = actions**n, rules**n, rules**n
+    else:
+        joint, updates = Problem(rules, actions).decision(agents_below(text, n)), n * rules
+    if joint * rules > MOST_OPERATIONS:
+        return None
+    scenario: Scenario = line_up
+    if isinstance(settings, SingleAgentSettings):
+        scenario, hierarchy = arrange(settings, line_up)
+        learner = _of_order(2 * n)
+    else:
+        learner = LEARNER
+        hierarchy = build(settings, line_up.agents, pairs(n))
+
+    _warm_up()
+    tracemalloc.start()
+    try:
+        team = Team.build(learner, scenario, hierarchy, policy_seed(0))
+        _steps(team, scenario, 1)
+        memory = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert team.evaluator is not None
+    counts = replace(team.evaluator.counts)
+    times = _steps(team, scenario, 1)
+    while sum(map(sum, times)) < LEAST_SECONDS and len(times) < MOST_TIMES:
+        times += _steps(team, scenario, 1)
+    deciding, learning = (median(part) for part in zip(*times, strict=True))
+    found = team.evaluator.counts
+    # An episode here has two steps, of which the second alone changes weights.
+    return Measured(
+        joint,
+        (found.joint_actions - counts.joint_actions) // (2 * len(times)),
+        joint * rules,
+        (found.rule_evaluations - counts.rule_evaluations) // (2 * len(times)),
+        updates,
+        (found.weight_updates - counts.weight_updates) // len(times),
+        deciding,
+        learning,
+        memory,
+    )
+
+
+def fitted(rows: Sequence[CostRow]) -> list[CostRow]:
+    """Return the measured rows of a topology that exponents are fitted over, by number of agents.
+
+    These are the larger half of the numbers of agents, where what is fixed per agent and step
+    matters least, but no fewer than five; none if fewer are measured.
+    """
+    measured = sorted((r for r in rows if r.measured is not None), key=lambda r: r.agents)
+    if len(measured) < LEAST_ROWS:
+        return []
+    return measured[min(len(measured) // 2, len(measured) - LEAST_ROWS) :]
+
+
+def exponent(
+    rows: Sequence[CostRow], quantity: Literal["deciding", "memory"], level: float = 0.95
+) -> Estimate | None:
+    """Return p of quantity ~ rule evaluations ** p, with its interval; none of too few rows.
+
+    Least squares on logarithms over the `fitted` rows. The formula's growth is p = 1. As long as
+    what is fixed per agent and step matters there, the true p is underestimated.
+    """
+    points = [
+        (log(r.measured.rule_evaluations_formula), log(getattr(r.measured, quantity)))
+        for r in fitted(rows)
+        if r.measured is not None
+    ]
+    if not points:
+        return None
+    x, y = zip(*points, strict=True)
+    fit = stats.linregress(x, y)
+    half = stats.t.ppf(0.5 + level / 2, len(points) - 2) * fit.stderr
+    value, low, high = (np.asarray(v) for v in (fit.slope, fit.slope - half, fit.slope + half))
+    return Estimate(value, low, high)
+
+
+@cache
+def _warm_up() -> None:
+    """Have everything imported and compiled before memory is traced and time taken."""
+    line_up = LineUp(2)
+    for settings in (ChainSettings(), IndependentSettings()):
+        hierarchy = build(settings, line_up.agents)
+        _steps(Team.build(LEARNER, line_up, hierarchy, policy_seed(0)), line_up, 1)
+
+
+def _of_order(order: int) -> TDLambdaSettings:
+    base = LEARNER.rule_base.model_copy(update={"order": order})
+    return LEARNER.model_copy(update={"rule_base": base})
+
+
+def _steps(team: Team, scenario: Scenario, times: int) -> list[tuple[float, float]]:
+    """Take a step some times, always from a fresh start; return (deciding, learning) [s] of each.
+
+    It is the second step of an episode: in the first, the learner has nothing to look back on.
+    """
+    records = control_loop(scenario, team, episodes=times, steps=2, seed=0)
+    return [(record.deciding, record.learning) for record in records if record.step == 1]

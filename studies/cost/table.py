@@ -1,0 +1,200 @@
+"""Tables of cost: for the terminal, as JSON, CSV and LaTeX. Integers keep every digit in the files.
+
+A ratio is written as an integer where it is one or no floating-point number holds it.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from fractions import Fraction
+from typing import Any, Literal
+
+from ...topologies.view import aligned, readable
+from ..analysis.statistics import Estimate
+from .cost import RULES, CostRow, Measured, exponent, fitted
+
+Form = Literal["table", "json", "csv", "latex"]
+
+FORMULAS = (
+    ("nested_exact", "Eq. 18"),
+    ("nested_closed_form", "Eq. 19"),
+    ("nested_asymptotic", "Eq. 21"),
+    ("single_agent", "single agent"),
+    ("ratio", "ratio"),
+)
+"""Columns by name, with their heading."""
+MEASURED = ("formula", "counted", "rules valued", "updates", "ms", "MiB")
+"""Headings of what was measured per step."""
+COUNTS = ("joint_actions", "rule_evaluations", "weight_updates")
+
+
+def written(rows: Sequence[CostRow], form: Form) -> str:
+    """Return the rows in a format."""
+    if form == "table":
+        return _table(rows)
+    if form == "latex":
+        return _latex(rows)
+    records = [_record(row) for row in rows]
+    with _all_digits():
+        if form == "json":
+            return "[" + ",\n ".join(json.dumps(record) for record in records) + "]"
+        file = io.StringIO()
+        columns = list(dict.fromkeys(name for record in records for name in record))
+        writer = csv.DictWriter(file, columns, lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(records)
+        return file.getvalue().rstrip("\n")
+
+
+def number(value: int | Fraction | None) -> str:
+    """Return a number for reading: some digits, powers of ten if it is large.
+
+    Examples
+    --------
+    >>> number(2457562500000), number(Fraction(5, 2)), number(None)
+    ('2.458e12', '2.5', '-')
+    """
+    if value is None:
+        return "-"
+    if isinstance(value, Fraction) and value.denominator > 1 and value < 1000:
+        return f"{float(value):.4g}"
+    return readable(round(value), 10**7)
+
+
+def _record(row: CostRow) -> dict[str, Any]:
+    """Return a row with integers as integers; Eq. 21 is rounded to the nearest one."""
+    asymptotic = row.nested_asymptotic
+    record: dict[str, Any] = {
+        "agents": row.agents,
+        "topology": row.topology,
+        "nested_exact": row.nested_exact,
+        "nested_closed_form": row.nested_closed_form,
+        "nested_asymptotic": None if asymptotic is None else round(asymptotic),
+        "single_agent": row.single_agent,
+        "ratio": _ratio(row.ratio),
+    }
+    if row.measured is None:
+        return record
+    for count in COUNTS:
+        for name in (f"{count}_formula", count):
+            record[f"{name}_per_step"] = getattr(row.measured, name)
+    record["deciding_s"] = row.measured.deciding
+    record["learning_s"] = row.measured.learning
+    record["memory_bytes"] = row.measured.memory
+    return record
+
+
+def _ratio(ratio: Fraction | None) -> int | float | None:
+    if ratio is None:
+        return None
+    if ratio.denominator == 1 or ratio > sys.float_info.max:
+        return round(ratio)
+    return float(ratio)
+
+
+@contextmanager
+def _all_digits() -> Iterator[None]:
+    """Let Python print integers of more than 4300 digits, which n = 1000 needs."""
+    most = sys.get_int_max_str_digits()
+    sys.set_int_max_str_digits(0)
+    try:
+        yield
+    finally:
+        sys.set_int_max_str_digits(most)
+
+
+def _table(rows: Sequence[CostRow]) -> str:
+    cells = [["n", "topology", *(title for _, title in FORMULAS)]]
+    for row in rows:
+        values = (number(getattr(row, name)) for name, _ in FORMULAS)
+        cells.append([str(row.agents), row.topology, *values])
+    lines = [*aligned(cells, "><>>>>>"), ""]
+    lines.append("Operations: nested by Eq. 18, chains by Eq. 19 and 21; single agent by Eq. 23.")
+    if any(row.measured is not None for row in rows):
+        lines += ["", *_measured(rows)]
+    return "\n".join(lines)
+
+
+def _measured(rows: Sequence[CostRow]) -> list[str]:
+    cells = [["n", "topology", *MEASURED]]
+    cells += [[str(row.agents), row.topology, *_measured_cells(row.measured)] for row in rows]
+    measured = [row.measured for row in rows if row.measured is not None]
+    agreeing = sum(m.agrees for m in measured)
+    lines = [f"Per step of the running system (line-up scenario, |A| = 4, |S| = {RULES}):", ""]
+    lines += [*aligned(cells, "><>>>>>>"), ""]
+    lines += ["formula, counted: joint actions tried; ms: deciding and learning;"]
+    lines += ["-: beyond a second or so a step."]
+    lines += [f"All counts equal the formulas in {agreeing} of {len(measured)} rows."]
+    return lines + _exponents(rows)
+
+
+def _exponents(rows: Sequence[CostRow]) -> list[str]:
+    lines = []
+    for text in dict.fromkeys(row.topology for row in rows):
+        own = [row for row in rows if row.topology == text]
+        deciding, memory = exponent(own, "deciding"), exponent(own, "memory")
+        if deciding is not None and memory is not None:
+            over = fitted(own)
+            lines.append(
+                f"{text}, n = {over[0].agents} to {over[-1].agents}: "
+                f"deciding {_interval(deciding)}, memory {_interval(memory)}"
+            )
+    if not lines:
+        return []
+    return [
+        "",
+        "Exponent p of (rules valued)^p, 95 % interval; the formula's is 1. Below that, p",
+        "is a lower bound: what is fixed per agent and step still matters for few agents.",
+        *lines,
+    ]
+
+
+def _measured_cells(measured: Measured | None) -> list[str]:
+    if measured is None:
+        return ["-"] * len(MEASURED)
+    m = measured
+    counts = (m.joint_actions_formula, m.joint_actions, m.rule_evaluations, m.weight_updates)
+    amounts = (1e3 * (m.deciding + m.learning), m.memory / 2**20)
+    return [*map(number, counts), *(f"{a:.3g}" if a < 1000 else f"{a:,.0f}" for a in amounts)]
+
+
+def _interval(estimate: Estimate) -> str:
+    return f"{estimate.value:.2f} [{estimate.low:.2f}, {estimate.high:.2f}]"
+
+
+def _latex(rows: Sequence[CostRow]) -> str:
+    """Return a tabular of the formulas and, if anything was measured, a second one of that."""
+    titles = ["nested (18)", "closed form (19)", "asymptotic (21)", "single agent (23)", "ratio"]
+    formulas = [[number(getattr(row, name)) for name, _ in FORMULAS] for row in rows]
+    lines = _tabular(rows, titles, formulas)
+    if any(row.measured is not None for row in rows):
+        lines += ["", *_tabular(rows, MEASURED, [_measured_cells(row.measured) for row in rows])]
+    return "\n".join(lines)
+
+
+def _tabular(
+    rows: Sequence[CostRow], titles: Sequence[str], cells: Sequence[Sequence[str]]
+) -> list[str]:
+    lines = [
+        rf"\begin{{tabular}}{{rl{'r' * len(titles)}}}",
+        r"\toprule",
+        " & ".join(["$n$", "topology", *titles]) + r" \\",
+        r"\midrule",
+    ]
+    for row, values in zip(rows, cells, strict=True):
+        topology = row.topology.replace("_", r"\_").replace("#", r"\#").replace(">", "$>$")
+        lines.append(" & ".join([str(row.agents), topology, *map(_latex_cell, values)]) + r" \\")
+    return [*lines, r"\bottomrule", r"\end{tabular}"]
+
+
+def _latex_cell(text: str) -> str:
+    """Return a number as it is printed, for LaTeX."""
+    if text == "-":
+        return "--"
+    mantissa, e, power = text.partition("e")
+    return rf"${mantissa}\times 10^{{{int(power)}}}$" if e else mantissa.replace(",", r"\,")

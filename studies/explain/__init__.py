@@ -1,0 +1,1 @@
+"""What a trained team has learned, in words and figures."""

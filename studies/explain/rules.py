@@ -1,0 +1,213 @@
+"""A rule base taken apart: what each state variable adds to an agent's f, and what pairs do.
+
+For every way of standing in the membership functions alike, f falls uniquely into a constant,
+functions of one variable, of two, and so on, each of mean zero in each of its variables (the
+analysis of variance, Hoeffding 1948)::
+
+    f(x) = c + sum_j g_j(x_j) + sum_jk h_jk(x_j, x_k) + the rest
+
+A rule base of order 1 is the first two parts, whole. Of one of order d the functions of one
+variable are marginals: the mean over the rules of all other variables. The *share* of a part is its
+share of the variance of f, all rules being equally likely; which rules were ever visited it does
+not know.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from math import degrees
+
+import numpy as np
+
+from ...core.arrays import FloatArray
+from ...core.rules.fuzzy import Partition
+from ...core.rules.rule_base import RuleBase
+from ...core.spaces import Variable
+from .body import headed
+
+WORDS = {
+    2: ("low", "high"),
+    3: ("low", "medium", "high"),
+    5: ("very low", "low", "medium", "high", "very high"),
+}
+"""Of membership functions on a line that have none of their own."""
+Pair = tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What the f of one agent consists of.
+
+    Attributes
+    ----------
+    constant
+        Mean of all rules.
+    singles
+        ``(m_j,)`` consequents of every variable j, of mean zero: g_j at the centres.
+    pairs
+        ``(m_j, m_k)`` consequents of pairs of variables beyond those of either.
+    variance
+        Of all rules.
+    """
+
+    constant: float
+    singles: tuple[FloatArray, ...]
+    pairs: dict[Pair, FloatArray]
+    variance: float
+
+    def share(self, consequents: FloatArray) -> float:
+        """Return the share of the variance that consequents of mean zero have."""
+        return float((consequents**2).mean()) / self.variance if self.variance > 0 else 0.0
+
+    @property
+    def rest(self) -> float:
+        """Share of what three or more variables do together."""
+        drawn = sum(map(self.share, [*self.singles, *self.pairs.values()]))
+        return max(0.0, 1.0 - drawn) if self.variance > 0 else 0.0
+
+
+def take_apart(rules: RuleBase, theta: FloatArray) -> Parts:
+    """Return the parts of f for one agent's consequent weights ``(n_rules,)``.
+
+    Examples
+    --------
+    Two variables with LOW and HIGH: the rule HIGH, HIGH pays, no other.
+
+    >>> base = RuleBase([Partition((0.0, 1.0), "triangular")] * 2, [(0, 1)])
+    >>> parts = take_apart(base, np.array([0.0, 0.0, 0.0, 4.0]))
+    >>> parts.constant, parts.singles[0].tolist(), parts.pairs[0, 1].tolist()
+    (1.0, [-1.0, 1.0], [[1.0, -1.0], [-1.0, 1.0]])
+    """
+    sizes = [partition.size for partition in rules.partitions]
+    tensors = []
+    begin = 0
+    for term, size in zip(rules.terms, rules.sizes, strict=True):
+        weights = np.asarray(theta[begin : begin + size], dtype=float)
+        tensors.append((term, weights.reshape([sizes[j] for j in term])))
+        begin += size
+    singles: list[FloatArray] = [np.zeros(size) for size in sizes]
+    pairs: dict[Pair, FloatArray] = {}
+    for term, tensor in tensors:
+        for j in term:
+            singles[j] += _onto(tensor, term, (j,)) - tensor.mean()
+        for j, k in combinations(term, 2):
+            both = _onto(tensor, term, (j, k))
+            own = both.mean(axis=1, keepdims=True) + both.mean(axis=0, keepdims=True)
+            pairs[j, k] = pairs.get((j, k), 0.0) + both - own + tensor.mean()
+    constant = float(sum(tensor.mean() for _, tensor in tensors))
+    return Parts(constant, tuple(singles), pairs, _variance(tensors))
+
+
+def _onto(tensor: FloatArray, term: Sequence[int], kept: Sequence[int]) -> FloatArray:
+    """Return the mean over all variables of a term but some."""
+    return np.asarray(tensor.mean(axis=tuple(i for i, j in enumerate(term) if j not in kept)))
+
+
+def _variance(tensors: Sequence[tuple[tuple[int, ...], FloatArray]]) -> float:
+    """Return the variance of a sum of terms: terms covary in what their variables in common do."""
+    total = 0.0
+    for i, (term, tensor) in enumerate(tensors):
+        for other, second in tensors[i:]:
+            common = [j for j in term if j in other]
+            if common:
+                first = _onto(tensor, term, common) - tensor.mean()
+                covariance = (first * (_onto(second, other, common) - second.mean())).mean()
+                total += float(covariance) * (1.0 if other == term else 2.0)
+    return total
+
+
+def labels(variable: Variable, partition: Partition) -> tuple[str, ...]:
+    """Return words for the membership functions of a variable.
+
+    Its own words if the partition is its own; else by rank, or by the centre on a circle.
+
+    Examples
+    --------
+    >>> gap = Variable("gap", "m", 0.0, 1.0)
+    >>> labels(gap, Partition.of(gap))
+    ('very low', 'low', 'medium', 'high', 'very high')
+    """
+    if variable.labels and variable.centres == partition.centres:
+        return variable.labels
+    if not variable.periodic and partition.size in WORDS:
+        return WORDS[partition.size]
+    return tuple(f"about {place(variable, centre)}" for centre in partition.centres)
+
+
+def place(variable: Variable, value: float) -> str:
+    """Return a value of a variable with its unit; angles in degrees.
+
+    >>> place(Variable("turn", "rad", -3.2, 3.2), 0.5), place(Variable("gap", "m", 0, 1), 0.015)
+    ('29°', '0.015 m')
+    """
+    if variable.unit == "rad":
+        return f"{degrees(value):.0f}°"
+    return f"{value:.3g}" + (f" {variable.unit}" if variable.unit != "1" else "")
+
+
+def table(
+    rules: RuleBase, variables: Sequence[Variable], agents: Sequence[str], parts: Sequence[Parts]
+) -> Iterator[str]:
+    """Yield the rules of some agents in words, a column of consequents for each agent.
+
+    Variables come in the order of their mean share; of pairs the three that do most.
+    """
+    power = exponent(parts)
+    strongest = sorted(
+        range(len(variables)), key=lambda j: -sum(p.share(p.singles[j]) for p in parts)
+    )
+    heads = [name.replace(".", "\n").replace("-", "-\n") for name in agents]
+    wide, _ = headed(heads, 8)
+    lines = [
+        (f"IF {v.name} is {word}", place(v, centre))
+        for v, p in zip(variables, rules.partitions, strict=True)
+        for word, centre in zip(labels(v, p), p.centres, strict=True)
+    ]
+    first, second = (max(len(line[i]) for line in lines) for i in (0, 1))
+    margin = first + second + 8
+    fit = max(1, (80 - margin) // wide)
+    for begin in range(0, len(agents), fit):
+        block = slice(begin, begin + fit)
+        for line in headed(heads[block], wide)[1]:
+            yield " " * margin + line
+        for j in strongest:
+            shares = [p.share(p.singles[j]) for p in parts[block]]
+            said = "".join(percent(s).rjust(wide) for s in shares)
+            yield f"{variables[j].name}, share of the variance"[: margin - 1].ljust(margin) + said
+            partition = rules.partitions[j]
+            for k, word in enumerate(labels(variables[j], partition)):
+                head = f"IF {variables[j].name} is {word}".ljust(first)
+                at = place(variables[j], partition.centres[k]).rjust(second + 1)
+                values = (f"{p.singles[j][k] * 10**power:+.2f}" for p in parts[block])
+                yield f"{head} {at}  THEN" + "".join(value.rjust(wide) for value in values)
+            yield ""
+
+
+def percent(share: float) -> str:
+    """Return a share in whole percents.
+
+    >>> percent(0.254), percent(0.0004), percent(0.0)
+    ('25 %', '<1 %', '0 %')
+    """
+    return "<1 %" if 0 < share < 0.005 else f"{100 * share:.0f} %"
+
+
+def exponent(parts: Sequence[Parts]) -> int:
+    """Return the power of ten by which consequents are multiplied to be read in two decimals.
+
+    The greatest then lies between 1 and 10.
+    """
+    greatest = max((float(np.abs(g).max()) for p in parts for g in p.singles), default=0.0)
+    return -int(np.floor(np.log10(greatest))) if greatest > 0 else 0
+
+
+def strongest_pairs(parts: Sequence[Parts], most: int = 3) -> list[Pair]:
+    """Return the pairs of variables of greatest mean share, those of none left out."""
+    shares = {
+        pair: sum(p.share(p.pairs[pair]) for p in parts)
+        for pair in (parts[0].pairs if parts else ())
+    }
+    found = sorted(shares, key=lambda pair: -shares[pair])[:most]
+    return [pair for pair in found if shares[pair] > 0]

@@ -1,0 +1,170 @@
+"""Explains a trained team: its functions with their rules in words, its policy, its self-model.
+
+Teams are not kept. A trial is a pure function of its content, so its training is run again, in
+seconds, and held against the episodes that are kept: the team explained is the team that was
+measured, or nothing is explained.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import track
+
+from ... import scenarios
+from ...core.protocols import Scenario
+from ...core.rules.rule_base import RuleBase
+from ...core.spaces import Variable
+from ...core.team import Team
+from ...scenarios.box_pushing.scenario import BoxPushing
+from ..spec.errors import SpecError, closest
+from ..store.store import Store
+from ..trials.episodes import COLUMNS
+from ..trials.trial import RESULTS_VERSION, Session, Trial, trials_of
+from . import policy as explain_policy
+from . import rules as explain_rules
+from .body import Bodies
+from .policy import Field
+from .rules import Parts
+
+
+@dataclass(frozen=True)
+class Explained:
+    """What is known of a trained team.
+
+    Attributes
+    ----------
+    trial
+        The trial that it was trained in.
+    agents, wheels
+        Its agents and the robots' wheels by name; mostly the same.
+    rules, variables
+        The rule base that all of them have, and its state variables.
+    parts
+        What each agent's f consists of.
+    fields
+        What robots do around the box; or why that is not known.
+    bodies
+        What robots believed their wheels to do; none: they have no self-model.
+    """
+
+    trial: Trial
+    agents: tuple[str, ...]
+    wheels: tuple[str, ...]
+    rules: RuleBase
+    variables: tuple[Variable, ...]
+    parts: tuple[Parts, ...]
+    fields: list[Field] | str
+    bodies: Bodies | None
+
+
+def choose(store: Store, condition: str | None, seed: int | None) -> Trial:
+    """Return the finished trial of a condition and seed, each the first one unless named.
+
+    Raises
+    ------
+    SpecError
+        If there is no such trial, it has not finished, or other code made the results.
+    """
+    if (version := store.meta("results_version")) != str(RESULTS_VERSION):
+        raise SpecError(
+            f"{store.directory}: holds results of version {version}, this is version "
+            f"{RESULTS_VERSION}, which would train another team"
+        )
+    spec = store.spec()
+    conditions = [c.label for c in spec.conditions()]
+    condition = conditions[0] if condition is None else condition
+    if condition not in conditions:
+        raise SpecError(f"--condition {condition!r}: {closest(condition, conditions)}")
+    seed = spec.seeds[0] if seed is None else seed
+    if seed not in spec.seeds:
+        raise SpecError(f"--seed {seed}: allowed {', '.join(map(str, spec.seeds))}")
+    trial = next(t for t in trials_of(spec) if (t.condition, t.seed) == (condition, seed))
+    if not _kept(store, trial):
+        raise SpecError(f"{store.directory}: {condition}, seed {seed} has not finished")
+    return trial
+
+
+def explained(store: Store, trial: Trial) -> Explained:
+    """Train the team of a trial again and explain it.
+
+    Raises
+    ------
+    SpecError
+        If the trial cannot be built, or an episode of the training is not, to the last bit, the one
+        that is kept.
+    """
+    team, scenario, bodies = _trained(store, trial)
+    rules = RuleBase.build(scenario.state_space, trial.settings.learner.rule_base)
+    parts = tuple(explain_rules.take_apart(rules, theta) for theta in team.learner.theta)
+    fields: list[Field] | str
+    if not isinstance(scenario, BoxPushing):
+        fields = "its agents are no wheels"
+    elif team.evaluator is None:
+        fields = "actions are drawn at random"
+    else:
+        try:
+            fields = explain_policy.fields(team, scenario)
+        except ValueError as error:
+            fields = str(error)
+    variables = scenario.state_space.variables
+    wheels = scenarios.build(trial.settings.scenario).agents
+    return Explained(trial, scenario.agents, wheels, rules, variables, parts, fields, bodies)
+
+
+def _trained(store: Store, trial: Trial) -> tuple[Team, Scenario, Bodies | None]:
+    try:
+        session = Session(trial)
+    except ValueError as error:  # a file that settings name is not what it was
+        raise SpecError(f"{store.directory}: {error}") from None
+    team, scenario = session.team, session.scenario
+    strikes = trial.settings.scenario.onset
+    model, bodies = team.self_model, None
+    if model is not None:
+        bodies = Bodies({}, ())
+        bodies.note("built", model)
+    episodes = track(
+        range(trial.episodes),
+        f"training {trial.condition}, seed {trial.seed} again",
+        console=Console(stderr=True),
+        transient=True,
+        disable=not sys.stderr.isatty(),
+    )
+    for episode in episodes:
+        if bodies and model and episode == strikes and episode > 0:
+            bodies.note("before", model)
+        session.train(1, episode)
+    if bodies and model:
+        bodies.note("after", model)
+    kept, found = _kept(store, trial), [row[1:] for row in session.result().rows]
+    if kept != found:
+        same = [one == other for one, other in zip(kept, found, strict=False)]
+        episode = same.index(False) if False in same else len(same)
+        raise SpecError(
+            f"{store.directory}: training {trial.condition}, seed {trial.seed} again gives another "
+            f"episode {episode} than the one that is kept; this is not the software, or not the "
+            "kind of machine, that ran the study"
+        )
+    return team, scenario, bodies
+
+
+def _kept(store: Store, trial: Trial) -> list[tuple[object, ...]]:
+    """Return the training episodes of a trial as they are kept, none if it has not finished."""
+    names, rows = store.rows("training")
+    at = [names.index(name) for name in COLUMNS[1:]]
+    where = names.index("condition"), names.index("seed")
+    own = (row for row in rows if tuple(row[i] for i in where) == (trial.condition, trial.seed))
+    return [tuple(row[i] for i in at) for row in own]
+
+
+def folder(directory: Path, trial: Trial, conditions: Sequence[str]) -> Path:
+    """Return where the explanation of a trial is kept: one folder for each condition and seed."""
+    names = [re.sub(r"[^\w.=+-]+", "-", c)[:60].strip("-.") for c in conditions]
+    at = list(conditions).index(trial.condition)
+    name = names[at] if names.count(names[at]) == 1 and names[at] else f"condition{at + 1}"
+    return directory / "explain" / f"{name}-seed{trial.seed}"

@@ -1,0 +1,1 @@
+"""How estimates look: figures, tables, files; nothing is computed here."""

@@ -1,0 +1,52 @@
+"""How every figure looks, and how figures are written to files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+SUFFIXES = (".svg", ".png", ".pdf")
+"""Formats that figures are written in."""
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+"""Distinct to colour-blind readers (Okabe and Ito 2008); the palest is left out."""
+STYLES = ("-", (0, (5, 2)), (0, (1, 1.2)), (0, (6, 1.5, 1, 1.5)))
+SETTINGS: dict[str, Any] = {
+    "font.size": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.titlesize": 9,
+    "svg.hashsalt": "nested-agents",
+    "svg.fonttype": "none",
+}
+
+
+def save(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
+    """Write figures as PNG and SVG into an existing folder, by their names; return the paths."""
+    paths = [folder / f"{name}.{suffix}" for name in figures for suffix in ("png", "svg")]
+    for path in paths:
+        write(figures[path.stem], path)
+    return paths
+
+
+def write(figure: Figure, path: Path) -> None:
+    """Write a figure: SVG, PNG or PDF by suffix. Equal figures give equal files: no date in them.
+
+    Raises
+    ------
+    ValueError
+        If the suffix is none of these.
+    """
+    check_suffix(path)
+    metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(path.suffix)
+    with mpl.rc_context(SETTINGS):  # type: ignore[arg-type]
+        figure.savefig(path, dpi=150, metadata=metadata)
+
+
+def check_suffix(path: Path) -> None:
+    """Refuse a path that `write` does not take, before anything is computed for it."""
+    if path.suffix not in SUFFIXES:
+        raise ValueError(f"{path}: suffix must be .svg, .png or .pdf")

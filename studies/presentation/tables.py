@@ -1,0 +1,142 @@
+"""The table of a study for reading, as Markdown and LaTeX, and as CSV with every digit."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..analysis.statistics import Estimate
+from ..analysis.summary import Summary, interval, number
+from ..spec.errors import SpecError
+
+LATEX = {
+    "\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_",
+    "{": r"\{", "}": r"\}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
+}  # fmt: skip
+"""What LaTeX reads otherwise, and how it is written instead."""
+MATHS_SPACE = r"\;"
+
+
+@dataclass(frozen=True)
+class Cell:
+    """An estimate as text: its value, and its interval or nothing."""
+
+    value: str
+    interval: str
+
+    def bracketed(self, between: str) -> str:
+        """Return the value, and its interval in brackets."""
+        around = f"{between}[{self.interval.replace('–', ', ')}]" if self.interval else ""
+        return self.value + around
+
+
+Row = tuple[str, int, tuple[Cell | None, ...]]
+"""Condition, number of seeds, and a cell per title; none where there is no estimate."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table in its forms.
+
+    Attributes
+    ----------
+    titles
+        Headings of the estimates.
+    rows
+        Its lines.
+    csv, latex, markdown
+        The whole table as text.
+    """
+
+    titles: tuple[str, ...]
+    rows: tuple[Row, ...]
+    csv: str
+    latex: str
+    markdown: str
+
+
+def tabulate(lines: Sequence[Summary], columns: Sequence[str] = ()) -> Table:
+    """Return the table of some summaries, whose estimates may differ in their titles.
+
+    Parameters
+    ----------
+    lines
+        Its lines.
+    columns
+        Titles of the estimates that it has; all of them if none are named.
+
+    Raises
+    ------
+    SpecError
+        If there are no estimates of a title.
+    """
+    titles = tuple(dict.fromkeys(title for line in lines for title in line.estimates))
+    for column in columns:
+        if column not in titles:
+            known = ", ".join(titles) or "none"
+            raise SpecError(f"--columns {column!r}: the table has no such column; it has {known}")
+    titles = tuple(columns) or titles
+    rows = tuple(
+        (s.condition, s.seeds, tuple(_cell(s.estimates.get(title)) for title in titles))
+        for s in lines
+    )
+    texts = _csv(lines, titles), _latex(titles, rows), _markdown(titles, rows)
+    return Table(titles, rows, *texts)
+
+
+def _cell(estimate: Estimate | None) -> Cell | None:
+    if estimate is None:
+        return None
+    known = not np.isnan(estimate.low)
+    return Cell(number(float(estimate.value)), interval(estimate) if known else "")
+
+
+def _csv(lines: Sequence[Summary], titles: Sequence[str]) -> str:
+    file = io.StringIO()
+    writer = csv.writer(file, lineterminator="\n")
+    ends = [f"{title}{end}" for title in titles for end in ("", " low", " high")]
+    writer.writerow(["condition", "seeds", *ends])
+    for line in lines:
+        values: list[object] = [line.condition, line.seeds]
+        for title in titles:
+            estimate = line.estimates.get(title)
+            numbers = (np.nan,) * 3 if estimate is None else _ends(estimate)
+            values += ["" if np.isnan(value) else repr(value) for value in numbers]
+        writer.writerow(values)
+    return file.getvalue()
+
+
+def _ends(estimate: Estimate) -> tuple[float, float, float]:
+    return float(estimate.value), float(estimate.low), float(estimate.high)
+
+
+def _markdown(titles: Sequence[str], rows: Sequence[Row]) -> str:
+    lines = [["condition", "seeds", *titles], ["---"] * (2 + len(titles))]
+    for condition, seeds, cells in rows:
+        lines.append([condition, str(seeds), *(c.bracketed(" ") if c else "" for c in cells)])
+    escaped = [[text.replace("|", r"\|") for text in line] for line in lines]
+    return "".join(f"| {' | '.join(line)} |\n" for line in escaped)
+
+
+def _latex(titles: Sequence[str], rows: Sequence[Row]) -> str:
+    lines = [
+        "% needs \\usepackage{booktabs}; 95 % intervals in brackets",
+        rf"\begin{{tabular}}{{lr{'r' * len(titles)}}}",
+        r"\toprule",
+        " & ".join(["condition", "seeds", *map(_escaped, titles)]) + r" \\",
+        r"\midrule",
+    ]
+    for condition, seeds, cells in rows:
+        # After a line's end LaTeX would take a leading bracket for an option.
+        name = "{}" * condition.startswith(("[", "*")) + _escaped(condition)
+        numbers = (f"${c.bracketed(MATHS_SPACE)}$" if c else "--" for c in cells)
+        lines.append(" & ".join([name, str(seeds), *numbers]) + r" \\")
+    return "\n".join([*lines, r"\bottomrule", r"\end{tabular}"]) + "\n"
+
+
+def _escaped(text: str) -> str:
+    return "".join(LATEX.get(character, character) for character in text)

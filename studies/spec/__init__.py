@@ -1,0 +1,1 @@
+"""Specs: what a study compares, and for how long."""

@@ -1,0 +1,255 @@
+"""Conditions: what a study compares, as a preset, tables, overrides and sweeps span it.
+
+Every override by name is crossed with its own sweep and with the spec's; without overrides the
+spec's tables alone are. Layers, each over the one before: the defaults of the settings, the preset,
+the spec's tables, the override's tables, the point of the sweeps.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, Field, ValidationError
+
+from ...core.settings import BatchTDSettings, Learner, Settings
+from ...scenarios.box_pushing.config import ScenarioSettings
+from ...topologies.config import ChainSettings, Topology, parse
+from .errors import SpecError, closest, explain, show
+from .overlay import Table, nested, overlay
+from .presets import PRESETS
+
+SECTIONS = ("scenario", "topology", "learner")
+
+
+class ConditionSettings(Settings):
+    """All that a trial depends on besides its seed and its length."""
+
+    scenario: ScenarioSettings = ScenarioSettings()
+    topology: Topology = ChainSettings()
+    learner: Learner = BatchTDSettings()
+
+    def canonical(self) -> str:
+        """Return the JSON text that equal settings share, whatever wrote them."""
+        return json.dumps(
+            self.model_dump(mode="json"), sort_keys=True, separators=(",", ":"), allow_nan=False
+        )
+
+
+def _printable(name: str) -> str:
+    if not name.strip() or not name.isprintable():
+        raise ValueError("must be a name that can be printed")
+    return name
+
+
+Name = Annotated[str, AfterValidator(_printable)]
+"""How users call something of theirs."""
+
+
+class Override(Settings):
+    """A named set of tables laid over those of a spec."""
+
+    name: Name
+    """How its conditions are called."""
+    preset: str | None = None
+    """The preset under its tables; none: the spec's."""
+    scenario: Mapping[str, Any] = Field(default_factory=dict)
+    topology: Mapping[str, Any] = Field(default_factory=dict)
+    learner: Mapping[str, Any] = Field(default_factory=dict)
+    sweep: Mapping[str, tuple[Any, ...]] = Field(default_factory=dict)
+    """Lists of values by dotted key, for this override alone."""
+
+    @property
+    def tables(self) -> Mapping[str, Table]:
+        """The tables by section."""
+        return {name: dict(getattr(self, name)) for name in SECTIONS}
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What one part of a study's trials have in common.
+
+    Attributes
+    ----------
+    label
+        Short name, unique within its study.
+    columns
+        What tells it from the others, as the columns of a result: `name` if there are overrides,
+        the swept keys (empty where an override does not sweep), `preset` if there is neither.
+    settings
+        The resolved settings.
+    evaluations
+        Names and scenarios in which its trained teams are evaluated beside its own.
+    """
+
+    label: str
+    columns: Mapping[str, Any]
+    settings: ConditionSettings
+    evaluations: tuple[tuple[str, ScenarioSettings], ...] = ()
+
+
+def grid(
+    preset: str,
+    tables: Mapping[str, Table],
+    sweep: Mapping[str, Sequence[Any]],
+    overrides: Sequence[Override] = (),
+    evaluations: Mapping[str, Mapping[str, Any]] | None = None,
+) -> tuple[Condition, ...]:
+    """Return the conditions: override by override, the last key of the sweeps varying fastest.
+
+    Parameters
+    ----------
+    preset
+        Name of the preset under conditions that name none.
+    tables
+        The spec's own `scenario`, `topology` and `learner` tables.
+    sweep
+        Lists of values by dotted key.
+    overrides
+        Crossed with `sweep`; none: the tables as they are.
+    evaluations
+        By name, what is laid over each condition's scenario.
+
+    Raises
+    ------
+    SpecError
+        If a condition is invalid, or two are the same.
+    """
+    conditions: list[Condition] = []
+    seen: dict[str, str] = {}
+    labels: set[str] = set()
+    keys = list(dict.fromkeys([*(key for o in overrides for key in o.sweep), *sweep]))
+    source = "overrides" if overrides else "sweep"
+    for override, point in _points(overrides, sweep):
+        name = label(point, override.name if override else "") or preset
+        where = f" (condition {name!r})" if point or override else ""
+        settings = resolve(preset, tables, point, where, override)
+        twin = seen.setdefault(settings.canonical(), name)
+        if twin != name or name in labels:
+            raise SpecError(f"{source}: conditions {twin!r} and {name!r} are the same")
+        labels.add(name)
+        columns: dict[str, Any] = {"name": override.name} if override else {}
+        columns |= {key: _scalar(point[key]) if key in point else "" for key in keys}
+        elsewhere = _elsewhere(settings, evaluations or {}, where)
+        conditions.append(Condition(name, columns or {"preset": preset}, settings, elsewhere))
+    return tuple(conditions)
+
+
+def _points(
+    overrides: Sequence[Override], sweep: Mapping[str, Sequence[Any]]
+) -> Iterator[tuple[Override | None, dict[str, Any]]]:
+    for override in overrides or (None,):
+        crossed = {**(override.sweep if override else {}), **sweep}
+        for values in itertools.product(*crossed.values()):
+            yield override, dict(zip(crossed, values, strict=True))
+
+
+def resolve(
+    preset: str,
+    tables: Mapping[str, Table],
+    point: Mapping[str, Any],
+    where: str = "",
+    override: Override | None = None,
+) -> ConditionSettings:
+    """Return the settings of one condition, layer by layer."""
+    own = override.preset if override else None
+    name = point.get("preset", preset if own is None else own)
+    if not isinstance(name, str) or name not in PRESETS:
+        raise SpecError(f"preset = {show(name)}: {closest(name, PRESETS)}{where}")
+    layers = [PRESETS[name].table, tables, override.tables if override else {}]
+    layers += [nested(key, value) for key, value in point.items() if key != "preset"]
+    table = ConditionSettings().model_dump()
+    for layer in layers:
+        expanded = {key: section(key, value) for key, value in layer.items()}
+        table = overlay(table, expanded, ConditionSettings)
+    return _validated(table, where)
+
+
+def _elsewhere(
+    settings: ConditionSettings, evaluations: Mapping[str, Mapping[str, Any]], where: str
+) -> tuple[tuple[str, ScenarioSettings], ...]:
+    table = settings.model_dump()
+    found = []
+    for name, changes in evaluations.items():
+        changed = overlay(table, {"scenario": section(name, changes)}, ConditionSettings)
+        resolved = _validated(changed, f" (evaluation {name!r}){where}")
+        found.append((name, resolved.scenario))
+    return tuple(found)
+
+
+def _validated(table: Table, where: str) -> ConditionSettings:
+    try:
+        return ConditionSettings.model_validate(tuples(table), strict=True)
+    except ValidationError as error:
+        raise SpecError(explain(error, ConditionSettings, table) + where) from None
+
+
+def section(name: str, value: object) -> Table:
+    """Return the table of a section: from a table, a settings model, or for a topology a string.
+
+    What is None in a model leaves what lies below as it is, as TOML has no word for it.
+
+    Examples
+    --------
+    >>> section("topology", "chain:reversed")
+    {'kind': 'chain', 'order': 'reversed'}
+    """
+    if isinstance(value, Mapping):
+        return dict(value)
+    if isinstance(value, Settings):
+        return value.model_dump(exclude_none=True)
+    is_topology = name.rpartition(".")[2] == "topology"
+    if not is_topology or not isinstance(value, str):
+        allowed = "a name or a table" if is_topology else "a table"
+        raise SpecError(f"{name} = {show(value)}: must be {allowed}")
+    try:
+        return parse(value).model_dump()
+    except ValueError as error:
+        raise SpecError(f"{name.removesuffix('topology')}{error}") from None
+
+
+def label(point: Mapping[str, Any], name: str = "") -> str:
+    """Return a short name for a point of the sweeps of an override.
+
+    Examples
+    --------
+    >>> label({"preset": "frozen"}), label({"preset": "default", "learner.rule_base.order": 2})
+    ('frozen', 'default, order=2')
+    >>> label({"scenario.robots": 3}, "no replay")
+    'no replay, robots=3'
+    """
+    if len(point) == 1 and not name:
+        return _brief(next(iter(point.values())))
+    last = [key.rpartition(".")[2] for key in point]
+    parts = [name] if name else []
+    for key, short in zip(point, last, strict=True):
+        shown = short if last.count(short) == 1 else key
+        value = _brief(point[key])
+        parts.append(value if key == "preset" else f"{shown}={value}")
+    return ", ".join(parts)
+
+
+def tuples(value: Any) -> Any:
+    """Return `value` with every list in it as a tuple, which strict validation asks for."""
+    if isinstance(value, Mapping):
+        return {key: tuples(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return tuple(tuples(inner) for inner in value)
+    return value
+
+
+def _brief(value: object) -> str:
+    """Return a value for a label: a long list is cut, and told from its like by a checksum."""
+    text = str(_scalar(value))
+    if isinstance(value, str) or len(text) <= 60:
+        return text
+    return f"{text[:50]}... {hashlib.sha256(text.encode(errors='replace')).hexdigest()[:6]}"
+
+
+def _scalar(value: object) -> object:
+    is_scalar = isinstance(value, int | float | str) and not isinstance(value, bool)
+    return value if is_scalar else show(value, width=None)

@@ -1,0 +1,130 @@
+"""What is wrong with a spec, in one line a user can act on.
+
+pydantic says where and what; this module turns that into the path as it stands in the spec, the
+value found there, what is allowed, and the closest known name.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from ...core.refusals import rule
+from .overlay import kind_of, model_at, models_of
+
+
+class SpecError(ValueError):
+    """Something the user can mend: its message is one line that names what, and what is allowed."""
+
+    def __init__(self, message: str) -> None:
+        line = " ".join(message.split())
+        # A terminal obeys control characters, and cannot write half of a surrogate pair.
+        shown = (c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)
+        super().__init__("".join(shown))
+
+
+def show(value: object, width: int | None = 60) -> str:
+    """Return a value as TOML would write it, shortened to `width` characters if that is given."""
+    if isinstance(value, bool):
+        text = str(value).lower()
+    elif isinstance(value, str):
+        text = repr(value)
+    elif isinstance(value, Mapping):
+        text = "{" + ", ".join(f"{k} = {show(v, width)}" for k, v in value.items()) + "}"
+    elif isinstance(value, Sequence):
+        text = "[" + ", ".join(show(v, width) for v in value) + "]"
+    else:
+        text = str(value)
+    return text if width is None or len(text) <= width else text[: width - 3] + "..."
+
+
+def closest(name: object, known: Iterable[str]) -> str:
+    """Return "; did you mean ...?" if a known name is near, and the known names in any case."""
+    known = sorted(known)
+    near = difflib.get_close_matches(str(name), known, n=1)
+    hint = f"did you mean {near[0]!r}? " if near else ""
+    return f"{hint}known: {', '.join(known) or 'none'}"
+
+
+def explain(error: ValidationError, model: type[BaseModel], data: Mapping[str, Any]) -> str:
+    """Return one line on the first thing that `error` found wrong with `data`.
+
+    Parameters
+    ----------
+    error
+        What pydantic raised when it validated `data` as `model`.
+    model
+        The model of the outermost table.
+    data
+        The table as the user gave it.
+    """
+    found = [(_place(e["loc"], data), e) for e in error.errors(include_url=False)]
+    # Where a name or a table may stand and a table does, what is wrong is in the table.
+    place = found[0][0]
+    inside = [f for f in found if len(f[0]) > len(place) and f[0][: len(place)] == place]
+    (keys, first) = (inside or found)[0]
+    path = _dotted(keys)
+    if first["type"] == "extra_forbidden":
+        owner = _owner(keys[:-1], model, data)
+        kind = f" for kind {kind_of(owner)!r}" if owner is not None and kind_of(owner) else ""
+        known = set() if owner is None else set(owner.model_fields)
+        return f"{path} = {show(first['input'])}: unknown key{kind}; {closest(keys[-1], known)}"
+    if first["type"] == "missing":
+        name = str(first["loc"][-1])
+        return f"{path}: missing" if keys == (name,) else f"{path}.{name}: missing"
+    value = first["input"]
+    if first["type"].startswith("union_tag"):
+        path, value = f"{path}.kind", value.get("kind") if isinstance(value, Mapping) else value
+        kinds = [kind_of(m) for m in models_of(_annotation(keys, model, data))]
+        return f"{path} = {show(value)}: {closest(value, [k for k in kinds if k])}"
+    # The members of a union complain one by one about the same place: say what any would take.
+    rules = dict.fromkeys(rule(e["msg"]) for place, e in found if place == keys)
+    return f"{path} = {show(value)}: {', or '.join(rules)}"
+
+
+def _place(loc: Sequence[int | str], data: object) -> tuple[int | str, ...]:
+    """Drop from pydantic's path what names a member of a union rather than a key of the spec."""
+    keys: list[int | str] = []
+    for index, item in enumerate(loc):
+        inside = isinstance(data, Mapping) and item in data
+        listed = isinstance(data, Sequence) and isinstance(item, int) and item < len(data)
+        if inside or (listed and not isinstance(data, str)):
+            keys.append(item)
+            data = data[item]  # type: ignore[index]
+        elif index == len(loc) - 1 and isinstance(data, Mapping) and not keys:
+            keys.append(item)
+    return tuple(keys)
+
+
+def _dotted(keys: Sequence[int | str]) -> str:
+    path = ""
+    for key in keys:
+        path += f"[{key}]" if isinstance(key, int) else f".{key}"
+    return path.lstrip(".").replace("\n", " ") or "spec"
+
+
+def _annotation(keys: Sequence[int | str], model: type[BaseModel], data: Any) -> Any:
+    annotation: Any = model
+    for key in keys:
+        if isinstance(key, int):  # an item of a list is one of the models that the list may hold
+            data = data[key]
+            continue
+        owner = model_at(annotation, data)
+        field = owner.model_fields.get(str(key)) if owner is not None else None
+        if field is None:
+            return None
+        annotation, data = field.annotation, data[key]
+    return annotation
+
+
+def _owner(
+    keys: Sequence[int | str], model: type[BaseModel], data: Mapping[str, Any]
+) -> type[BaseModel] | None:
+    """Return the model of the table at `keys`."""
+    inner: Any = data
+    for key in keys:
+        inner = inner[key]
+    return model_at(_annotation(keys, model, data), inner)

@@ -1,0 +1,217 @@
+"""The spec of a study, as it stands in a TOML file.
+
+``study``, ``preset``, ``seeds``, ``episodes``, ``steps``, ``evaluation``, then the tables
+``[scenario]``, ``[topology]``, ``[learner]``, laid over the preset. What is compared:
+``[[overrides]]``, further tables by name, and ``[sweep]``, lists of values by dotted key; the
+conditions are their combinations. ``[evaluations]`` are further scenarios for the trained teams.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field, ValidationError, field_validator
+
+from ...core.settings import Settings
+from .. import STUDIES
+from .conditions import SECTIONS, Condition, Name, Override, grid, section, tuples
+from .errors import SpecError, closest, explain, show
+from .overlay import Table, assignment, flat, overlay
+from .presets import PRESETS
+
+MOST_TRIALS = 100_000
+"""A larger grid is taken for a slip of the pen."""
+
+Length = Annotated[int, Field(ge=1, le=1_000_000)]
+Seed = Annotated[int, Field(ge=0, le=2**63 - 1)]
+
+
+class Spec(Settings):
+    """What a study measures: conditions x seeds, and for how long.
+
+    Examples
+    --------
+    >>> spec = Spec.of({"seeds": 3, "sweep": {"preset": ["default", "frozen"]}})
+    >>> spec.seeds, [condition.label for condition in spec.conditions()]
+    ((0, 1, 2), ['default', 'frozen'])
+
+    Tables may be made by any Python, and hold settings models:
+
+    >>> from nested_agents.core.settings import TDLambdaSettings
+    >>> ridges = [{"name": f"ridge {r}", "learner": {"ridge": r}} for r in (1.0, 100.0)]
+    >>> online = {"name": "online", "learner": TDLambdaSettings(step_size=0.1, normalised=True)}
+    >>> [c.label for c in Spec.of({"overrides": [*ridges, online]}).conditions()]
+    ['ridge 1.0', 'ridge 100.0', 'online']
+    """
+
+    study: str = "learning-curve"
+    """Which study, by name."""
+    preset: str = "default"
+    """The preset under the tables below."""
+    seeds: tuple[Seed, ...] = tuple(range(8))
+    """A list of seeds, or their number: n stands for 0 to n - 1."""
+    episodes: Length = 20
+    """Training episodes of a trial."""
+    steps: Length = 450
+    """Most decisions in an episode."""
+    evaluation: Annotated[int, Field(ge=0, le=1_000_000)] = 10
+    """Episodes after training in which nothing is explored and nothing learned."""
+    scenario: Mapping[str, Any] = Field(default_factory=dict)
+    """Laid over the preset's scenario."""
+    topology: Mapping[str, Any] = Field(default_factory=dict)
+    """Laid over the preset's topology; may be written as a string, see `conditions.section`."""
+    learner: Mapping[str, Any] = Field(default_factory=dict)
+    """Laid over the preset's learner."""
+    sweep: Mapping[str, tuple[Any, ...]] = Field(default_factory=dict)
+    """Lists of values by dotted key; the conditions are all their combinations."""
+    overrides: tuple[Override, ...] = ()
+    """Tables by name, each laid over those above and crossed with the sweep."""
+    evaluations: Mapping[Name, Mapping[str, Any]] = Field(default_factory=dict)
+    """By name, changes of the scenario in which the trained teams are evaluated too."""
+
+    @field_validator("study", "preset")
+    @classmethod
+    def _known(cls, value: str, info: Any) -> str:
+        known: Iterable[str] = STUDIES if info.field_name == "study" else PRESETS
+        if value not in known:
+            raise ValueError(closest(value, known))
+        return value
+
+    @field_validator("seeds", mode="before")
+    @classmethod
+    def _count(cls, value: object) -> object:
+        if isinstance(value, int) and not isinstance(value, bool):
+            if not 1 <= value <= MOST_TRIALS:
+                raise ValueError(f"must be between 1 and {MOST_TRIALS}, or a list of seeds")
+            return tuple(range(value))
+        if not isinstance(value, list | tuple):
+            raise ValueError("must be a whole number or a list of whole numbers")
+        if not 1 <= len(value) <= MOST_TRIALS:
+            raise ValueError(f"must be a list of 1 to {MOST_TRIALS} seeds")
+        if len(set(map(repr, value))) < len(value):
+            raise ValueError("must be a list of distinct seeds")
+        return tuple(value)
+
+    @classmethod
+    def of(cls, table: Mapping[str, Any]) -> Spec:
+        """Build a spec from a table as TOML reads it.
+
+        Raises
+        ------
+        SpecError
+            If anything in it, the conditions included, is wrong.
+        """
+        try:
+            return cls._of(table)
+        except RecursionError:
+            raise SpecError("spec: is nested too deeply") from None
+
+    @classmethod
+    def _of(cls, table: Mapping[str, Any]) -> Spec:
+        table = _read(table, "")
+        if isinstance(table.get("overrides"), list | tuple):
+            table["overrides"] = tuple(
+                _read(override, f"overrides[{i}].") if isinstance(override, Mapping) else override
+                for i, override in enumerate(table["overrides"])
+            )
+        try:
+            spec = cls.model_validate(tuples(table), strict=True)
+        except ValidationError as error:
+            raise SpecError(explain(error, cls, table)) from None
+        points = spec.n_conditions
+        if points * len(spec.seeds) > MOST_TRIALS:
+            grid_size = f"{points} conditions x {len(spec.seeds)} seeds"
+            raise SpecError(f"sweep: {grid_size}, at most {MOST_TRIALS} trials")
+        spec.conditions()
+        return spec
+
+    @classmethod
+    def load(cls, path: Path, changes: Iterable[str] = ()) -> Spec:
+        """Read a TOML file and lay ``key=value`` changes over it.
+
+        Raises
+        ------
+        SpecError
+            If the file cannot be read, is no TOML, or anything in it is wrong.
+        """
+        try:
+            text = path.read_text(encoding="utf-8")
+        except OSError as error:
+            raise SpecError(f"{path}: {error.strerror or error}") from None
+        except UnicodeDecodeError:
+            raise SpecError(f"{path}: is not UTF-8 text") from None
+        return cls.parse(text, changes, str(path))
+
+    @classmethod
+    def parse(cls, text: str, changes: Iterable[str] = (), source: str = "spec") -> Spec:
+        """Read TOML text and lay ``key=value`` changes over it; see `load`."""
+        try:
+            table = tomllib.loads(text)
+        except tomllib.TOMLDecodeError as error:
+            raise SpecError(f"{source}: is not valid TOML: {error}") from None
+        except RecursionError:
+            raise SpecError(f"{source}: is nested too deeply") from None
+        for change in changes:
+            try:
+                table = _changed(table, assignment(change))
+            except ValueError as error:
+                raise SpecError(f"--set {change}: {error}") from None
+        return cls.of(table)
+
+    @property
+    def n_conditions(self) -> int:
+        """How many conditions there are."""
+        own = [override.sweep for override in self.overrides] or [{}]
+        sizes = [math.prod(map(len, {**swept, **self.sweep}.values())) for swept in own]
+        return sum(sizes)
+
+    def conditions(self) -> tuple[Condition, ...]:
+        """Return the conditions in the order of the overrides and sweeps."""
+        tables = {name: getattr(self, name) for name in SECTIONS}
+        return grid(self.preset, tables, self.sweep, self.overrides, self.evaluations)
+
+    def table(self) -> Table:
+        """Return the spec as a table that `of` reads back."""
+        table = _filled(self.model_dump())
+        table["overrides"] = [_filled(override) for override in table.get("overrides", ())]
+        if self.seeds == tuple(range(len(self.seeds))):
+            table["seeds"] = len(self.seeds)
+        return {key: value for key, value in table.items() if value != []}
+
+
+def _changed(table: Table, change: Table) -> Table:
+    """Lay a change over a table; a topology written as a string is a table from then on."""
+    below = table.get("topology")
+    if isinstance(below, str) and isinstance(change.get("topology"), Mapping):
+        table = {**table, "topology": section("topology", below)}
+    return overlay(table, change)
+
+
+def _filled(table: Table) -> Table:
+    return {key: value for key, value in table.items() if value not in ({}, (), None)}
+
+
+def _read(table: Mapping[str, Any], where: str) -> Table:
+    """Return a spec's or an override's table with its sections and sweep spelled out."""
+    table = dict(table)
+    for name in SECTIONS:
+        if name in table:
+            table[name] = section(f"{where}{name}", table[name])
+    if isinstance(table.get("sweep"), Mapping):
+        table["sweep"] = dict(_sweep(table["sweep"], f"{where}sweep"))
+    return table
+
+
+def _sweep(table: Mapping[str, Any], where: str) -> Iterable[tuple[str, Any]]:
+    for key, values in flat(table):
+        head, _, tail = key.partition(".")
+        if key not in ("preset", "topology") and not (head in SECTIONS and tail):
+            known = [*(f"{name}.*" for name in SECTIONS), "preset", "topology"]
+            raise SpecError(f"{where}.{key}: unknown key; {closest(key, known)}")
+        if not isinstance(values, list | tuple) or not values:
+            raise SpecError(f"{where}.{key} = {show(values)}: must be a list of at least one value")
+        yield key, values

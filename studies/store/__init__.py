@@ -1,0 +1,1 @@
+"""The ledger of a study: nothing that was finished is lost."""

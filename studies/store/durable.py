@@ -1,0 +1,83 @@
+"""Files that are there whole or not at all, and recordings kept in them."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import os
+import zipfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from ..spec.errors import SpecError
+from ..trials.episodes import Recording
+
+
+def write(path: Path, content: bytes) -> None:
+    """Replace a file so that, whenever power fails, it holds the old or the new content."""
+    with replacing(path) as file:
+        file.write(content)
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[BinaryIO]:
+    """Write a file that takes the place of `path` when the context ends without an error."""
+    temporary = path.with_name(f".{path.name}.new")
+    try:
+        with open(temporary, "wb") as file:
+            yield file
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(temporary, path)
+    except BaseException:
+        temporary.unlink(missing_ok=True)
+        raise
+    folder = os.open(path.parent, os.O_RDONLY)
+    try:
+        os.fsync(folder)
+    finally:
+        os.close(folder)
+
+
+def write_recordings(path: Path, recordings: Mapping[str, Recording]) -> str:
+    """Write recordings by name to an ``.npz`` file; return the SHA-256 of its content."""
+    buffer = io.BytesIO()
+    arrays = {f"{name}/{key}": a for name, r in recordings.items() for key, a in r.items()}
+    np.savez_compressed(buffer, **arrays)  # type: ignore[arg-type]
+    content = buffer.getvalue()
+    write(path, content)
+    return hashlib.sha256(content).hexdigest()
+
+
+def sha256(path: Path) -> str | None:
+    """Return the SHA-256 of a file; none if it cannot be read."""
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError:
+        return None
+
+
+def read_recording(path: Path, name: str) -> Recording:
+    """Read one recording from a file that `write_recordings` wrote.
+
+    Raises
+    ------
+    SpecError
+        If the file is not there or damaged, or holds no such recording.
+    """
+    prefix = f"{name}/"
+    try:
+        with np.load(path, allow_pickle=False) as arrays:
+            keys = [key for key in arrays.files if key.startswith(prefix)]
+            found = {key.removeprefix(prefix): arrays[key] for key in keys}
+    except FileNotFoundError:
+        raise SpecError(f"{path}: no such file") from None
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile):
+        raise SpecError(f"{path}: is damaged") from None
+    if not found:
+        raise SpecError(f"{path}: holds no recording {name!r}")
+    return found

@@ -1,0 +1,99 @@
+"""A damaged database: noticed, set aside, and what can be trusted of it taken over."""
+
+from __future__ import annotations
+
+import os
+import sqlite3
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+
+from ..spec.errors import SpecError
+from . import database
+from .schema import OF_A_TRIAL, study_checksum, trial_checksum
+
+
+def damage(path: Path) -> str | None:
+    """Return what is wrong with a database as a whole; None if nothing is, or it is empty.
+
+    Raises
+    ------
+    SpecError
+        If it cannot be read for another reason, or is sound but no study's.
+    """
+    try:
+        with database.reading(path) as db:
+            tables = {name for (name,) in db.execute("SELECT name FROM sqlite_master")}
+            if not tables:
+                return None
+            if not tables & {"meta", "trials", *OF_A_TRIAL}:
+                raise SpecError(f"{path}: is a database, but no study; use another directory")
+            (said,) = db.execute("PRAGMA integrity_check(1)").fetchone()
+            if said != "ok":
+                return " ".join(str(said).replace("*** in database main ***", "").split())
+            noted = db.execute("SELECT value FROM meta WHERE key = 'sha256'").fetchone()
+            # Studies begun before there were checksums have none.
+            if noted is not None and noted[0] != study_checksum(db):
+                return "what it says of the study is not what was written"
+    except database.DamageError as error:
+        return error.reason
+    return None
+
+
+def set_aside(path: Path) -> Path:
+    """Give a database, with its log, a name that nothing else has; return it."""
+    number = 1
+    while (aside := path.with_name(f"{path.name}.damaged-{number}")).exists():
+        number += 1
+    # The database last: if this is interrupted, it is found damaged once more.
+    for suffix in ("-wal", ""):
+        old = path.with_name(path.name + suffix)
+        if old.exists():
+            os.replace(old, aside.with_name(aside.name + suffix))
+    path.with_name(f"{path.name}-shm").unlink(missing_ok=True)
+    return aside
+
+
+def recover(damaged: Path, db: sqlite3.Connection) -> int:
+    """Copy the trials whose rows are what was written; within a transaction.
+
+    Parameters
+    ----------
+    damaged
+        A database that was set aside.
+    db
+        The new one, which has tables but no trials.
+
+    Returns
+    -------
+    int
+        How many trials were copied.
+    """
+    copied = 0
+    for tables in _sound(damaged):
+        for table, rows in tables.items():
+            database.insert(db, table, rows)
+        copied += 1
+    return copied
+
+
+def _sound(path: Path) -> Iterator[dict[str, list[tuple[object, ...]]]]:
+    """Yield the rows by table of every trial that can be read and has its checksum."""
+    identities: dict[str, str] = {}
+    with suppress(sqlite3.DatabaseError), database.copied(path) as db:
+        db.execute("PRAGMA writable_schema = ON")  # a table it cannot understand is passed over
+        for identity, noted in db.execute("SELECT identity, sha256 FROM checksums"):
+            identities.setdefault(identity, noted)
+    with database.copied(path) as db:
+        db.execute("PRAGMA writable_schema = ON")
+        for identity, noted in identities.items():
+            found: dict[str, list[tuple[object, ...]]] = {}
+            try:
+                if trial_checksum(db, identity) == noted:
+                    for table in ("trials", *OF_A_TRIAL):
+                        query = f"SELECT * FROM {table} WHERE identity = ?"
+                        found[table] = db.execute(query, (identity,)).fetchall()
+            except sqlite3.DatabaseError:
+                continue
+            if found:
+                yield found

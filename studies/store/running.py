@@ -1,0 +1,112 @@
+"""A light mark of what is running: for the eye only, nothing is decided by it.
+
+``running.json`` in the directory of a study names the trials that workers have been handed. Whether
+anything runs at all is told by the lock that the running process holds on ``.lock``, and which the
+system takes from it however it ends: a mark that outlived its process is passed over.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import json
+import os
+import threading
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+
+from ..trials.trial import Trial
+
+LOCK = ".lock"
+MARK = "running.json"
+
+
+class Running:
+    """Keeps the mark while its context lasts.
+
+    Parameters
+    ----------
+    directory
+        Of the study, whose lock this process holds.
+    processes
+        How many trials run at a time.
+    """
+
+    def __init__(self, directory: Path, processes: int) -> None:
+        self._path = directory / MARK
+        self._processes = processes
+        self._begun: dict[str, float] = {}
+        self._changing = threading.Lock()
+
+    def __enter__(self) -> Running:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        with contextlib.suppress(OSError):
+            self._path.unlink(missing_ok=True)
+
+    def begin(self, trial: Trial) -> None:
+        """Note that a trial has been handed to a worker."""
+        with self._changing:
+            self._begun[trial.identity] = time.time()
+            self._write()
+
+    def end(self, trial: Trial) -> None:
+        """Note that a trial has come back."""
+        with self._changing:
+            self._begun.pop(trial.identity, None)
+            self._write()
+
+    def _write(self) -> None:
+        temporary = self._path.with_name(f".{MARK}.new")
+        # Not worth an fsync, nor an error if the disk is full.
+        with contextlib.suppress(OSError):
+            temporary.write_text(json.dumps({"processes": self._processes, "begun": self._begun}))
+            os.replace(temporary, self._path)
+
+
+@dataclass(frozen=True)
+class Mark:
+    """What a mark says.
+
+    Attributes
+    ----------
+    processes
+        How many trials run at a time.
+    seconds
+        How long each running trial has been running so far [s], by identity.
+    """
+
+    processes: int
+    seconds: dict[str, float]
+
+
+def look(directory: Path) -> Mark | None:
+    """Return what is running in the directory of a study; None if nothing is."""
+    if not _locked(directory / LOCK):
+        return None
+    try:
+        found = json.loads((directory / MARK).read_text())
+        now = time.time()
+        seconds = {identity: max(now - begun, 0.0) for identity, begun in found["begun"].items()}
+        return Mark(found["processes"], seconds)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return Mark(1, {})  # begins or ends just now
+
+
+def _locked(path: Path) -> bool:
+    try:
+        with open(path) as lock:
+            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    return False

@@ -1,0 +1,94 @@
+"""The tables of a study's database, and checksums of what they hold.
+
+SQLite notices a torn page but not a flipped digit. Each finished trial therefore has a checksum of
+its rows, and what concerns the study as a whole has another one, in `meta`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import sqlite3
+
+from ..spec.spec import Spec
+from ..trials.episodes import COLUMNS
+from ..trials.trial import RESULTS_VERSION
+from .database import insert, quoted
+
+SECONDS = ("decision", "physics", "sensors", "learning", "total")
+
+OF_A_TRIAL = ("episodes", "seconds", "numbers", "checksums")
+"""The tables that hold what a trial measured, by its identity."""
+
+SCHEMA = (
+    "CREATE TABLE IF NOT EXISTS meta (key TEXT PRIMARY KEY, value TEXT NOT NULL)",
+    """CREATE TABLE IF NOT EXISTS trials (
+        identity TEXT PRIMARY KEY, condition TEXT NOT NULL, seed INTEGER NOT NULL,
+        state TEXT NOT NULL CHECK (state IN ('done', 'failed')), error TEXT,
+        recording_sha256 TEXT)""",
+    """CREATE TABLE IF NOT EXISTS episodes (
+        identity TEXT NOT NULL REFERENCES trials ON DELETE CASCADE, phase TEXT NOT NULL,
+        episode INTEGER NOT NULL, steps INTEGER NOT NULL, success INTEGER NOT NULL,
+        stopped_at_goal INTEGER NOT NULL, final_distance_m REAL NOT NULL,
+        final_orientation_rad REAL NOT NULL, contact_fraction REAL NOT NULL,
+        "return" REAL NOT NULL, PRIMARY KEY (identity, phase, episode)) WITHOUT ROWID""",
+    f"""CREATE TABLE IF NOT EXISTS seconds (
+        identity TEXT PRIMARY KEY REFERENCES trials ON DELETE CASCADE,
+        {", ".join(f"{part} REAL NOT NULL" for part in SECONDS)})""",
+    """CREATE TABLE IF NOT EXISTS numbers (
+        identity TEXT NOT NULL REFERENCES trials ON DELETE CASCADE, name TEXT NOT NULL,
+        value REAL NOT NULL, repeatable INTEGER NOT NULL, PRIMARY KEY (identity, name))
+        WITHOUT ROWID""",
+    """CREATE TABLE IF NOT EXISTS checksums (
+        identity TEXT PRIMARY KEY REFERENCES trials ON DELETE CASCADE, sha256 TEXT NOT NULL)""",
+)
+
+
+def prepare(db: sqlite3.Connection, spec: Spec) -> None:
+    """Make the tables, and note what the study consists of; within a transaction."""
+    conditions = spec.conditions()
+    settings = {c.label: c.settings.model_dump(mode="json") for c in conditions}
+    swept = [quoted(key) for key in conditions[0].columns]
+    columns = ", ".join(["position INTEGER", "condition TEXT PRIMARY KEY", *swept])
+    for statement in SCHEMA:
+        db.execute(statement)
+    db.execute(f"CREATE TABLE IF NOT EXISTS conditions ({columns})")
+    db.execute("DELETE FROM conditions")
+    insert(db, "conditions", [(i, c.label, *c.columns.values()) for i, c in enumerate(conditions)])
+    db.execute(
+        f"""CREATE VIEW IF NOT EXISTS results AS
+        SELECT c.condition, {"".join(f"c.{key}, " for key in swept)}t.seed,
+            {", ".join(f"e.{quoted(name)}" for name in COLUMNS)}
+        FROM episodes e JOIN trials t USING (identity) JOIN conditions c USING (condition)
+        WHERE t.state = 'done' ORDER BY c.position, t.seed, e.phase DESC, e.episode"""
+    )
+    db.execute("DELETE FROM meta")
+    meta = {"results_version": str(RESULTS_VERSION), "spec": json.dumps(spec.table())}
+    insert(db, "meta", [*meta.items(), ("conditions", json.dumps(settings))])
+    insert(db, "meta", [("sha256", study_checksum(db))])
+
+
+def study_checksum(db: sqlite3.Connection) -> str:
+    """Return the SHA-256 of what the database says of the study as a whole."""
+    queries = (
+        "SELECT type, name, tbl_name, sql FROM sqlite_master ORDER BY name",
+        "SELECT key, value FROM meta WHERE key <> 'sha256' ORDER BY key",
+        "SELECT * FROM conditions ORDER BY condition",
+    )
+    return _sha256([db.execute(query).fetchall() for query in queries])
+
+
+def trial_checksum(db: sqlite3.Connection, identity: str) -> str:
+    """Return the SHA-256 of all rows of a trial."""
+    queries = (
+        "SELECT identity, condition, seed, state, recording_sha256 FROM trials WHERE identity = ?",
+        "SELECT * FROM episodes WHERE identity = ? ORDER BY phase, episode",
+        "SELECT * FROM seconds WHERE identity = ?",
+        "SELECT * FROM numbers WHERE identity = ? ORDER BY name",
+    )
+    return _sha256([db.execute(query, (identity,)).fetchall() for query in queries])
+
+
+def _sha256(content: object) -> str:
+    # default: a flipped type makes bytes of a text
+    return hashlib.sha256(json.dumps(content, default=repr).encode()).hexdigest()

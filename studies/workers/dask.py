@@ -1,0 +1,173 @@
+"""Workers of a Dask cluster: one started here, or one whose scheduler has an address.
+
+A cluster has an idea of its own of what to do when a worker dies: it hands the trial to another
+one, and gives up after some deaths (`allowed-failures` in its configuration; none in a cluster
+started here). Only then is the trial lost. Workers may join and leave at any time.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+import warnings
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from itertools import islice
+from queue import Empty, SimpleQueue
+
+from distributed import CancelledError, Client, Future, KilledWorker, LocalCluster
+from distributed.comm.core import CommClosedError
+
+from ..spec.errors import SpecError
+from ..trials.trial import Trial
+from .interrupts import deaf
+from .worker import ONE_THREAD, Arrival, Measure, UnlikeWorkerError, attempt_alike, versions
+
+CONNECT = 10.0
+"""How long to try to reach a scheduler [s]."""
+
+PATIENCE = 60.0
+"""How long to wait for the first worker, or for another one when all are gone [s]."""
+
+POLL = 1.0
+"""How often to look for workers while no trial finishes [s]."""
+
+
+class DaskWorkers:
+    """Workers of a Dask cluster; see `Workers`. Use `DaskWorkers.local` or `DaskWorkers.at`.
+
+    Parameters
+    ----------
+    client
+        Connected to the cluster.
+    most
+        Most trials at a time; None: one for every worker.
+    name
+        What to call the cluster in messages.
+    """
+
+    def __init__(self, client: Client, most: int | None, name: str) -> None:
+        self._client, self._most, self._name = client, most, name
+
+    @classmethod
+    @contextmanager
+    def local(cls, jobs: int) -> Iterator[DaskWorkers]:
+        """Start a cluster of `jobs` workers on this machine; it ends with the context."""
+        with _quiet():
+            with deaf():
+                cluster = LocalCluster(
+                    n_workers=jobs,
+                    threads_per_worker=1,
+                    env=ONE_THREAD,
+                    memory_limit=0,
+                    dashboard_address=None,
+                    silence_logs=logging.CRITICAL,
+                    scheduler_kwargs={"allowed_failures": 0},
+                )
+            with cluster, Client(cluster) as client:
+                yield cls(client, jobs, "the local Dask cluster")
+
+    @classmethod
+    @contextmanager
+    def at(cls, address: str, jobs: int | None) -> Iterator[DaskWorkers]:
+        """Use the cluster whose scheduler is at `address`, with at most `jobs` trials at a time.
+
+        Raises
+        ------
+        SpecError
+            If it cannot be reached.
+        """
+        with _quiet():
+            try:
+                client = Client(address, timeout=CONNECT)
+            except (OSError, ValueError) as error:
+                why = " ".join(str(error).split()) or "no scheduler answers"
+                raise SpecError(f"--address {address}: {why}") from None
+            with client:
+                yield cls(client, jobs, f"the Dask cluster at {address}")
+
+    @property
+    def processes(self) -> int:
+        """How many trials run at a time with the workers there are."""
+        try:
+            found = len(self._client.nthreads())
+        except (OSError, ValueError) as error:
+            raise self._gone() from error
+        return found if self._most is None else min(found, self._most)
+
+    def arrivals(
+        self, trials: Sequence[Trial], measure: Measure, started: Callable[[Trial], None]
+    ) -> Generator[Arrival]:
+        """See `Workers.arrivals`."""
+        waiting, expected = iter(trials), versions()
+        running: dict[Future, Trial] = {}
+        finished: SimpleQueue[Future] = SimpleQueue()
+        seen = time.monotonic()
+        left = len(trials)
+        try:
+            while left:
+                processes = self.processes
+                for trial in islice(waiting, max(processes - len(running), 0)):
+                    future = self._client.submit(
+                        attempt_alike, expected, measure, trial, pure=False
+                    )
+                    running[future] = trial
+                    started(trial)
+                    future.add_done_callback(finished.put)
+                if processes:
+                    seen = time.monotonic()
+                elif time.monotonic() - seen > PATIENCE:
+                    raise SpecError(
+                        f"{self._name} has had no worker for {PATIENCE:.0f} s; what has finished "
+                        "is kept, the same command continues"
+                    )
+                try:
+                    future = finished.get(timeout=POLL)
+                except Empty:
+                    continue
+                try:
+                    arrival = self._fetch(future, running[future])
+                except TimeoutError:
+                    # The worker that held the result died, and the trial runs once more.
+                    future.add_done_callback(finished.put)
+                    continue
+                del running[future]
+                left -= 1
+                yield arrival
+        finally:
+            with suppress(OSError, ValueError, CancelledError):
+                self._client.cancel(list(running), force=True)
+
+    def _fetch(self, future: Future, trial: Trial) -> Arrival:
+        try:
+            arrival: Arrival = future.result(timeout=CONNECT)
+        except KilledWorker:
+            return Arrival(trial, None, f"killed, in {self._name}", 0.0, lost=True)
+        except UnlikeWorkerError as error:
+            raise SpecError(f"{self._name}: {error}") from None
+        except (CancelledError, CommClosedError):
+            raise self._gone() from None
+        except ImportError as error:
+            raise SpecError(f"{self._name}: a worker cannot begin: {error}") from None
+        return arrival
+
+    def _gone(self) -> SpecError:
+        return SpecError(
+            f"{self._name} is gone; what has finished is kept, the same command continues"
+        )
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep to ourselves what the cluster logs and warns of: what matters is told in one line."""
+    loggers = [logging.getLogger(name) for name in ("distributed", "tornado", "asyncio")]
+    levels = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL + 1)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.setLevel(level)

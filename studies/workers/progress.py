@@ -1,0 +1,105 @@
+"""How far a study is: counts of trials, and an estimate of the time left."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from statistics import fmean
+
+from ..store.running import look
+from ..store.store import Store
+from ..trials.trial import trials_of
+from .worker import CORES
+
+
+@dataclass(frozen=True)
+class Progress:
+    """The trials of a study, each counted once.
+
+    Attributes
+    ----------
+    total, done, failed, left
+        Numbers of trials; `left` are those that neither ended nor run.
+    running
+        Condition, seed, and seconds so far of the trials that are running.
+    processes
+        How many trials run at a time; the cores of this machine if none does.
+    seconds
+        Estimate of the time left [s]; None if nothing has finished to go by.
+    damaged
+        What has finished but is not as it was written, one line each; counted as left.
+    refusal
+        Why this version would not go on with the study, in one line; None if it would.
+    """
+
+    total: int
+    done: int
+    failed: int
+    left: int
+    running: tuple[tuple[str, int, float], ...]
+    processes: int
+    seconds: float | None
+    damaged: tuple[str, ...]
+    refusal: str | None
+
+
+def progress(store: Store) -> Progress:
+    """Return how far the study of an open store is."""
+    spec = store.spec()
+    trials, refusal, counts = trials_of(spec), store.refusal(spec), store.counts()
+    if refusal is not None:
+        # Trials of another version have other identities: what is there counts.
+        return Progress(
+            total=len(trials),
+            done=counts["done"],
+            failed=counts["failed"],
+            left=len(trials) - counts["done"] - counts["failed"],
+            running=(),
+            processes=CORES,
+            seconds=None,
+            damaged=(),
+            refusal=refusal,
+        )
+    mark = look(store.directory)
+    begun = {} if mark is None else mark.seconds
+    pending = store.pending(trials)
+    running = [trial for trial in pending if trial.identity in begun]
+    left = [trial for trial in pending if trial.identity not in begun]
+    processes = CORES if mark is None else mark.processes
+    seconds = _estimate(
+        store.mean_seconds(),
+        [trial.condition for trial in left],
+        [(trial.condition, begun[trial.identity]) for trial in running],
+        processes,
+    )
+    return Progress(
+        total=len(trials),
+        done=len(trials) - len(pending) - counts["failed"],
+        failed=counts["failed"],
+        left=len(left),
+        running=tuple((t.condition, t.seed, begun[t.identity]) for t in running),
+        processes=processes,
+        seconds=seconds,
+        damaged=tuple(store.notes),
+        refusal=None,
+    )
+
+
+def _estimate(
+    means: Mapping[str, float],
+    left: list[str],
+    running: list[tuple[str, float]],
+    processes: int,
+) -> float | None:
+    """Return the time left [s], by what the finished trials of each condition took on average.
+
+    Conditions of which none has finished are taken to be like the others on average.
+    """
+    if not (left or running):
+        return 0.0
+    if not means or not processes:
+        return None
+    overall = fmean(means.values())
+    rest = [max(means.get(condition, overall) - spent, 0.0) for condition, spent in running]
+    waiting = sum(means.get(condition, overall) for condition in left)
+    return max((waiting + sum(rest)) / processes, max(rest, default=0.0))

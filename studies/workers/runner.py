@@ -1,0 +1,90 @@
+"""Runs trials on workers of any kind and keeps every result the moment it arrives.
+
+A trial whose worker died is run again when the others are done, alone, up to `ATTEMPTS` times.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+
+from ..store.running import Running
+from ..store.store import Store
+from ..trials.trial import Trial
+from .interrupts import undisturbed
+from .worker import Arrival, Measure
+from .workers import Workers
+
+ATTEMPTS = 2
+"""How often a trial is run alone whose worker has died."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a trial: its result is in the store already.
+
+    Attributes
+    ----------
+    trial
+        The trial.
+    error
+        The traceback, if it failed.
+    seconds
+        How long it took.
+    """
+
+    trial: Trial
+    error: str | None
+    seconds: float
+
+
+def run_trials(
+    trials: Sequence[Trial], store: Store, measure: Measure, workers: Workers
+) -> Generator[Outcome]:
+    """Run trials in parallel; store, then yield each as it finishes.
+
+    Closing the generator, or an exception in its consumer, stops the workers at once.
+
+    Parameters
+    ----------
+    trials
+        The trials to run, for instance `Store.pending`.
+    store
+        Where results and tracebacks are kept.
+    measure
+        Runs one trial; a module-level function, since workers import it by name.
+    workers
+        Who runs them.
+    """
+    lost: list[Trial] = []
+    with Running(store.directory, workers.processes) as running:
+        with closing(workers.arrivals(trials, measure, running.begin)) as arriving:
+            for arrival in arriving:
+                running.end(arrival.trial)
+                if arrival.lost:
+                    lost.append(arrival.trial)
+                else:
+                    yield _keep(store, arrival)
+        for trial in lost:
+            arrival = _alone(trial, measure, workers, running)
+            running.end(trial)
+            yield _keep(store, arrival)
+
+
+def _alone(trial: Trial, measure: Measure, workers: Workers, running: Running) -> Arrival:
+    for _ in range(ATTEMPTS):
+        with closing(workers.arrivals([trial], measure, running.begin)) as arriving:
+            (arrival,) = arriving
+        if not arrival.lost:
+            return arrival
+    return arrival._replace(error=f"its worker died {ATTEMPTS} times: {arrival.error}")
+
+
+def _keep(store: Store, arrival: Arrival) -> Outcome:
+    with undisturbed():
+        if arrival.result is None:
+            store.fail(arrival.trial, arrival.error or "")
+        else:
+            store.save(arrival.trial, arrival.result, arrival.seconds)
+    return Outcome(arrival.trial, arrival.error, arrival.seconds)

@@ -1,0 +1,111 @@
+"""What happens in a worker process. Light to import: a worker must be up early."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+import traceback
+from collections.abc import Callable
+from importlib.metadata import version
+from platform import python_version
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from ..trials.trial import Trial, TrialResult
+
+CORES = len(os.sched_getaffinity(0))
+"""Cores that this process may use."""
+
+POLL = 0.5
+"""How often a worker looks whether its parent is still there [s]."""
+
+PACKAGES = ("nested-agents", "numpy", "numba", "scipy", "box2d-py")
+"""The packages on whose versions the bits of a result may depend."""
+
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+"""What tells linear algebra to use one thread: last bits depend on their number."""
+
+Measure = Callable[["Trial"], "TrialResult"]
+
+
+class Arrival(NamedTuple):
+    """What comes back from a worker.
+
+    Attributes
+    ----------
+    trial
+        The trial.
+    result
+        What it measured, if it came to an end.
+    error
+        Its traceback if it failed; how its worker died if it is `lost`.
+    seconds
+        How long it took.
+    lost
+        Whether its worker died while it ran: perhaps its fault, perhaps not.
+    """
+
+    trial: Trial
+    result: TrialResult | None
+    error: str | None
+    seconds: float
+    lost: bool = False
+
+
+class UnlikeWorkerError(Exception):
+    """A worker on which a trial might give other bits, or could not run; one line."""
+
+
+def begin(parent: int) -> None:
+    """Do not outlive the process `parent`, even if it is killed."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(POLL)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+def attempt(measure: Measure, trial: Trial) -> Arrival:
+    """Run one trial; what goes wrong is returned as text."""
+    begin = time.perf_counter()
+    try:
+        result = measure(trial)
+    except Exception:
+        return Arrival(trial, None, traceback.format_exc(), time.perf_counter() - begin)
+    return Arrival(trial, result, None, time.perf_counter() - begin)
+
+
+def attempt_alike(expected: dict[str, str], measure: Measure, trial: Trial) -> Arrival:
+    """Run one trial on a worker that somebody else started, if it is as `expected`.
+
+    Raises
+    ------
+    UnlikeWorkerError
+        If its versions are not the `expected` ones, see `versions`, or it uses several threads.
+    """
+    from distributed import get_worker
+
+    worker = get_worker()
+    here = versions() | {name: os.environ.get(name, "not set") for name in ONE_THREAD}
+    for name, wanted in (expected | ONE_THREAD).items():
+        if here[name] != wanted:
+            raise UnlikeWorkerError(
+                f"the worker {worker.address} has {name} {here[name]}, must be {wanted}"
+            )
+    if worker.state.nthreads > 1:
+        raise UnlikeWorkerError(
+            f"the worker {worker.address} has {worker.state.nthreads} threads, must be 1: start "
+            f"dask worker with --nworkers {worker.state.nthreads} --nthreads 1"
+        )
+    return attempt(measure, trial)
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of what a trial's bits may depend on, by name."""
+    from ..trials.trial import RESULTS_VERSION
+
+    packages = {name: version(name) for name in PACKAGES}
+    return {"results version": str(RESULTS_VERSION), "Python": python_version(), **packages}

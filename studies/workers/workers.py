@@ -1,0 +1,95 @@
+"""Who runs the trials: processes on this machine, or workers of a Dask cluster on many.
+
+A family of siblings with one interface, told apart by the name of their backend. Whoever runs a
+trial, its bits are the same: each trial has a process to itself, linear algebra uses one thread.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Literal, Protocol
+
+from ..spec.errors import SpecError
+from ..trials.trial import Trial
+from .worker import CORES, Arrival, Measure
+
+Backend = Literal["loky", "dask"]
+"""``loky``: processes of this machine. ``dask``: workers of a Dask cluster."""
+
+
+class Workers(Protocol):
+    """Processes that run trials."""
+
+    @property
+    def processes(self) -> int:
+        """How many trials run at a time."""
+        ...
+
+    def arrivals(
+        self, trials: Sequence[Trial], measure: Measure, started: Callable[[Trial], None]
+    ) -> Generator[Arrival]:
+        """Run trials and yield what becomes of each, in whatever order; closing stops them.
+
+        Parameters
+        ----------
+        trials
+            The trials.
+        measure
+            Runs one of them; a module-level function, since workers import it by name.
+        started
+            Called with each trial when it is handed to a worker, by any thread.
+        """
+        ...
+
+
+def check_jobs(jobs: int) -> None:
+    """Refuse a number of processes below one."""
+    if jobs < 1:
+        raise SpecError(f"--jobs {jobs}: must be at least 1")
+
+
+@contextmanager
+def hire(backend: Backend, jobs: int | None, address: str | None, trials: int) -> Iterator[Workers]:
+    """Have workers for as long as the context lasts.
+
+    Parameters
+    ----------
+    backend
+        Of which kind.
+    jobs
+        Most trials at a time; None: one for every core, or for every worker at `address`.
+    address
+        Of the scheduler of a running Dask cluster; None: workers of this machine are started.
+    trials
+        How many trials there are; no more workers are started.
+
+    Raises
+    ------
+    SpecError
+        If there are none to be had; one line says why.
+    """
+    if jobs is not None:
+        check_jobs(jobs)
+    wanted = max(1, min(jobs or CORES, trials))
+    if backend == "loky":
+        from .loky import LokyWorkers
+
+        if address is not None:
+            raise SpecError(f"--address {address}: is for --backend dask only")
+        yield LokyWorkers(wanted)
+        return
+    try:
+        from .dask import DaskWorkers
+    except ModuleNotFoundError as error:
+        if error.name not in ("dask", "distributed"):
+            raise
+        raise SpecError(
+            f"--backend dask: {error.name} is not installed; pip install 'nested-agents[dask]'"
+        ) from None
+    if address is None:
+        with DaskWorkers.local(wanted) as workers:
+            yield workers
+    else:
+        with DaskWorkers.at(address, jobs) as workers:
+            yield workers

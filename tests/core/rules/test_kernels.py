@@ -1,0 +1,270 @@
+"""Every kernel against its plain-NumPy twin, over many shapes of rule base."""
+
+from itertools import combinations
+from math import pi
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nested_agents.core.protocols import Blocks
+from nested_agents.core.rules import kernels
+from nested_agents.core.rules import reference as twins
+from nested_agents.core.rules.fuzzy import Partition
+from nested_agents.core.rules.rule_base import RuleBase
+
+N_ACTIONS, N_AGENTS, GROUP = 4, 4, 2
+TERMS = {
+    "order 1": [(0,), (1,), (2,), (3,)],
+    "order 2": list(combinations(range(4), 2)),
+    "order 4": [(0, 1, 2, 3)],
+    "mixed": [(0,), (2,), (1, 3), (0, 2, 3)],
+    "one variable unused": [(1, 2)],
+}
+
+
+def partitions_of(membership: str) -> list[Partition]:
+    return [
+        Partition((-1.0, 0.0, 0.5, 2.0), membership),
+        Partition((-2.2, -0.5, 0.0, 0.5, 2.2), membership, 2 * pi),
+        Partition((0.0, 1.0), membership, steepness=3.0),
+        Partition((-1.0, 1.0, 1.5), membership, 4.0, 5.0),
+    ]
+
+
+def states_of(rng: np.random.Generator, m: int, d: int = 4) -> np.ndarray:
+    """States inside and outside the ranges, some of them exactly on centres."""
+    states = rng.uniform(-4.0, 4.0, (m, d))
+    states[: m // 3] = rng.choice([-2.2, -1.0, 0.0, 0.5, 1.0, 2.0], (m // 3, d))
+    return states
+
+
+def blocks_of(rng: np.random.Generator, n_own: int, d: int = 4) -> Blocks:
+    own = states_of(rng, N_ACTIONS**GROUP, d)[:, :n_own]
+    shared = states_of(rng, N_ACTIONS**N_AGENTS, d)[:, n_own:]
+    divisor = int(rng.choice([1, N_ACTIONS, N_ACTIONS**GROUP]))
+    own_rows = shared_rows = np.zeros(0, dtype=np.int64)
+    if rng.random() < 0.7:  # several codes lead to one
+        own_rows = rng.integers(len(own), size=len(own))
+        shared_rows = rng.integers(len(shared) // 2, size=len(shared))
+    return Blocks(
+        np.ascontiguousarray(own), np.ascontiguousarray(shared), divisor, own_rows, shared_rows
+    )
+
+
+@pytest.fixture(params=[0, 2, 4], ids=lambda n: f"{n} own")
+def n_own(request: pytest.FixtureRequest) -> int:
+    return request.param
+
+
+@pytest.fixture(params=TERMS)
+def terms(request: pytest.FixtureRequest) -> list:
+    return TERMS[request.param]
+
+
+@pytest.fixture(params=["triangular", "sigmoid"])
+def base(request: pytest.FixtureRequest, terms: list, n_own: int) -> RuleBase:
+    return RuleBase(partitions_of(request.param), terms, n_own)
+
+
+@pytest.fixture
+def rng() -> np.random.Generator:
+    return np.random.default_rng(20100)
+
+
+def test_values(base: RuleBase, rng: np.random.Generator) -> None:
+    theta, states = rng.normal(size=base.n_rules), states_of(rng, 60)
+    expected = twins.values(base, theta, states)
+    assert base.values(theta, states) == pytest.approx(expected, rel=0, abs=1e-12)
+    # The dense kernel serves any shape; the compact one is a shortcut for triangles.
+    dense = kernels.values_dense(theta, states, base.layout)
+    assert dense == pytest.approx(expected, rel=0, abs=1e-12)
+
+
+def test_block_values(base: RuleBase, rng: np.random.Generator) -> None:
+    theta, blocks = rng.normal(size=base.n_rules), blocks_of(rng, base.n_own)
+    codes = rng.integers(N_ACTIONS**N_AGENTS, size=90)
+    expected = twins.block_values(base, theta, blocks, codes)
+    assert base.block_values(theta, blocks, codes) == pytest.approx(expected, rel=0, abs=1e-12)
+    # Whatever the shape, the other kernels agree.
+    none = np.zeros(0, dtype=np.int64)
+    tried = kernels.Tried(codes[:, None], none, none)
+    kinds = [kernels.enumerate_dense]
+    if base.compact:
+        kinds += [kernels.enumerate_looked_up, kernels.enumerate_contracted]
+    for kind in kinds:
+        found = kind(
+            theta, blocks.own, blocks.own_rows, blocks.shared, blocks.shared_rows, blocks.divisor,
+            *tried, none, np.zeros((0, 0)), base.layout,
+        )  # fmt: skip
+        assert found == pytest.approx(expected, rel=0, abs=1e-12)
+
+
+@pytest.mark.parametrize("averaged", [False, True])
+@pytest.mark.parametrize("agent", [0, 1, 3])
+def test_enumerate(base: RuleBase, rng: np.random.Generator, agent: int, averaged: bool) -> None:
+    theta, blocks = rng.normal(size=base.n_rules), blocks_of(rng, base.n_own)
+    joint, chances = rng.integers(N_ACTIONS, size=N_AGENTS), rng.random((N_AGENTS, N_ACTIONS))
+    below = np.arange(agent + 1, N_AGENTS)
+    grid = np.indices((N_ACTIONS,) * (1 + len(below))).reshape(1 + len(below), -1)
+    every = np.tile(joint[:, None], grid.shape[1])
+    every[agent:] = grid
+    places = N_ACTIONS ** np.arange(N_AGENTS - 1, -1, -1)
+    values = twins.block_values(base, theta, blocks, places @ every).reshape(N_ACTIONS, -1)
+    given = np.where(np.arange(N_AGENTS) < agent, places, 0)
+    codes = (places[agent:] @ grid).reshape(N_ACTIONS, -1)
+    tried = kernels.Tried(codes, given, below)
+    expected = values.max(axis=1)
+    if averaged:
+        weights = np.ones(1)
+        for one in below:
+            weights = np.multiply.outer(weights, chances[one]).ravel()
+        expected = values @ (weights / weights.sum())
+    found = base.enumerate(theta, blocks, tried, joint, chances if averaged else np.zeros((0, 0)))
+    assert found == pytest.approx(expected, rel=0, abs=1e-12)
+    assert not base.enumerate(0.0 * theta, blocks, tried, joint, np.zeros((0, 0))).any()
+
+
+def test_td_update(base: RuleBase, rng: np.random.Generator) -> None:
+    theta, trace = rng.normal(size=(2, 3, base.n_rules))
+    theta_twin, trace_twin = theta.copy(), trace.copy()
+    reach = np.full((3, base.n_parts), 5.0)
+    for _ in range(60):
+        states, steps = states_of(rng, 3), 0.1 * rng.normal(size=3)
+        kernels.td_update(theta, trace, reach, states, steps, 0.38, base.layout)
+        twins.td_update(base, theta_twin, trace_twin, states, steps, 0.38)
+    assert trace == pytest.approx(trace_twin, rel=0, abs=1e-12)
+    assert theta == pytest.approx(theta_twin, rel=0, abs=1e-12)
+
+
+@pytest.mark.parametrize("discount", [0.95, 0.0])
+def test_td_updates_with_their_errors(
+    base: RuleBase, rng: np.random.Generator, discount: float
+) -> None:
+    theta, trace = rng.normal(size=(2, 3, base.n_rules))
+    theta_twin, trace_twin, lengths = theta.copy(), trace.copy(), np.array([1.0, 2.0, 0.5])
+    reach = np.full((3, base.n_parts), 5.0)
+    for _ in range(5):
+        states, entered = states_of(rng, 6).reshape(2, 3, -1)
+        now, ahead = (
+            np.einsum("ij,ij->i", base.features(met), theta_twin) for met in (states, entered)
+        )
+        base.td_update(theta, trace, reach, states, entered, -0.3, discount, 0.1, lengths, 0.38)
+        steps = 0.1 * (-0.3 + discount * ahead - now) / lengths
+        twins.td_update(base, theta_twin, trace_twin, states, steps, 0.38)
+    assert trace == pytest.approx(trace_twin, rel=0, abs=1e-12)
+    assert theta == pytest.approx(theta_twin, rel=0, abs=1e-12)
+
+
+def test_strengths_of_many(base: RuleBase, rng: np.random.Generator) -> None:
+    lay = kernels.unpack(base.layout)
+    states = states_of(rng, 300)
+    states[-3:] = [[-90.0] * 4, [90.0] * 4, [1e6] * 4]
+    for j, partition in enumerate(base.partitions):
+        out = np.empty((lay.counts.max(), len(states)))
+        kernels.many_strengths(j, states[:, j], lay, out)
+        expected = partition.strengths(states[:, j]).T
+        assert out[: lay.counts[j]] == pytest.approx(expected, rel=0, abs=1e-14)
+
+
+def test_strengths_of_many_between_steep_sigmoids() -> None:
+    steep = Partition(tuple(np.linspace(0.0, 1.0, 9).tolist()), "sigmoid", steepness=120.0)
+    x = np.linspace(-2.0, 3.0, 501)
+    out = np.empty((9, len(x)))
+    kernels.many_strengths(0, x, kernels.unpack(kernels.layout([steep], [(0,)], 0)), out)
+    assert out == pytest.approx(steep.strengths(x).T, rel=0, abs=1e-13)
+
+
+@given(st.floats(-690, 690))
+def test_exponentials_are_exact_to_the_last_bits(x: float) -> None:
+    assert kernels.exponential(x) == pytest.approx(np.exp(x), rel=1e-15, abs=0)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_each(base: RuleBase, rng: np.random.Generator, count: int) -> None:
+    theta = rng.normal(size=(5, base.n_rules))
+    states = states_of(rng, 5 * count).reshape(5, count, -1)
+    expected = [base.features(states[i]) @ theta[i] for i in range(5)]
+    assert base.each(theta, states) == pytest.approx(np.array(expected), rel=0, abs=1e-12)
+    dense = kernels.each_dense(theta, states, base.layout)
+    assert dense == pytest.approx(np.array(expected), rel=0, abs=1e-12)
+
+
+def test_single_precision(base: RuleBase, rng: np.random.Generator) -> None:
+    theta, trace = rng.normal(size=(2, 3, base.n_rules)).astype(np.float32)
+    blocks, codes = blocks_of(rng, base.n_own), rng.integers(N_ACTIONS**N_AGENTS, size=50)
+    states, steps = states_of(rng, 3), 0.1 * rng.normal(size=3)
+    wide = theta.astype(float), trace.astype(float)
+    scale = float(np.abs(theta).max())
+    for found, expected in (
+        (
+            base.block_values(theta[0], blocks, codes),
+            twins.block_values(base, wide[0][0], blocks, codes),
+        ),
+        (
+            base.each(theta, states[:, None])[:, 0],
+            np.einsum("ij,ij->i", base.features(states), wide[0]),
+        ),
+    ):
+        assert found == pytest.approx(expected, rel=1e-5, abs=1e-5 * scale)
+    reach = np.full((3, base.n_parts), 5.0)
+    kernels.td_update(theta, trace, reach, states, steps, 0.38, base.layout)
+    twins.td_update(base, *wide, states, steps, 0.38)
+    assert theta.dtype == trace.dtype == np.float32
+    assert trace == pytest.approx(wide[1], rel=1e-5, abs=1e-5)
+    assert theta == pytest.approx(wide[0], rel=1e-5, abs=1e-5)
+
+
+def test_block_values_agree_with_values_of_the_states(
+    base: RuleBase, rng: np.random.Generator
+) -> None:
+    theta, blocks = rng.normal(size=base.n_rules), blocks_of(rng, base.n_own)
+    codes = np.arange(N_ACTIONS**N_AGENTS)
+    expected = base.values(theta, blocks.states(codes))
+    assert base.block_values(theta, blocks, codes) == pytest.approx(expected, rel=0, abs=1e-12)
+
+
+def test_a_states_array_in_any_memory_order(base: RuleBase, rng: np.random.Generator) -> None:
+    theta, states = rng.normal(size=base.n_rules), states_of(rng, 12)
+    assert (base.values(theta, np.asfortranarray(states)) == base.values(theta, states)).all()
+    assert (base.values(theta, states[::2]) == base.values(theta, states)[::2]).all()
+
+
+@pytest.mark.parametrize("membership", ["triangular", "sigmoid"])
+def test_the_papers_78125_rules(membership: str, rng: np.random.Generator) -> None:
+    angle = tuple(float(c) for c in np.linspace(-pi, pi, 5, endpoint=False))
+    circle = Partition(angle, membership, 2 * pi)
+    line = Partition((0.0, 0.25, 0.5, 0.75, 1.0), membership)
+    base = RuleBase([circle, circle, line, line, circle, circle, line], [tuple(range(7))], n_own=4)
+    assert base.n_rules == 5**7
+    theta, states = rng.normal(size=base.n_rules), rng.uniform(-4, 4, (4, 7))
+    expected = [float(base.features(state[None])[0] @ theta) for state in states]
+    assert base.each(theta[None], states[None])[0] == pytest.approx(expected, rel=0, abs=1e-12)
+    states = np.tile(states, (6, 1))
+    states[:, 4:] += 0.01 * rng.normal(size=(24, 3))  # a few own blocks, shared ones near by
+    expected = twins.values(base, theta, states)
+    assert base.values(theta, states) == pytest.approx(expected, rel=0, abs=1e-12)
+    for size in (1, 2, 3, 24):
+        blocks, codes = blocks_of(rng, 4, 7), rng.integers(N_ACTIONS**N_AGENTS, size=size)
+        blocks.own[:, 3] = rng.choice([0.1, 0.5, 0.52, 0.9], len(blocks.own))  # levels shared
+        expected = twins.block_values(base, theta, blocks, codes)
+        found = base.block_values(theta, blocks, codes)
+        assert found == pytest.approx(expected, rel=0, abs=1e-12)
+
+    theta, trace = rng.normal(size=(2, 2, base.n_rules))
+    theta_twin, trace_twin = theta.copy(), trace.copy()
+    steps = np.array([0.01, -0.02])
+    reach = np.full((2, base.n_parts), 5.0)
+    kernels.td_update(theta, trace, reach, states[:2], steps, 0.3996, base.layout)
+    twins.td_update(base, theta_twin, trace_twin, states[:2], steps, 0.3996)
+    assert np.abs(trace - trace_twin).max() <= 1e-12
+    assert np.abs(theta - theta_twin).max() <= 1e-12
+
+
+def test_add_features(base: RuleBase, rng: np.random.Generator) -> None:
+    target, states = rng.normal(size=(3, base.n_rules)), states_of(rng, 3)
+    weights = rng.normal(size=3)
+    expected = target + weights[:, None] * base.features(states)
+    kernels.add_features(target, states, weights, base.layout)
+    assert target == pytest.approx(expected, rel=0, abs=1e-12)

@@ -1,0 +1,99 @@
+"""Predictions: block tables, single joint actions and rewards agree with each other."""
+
+import numpy as np
+import pytest
+
+from nested_agents.scenarios import BoxPushing, ScenarioSettings
+from nested_agents.scenarios.box_pushing.prediction.prediction import mean_twists
+
+
+def moving(**settings) -> BoxPushing:
+    scenario = BoxPushing(ScenarioSettings(**settings))
+    scenario.reset(3)
+    scenario.step(np.arange(len(scenario.agents)) % 2)
+    return scenario
+
+
+def all_joint_actions(n: int) -> np.ndarray:
+    return np.indices((4,) * n).reshape(n, -1).T
+
+
+@pytest.mark.parametrize("robots", [1, 2])
+def test_relational_blocks_are_the_states_of_every_joint_action(robots: int) -> None:
+    scenario = moving(robots=robots)
+    prediction, joint = scenario.predict(), all_joint_actions(2 * robots)
+    for agent in range(len(scenario.agents)):
+        tables = prediction.blocks(agent).states(np.arange(len(joint)))
+        np.testing.assert_array_equal(tables, prediction.states(agent, joint))
+
+
+def test_drives_of_one_twist_are_pushed_once() -> None:
+    scenario = moving(robot="four-wheel", robots=1)
+    prediction, joint = scenario.predict(), all_joint_actions(4)
+    for agent in range(4):
+        blocks = prediction.blocks(agent)
+        # Three speeds of each wheel, so six sums at most on each side; two are at rest.
+        assert len(blocks.shared) <= 36 < prediction.drives.counts[0]
+        assert len(blocks.own) <= 3
+        tables = blocks.states(np.arange(len(joint)))
+        np.testing.assert_allclose(tables, prediction.states(agent, joint), rtol=0, atol=1e-12)
+
+
+def test_played_predictions_keep_drives_of_one_twist_apart() -> None:
+    scenario = moving(robot="four-wheel", robots=1, predictor="exact")
+    prediction = scenario.predict()
+    assert len(prediction.blocks(0).shared) == prediction.drives.counts[0]
+
+
+def test_the_own_block_of_the_paper_is_that_of_the_robot_alone() -> None:
+    scenario = moving(state_space="paper")
+    prediction, joint = scenario.predict(), all_joint_actions(4)
+    for agent in range(4):
+        tables = prediction.blocks(agent).states(np.arange(256))
+        states = prediction.states(agent, joint)
+        np.testing.assert_array_equal(tables[:, 3:], states[:, 3:])
+        # The distance from the goal of a robot that the other one hardly moves.
+        assert np.abs(tables - states)[:, 2].max() < 0.05
+
+
+def test_predicted_rewards_know_the_sensors() -> None:
+    usual = moving().predict().reward_table()
+    short = moving(infrared={"reach": 0.001}).predict().reward_table()
+    assert (short <= usual).all()
+    assert (short < usual).any()
+
+
+def test_rewards_by_code_are_the_rewards_of_every_joint_action() -> None:
+    prediction = moving().predict()
+    np.testing.assert_array_equal(
+        prediction.reward_table(), prediction.rewards(all_joint_actions(4))
+    )
+
+
+def test_commands_are_what_the_servo_layer_commands() -> None:
+    scenario = moving()
+    joint = np.array([0, 1, 2, 3])
+    commands = scenario.predict().commands(joint)
+    scenario.step(joint)
+    np.testing.assert_array_equal(commands, scenario.measure()["wheel_speeds"])
+
+
+def test_free_robots_do_not_slip() -> None:
+    scenario = BoxPushing(ScenarioSettings())
+    scenario.reset(3)
+    scenario.world.place(
+        np.array([[-1.0, 0.3, 0.4], [-1.0, -0.3, 1.0]]), scenario.world.box_pose.copy()
+    )
+    slips = scenario.predict().slips(np.array([0, 0, 0, 2]))
+    np.testing.assert_allclose(slips, 0.0, atol=2e-3)
+
+
+def test_mean_twists_invert_driving_an_arc() -> None:
+    before = np.array([[0.2, -0.1, 3.0]])
+    ahead, turn, seconds = 0.08, 0.9, 0.5
+    heading = 3.0 + turn * seconds
+    radius = ahead / turn
+    chord = radius * np.array([np.sin(heading) - np.sin(3.0), np.cos(3.0) - np.cos(heading)])
+    after = before + np.append(chord, turn * seconds)
+    found = mean_twists(before, after, seconds)
+    np.testing.assert_allclose(found, [[ahead, 0.0, turn]], atol=1e-12)

@@ -1,0 +1,140 @@
+"""The push predictor: limits that can be worked out, and the world that it predicts."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nested_agents.scenarios import BoxPushing, ScenarioSettings
+from nested_agents.scenarios.box_pushing.prediction.push import PushModel, push
+from nested_agents.scenarios.box_pushing.prediction.push_lanes import (
+    BOX_ROWS,
+    COS,
+    LANES,
+    PSI,
+    SIN,
+    head,
+)
+from nested_agents.scenarios.box_pushing.prediction.push_reference import push_one
+from nested_agents.scenarios.box_pushing.world.boxes import BOXES
+from nested_agents.scenarios.box_pushing.world.robots import ROBOTS, compliance
+
+BOX, ROBOT = BOXES["square"], ROBOTS["e-puck"]
+BEHIND = -0.1 - ROBOT.radius
+
+
+def model(n: int, *, rigid: bool = False) -> PushModel:
+    yielding = np.zeros((3, 3)) if rigid else compliance(ROBOT)
+    return PushModel(
+        edges=BOX.outline.edges,
+        rounding=BOX.outline.rounding,
+        reach=BOX.reach,
+        radii=np.full(n, ROBOT.radius),
+        compliance=np.stack([yielding] * n),
+        friction_force=BOX.friction_force,
+        friction_radius=BOX.friction_radius,
+        contact_friction=0.0 if rigid else BOX.contact_friction,
+    )
+
+
+def ahead(poses, speed: float, believed: PushModel, seconds: float = 0.512):
+    robots = np.array(poses, dtype=float)
+    twists = np.zeros((len(robots), 1, 3))
+    twists[:, 0, 0] = speed
+    choices = np.zeros((1, len(robots)), dtype=np.int64)
+    after, box, gaps = push(robots, np.zeros(3), twists, choices, seconds, believed)
+    return after[0], box[0], gaps[0]
+
+
+def test_a_free_robot_drives_an_arc() -> None:
+    robots, box = np.array([[-1.0, 0.0, 0.3]]), np.zeros(3)
+    twists = np.array([[[0.1, 0.0, 0.8]]])
+    after, moved, gaps = push(robots, box, twists, np.zeros((1, 1), np.int64), 0.512, model(1))
+    turned, radius = 0.3 + 0.8 * 0.512, 0.1 / 0.8
+    expected = [
+        -1.0 + radius * (np.sin(turned) - np.sin(0.3)),
+        radius * (np.cos(0.3) - np.cos(turned)),
+        turned,
+    ]
+    np.testing.assert_allclose(after[0, 0], expected, atol=1e-4)
+    np.testing.assert_array_equal(moved[0], 0.0)
+    assert gaps[0, 0] == pytest.approx(-after[0, 0, 0] - 0.1 - ROBOT.radius, abs=1e-12)
+
+
+def test_rigid_robots_carry_the_box_along() -> None:
+    after, box, gaps = ahead([[BEHIND, 0.05, 0.0], [BEHIND, -0.05, 0.0]], 0.1, model(2, rigid=True))
+    # The sweeps visit one robot after the other and stop before they have wholly agreed.
+    np.testing.assert_allclose(box, [0.1 * 0.512, 0.0, 0.0], atol=5e-3)
+    np.testing.assert_allclose(after[:, 0], BEHIND + 0.1 * 0.512, atol=1e-12)
+    np.testing.assert_allclose(gaps, 0.0, atol=5e-4)
+
+
+def test_two_soft_robots_slip_by_compliance_times_half_the_load() -> None:
+    _, box, _ = ahead([[BEHIND, 0.05, 0.0], [BEHIND, -0.05, 0.0]], 0.13, model(2))
+    slip = compliance(ROBOT)[0, 0] * BOX.friction_force / 2
+    np.testing.assert_allclose(box[0], (0.13 - slip) * 0.512, rtol=0.02)
+    np.testing.assert_allclose(box[1:], 0.0, atol=5e-3)
+
+
+def test_a_robot_that_drives_away_leaves_the_box() -> None:
+    _, box, gaps = ahead([[BEHIND, 0.0, 0.0]], -0.1, model(1))
+    np.testing.assert_array_equal(box, 0.0)
+    assert gaps[0] == pytest.approx(0.0512, abs=1e-9)
+
+
+def test_a_push_off_the_centre_turns_the_box_away() -> None:
+    _, left, _ = ahead([[BEHIND, 0.06, 0.0]], 0.13, model(1))
+    _, right, _ = ahead([[BEHIND, -0.06, 0.0]], 0.13, model(1))
+    assert left[2] < -0.05
+    np.testing.assert_allclose(right, left * [1, -1, -1], atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["square", "L", "circle", "star"])
+@pytest.mark.parametrize("rigid", [False, True])
+def test_the_lanes_compute_what_is_written(name: str, rigid: bool) -> None:
+    rng = np.random.default_rng(0)
+    outline = BOXES[name].outline
+    believed = model(3, rigid=rigid)._replace(
+        edges=outline.edges, rounding=outline.rounding, reach=outline.radius
+    )
+    for count in (1, 37):
+        angles = rng.uniform(-np.pi, np.pi, 3)
+        distances = rng.uniform(0.8, 1.2, 3) * (outline.radius + ROBOT.radius)
+        robots = np.stack([distances * np.cos(angles), distances * np.sin(angles), angles + 3], 1)
+        box = np.array([0.0, 0.0, rng.uniform(-9, 9)])
+        twists = rng.uniform(-0.1, 0.13, (3, 5, 3)) * [1, 0.2, 9]
+        choices = rng.integers(5, size=(count, 3))
+        found = push(robots, box, twists, choices, 0.512, believed)
+        for c in range(count):
+            written = push_one(robots, box, twists, choices[c], 0.512, believed)
+            for a, b in zip(found, written, strict=True):
+                np.testing.assert_allclose(a[c], b, rtol=0, atol=1e-11)
+
+
+@given(st.lists(st.floats(-1e4, 1e4), min_size=1, max_size=LANES))
+def test_headings_are_exact_to_the_last_bit_but_one(angles: list[float]) -> None:
+    rows = np.zeros(BOX_ROWS * LANES)
+    rows[PSI * LANES : PSI * LANES + len(angles)] = angles
+    head(rows, len(angles))
+    for row, function in ((COS, np.cos), (SIN, np.sin)):
+        found = rows[row * LANES : row * LANES + len(angles)]
+        np.testing.assert_allclose(found, function(angles), rtol=0, atol=3e-16)
+
+
+def test_it_predicts_the_world_within_millimetres() -> None:
+    scenario = BoxPushing(ScenarioSettings(start="easy"))
+    rng = np.random.default_rng(1)
+    errors, moves = [], []
+    for episode in range(6):
+        scenario.reset(20_000 + episode)
+        joint = np.zeros(4, dtype=np.int64)
+        for _ in range(12):
+            predicted = scenario.predict().poses(joint[None])
+            before = scenario.world.box_pose.copy()
+            scenario.step(joint)
+            errors.append(np.hypot(*(predicted.box[0] - scenario.world.box_pose)[:2]))
+            moves.append(np.hypot(*(before - scenario.world.box_pose)[:2]))
+            joint = rng.choice([0, 2, 2, 2], size=4)
+    pushed = np.array(moves) > 0.005
+    assert pushed.sum() > 20
+    assert np.mean(np.array(errors)[pushed]) < 0.2 * np.mean(np.array(moves)[pushed])

@@ -1,0 +1,63 @@
+"""The scripted controller solves box pushing: the scenario is known to be solvable."""
+
+import numpy as np
+import pytest
+
+from nested_agents.scenarios import BoxPushing, ScenarioSettings, build
+from nested_agents.scenarios.box_pushing.scripted.controller import (
+    ScriptedController,
+    decisions_to_goal,
+)
+from nested_agents.scenarios.box_pushing.world.boxes import BOXES
+from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
+
+
+def solved(scenario: BoxPushing, seed: int) -> bool:
+    """Return whether the controller brings the box to the goal within 200 decisions."""
+    return decisions_to_goal(scenario, seed, 200) is not None
+
+
+# The whole table, 20 seeds of every box and start, all solved: python -m benchmarks.scripted.
+
+
+@pytest.mark.parametrize("start", ["easy", "medium", "hard"])
+def test_two_robots_and_a_square(start: str) -> None:
+    scenario = build(ScenarioSettings(start=start))  # type: ignore[arg-type]
+    assert all(solved(scenario, seed) for seed in range(6))
+
+
+@pytest.mark.parametrize("box", BOXES)
+def test_every_box(box: str) -> None:
+    scenario = build(ScenarioSettings(box=box))
+    assert all(solved(scenario, seed) for seed in range(3))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("box", BOXES)
+def test_every_box_from_anywhere(box: str) -> None:
+    scenario = build(ScenarioSettings(box=box, start="hard"))
+    assert all(solved(scenario, seed) for seed in range(100, 105))
+
+
+@pytest.mark.parametrize("robots", [1, 3, 4])
+def test_other_numbers_of_robots(robots: int) -> None:
+    scenario = build(ScenarioSettings(robots=robots))
+    assert np.mean([solved(scenario, seed) for seed in range(4)]) >= 0.75
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_every_robot(robot: str) -> None:
+    scenario = build(ScenarioSettings(robot=robot))
+    assert np.mean([solved(scenario, seed) for seed in range(3)]) > 0.5
+
+
+def test_it_remembers_nothing() -> None:
+    scenario = build(ScenarioSettings(start="hard"))
+    old = ScriptedController(scenario.world.robots, scenario.box)
+    scenario.reset(3)
+    for _ in range(10):
+        measured = scenario.measure()
+        action = old.act(measured)
+        fresh = ScriptedController(scenario.world.robots, scenario.box)
+        np.testing.assert_array_equal(fresh.act(measured), action)
+        scenario.step(action)

@@ -1,0 +1,163 @@
+"""State variables worked out by hand, and their mirror images."""
+
+from math import pi
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nested_agents.scenarios import BoxPushing, ScenarioSettings
+from nested_agents.scenarios.box_pushing.states.kernels import angle_of
+from nested_agents.scenarios.box_pushing.states.relational import VARIABLES
+from nested_agents.scenarios.box_pushing.states.state_spaces import (
+    STATE_SPACES,
+    relational,
+    state_space_for,
+)
+from nested_agents.scenarios.box_pushing.states.view import View, wrap
+
+GOAL = np.array([1.0, 0.0, 0.0])
+
+
+def view(robots, box, gaps) -> View:
+    described = np.array([robots], float), np.array([box], float), np.array([gaps], float)
+    return View(*described, GOAL, before=1.03, periods=3.0)
+
+
+EVERY = relational("every", *VARIABLES)
+
+
+@pytest.mark.parametrize("name", STATE_SPACES)
+def test_functions_fill_the_space_they_describe(name: str) -> None:
+    spec = STATE_SPACES[name]
+    poses = np.random.default_rng(0).uniform(-1, 1, (5, 2, 3))
+    seen = View(poses, poses[:, 0], np.abs(poses[:, :, 0]), GOAL, 1.0, 1.0)
+    assert spec.own(poses[:, 0], poses[:, 0, 0], GOAL).shape == (5, spec.space.n_own)
+    assert spec.shared(seen, 1).shape == (5, spec.space.n_variables - spec.space.n_own)
+
+
+def test_relational_variables_by_hand() -> None:
+    # The box 1 m before the goal, robot 1 straight behind it, robot 2 on its left, facing it.
+    situation = view([[-0.2, 0.0, 0.1], [0.0, 0.2, -pi / 2]], [0.0, 0.0, 0.3], [0.06, 0.08])
+    first = dict(zip(VARIABLES, EVERY.shared(situation, 0)[0], strict=True))
+    assert (first["gap"], first["others_gap"], first["box_distance"]) == (0.06, 0.08, 1.0)
+    assert first["box_bearing"] == pytest.approx(-0.1)
+    assert first["side"] == pytest.approx(0.0)
+    # Their middle is behind on the left and pushes to the right.
+    assert first["push_bearing"] == pytest.approx(-pi / 4)
+    assert first["miss"] == pytest.approx(-np.sqrt(0.5))
+    assert first["approach"] == pytest.approx(0.01)  # 3 cm in three periods
+    assert first["box_turn"] == first["bend"] == pytest.approx(0.3)  # straight ahead
+    second = dict(zip(VARIABLES, EVERY.shared(situation, 1)[0], strict=True))
+    assert second["box_bearing"] == pytest.approx(0.0)
+    assert second["side"] == pytest.approx(-pi / 2)
+
+
+def test_a_push_away_from_the_goal_misses_it_by_the_whole_distance() -> None:
+    situation = view([[0.2, 0.1, 0.0]], [0.0, 0.0, 0.0], [0.06])
+    assert EVERY.shared(situation, 0)[0][list(VARIABLES).index("miss")] == -1.0
+
+
+def test_the_arc_to_the_goal_pose_bends_twice_as_far_as_the_course() -> None:
+    # 45 degrees to the left of the way to the goal: an arc begins at right angles to it.
+    situation = view([[0.0, 0.0, 0.0]], [0.0, 1.0, -pi / 2], [0.06])
+    assert EVERY.shared(situation, 0)[0][list(VARIABLES).index("bend")] == pytest.approx(0.0)
+
+
+def test_a_single_robot_has_no_others() -> None:
+    shared = EVERY.shared(view([[-0.2, 0, 0]], [0, 0, 0], [0.06]), 0)[0]
+    assert shared[3] == shared[0] == 0.06
+
+
+def test_equation_1_by_hand() -> None:
+    own = STATE_SPACES["paper"].own(np.array([[1.0, -2.0, pi]]), np.array([0.05]), GOAL)[0]
+    np.testing.assert_allclose(own, [-pi, -pi / 2, 2.0, 0.05], atol=1e-12)
+    shared = STATE_SPACES["paper"].shared(view([[0, 0, 0]], [1.0, 1.0, 0.2], [0.1]), 0)[0]
+    np.testing.assert_allclose(shared, [0.2, -pi / 2 - 0.2, 1.0], atol=1e-12)
+
+
+def test_mirrored_worlds_have_mirrored_angles() -> None:
+    rng = np.random.default_rng(2)
+    robots, box = rng.uniform(-1, 1, (2, 3)), rng.uniform(-0.5, 0.5, 3)
+    flip = np.array([1.0, -1.0, -1.0])
+    for robot in (0, 1):
+        seen = EVERY.shared(view(robots, box, [0.1, 0.2]), robot)[0]
+        mirrored = EVERY.shared(view(robots * flip, box * flip, [0.1, 0.2]), robot)[0]
+        signs = [
+            -1 if described.low < 0 and name != "approach" else 1
+            for name, (described, _) in VARIABLES.items()
+        ]
+        np.testing.assert_allclose(mirrored, seen * signs, atol=1e-12)
+
+
+def test_angles_wrap() -> None:
+    np.testing.assert_allclose(wrap(np.array([0.0, 3 * pi, -1.5 * pi])), [0.0, -pi, 0.5 * pi])
+
+
+def test_wrap_is_the_remainder_to_the_last_bit() -> None:
+    angles = np.random.default_rng(0).uniform(-300, 300, 100_000)
+    np.testing.assert_array_equal(wrap(angles), (angles + pi) % (2 * pi) - pi)
+
+
+@pytest.mark.parametrize("name", STATE_SPACES)
+def test_memberships_of_wheel_speeds_span_those_of_the_robot(name: str) -> None:
+    assert state_space_for(name, 0.13) is STATE_SPACES[name]
+    fast, plain = state_space_for(name, 0.39).space, STATE_SPACES[name].space
+    for variable, like in zip(fast.variables, plain.variables, strict=True):
+        if variable.name != "wheel_speed":
+            assert variable == like
+        else:
+            assert (variable.low, variable.high) == pytest.approx((-0.39, 0.39))
+            assert variable.centres == pytest.approx(np.multiply(3, like.centres))
+            assert variable.labels == like.labels
+
+
+def test_a_fast_robot_gets_them() -> None:
+    wheels = [{"name": "a", "x": 0, "y": 0.02}, {"name": "b", "x": 0, "y": -0.02}]
+    settings = ScenarioSettings.model_validate({"robot": {"wheels": wheels, "max_speed": 0.26}})
+    scenario = BoxPushing(settings)
+    assert scenario.state_space.own[0].high == pytest.approx(0.26)
+    scenario.reset(0)
+    ahead = np.zeros(4, dtype=int)
+    states = [scenario.step(ahead).states for _ in range(3)][-1]
+    assert states[:, 0].max() == 0.26
+    assert (states >= scenario.bounds[:, 0]).all()
+    assert (states <= scenario.bounds[:, 1]).all()
+
+
+@pytest.mark.parametrize("robots", [1, 2, 5])
+@pytest.mark.parametrize("names", [tuple(VARIABLES), ("miss",), ("bend", "gap")])
+def test_compiled_blocks_are_those_of_the_definition(names: tuple[str, ...], robots: int) -> None:
+    rng = np.random.default_rng(robots)
+    seen = View(
+        rng.normal(size=(100, robots, 3)) * [1, 1, 9], rng.normal(size=(100, 3)) * [1, 1, 9],
+        rng.normal(size=(100, robots)), rng.normal(size=3), 0.7, 3.0,
+    )  # fmt: skip
+    space, wanted = relational("some", *names), list(range(robots))[::-1]
+    expected = np.array([space.shared(seen, r) for r in wanted])
+    np.testing.assert_allclose(space.shared_of(seen, wanted), expected, rtol=0, atol=1e-12)
+
+
+@given(st.floats(-1e9, 1e9), st.floats(-1e9, 1e9))
+def test_angles_are_exact_to_the_last_bits(x: float, y: float) -> None:
+    assert angle_of(x, y) == pytest.approx(np.arctan2(y + 0.0, x + 0.0), rel=0, abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("names", "complaint"),
+    [
+        (("gap", "mass"), "scenario.state_space: unknown variable 'mass', known: gap, "),
+        (("gap", "gap"), r"scenario.state_space = \['gap', 'gap'\]: variables must be distinct"),
+        ((), "at least one"),
+    ],
+)
+def test_lists_that_make_no_state_space_are_refused(names: tuple[str, ...], complaint: str) -> None:
+    with pytest.raises(ValueError, match=complaint):
+        BoxPushing(ScenarioSettings(state_space=names))
+
+
+def test_a_state_space_may_be_listed() -> None:
+    scenario = BoxPushing(ScenarioSettings(state_space=("gap", "miss")))
+    assert [v.name for v in scenario.state_space.variables] == ["wheel_speed", "gap", "miss"]
+    assert scenario.reset(0).shape == (4, 3)

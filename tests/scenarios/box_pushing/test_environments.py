@@ -1,0 +1,180 @@
+"""Environments: what the ecosystem's own checks say, and that they are the scenario."""
+
+import importlib.util
+import warnings
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from pettingzoo.test import parallel_api_test, parallel_seed_test
+
+from nested_agents.scenarios import BoxPushing, ScenarioSettings
+from nested_agents.scenarios.box_pushing.config import SeizedSettings
+from nested_agents.scenarios.box_pushing.environments import (
+    ENV_ID,
+    BoxPushingEnv,
+    RobotsEnv,
+    WheelsEnv,
+)
+from nested_agents.scenarios.box_pushing.pictures.rendering import SIDES
+
+PARALLEL = [WheelsEnv, RobotsEnv]
+SETTINGS = [
+    ScenarioSettings(hold=2),
+    ScenarioSettings(robots=3, robot="three-wheel", start="hard", state_space="paper", hold=2),
+    ScenarioSettings(failures=(SeizedSettings(wheels=("robot1.*",), episode=1),), hold=2),
+]
+
+
+@pytest.mark.parametrize("kind", PARALLEL)
+@pytest.mark.parametrize("settings", SETTINGS)
+def test_pettingzoo_finds_nothing(kind: type[WheelsEnv], settings: ScenarioSettings) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        parallel_api_test(kind(settings, steps=30), num_cycles=50)
+        parallel_seed_test(lambda: kind(settings, steps=30))
+
+
+@pytest.mark.parametrize("settings", SETTINGS)
+def test_gymnasium_finds_nothing(settings: ScenarioSettings) -> None:
+    env = gymnasium.make(ENV_ID, settings=settings, steps=20, render_mode="rgb_array")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        # Robots may go as far away as they like: such bounds are the true ones.
+        warnings.filterwarnings("ignore", message=".*A Box observation space m.*infinity.*")
+        check_env(env.unwrapped)
+    env.close()
+
+
+def play(env: WheelsEnv, seed: int | None = 3, steps: int = 12) -> list[Any]:
+    """Return all that an episode of equal random actions gives, as comparable bits."""
+    rng = np.random.default_rng(5)
+    given: list[Any] = [env.reset(seed=seed)[0]]
+    while env.agents and len(given) <= steps:
+        actions = {}
+        for agent in env.agents:
+            shape = env.action_space(agent).shape
+            actions[agent] = rng.integers(4, size=shape)
+        observations, rewards, ends, breaks, _ = env.step(actions)
+        given.append((observations, rewards, ends, breaks))
+    return [repr(frame) for frame in given]
+
+
+@pytest.mark.parametrize("kind", PARALLEL)
+def test_whole_episodes_follow_from_the_seed(kind: type[WheelsEnv]) -> None:
+    env = kind(SETTINGS[0])
+    first, second = play(env), play(env, seed=None)
+    assert first != second
+    assert (play(env), play(env, seed=None)) == (first, second)
+    assert (play(kind(SETTINGS[0])), play(kind(SETTINGS[0]), 4)) != (first, first)
+    assert play(kind(SETTINGS[0])) == first
+
+
+def test_the_three_views_show_one_scenario() -> None:
+    wheels, robots, joint = (kind(SETTINGS[1]) for kind in (WheelsEnv, RobotsEnv, BoxPushingEnv))
+    scenario = BoxPushing(SETTINGS[1])
+    seen = [wheels.reset(seed=1)[0], robots.reset(seed=1)[0], joint.reset(seed=1)[0]]
+    states = scenario.reset(int(np.random.default_rng(1).integers(2**63)))
+    rng = np.random.default_rng(2)
+    for _ in range(8):
+        for i, name in enumerate(scenario.agents):
+            np.testing.assert_array_equal(seen[0][name], states[i].astype(np.float32))
+        own = scenario.state_space.n_own
+        expected = [
+            np.concatenate([*states[list(group), :own], states[group[0], own:]])
+            for group in scenario.groups
+        ]
+        for r, part in enumerate(expected):
+            np.testing.assert_array_equal(seen[1][f"robot{r + 1}"], part.astype(np.float32))
+        np.testing.assert_array_equal(seen[2], np.concatenate(expected).astype(np.float32))
+        assert joint.seat.names[own - 1] == f"robot1.left.{scenario.state_space.own[-1].name}"
+        action = rng.integers(4, size=9)
+        transition = scenario.step(action)
+        states = transition.states
+        by_wheel = dict(zip(scenario.agents, action, strict=True))
+        by_robot = {f"robot{r + 1}": action[3 * r : 3 * r + 3] for r in range(3)}
+        one, two, three = wheels.step(by_wheel), robots.step(by_robot), joint.step(action)
+        seen = [one[0], two[0], three[0]]
+        assert set(one[1].values()) | set(two[1].values()) | {three[1]} == {transition.reward}
+
+
+@pytest.mark.parametrize("settings", SETTINGS)
+def test_observations_stay_within_their_spaces(settings: ScenarioSettings) -> None:
+    env = BoxPushingEnv(settings, steps=60)
+    env.action_space.seed(0)
+    for seed in range(4):
+        seen, _ = env.reset(seed=seed)
+        truncated = False
+        while not truncated:
+            assert env.observation_space.contains(seen)
+            seen, _, _, truncated, _ = env.step(env.action_space.sample())
+
+
+def test_episodes_are_counted_so_that_failures_set_in() -> None:
+    env = WheelsEnv(SETTINGS[2], steps=2)
+    failed = []
+    for options in (None, None, {"episode": 0}, {"episode": 7}, None):
+        _, infos = env.reset(seed=0 if not failed else None, options=options)
+        failed.append(bool(infos["robot1.left"]["failed"][0]))
+    assert failed == [False, True, False, True, True]
+
+
+def test_an_episode_ends_by_the_clock_and_at_the_goal() -> None:
+    env = BoxPushingEnv({"tolerance": 5.0}, steps=1)
+    env.reset(seed=0)
+    assert env.step(np.zeros(4))[2:4] == (True, False)
+    env = BoxPushingEnv(steps=2)
+    env.reset(seed=0)
+    assert [env.step(np.zeros(4))[3] for _ in range(2)] == [False, True]
+
+
+def test_a_step_after_the_end_is_empty() -> None:
+    env = WheelsEnv(steps=1)
+    env.reset(seed=0)
+    assert env.step(dict.fromkeys(env.agents, 0))[3]["robot1.left"]
+    assert env.agents == []
+    assert env.step({}) == ({}, {}, {}, {}, {})
+    assert env.game.scenario.measure()["robot_poses"].shape == (2, 3)
+
+
+def test_pictures() -> None:
+    env = BoxPushingEnv(SETTINGS[2], render_mode="rgb_array")
+    with pytest.raises(RuntimeError, match="call reset first"):
+        env.render()
+    env.reset(seed=0, options={"episode": 1})
+    first = env.render()
+    assert (first.shape, first.dtype) == ((SIDES[1], SIDES[0], 3), np.uint8)
+    env.step(np.zeros(4))
+    assert (env.render() != first).any()
+    assert BoxPushingEnv().render() is None
+
+
+@pytest.mark.skipif(importlib.util.find_spec("pygame") is None, reason="extra [human]")
+def test_the_window(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    env = WheelsEnv(render_mode="human")
+    env.reset(seed=0)
+    env.step(dict.fromkeys(env.agents, 0))
+    import pygame
+
+    shown = pygame.display.get_surface()
+    assert shown.get_size() == SIDES
+    assert len(np.unique(pygame.surfarray.array2d(shown))) > 5
+    assert env.render() is None
+    env.close()
+    assert not pygame.display.get_init()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        ({"steps": 0}, "steps = 0, must be at least 1"),
+        ({"render_mode": "ansi"}, "render_mode = 'ansi', allowed"),
+        ({"settings": {"robots": 0}}, "robots"),
+    ],
+)
+def test_refusals(arguments: dict[str, Any], complaint: str) -> None:
+    with pytest.raises(ValueError, match=complaint):
+        BoxPushingEnv(**arguments)

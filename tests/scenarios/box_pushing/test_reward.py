@@ -1,0 +1,73 @@
+"""The reward by hand, condition by condition (Eq. 15-17)."""
+
+from math import exp
+
+import numpy as np
+import pytest
+
+from nested_agents.scenarios.box_pushing.config import RewardSettings
+from nested_agents.scenarios.box_pushing.reward import Task, reward
+
+TASK = Task(RewardSettings(), tolerance=0.05, orientation_tolerance=0.25)
+
+
+def one(
+    distance=0.5, approach=-0.02, turn=0.2, contact=(True, True), readings=(1.0, 0.9), task=TASK
+) -> float:
+    value = reward(
+        task,
+        np.array([distance]),
+        np.array([approach]),
+        np.array([turn]),
+        np.array([contact]),
+        np.array([readings]),
+    )
+    return float(value[0])
+
+
+def penalties(*readings: float) -> float:
+    return sum(0.0007 * exp(-5.0 * reading) for reading in readings)
+
+
+def test_condition_1_pays_nearness_less_penalties() -> None:
+    expected = 0.01 * exp(-1.5 * 0.5) - penalties(1.0, 0.9) - 0.0003 * 0.2
+    assert one() == pytest.approx(expected, rel=1e-12)
+    assert one(turn=-0.2) == one(turn=0.2)
+
+
+@pytest.mark.parametrize("approach", [0.0, 0.03, -0.0009])
+def test_condition_2_a_box_that_does_not_come_nearer(approach: float) -> None:
+    assert one(approach=approach) == 0.000001
+
+
+def test_condition_3_all_within_range() -> None:
+    readings = (0.4, 0.02)
+    assert one(contact=(True, False), readings=readings) == pytest.approx(-penalties(*readings))
+
+
+def test_condition_3_as_printed_adds_the_attraction() -> None:
+    printed = TASK._replace(reward=RewardSettings(attraction_without_contact=True))
+    value = one(contact=(False, False), readings=(0.1, 0.1), task=printed)
+    assert value == pytest.approx(0.01 * exp(-0.75) - penalties(0.1, 0.1))
+
+
+def test_conditions_4_and_5_out_of_range() -> None:
+    assert one(contact=(False, False), readings=(0.3, 0.0)) == -0.0015
+    assert one(contact=(False, False), readings=(0.0, 0.0)) == -0.002
+
+
+def test_any_number_of_robots() -> None:
+    assert one(contact=(True,), readings=(1.0,)) > one(contact=(True,) * 4, readings=(1.0,) * 4)
+
+
+@pytest.mark.parametrize("contact", [(True, True), (False, True), (False, False)])
+def test_the_goal_pays_whatever_the_robots_do(contact: tuple[bool, bool]) -> None:
+    assert one(distance=0.05, contact=contact) == 0.01
+    assert one(distance=0.05, turn=0.3, contact=contact) != 0.01
+    printed = TASK._replace(reward=RewardSettings(pays_at_goal=False))
+    assert one(distance=0.05, contact=contact, task=printed) < 0.01
+
+
+def test_any_orientation_counts_unless_one_is_asked_for() -> None:
+    task = TASK._replace(orientation_tolerance=None)
+    assert one(distance=0.05, turn=3.0, task=task) == 0.01

@@ -1,0 +1,178 @@
+"""Boxes: mass properties against closed forms and Box2D, friction, scaling, refusals."""
+
+import warnings
+from math import pi, sqrt
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from shapely.affinity import rotate, translate
+from shapely.geometry import Polygon
+
+from nested_agents.scenarios.box_pushing.config import BoxSettings, label
+from nested_agents.scenarios.box_pushing.world.boxes import AREA, BOXES, BoxSpec, box_for
+from nested_agents.scenarios.box_pushing.world.polygons import moments, polygon_edges
+from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
+from nested_agents.scenarios.box_pushing.world.world import UNIT, World
+
+L_SHAPE = ((0, 0), (0.2, 0), (0.2, 0.1), (0.1, 0.1), (0.1, 0.2), (0, 0.2))
+FRAME = ((0, 0), (0.2, 0), (0.2, 0.2), (0, 0.2))
+WINDOW = ((0.05, 0.05), (0.15, 0.05), (0.15, 0.15), (0.05, 0.15))
+
+
+def star(rng: np.random.Generator, corners: int) -> list[tuple[float, float]]:
+    """Return a random simple polygon around the origin."""
+    angles = (np.arange(corners) + rng.uniform(0.05, 0.95, corners)) * 2 * pi / corners
+    radii = rng.uniform(0.03, 0.15, corners)
+    return list(zip(radii * np.cos(angles), radii * np.sin(angles), strict=True))
+
+
+def test_inertia_of_known_shapes() -> None:
+    square, circle, bar = BOXES["square"], BOXES["circle"], BOXES["bar"]
+    assert square.inertia == pytest.approx(square.mass * 0.2**2 / 6, rel=1e-12)
+    assert bar.inertia == pytest.approx(bar.mass * (0.08**2 + 0.5**2) / 12, rel=1e-12)
+    assert circle.inertia == pytest.approx(circle.mass * circle.radius**2 / 2, rel=1e-12)
+
+
+def test_friction_radius_of_known_shapes() -> None:
+    # Mean distance from the centre: (sqrt 2 + asinh 1) / 6 of a square's side, 2/3 of a radius.
+    assert BOXES["square"].friction_radius == pytest.approx(0.2 * (sqrt(2) + np.arcsinh(1)) / 6)
+    assert BOXES["circle"].friction_radius == pytest.approx(BOXES["circle"].radius * 2 / 3)
+
+
+@pytest.mark.parametrize("name", BOXES)
+def test_every_box(name: str) -> None:
+    box = BOXES[name]
+    assert box.area == pytest.approx(AREA, rel=1e-12)
+    np.testing.assert_allclose(box.moments.first, 0, atol=1e-15)
+    lever = np.linalg.norm(box.friction_points, axis=1)
+    np.testing.assert_allclose(lever, box.friction_radius, rtol=1e-12)
+    np.testing.assert_allclose(box.friction_points.mean(axis=0), 0, atol=1e-15)
+    # The back is straight, or round, and lies towards -x.
+    least = box.outline.edges[:, 0].min() - box.outline.rounding
+    if name == "circle":
+        assert least == pytest.approx(-np.sqrt(AREA / np.pi), rel=1e-3)
+    assert sum(x < least + 1e-9 for x in box.outline.edges[:, 0]) in (0, 2)
+
+
+@pytest.mark.parametrize("name", BOXES)
+def test_box2d_has_the_same_mass(name: str) -> None:
+    box = BOXES[name]
+    world = World([ROBOTS["e-puck"]], box)  # owns the body
+    body = world._box
+    assert body.mass == pytest.approx(box.mass, rel=1e-6)
+    assert body.inertia == pytest.approx(box.inertia * UNIT**2, rel=1e-6)
+    of_fixtures = sum(fixture.massData.mass for fixture in body.fixtures)  # at density 1
+    assert of_fixtures == pytest.approx(box.area * UNIT**2, rel=1e-5)
+
+
+@pytest.mark.slow
+@settings(max_examples=500)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    corners=st.integers(3, 12),
+    window=st.booleans(),
+    angle=st.floats(0, 2 * pi),
+)
+def test_pieces_make_up_the_polygon(seed: int, corners: int, window: bool, angle: float) -> None:
+    rng = np.random.default_rng(seed)
+    vertices = star(rng, corners)
+    assume(Polygon(vertices).area >= 1e-4)
+    hole = [(0.004, -0.004), (0.004, 0.004), (-0.004, 0.004), (-0.004, -0.004)]
+    fits = window and Polygon(vertices).buffer(-1e-4).contains(Polygon(hole))
+    geometry = rotate(Polygon(vertices, [hole] if fits else []), angle, use_radians=True)
+    box = BoxSpec.of("random", translate(geometry, *rng.uniform(-1, 1, 2)))
+    assert box.area == pytest.approx(geometry.area, rel=1e-9)
+    # Without rounding errors of places far from the origin.
+    parts = [moments(polygon_edges(Polygon(piece))) for piece in box.fixtures]
+    area = sum(part.area for part in parts)
+    assert area == pytest.approx(geometry.area, rel=1e-9)
+    centre = sum((part.first for part in parts), np.zeros(2)) / area
+    np.testing.assert_allclose(centre, 0, atol=1e-9 * box.reach)
+    inertia = sum(float(np.trace(part.second)) for part in parts) * box.mass / area
+    assert inertia == pytest.approx(box.inertia, rel=1e-9)
+    assert inertia == pytest.approx(_inertia(geometry) * box.mass / area, rel=1e-9)
+    for piece in box.fixtures:
+        assert 3 <= len(piece) <= 8
+        assert Polygon(piece).exterior.is_ccw
+        assert Polygon(piece).convex_hull.area == pytest.approx(Polygon(piece).area, rel=1e-9)
+    union = shapely.union_all([Polygon(piece) for piece in box.fixtures])
+    assert union.area == pytest.approx(geometry.area, rel=1e-9)
+
+
+def _inertia(polygon: Polygon) -> float:
+    """Return the second polar moment of area about the centre by triangles, another way [m4]."""
+    centre = np.array(polygon.centroid.coords[0])
+    total = 0.0
+    for triangle in shapely.constrained_delaunay_triangles(polygon).geoms:
+        corners = np.asarray(triangle.exterior.coords)[:3] - centre
+        # A triangle's second moment is that of three thirds of its area at the edge middles.
+        middles = (corners + np.roll(corners, 1, axis=0)) / 2
+        total += triangle.area / 3 * float((middles**2).sum())
+    return total
+
+
+def test_a_shapely_geometry_of_several_parts_is_refused() -> None:
+    two = Polygon(FRAME).union(translate(Polygon(FRAME), 1.0, 0.0))
+    with pytest.raises(ValueError, match="box 'two': a MultiPolygon, must be one Polygon"):
+        BoxSpec.of("two", two)
+
+
+def test_a_described_box_and_its_label() -> None:
+    table = BoxSettings(vertices=FRAME, holes=(WINDOW,), mass=0.3)
+    box = box_for(table, 2)
+    assert (box.area, box.mass) == (pytest.approx(0.03), 0.3)
+    assert box_for(label(table), 2) == box
+    assert box_for(table, 6) == box
+    assert box_for(table.model_copy(update={"grows": True}), 6) == box.scaled(3.0)
+    assert label("L") == "L"
+
+
+def test_concave_boxes_and_holes() -> None:
+    assert len(BoxSpec("L", L_SHAPE).fixtures) == 2
+    frame = BoxSpec("frame", FRAME, holes=(WINDOW,))
+    assert frame.area == pytest.approx(0.03)
+    assert frame.inertia == pytest.approx(frame.mass / 0.03 * (0.2**4 - 0.1**4) / 6)
+    assert len(frame.fixtures) == 4
+
+
+def test_clockwise_is_turned_around_with_a_word() -> None:
+    with pytest.warns(UserWarning, match="clockwise"):
+        turned = BoxSpec("L", L_SHAPE[::-1])
+    assert turned.area == pytest.approx(0.03)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "word"),
+    [
+        ({"vertices": ((0, 0), (1, 1), (1, 0), (0, 1))}, "not a simple polygon"),
+        ({"vertices": ((0, 0), (1, 0), (2, 0))}, "simple|degenerate"),
+        ({"vertices": ((0, 0), (1, 0), (0.5, 1e-7))}, "degenerate"),
+        ({"vertices": ((0, 0), (1, 0))}, "at least 3"),
+        ({"vertices": ((0, 0), (1, 0), (float("nan"), 1))}, "finite"),
+        ({"vertices": FRAME, "radius": 0.1}, "either"),
+        ({}, "either"),
+        ({"radius": 0.1, "mass": 0.0}, "mass"),
+        ({"radius": 0.1, "friction": -1.0}, "friction"),
+        ({"radius": float("inf")}, "radius"),
+    ],
+)
+def test_bad_boxes_are_refused(arguments: dict[str, object], word: str) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(ValueError, match=word) as error:
+            BoxSpec("bad", **arguments)  # type: ignore[arg-type]
+    assert "\n" not in str(error.value)
+
+
+def test_size_grows_with_the_number_of_robots() -> None:
+    assert box_for("square", 1) is box_for("square", 2) is BOXES["square"]
+    four = box_for("square", 4)
+    assert four.area == pytest.approx(4 * AREA)
+    # The same friction per robot as for two.
+    assert four.friction_force / 4 == pytest.approx(BOXES["square"].friction_force / 2)
+    assert box_for("circle", 3).radius == pytest.approx(1.5 * BOXES["circle"].radius)
+    with pytest.raises(ValueError, match=r"box = .egg., allowed L, T, U, bar, circle"):
+        box_for("egg", 2)

@@ -1,0 +1,98 @@
+"""Robots and boxes that a spec describes, and robots in number."""
+
+import itertools
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from nested_agents.core.loop import world_seed
+from nested_agents.scenarios import BoxPushing, ScenarioSettings
+from nested_agents.scenarios.box_pushing.config import BoxSettings, RobotSettings, label
+from nested_agents.scenarios.box_pushing.world.robots import (
+    E_PUCK_SENSORS,
+    ROBOTS,
+    robot_for,
+)
+from nested_agents.scenarios.checking.checker import CHECKS, check_scenario
+from nested_agents.studies.spec.errors import SpecError
+from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.trials.trial import check, run_trial, trials_of
+
+SPEC = """
+preset = "frozen"
+seeds = 1
+episodes = 1
+steps = 2
+evaluation = 0
+
+[scenario]
+box = { vertices = [[0, 0], [0.3, 0], [0.3, 0.1], [0.1, 0.1], [0.1, 0.3], [0, 0.3]], mass = 0.3 }
+
+[scenario.robot]
+radius = 0.05
+wheels = [{ name = "left", x = 0.0, y = 0.03 }, { name = "right", x = 0.0, y = -0.03 }]
+"""
+
+
+def test_an_e_puck_described_is_an_e_puck() -> None:
+    wheels = tuple({"name": w.name, "x": w.x, "y": w.y} for w in ROBOTS["e-puck"].wheels)
+    robot = robot_for(RobotSettings.model_validate({"wheels": wheels}))
+    assert robot.sensors == E_PUCK_SENSORS
+    for name in ("radius", "mass", "max_speed", "stiffness", "lateral_stiffness", "traction"):
+        assert getattr(robot, name) == getattr(ROBOTS["e-puck"], name)
+    assert robot.wheels == ROBOTS["e-puck"].wheels
+
+
+def test_a_spec_that_describes_its_box_and_robot_runs_and_can_be_drawn() -> None:
+    spec = Spec.parse(SPEC)
+    check(spec)
+    settings = spec.conditions()[0].settings.scenario
+    assert isinstance(settings.box, BoxSettings)
+    assert check_scenario(lambda: BoxPushing(settings), steps=10) == tuple(CHECKS)
+    recording = run_trial(trials_of(spec)[0]).recordings["last"]
+    from nested_agents.scenarios.box_pushing.pictures.rendering import picture
+
+    assert picture(recording, 1).std() > 0
+    assert Spec.of(spec.table()) == spec
+    assert robot_for(label(settings.robot)) == robot_for(settings.robot)
+
+
+@pytest.mark.parametrize(
+    ("change", "complaint"),
+    [
+        ("scenario.box={vertices=[[0,0],[1,1],[1,0],[0,1]]}", "not a simple polygon"),
+        ("scenario.box={vertices=[[0,0],[1,1]]}", "scenario.box.vertices"),
+        ("scenario.box={vertices=[[0,0],[1,1],[0,1]], wait=1}", "scenario.box.wait"),
+        ("scenario.box=3", "scenario.box = 3"),
+        ("scenario.robot.wheels=[]", "scenario.robot.wheels"),
+        ("scenario.robot.wheels=[{name='a', x=0, y=0.2}]", "within the body"),
+        ("scenario.robot.wheels=[{name='a b', x=0, y=0.2}]", "wheels[0].name"),
+        ("scenario.robot=tank", "scenario.robot = 'tank', allowed e-puck"),
+        ("scenario.box=egg", "scenario.box = 'egg', allowed L"),
+        ("scenario.robots=9", "do not fit side by side"),
+    ],
+)
+def test_refusals(change: str, complaint: str) -> None:
+    with pytest.raises(SpecError) as error:
+        check(Spec.parse(SPEC, [change]))
+    assert complaint in str(error.value)
+
+
+def test_quantities_out_of_range_are_refused() -> None:
+    with pytest.raises(ValidationError, match="mass"):
+        BoxSettings(vertices=((0, 0), (1, 0), (0, 1)), mass=0.0)
+
+
+@pytest.mark.parametrize("start", ["easy", "hard"])
+@pytest.mark.parametrize("robots", [1, 2, 8, 64])
+def test_robots_in_number_stand_free_of_each_other_and_of_the_box(robots: int, start: str) -> None:
+    scenario = BoxPushing(ScenarioSettings(robots=robots, start=start))  # type: ignore[arg-type]
+    for number in range(3):
+        scenario.reset(world_seed(5, number), number)
+        places = scenario.measure()["robot_poses"][:, :2]
+        assert (scenario.world.gaps > 0).all()
+        for one, other in itertools.combinations(places, 2):
+            assert np.hypot(*(one - other)) > 2 * scenario.robot.radius
+    assert len(scenario.agents) == 2 * robots
+    assert np.isfinite(scenario.step(np.zeros(2 * robots, dtype=int)).states).all()

@@ -1,0 +1,100 @@
+"""Signed distance and rays: known answers, and the compiled kernels against their NumPy twins."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nested_agents.core.arrays import FloatArray
+from nested_agents.scenarios.box_pushing.world.geometry import (
+    Outline,
+    ray,
+    ray_numpy,
+    ring_edges,
+    surface,
+    surface_numpy,
+)
+
+L_SHAPE = ring_edges(np.array([[-0.1, -0.1], [0.1, -0.1], [0.1, 0], [0, 0], [0, 0.1], [-0.1, 0.1]]))
+HOLE = ring_edges(np.array([[-0.08, -0.08], [-0.08, -0.02], [-0.02, -0.02], [-0.02, -0.08]]))
+PLATE = np.vstack([L_SHAPE, HOLE])
+SQUARE = ring_edges(np.array([[-0.1, -0.1], [0.1, -0.1], [0.1, 0.1], [-0.1, 0.1]]))
+DISC = np.zeros((1, 4))
+OUTLINES = [(PLATE, 0.0), (PLATE, 0.01), (SQUARE, 0.0), (DISC, 0.1)]
+coordinates = st.floats(-0.25, 0.25)
+
+
+@pytest.mark.parametrize(
+    ("point", "distance", "normal", "nearest"),
+    [
+        ((0.3, 0.05), 0.2, (1, 0), (0.1, 0.05)),
+        ((0.09, 0.02), -0.01, (1, 0), (0.1, 0.02)),
+        ((0.1, 0.02), 0.0, (1, 0), (0.1, 0.02)),
+        ((-0.13, -0.14), 0.05, (-0.6, -0.8), (-0.1, -0.1)),
+    ],
+)
+def test_square(
+    point: tuple[float, float],
+    distance: float,
+    normal: tuple[float, float],
+    nearest: tuple[float, float],
+) -> None:
+    got = surface(SQUARE, 0.0, *point)
+    np.testing.assert_allclose(got, (distance, *normal, *nearest), atol=1e-14)
+
+
+def test_inside_a_hole_is_outside_the_material() -> None:
+    assert surface(PLATE, 0.0, -0.05, -0.05)[0] == pytest.approx(0.03)
+    assert surface(PLATE, 0.0, -0.01, -0.05)[0] == pytest.approx(-0.01)
+    assert surface(PLATE, 0.0, 0.03, 0.02)[0] == pytest.approx(0.02)  # in the notch of the L
+
+
+def test_rays() -> None:
+    assert ray(SQUARE, 0.0, -0.15, 0.0, 1.0, 0.0, 1.0) == pytest.approx(0.05)
+    assert ray(SQUARE, 0.0, -0.15, 0.0, -1.0, 0.0, 1.0) == 1.0
+    assert ray(SQUARE, 0.0, 0.05, 0.0, 1.0, 0.0, 1.0) == 0.0
+    assert ray(DISC, 0.1, 0.0, -0.3, 0.0, 1.0, 1.0) == pytest.approx(0.2)
+    assert ray(DISC, 0.1, 0.0, -0.3, 0.0, 1.0, 0.15) == 0.15
+    # Out of the hole, across the wall: the wall's inner face is hit.
+    assert ray(PLATE, 0.0, -0.05, -0.05, 1.0, 0.0, 1.0) == pytest.approx(0.03)
+
+
+@given(x=coordinates, y=coordinates, which=st.integers(0, len(OUTLINES) - 1))
+def test_surface_equals_its_twin(x: float, y: float, which: int) -> None:
+    edges, rounding = OUTLINES[which]
+    got, twin = surface(edges, rounding, x, y), surface_numpy(edges, rounding, x, y)
+    assert got[0] == pytest.approx(twin[0], abs=1e-12)
+    for distance, nx, ny, px, py in (got, twin):
+        assert np.hypot(nx, ny) == pytest.approx(1.0, abs=1e-12)
+        # The point is its nearest surface point plus the distance along the normal. (Twins may
+        # choose another one of two nearest points.)
+        np.testing.assert_allclose([px + distance * nx, py + distance * ny], [x, y], atol=1e-11)
+
+
+@given(
+    x=coordinates,
+    y=coordinates,
+    angle=st.floats(0, 6.28),
+    which=st.integers(0, len(OUTLINES) - 1),
+)
+def test_ray_equals_its_twin(x: float, y: float, angle: float, which: int) -> None:
+    edges, rounding = OUTLINES[which]
+    direction = np.cos(angle), np.sin(angle)
+    got = ray(edges, rounding, x, y, *direction, 0.3)
+    twin = ray_numpy(edges, rounding, x, y, *direction, 0.3)
+    if abs(got - twin) > 1e-7:
+        # Only a ray that grazes the surface may be judged differently.
+        travelled = min(got, twin)
+        point = x + travelled * direction[0], y + travelled * direction[1]
+        assert abs(surface(edges, rounding, *point)[0]) < 1e-6
+
+
+@pytest.mark.parametrize("edges", [np.zeros((0, 4)), np.zeros((3, 2)), np.full((1, 4), np.nan)])
+def test_bad_outlines_are_refused(edges: FloatArray) -> None:
+    with pytest.raises(ValueError, match="outline"):
+        Outline(edges)
+
+
+def test_radius_reaches_the_farthest_point() -> None:
+    assert Outline(SQUARE).radius == pytest.approx(0.1 * np.sqrt(2))
+    assert Outline(DISC, 0.1).radius == pytest.approx(0.1)

@@ -1,0 +1,139 @@
+"""Infrared sensors: known readings, and the kernel against its NumPy twin."""
+
+from dataclasses import replace
+from math import exp
+
+import numpy as np
+import pytest
+
+from nested_agents.scenarios import BoxPushing, ScenarioSettings
+from nested_agents.scenarios.box_pushing.world.boxes import BOXES
+from nested_agents.scenarios.box_pushing.world.infrared import (
+    NORMALISATIONS,
+    InfraredSpec,
+    expected_reading,
+    infrared_readings,
+    infrared_readings_numpy,
+    sensor_directions,
+    strongest_reading,
+)
+from nested_agents.scenarios.box_pushing.world.robots import E_PUCK_SENSORS, ROBOTS
+from nested_agents.scenarios.box_pushing.world.world import World
+from nested_agents.studies.spec.errors import SpecError
+from nested_agents.studies.spec.spec import Spec
+
+SPEC = InfraredSpec()
+RNG = np.random.default_rng(0)
+
+
+@pytest.mark.parametrize("normalisation", NORMALISATIONS)
+@pytest.mark.parametrize("box", ["square", "circle", "triangle"])
+def test_kernel_equals_its_twin(box: str, normalisation: str) -> None:
+    spec = InfraredSpec(normalisation=normalisation)
+    rng = np.random.default_rng(7)
+    outline = BOXES[box].outline
+    radii = np.full(3, 0.037)
+    sensors = np.array([E_PUCK_SENSORS] * 3)
+    seen = 0
+    for _ in range(60):
+        robots = rng.uniform([-0.2, -0.2, -3], [0.2, 0.2, 3], (3, 3))
+        pose = rng.uniform([-0.1, -0.1, -3], [0.1, 0.1, 3])
+        got = infrared_readings(
+            robots, radii, sensors, pose, outline.edges, outline.rounding,
+            spec.reach, spec.decay, spec.kind,
+        )  # fmt: skip
+        twin = infrared_readings_numpy(robots, radii, sensors, pose, outline, spec)
+        np.testing.assert_allclose(got, twin, atol=1e-6)
+        assert ((got >= 0) & (got <= 1)).all()
+        seen += int(np.count_nonzero(got))
+    assert seen > 100
+
+
+def test_readings_by_hand() -> None:
+    world = World([ROBOTS["e-puck"]] * 2, BOXES["square"])
+    # The first looks at the box with ps5 (90 degrees left), 3 cm away; the second is 2 cm to the
+    # right of it, where ps2 looks.
+    world.place(
+        np.array([[0.0, -0.1 - 0.037 - 0.03, 0.0], [0.0, -0.261, 0.0]]), np.array([0.0, 0.0, 0.0])
+    )
+    readings = world.infrared()
+    assert readings.shape == (2, 8)
+    assert readings[0, 5] == pytest.approx(exp(-0.03 / SPEC.decay))
+    assert readings[0, 2] == pytest.approx(exp(-0.02 / SPEC.decay))
+    assert readings[1, 5] == pytest.approx(exp(-0.02 / SPEC.decay))
+    assert world.infrared_of_box()[0, 2] == 0.0
+    strongest = strongest_reading(world, RNG)
+    assert strongest[0] == pytest.approx(exp(-0.03 / SPEC.decay))
+    assert strongest[1] == 0.0
+    np.testing.assert_allclose(expected_reading(world.gaps, SPEC), strongest, atol=1e-12)
+
+
+def test_touching_reads_one_and_far_reads_zero() -> None:
+    np.testing.assert_array_equal(SPEC.reading(np.array([-0.001, 0.0, 0.06, 1.0])), [1, 1, 0, 0])
+
+
+def test_normalisations_by_hand() -> None:
+    at = np.array([0.0, 0.02, 0.0399, 0.04])
+    linear = InfraredSpec(reach=0.04, normalisation="linear")
+    np.testing.assert_allclose(linear.reading(at), [1, 0.5, 0.0025, 0])
+    binary = InfraredSpec(reach=0.04, normalisation="binary")
+    np.testing.assert_array_equal(binary.reading(at), [1, 1, 1, 0])
+
+
+def test_noise_is_a_fraction_of_the_reading() -> None:
+    spec = InfraredSpec(noise=0.1)
+    clean = np.tile([0.0, 0.2, 0.5, 1.0], (20_000, 1))
+    noisy = spec.noisy(clean, np.random.default_rng(1))
+    np.testing.assert_allclose(noisy[:, :3].std(axis=0), [0, 0.02, 0.05], rtol=0.02)
+    np.testing.assert_allclose(noisy[:, :3].mean(axis=0), [0, 0.2, 0.5], atol=0.002)
+    assert noisy.max() == 1.0
+    state = RNG.bit_generator.state
+    assert SPEC.noisy(clean, RNG) is clean
+    assert RNG.bit_generator.state == state
+
+
+def rewards(infrared: dict[str, object], seed: int = 1) -> list[float]:
+    """Return the rewards of an episode of robots that hover near the box."""
+    settings = ScenarioSettings.model_validate({"start": "easy", "infrared": infrared})
+    scenario = BoxPushing(settings)
+    scenario.reset(seed)
+    return [scenario.step(np.full(4, 3)).reward for _ in range(5)]  # all wheels at rest
+
+
+def test_sensors_are_options_of_the_scenario() -> None:
+    default = rewards({})
+    assert rewards({"reach": 0.06, "decay": 0.015, "noise": 0.0}) == default
+    for change in ({"decay": 0.03}, {"normalisation": "linear"}, {"reach": 0.001}):
+        assert rewards(change) != default
+    noisy = rewards({"noise": 0.2})
+    assert len(set(noisy)) == 5
+    assert rewards({"noise": 0.2}) == noisy
+    assert rewards({"noise": 0.2}, seed=2) != noisy
+
+
+@pytest.mark.parametrize(
+    ("table", "complaint"),
+    [
+        ({"reach": 0}, "infrared.reach = 0"),
+        ({"noise": 2}, "infrared.noise = 2"),
+        ({"normalisation": "raw"}, "infrared.normalisation = 'raw'"),
+        ({"normalisation": "linear", "decay": 0.02}, "decay = 0.02 is for normalisation"),
+    ],
+)
+def test_bad_options_are_refused(table: dict[str, object], complaint: str) -> None:
+    with pytest.raises(SpecError, match=complaint) as error:
+        Spec.of({"scenario": {"infrared": table}})
+    assert "\n" not in str(error.value)
+
+
+def test_bad_sensors_are_refused() -> None:
+    for change, complaint in (
+        ({"reach": 0.0}, "reach = 0"),
+        ({"noise": -0.1}, "noise = -0.1"),
+        ({"normalisation": "raw"}, "allowed exponential, linear, binary"),
+    ):
+        with pytest.raises(ValueError, match=complaint):
+            InfraredSpec(**change)  # type: ignore[arg-type]
+    blind = [ROBOTS["e-puck"], replace(ROBOTS["e-puck"], sensors=(0.0,))]
+    with pytest.raises(ValueError, match="same number"):
+        sensor_directions(blind)

@@ -1,0 +1,379 @@
+"""The checker passes sound scenarios and catches every planted fault in one line."""
+
+import random
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from nested_agents.core.protocols import Blocks, Scenario
+from nested_agents.core.robot_agents import per_robot
+from nested_agents.core.single_agent import SingleAgent
+from nested_agents.core.spaces import StateSpace
+from nested_agents.scenarios import BoxPushing, ScenarioSettings
+from nested_agents.scenarios.box_pushing.config import (
+    DelayedSettings,
+    NoisySettings,
+    SeizedSettings,
+)
+from nested_agents.scenarios.checking.checker import CHECKS, ScenarioError, check_scenario
+from nested_agents.scenarios.checking.predictions import fault_of_prediction
+from nested_agents.scenarios.line_up import LEAD, LineUp, LineUpPrediction
+from nested_agents.studies.cli.main import main
+
+FAILURES = (
+    NoisySettings(wheels=("*",), episode=1, end_episode=2),
+    DelayedSettings(wheels=("robot1.*",), periods=5),
+    SeizedSettings(wheels=("*.left",), step=4),
+)
+
+
+def line(**changes: Callable[..., Any]) -> Callable[[], Scenario]:
+    """Return a factory of line-ups with methods changed."""
+    return lambda: type("Changed", (LineUp,), changes)(2)
+
+
+@pytest.mark.parametrize(
+    "factory",
+    [
+        lambda: LineUp(3),
+        lambda: SingleAgent(LineUp(2)),
+        lambda: BoxPushing(ScenarioSettings()),
+        lambda: BoxPushing(ScenarioSettings(state_space="paper", start="hard", box="bar")),
+        lambda: BoxPushing(ScenarioSettings(failures=FAILURES)),
+        lambda: per_robot(BoxPushing(ScenarioSettings(state_space="paper"))),
+    ],
+    ids=["line-up", "single agent", "box pushing", "paper", "failures", "robots"],
+)
+def test_sound_scenarios_pass(factory: Callable[[], Scenario]) -> None:
+    assert check_scenario(factory, steps=20) == tuple(CHECKS)
+
+
+def test_a_made_up_scenario_passes(line_world: Any) -> None:
+    assert check_scenario(lambda: line_world(2, 2)) == tuple(CHECKS)
+
+
+# The faults, each a small change of a sound scenario.
+
+entropy = random.Random(3)
+
+
+def late_noise(self: Any, joint_action: Any) -> Any:
+    """Differ from run to run from step 2 on, as nothing that compares one step notices."""
+    self.count = getattr(self, "count", 0) + 1
+    if self.count >= 2:
+        self._places = self._places + 1e-12 * entropy.random()
+    return LineUp.step(self, joint_action)
+
+
+def same_start(self: Any, seed: Any, episode: int = 0) -> Any:
+    return LineUp.reset(self, 0, episode)
+
+
+shared: dict[str, Any] = {}
+
+
+def shared_state(self: Any, joint_action: Any) -> Any:
+    """Keep the speeds in one place for all instances."""
+    self._speeds = shared.get("speeds", self._speeds)
+    transition = LineUp.step(self, joint_action)
+    shared["speeds"] = self._speeds
+    return transition
+
+
+def shared_reset(self: Any, seed: Any, episode: int = 0) -> Any:
+    shared.clear()
+    return LineUp.reset(self, seed, episode)
+
+
+def forgets_to_reset(self: Any, seed: Any, episode: int = 0) -> Any:
+    before = self._commands
+    LineUp.reset(self, seed, episode)
+    self._commands = before
+    return self._states()
+
+
+def nan_at(step: int, field: str) -> Callable[..., Any]:
+    def changed(self: Any, joint_action: Any) -> Any:
+        self.count = getattr(self, "count", 0) + 1
+        transition = LineUp.step(self, joint_action)
+        if self.count != step:
+            return transition
+        if field == "info":
+            return replace(transition, info={**transition.info, "deep": {"x": np.inf}})
+        value = transition.states + np.nan if field == "states" else float("nan")
+        return replace(transition, **{field: value})
+
+    return changed
+
+
+def predict_and_move(self: Any) -> Any:
+    self._places = self._places + 1e-9
+    return LineUp.predict(self)
+
+
+def global_numbers(self: Any, seed: Any, episode: int = 0) -> Any:
+    np.random.seed(0)  # noqa: NPY002
+    random.random()
+    return LineUp.reset(self, seed, episode)
+
+
+def spawning(self: Any, seed: Any, episode: int = 0) -> Any:
+    self.other = seed.spawn(1)[0] if isinstance(seed, np.random.SeedSequence) else None
+    return LineUp.reset(self, seed, episode)
+
+
+def one_buffer(self: Any) -> Any:
+    if not hasattr(self, "buffer"):
+        self.buffer = np.zeros((2, 2))
+    self.buffer[:, 0] = self._places
+    self.buffer[:, 1] = self._places - self._places.mean()
+    return self.buffer
+
+
+def greedy_hands(self: Any, joint_action: Any) -> Any:
+    transition = LineUp.step(self, joint_action)
+    joint_action[:] = 0
+    return transition
+
+
+def half_saved(self: Any) -> Any:
+    return self._places.copy()
+
+
+def half_restored(self: Any, saved: Any) -> None:
+    self._places = saved.copy()
+
+
+def angle_out_of_range(self: Any, *args: Any) -> None:
+    LineUp.__init__(self, 2)
+    angle = replace(LEAD, low=-0.01, high=0.01, centres=(), periodic=True)
+    self.state_space = StateSpace("line-up", (self.state_space.variables[0], angle), n_own=1)
+
+
+def short_states(self: Any) -> Any:
+    return self._places[:, None]
+
+
+def lengthy_reward(self: Any, joint_action: Any) -> Any:
+    return replace(LineUp.step(self, joint_action), reward=np.zeros(2))
+
+
+def uncertain_end(self: Any, joint_action: Any) -> Any:
+    return replace(LineUp.step(self, joint_action), terminated=None)
+
+
+def twins(self: Any, *args: Any) -> None:
+    LineUp.__init__(self, 2)
+    self.agents = ("cart", "cart")
+
+
+def crossed(self: Any, *args: Any) -> None:
+    LineUp.__init__(self, 2)
+    self.groups = ((1,), (0,))
+
+
+def no_prediction(self: Any) -> Any:
+    prediction = LineUp.predict(self)
+    prediction._places[:] = np.nan
+    return prediction
+
+
+def raising(self: Any, joint_action: Any) -> Any:
+    raise KeyError("two\nlines")
+
+
+def a_tuple(self: Any, joint_action: Any) -> Any:
+    transition = LineUp.step(self, joint_action)
+    return transition.states, transition.reward
+
+
+def tables(
+    blocks: Callable[[Blocks], Blocks] | None = None, rewards: Callable[[Any], Any] | None = None
+) -> Callable[[], Scenario]:
+    """Return a factory of line-ups whose predictions have other tables."""
+
+    class Changed(LineUpPrediction):
+        def blocks(self, agent: int) -> Blocks:
+            sound = super().blocks(agent)
+            return blocks(sound) if blocks and agent == 1 else sound
+
+        def reward_table(self) -> Any:
+            sound = super().reward_table()
+            return rewards(sound) if rewards else sound
+
+    def predict(self: Any) -> Any:
+        return Changed(LineUp.predict(self)._places)
+
+    return line(predict=predict)
+
+
+def rowed(**changes: Any) -> Callable[[], Scenario]:
+    """Return a factory of line-ups whose blocks have other fields."""
+    return tables(lambda blocks: replace(blocks, **changes))
+
+
+BLOCKS = "predictions: blocks of agent 1: "
+
+FAULTS: dict[str, tuple[Callable[[], Scenario], str]] = {
+    "late noise": (line(step=late_noise), r"equal seeds: two runs with seed 0 differ at step 2"),
+    "ignored seed": (line(reset=same_start), "different seeds: seeds 0, 1 give one and the same"),
+    "shared state": (
+        line(step=shared_state, reset=shared_reset),
+        "two instances: an instance with seed . played in turns with another differs at step",
+    ),
+    "state left over": (line(reset=forgets_to_reset), "equal seeds: seed . after another episode"),
+    "NaN state": (line(step=nan_at(4, "states")), "finite numbers: states is not finite at step 4"),
+    "NaN reward": (line(step=nan_at(2, "reward")), "finite numbers: reward is not .* step 2"),
+    "infinite info": (line(step=nan_at(1, "info")), "finite numbers: info.deep.x is not finite"),
+    "prediction moves": (line(predict=predict_and_move), "predicting: an episode in which"),
+    "NaN prediction": (line(predict=no_prediction), "predictions: predicted states of agent 0"),
+    "global numbers": (line(reset=global_numbers), "the global state of random and numpy.random"),
+    "spawns": (line(reset=spawning), "returned arrays: reset spawns"),
+    "one buffer": (line(_states=one_buffer), "returned arrays: states at the start: .* changed"),
+    "action changed": (line(step=greedy_hands), "step changes the joint action"),
+    "half restored": (
+        line(save=half_saved, restore=half_restored),
+        "save and restore: the future of a restored scenario differs at step",
+    ),
+    "period": (line(__init__=angle_out_of_range), "bounds: lead leaves .* at the start"),
+    "shape": (line(_states=short_states), r"form: states of shape \(2, 1\) at the start"),
+    "two rewards": (line(step=lengthy_reward), r"form: reward of shape \(2,\)"),
+    "end": (line(step=uncertain_end), "form: terminated and truncated must be bool"),
+    "twins": (line(__init__=twins), "form: agents .*, of different names"),
+    "groups": (line(__init__=crossed), "form: groups .* must hold the 2 agents once each"),
+    "raises": (line(step=raising), r"form: KeyError in raising, test_checker.py:\d+: .two.*lines"),
+    "tuple": (line(step=a_tuple), "form: step returns tuple, must be Transition: no states"),
+    "own reversed": (
+        tables(lambda b: replace(b, own=b.own[::-1].copy())),
+        BLOCKS + r"distance = \S+ after joint action \[0, 0\], states has",
+    ),
+    "shared reversed": (
+        tables(lambda b: replace(b, shared=b.shared[::-1].copy())),
+        BLOCKS + "lead = ",
+    ),
+    "shared nearly right": (
+        tables(lambda b: replace(b, shared=b.shared + 1e-6)),
+        BLOCKS + "lead = ",
+    ),
+    "rewards reversed": (
+        tables(rewards=lambda table: table[::-1]),
+        "predictions: reward_table: .*, rewards has",
+    ),
+    "rewards short": (
+        tables(rewards=lambda table: table[:5]),
+        r"reward_table of shape \(5,\), must be \(16,\)",
+    ),
+    "divisor": (rowed(divisor=4), BLOCKS + "divisor = 4, must be 1"),
+    "shared short": (
+        tables(lambda b: replace(b, shared=b.shared[:5].copy())),
+        BLOCKS + "shared has 5 rows and no shared_rows, must have 16 rows",
+    ),
+    "own short": (
+        tables(lambda b: replace(b, own=b.own[:1].copy())),
+        BLOCKS + "own has 1 rows and no own_rows, must have 4 rows",
+    ),
+    "own wide": (
+        tables(lambda b: replace(b, own=np.hstack([b.own, b.own]))),
+        BLOCKS + r"own of shape \(4, 2\), must be \(rows, 1\)",
+    ),
+    "own rows": (
+        rowed(own_rows=np.array([0, 1, 2, 4])),
+        BLOCKS + "own_rows names rows 0 to 4, own has 4",
+    ),
+    "negative rows": (
+        rowed(shared_rows=np.arange(16) - 1),
+        BLOCKS + "shared_rows names rows -1 to 14",
+    ),
+    "few rows": (rowed(shared_rows=np.arange(5)), BLOCKS + "shared_rows has 5 .* must have 16"),
+    "broken rows": (rowed(own_rows=np.zeros(4)), BLOCKS + "own_rows is float64, must be an array"),
+    "listed own": (rowed(own=[[0.0]]), BLOCKS + "own is list, must be an array of floats"),
+    "flat own": (rowed(own=np.zeros(4)), BLOCKS + r"own of shape \(4,\), must have 2 axes"),
+    "NaN own": (rowed(own=np.full((4, 1), np.nan)), BLOCKS + "own is not finite"),
+    "no scenario": (lambda: object(), "form: object lacks agents, groups, .*measure"),  # type: ignore[dict-item,return-value]
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_every_planted_fault_is_caught_in_one_line(name: str) -> None:
+    factory, complaint = FAULTS[name]
+    with pytest.raises(ScenarioError, match=complaint) as fault:
+        check_scenario(factory)
+    assert "\n" not in str(fault.value)
+    assert len(str(fault.value)) < 200
+
+
+def test_the_documentation_counts_the_faults() -> None:
+    text = (Path(__file__).resolve().parents[3] / "docs" / "worlds.md").read_text(encoding="utf-8")
+    (told,) = re.findall(r"tests hold (\d+) deliberately broken", text)
+    assert int(told) == len(FAULTS)
+
+
+# Where the command line finds them: ``nested-agents check THIS_FILE:fault_late_noise``.
+globals().update(
+    {f"fault_{name.replace(' ', '_')}": factory for name, (factory, _) in FAULTS.items()}
+)
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_the_command_catches_every_planted_fault(
+    name: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["check", f"{__file__}:fault_{name.replace(' ', '_')}"]) == 1
+    line = capsys.readouterr().out
+    assert line.startswith("FAULT   fault_")
+    assert re.search(FAULTS[name][1], line)
+    assert line.count("\n") == 1
+
+
+def test_a_full_saver_passes() -> None:
+    def save(self: Any) -> Any:
+        return self._places.copy(), self._speeds.copy(), self._commands.copy()
+
+    def restore(self: Any, saved: Any) -> None:
+        self._places, self._speeds, self._commands = (part.copy() for part in saved)
+
+    assert check_scenario(line(save=save, restore=restore)) == tuple(CHECKS)
+
+
+@pytest.mark.parametrize("own", [0.5, np.nan])
+def test_own_variables_as_if_alone_may_differ_but_must_be_numbers(own: float) -> None:
+    factory = rowed(own=np.full((4, 1), own), alone=True)
+    if np.isfinite(own):
+        assert check_scenario(factory) == tuple(CHECKS)
+    else:
+        with pytest.raises(ScenarioError, match="own is not finite"):
+            check_scenario(factory)
+
+
+def test_many_joint_actions_are_drawn_and_too_many_left_out() -> None:
+    class Reversed(LineUpPrediction):
+        def reward_table(self) -> Any:
+            return super().reward_table()[::-1]
+
+    class Many(LineUp):
+        def predict(self) -> Any:
+            return Reversed(super().predict()._places)
+
+    for n, said in ((6, "reward_table: .* after joint action"), (8, "reward_table: ")):
+        scenario = Many(n)
+        scenario.reset(0)
+        fault = fault_of_prediction(scenario, np.zeros((1, n), int), np.random.default_rng(0))
+        assert re.match(said, fault or "")
+    scenario = Many(9)
+    scenario.reset(0)
+    none = fault_of_prediction(scenario, np.zeros((1, 9), int), np.random.default_rng(0))
+    assert none is None
+
+
+def test_too_little_to_check_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"^seeds = \[0\]: must hold at least 2$"):
+        check_scenario(lambda: LineUp(2), seeds=(0,))
+    with pytest.raises(ValueError, match=r"^episodes = \[\]: must hold at least 1$"):
+        check_scenario(lambda: LineUp(2), episodes=())
+    with pytest.raises(ValueError, match=r"^steps = 1: must be at least 2$"):
+        check_scenario(lambda: LineUp(2), steps=1)

@@ -1,0 +1,60 @@
+"""Permutation tests against exact enumeration, scipy and known distributions."""
+
+from itertools import permutations, product
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from nested_agents.studies.analysis.paired_tests import friedman, holm, paired_permutation
+
+
+def test_friedman_is_scipys_statistic_with_ties_and_without() -> None:
+    rng = np.random.default_rng(0)
+    for values in (rng.normal(size=(9, 4)), rng.integers(3, size=(12, 5)).astype(float)):
+        found = friedman(values, permutations=99)
+        assert found.statistic == pytest.approx(stats.friedmanchisquare(*values.T).statistic)
+        n, k = values.shape
+        assert found.concordance == pytest.approx(found.statistic / (n * (k - 1)))
+
+
+def test_friedman_p_is_that_of_all_permutations() -> None:
+    values = np.array([[1.0, 2.0, 3.0], [1.0, 3.0, 2.0], [2.0, 1.0, 3.0]])
+    sums = [
+        (np.sum(rows, axis=0) ** 2).sum() for rows in product(permutations((-1, 0, 1)), repeat=3)
+    ]
+    observed = ((values - 2).sum(axis=0) ** 2).sum()
+    exact = np.mean(np.array(sums) >= observed)
+    assert friedman(values, permutations=20000).p == pytest.approx(exact, abs=0.02)
+
+
+def test_friedman_of_equal_conditions_says_nothing() -> None:
+    assert friedman(np.ones((5, 3))) == friedman(np.zeros((5, 3)))
+    assert friedman(np.ones((5, 3))).p == 1.0
+    with pytest.raises(ValueError, match="1 seeds x 3 conditions"):
+        friedman(np.ones((1, 3)))
+
+
+def test_false_alarms_are_as_rare_as_promised() -> None:
+    rng = np.random.default_rng(1)
+    alarms = np.mean([friedman(rng.normal(size=(6, 3)), 199, seed=s).p <= 0.05 for s in range(400)])
+    assert 0.02 < alarms < 0.08
+
+
+def test_sign_flips_by_hand() -> None:
+    # Differences 1, 2, 3: only +++ and --- reach a sum of 6.
+    assert paired_permutation([1, 2, 3], [0, 0, 0]) == 2 / 8
+    assert paired_permutation([1, 2], [1, 2]) == 1.0
+
+
+def test_drawn_sign_flips_are_near_all_of_them() -> None:
+    rng = np.random.default_rng(2)
+    difference = rng.normal(0.4, 1.0, size=14)
+    exact = paired_permutation(difference, np.zeros(14))
+    drawn = paired_permutation(difference, np.zeros(14), permutations=10000)
+    assert drawn == pytest.approx(exact, abs=0.02)
+
+
+def test_holm_by_hand() -> None:
+    np.testing.assert_allclose(holm([0.01, 0.02, 0.03, 0.005]), [0.03, 0.04, 0.04, 0.02])
+    assert holm([0.6, 0.7]).tolist() == [1.0, 1.0]

@@ -1,0 +1,47 @@
+from pathlib import Path
+
+from made_up_results import ablation
+
+from nested_agents.studies.analysis.results import Results
+from nested_agents.studies.catalogue.ablation import analysis as module
+from nested_agents.studies.catalogue.ablation import draw
+from nested_agents.studies.catalogue.ablation.analysis import analyse
+from nested_agents.studies.presentation.figures import save
+from nested_agents.studies.spec.spec import Spec
+
+CHANCES = {"default": 0.8, "no replay": 0.2, "no arena": 0.8, "more of it": 1.0}
+
+
+def test_what_matters_is_named_and_what_does_not_is_not() -> None:
+    analysis = analyse(ablation(CHANCES))
+    text = "\n".join(analysis.notes)
+    assert "worse: no replay" in text
+    assert "better: more of it" in text
+    assert text.count("not told apart: no arena") == 2
+    assert "p adjusted over 6 comparisons" in text
+    assert [line.condition for line in analysis.table] == list(CHANCES)
+    by_name = {line.condition: line.estimates for line in analysis.table}
+    assert by_name["default"]["greedy, difference"].value == 0.0
+    assert by_name["no replay"]["greedy, difference"].high < -0.4
+
+
+def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
+    paths = save(draw(analyse(ablation(CHANCES))), tmp_path)
+    assert [path.name for path in paths] == ["ablation.png", "ablation.svg"]
+    assert draw(analyse(Results({}, {}))) == {}
+
+
+def test_the_spec_compares_one_change_at_a_time_over_twenty_seeds() -> None:
+    spec = Spec.load(Path(module.__file__).parent / "ablation.toml")
+    default, *others = spec.conditions()
+    assert default.label == "default"
+    assert len(spec.seeds) >= 20
+    assert default.settings == Spec.of({}).conditions()[0].settings
+    for other in others[:-1]:
+        changed = [
+            name
+            for name in ("scenario", "topology", "learner")
+            if getattr(other.settings, name) != getattr(default.settings, name)
+        ]
+        assert len(changed) == 1, other.label
+    assert others[-1].settings == Spec.of({"preset": "paper"}).conditions()[0].settings

@@ -1,0 +1,93 @@
+import io
+
+import numpy as np
+import pytest
+
+from nested_agents.studies.analysis.results import MEASURES, Results
+from nested_agents.studies.analysis.statistics import Estimate
+from nested_agents.studies.analysis.summary import interval, number
+from nested_agents.studies.catalogue.learning_curve import draw
+from nested_agents.studies.catalogue.learning_curve.analysis import METRICS, analyse
+from nested_agents.studies.presentation.figures import save
+from nested_agents.studies.presentation.row_formats import TITLES, write_rows
+from nested_agents.studies.trials.episodes import COLUMNS
+
+
+def arrays(seeds, episodes, success):
+    values = {name: np.tile(np.arange(episodes, dtype=float), (seeds, 1)) for name in MEASURES}
+    success = np.broadcast_to(success, (seeds, episodes)).astype(int)
+    return values | {"success": success, "stopped_at_goal": success}
+
+
+def made_up(seeds=4, episodes=12):
+    learns = arrays(seeds, episodes, np.arange(episodes) >= 6)
+    never = arrays(seeds, episodes, 0)
+    greedy = {"learns": arrays(seeds, 3, 1), "never": arrays(seeds, 3, 0)}
+    return Results({"learns": learns, "never": never}, greedy)
+
+
+def test_the_table_takes_the_ends_of_training_and_the_evaluation():
+    learns, never = analyse(made_up()).table
+    assert (learns.condition, learns.seeds) == ("learns", 4)
+    values = {title: float(e.value) for title, e in learns.estimates.items()}
+    assert values["success first 5"] == 0.0
+    assert values["success last 5"] == 1.0
+    assert values["success greedy"] == 1.0
+    assert values["distance [m]"] == np.mean([7, 8, 9, 10, 11])
+    assert float(never.estimates["success last 5"].value) == 0.0
+    assert list(learns.estimates) == [metric.title for metric in METRICS]
+
+
+def test_curves_have_a_point_for_every_episode():
+    curves = analyse(made_up()).curves
+    assert curves["learns"]["final_distance_m"].value.tolist() == list(range(12))
+    assert curves["never"]["success"].value.tolist() == [0.0] * 12
+    assert (curves["never"]["success"].high > 0.3).all()
+
+
+def test_few_episodes_no_evaluation_and_one_seed_are_no_trouble(tmp_path):
+    results = Results({"alone": arrays(1, 2, 1)}, {})
+    analysis = analyse(results)
+    assert "success greedy" not in analysis.table[0].estimates
+    assert np.isnan(analysis.curves["alone"]["success"].low).all()
+    assert len(save(draw(analysis), tmp_path)) == 2
+
+
+def test_conditions_may_have_unequal_numbers_of_seeds(tmp_path):
+    results = made_up()
+    results.training["never"] = arrays(2, 12, 0)
+    analysis = analyse(results)
+    assert [line.seeds for line in analysis.table] == [4, 2]
+    _, svg = save(draw(analysis), tmp_path)
+    assert "never (2 seeds)" in svg.read_text()
+
+
+def test_equal_results_give_equal_figures(tmp_path):
+    once = [path.read_bytes() for path in save(draw(analyse(made_up())), tmp_path)]
+    again = [path.read_bytes() for path in save(draw(analyse(made_up())), tmp_path)]
+    assert once == again
+
+
+def test_every_condition_is_in_the_legend(tmp_path):
+    many = {f"condition {i}": arrays(2, 3, i % 2) for i in range(13)}
+    _, svg = save(draw(analyse(Results(many, {}))), tmp_path)
+    text = svg.read_text()
+    assert all(f">{name}<" in text for name in many)
+
+
+def test_an_unknown_interval_is_a_dash():
+    assert interval(Estimate(*map(np.asarray, (0.5, np.nan, np.nan)))) == "–"
+    assert interval(Estimate(*map(np.asarray, (0.5, 0.25, 1.0)))) == ".25–1.0"
+    assert number(float("nan")) == "?"
+
+
+@pytest.mark.parametrize("form", ["table", "csv", "json"])
+def test_no_rows_are_still_a_table(form):
+    expected = {"table": "seed  return\n", "csv": "seed,return\n", "json": "[]\n"}
+    file = io.StringIO()
+    write_rows(["seed", "return"], [], form, file)
+    assert file.getvalue() == expected[form]
+
+
+def test_the_table_of_rows_has_a_title_for_every_measure():
+    assert list(TITLES) == ["seed", *COLUMNS[1:]]

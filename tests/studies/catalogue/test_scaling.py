@@ -1,0 +1,128 @@
+from pathlib import Path
+
+import pytest
+from made_up_results import scaling
+from matplotlib.figure import Figure
+
+from nested_agents.studies.analysis.results import Results
+from nested_agents.studies.catalogue.scaling import analysis as module
+from nested_agents.studies.catalogue.scaling import draw
+from nested_agents.studies.catalogue.scaling import figure as scaling_figure
+from nested_agents.studies.catalogue.scaling.analysis import analyse, measure, messages
+from nested_agents.studies.presentation.figures import save
+from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.trials.trial import build, check, run_trial, trials_of
+
+SIZES = {2: 0.9, 8: 0.9, 64: 0.5}
+
+
+def test_exponents_and_messages() -> None:
+    analysis = analyse(scaling(SIZES))
+    assert analysis.exponents["sums"]["deciding"] == pytest.approx(1.0, abs=0.02)
+    assert analysis.exponents["sampling"]["deciding"] == pytest.approx(2.0, abs=0.02)
+    assert [p.messages for p in analysis.points[:3]] == [6, 120, 8128]
+    assert [p.evaluator for p in analysis.points] == ["sums"] * 3 + ["sampling"] * 3
+    assert "64 robots: 128 agents, 8128 messages a step" in analysis.notes
+
+
+def by_topology(passed: dict[str, dict[int, int]], first: str = "topology") -> Results:
+    """Results of topologies that pass so many messages, by number of robots."""
+    base = Results({}, {})
+    for name, counts in passed.items():
+        made = scaling(dict.fromkeys(counts, 0.9))
+        for robots, count in counts.items():
+            old, parts = f"sums, robots={robots}", [f"topology={name}", f"robots={robots}"]
+            new = ", ".join(parts if first == "topology" else parts[::-1])
+            for kept, found in (
+                (base.training, made.training),
+                (base.evaluation, made.evaluation),
+                (base.numbers, made.numbers),
+                (base.usage, made.usage),
+            ):
+                kept[new] = found[old]
+            base.numbers[new]["messages"][:] = count
+    return base
+
+
+PASSED = {"chain": {2: 6, 4: 28}, "star": {2: 3, 4: 7}, "independent": {2: 0, 4: 0}}
+
+
+@pytest.mark.parametrize("first", ["topology", "robots"])
+def test_messages_are_told_by_topology_where_they_differ(first: str) -> None:
+    analysis = analyse(by_topology(PASSED, first))
+    assert list(dict.fromkeys(p.evaluator for p in analysis.points)) == [
+        f"topology={name}" for name in PASSED
+    ]
+    told = [note for note in analysis.notes if "messages" in note]
+    assert told == [
+        "2 robots (topology=chain): 4 agents, 6 messages a step",
+        "2 robots (topology=star): 4 agents, 3 messages a step",
+        "2 robots (topology=independent): 4 agents, 0 messages a step",
+        "4 robots (topology=chain): 8 agents, 28 messages a step",
+        "4 robots (topology=star): 8 agents, 7 messages a step",
+        "4 robots (topology=independent): 8 agents, 0 messages a step",
+    ]
+
+
+def test_as_many_agents_of_fewer_robots_have_a_line_of_their_own() -> None:
+    results = by_topology({"two wheels": {2: 6, 4: 28}, "four wheels": {2: 28}})
+    results.numbers["topology=four wheels, robots=2"]["agents"][:] = 8
+    told = [note for note in analyse(results).notes if "messages" in note]
+    assert told == [
+        "2 robots (topology=two wheels): 4 agents, 6 messages a step",
+        "2 robots (topology=four wheels): 8 agents, 28 messages a step",
+        "4 robots: 8 agents, 28 messages a step",
+    ]
+
+
+def test_robots_alone_make_one_line() -> None:
+    made = scaling(SIZES)
+    parts = [made.training, made.evaluation, made.numbers, made.usage]
+    own = [{str(n): part[f"sums, robots={n}"] for n in SIZES} for part in parts]
+    analysis = analyse(Results(*own[:2], numbers=own[2], usage=own[3]))
+    assert {p.evaluator for p in analysis.points} == {"default"}
+    assert analysis.exponents["default"]["deciding"] == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize(("made", "lines"), [(scaling(SIZES), 1), (by_topology(PASSED), 3)])
+def test_the_figure_has_a_line_of_messages_by_topology(made: Results, lines: int) -> None:
+    analysis = analyse(made)
+    axes = Figure().subplots()
+    evaluators = list(dict.fromkeys(p.evaluator for p in analysis.points))
+    scaling_figure._messages(axes, analysis, evaluators)
+    drawn = [list(line.get_ydata()) for line in axes.get_lines()]
+    counts = [[6, 120, 8128]] if lines == 1 else [list(c.values()) for c in PASSED.values()]
+    assert drawn == counts
+
+
+def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
+    paths = save(draw(analyse(scaling(SIZES))), tmp_path)
+    assert [path.name for path in paths] == ["scaling.png", "scaling.svg"]
+    assert draw(analyse(Results({}, {}))) == {}
+
+
+@pytest.mark.parametrize(("topology", "count"), [("chain", 6), ("star", 3), ("independent", 0)])
+def test_messages_are_the_edges_of_the_transitive_closure(topology: str, count: int) -> None:
+    (condition,) = Spec.of({"topology": topology}).conditions()
+    hierarchy = build(condition.settings, 0)[1].hierarchy
+    assert messages(hierarchy.below(i) for i in range(len(hierarchy))) == count
+
+
+def test_a_trial_is_measured_without_being_changed() -> None:
+    table = {"study": "scaling", "seeds": [7], "episodes": 1, "steps": 4, "evaluation": 1}
+    (trial,) = trials_of(Spec.of(table))
+    result = measure(trial)
+    assert result.rows == run_trial(trial).rows
+    assert (result.numbers["agents"], result.numbers["messages"]) == (4.0, 6.0)
+    assert result.numbers["weight_bytes"] == 4 * 40 * 8
+    assert result.numbers["joint_actions"] == pytest.approx(340.0), "4 + 16 + 64 + 256"
+    assert 0.0 < result.usage["decision_median"] <= result.usage["decision_99"]
+    assert result.usage["process_bytes"] > result.usage["step_bytes"] > 0
+
+
+def test_the_spec_reaches_from_2_to_64_robots() -> None:
+    spec = Spec.load(Path(module.__file__).parent / "scaling.toml")
+    robots = {condition.settings.scenario.robots for condition in spec.conditions()}
+    assert {2, 4, 8, 16, 32, 64} <= robots
+    small = spec.model_copy(update={"overrides": spec.overrides[:1]})
+    check(small)

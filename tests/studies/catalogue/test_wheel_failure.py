@@ -1,0 +1,160 @@
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from made_up_results import wheel_failure
+
+from nested_agents.studies.analysis.results import Results
+from nested_agents.studies.catalogue.wheel_failure import analysis as module
+from nested_agents.studies.catalogue.wheel_failure import draw
+from nested_agents.studies.catalogue.wheel_failure.analysis import (
+    KEPT,
+    Course,
+    analyse,
+    measure,
+)
+from nested_agents.studies.presentation.figures import save
+from nested_agents.studies.spec.errors import SpecError
+from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.trials.trial import Session, check, run_trial, trials_of
+
+ENDS = {
+    "4 wheels, seized": {"nothing": 0.05, "weights": 0.4, "self-model": 0.7, "both": 0.95},
+    "2 wheels, seized": {"nothing": 0.0, "weights": 0.0, "self-model": 0.0, "both": 0.0},
+}
+SEIZED = {"kind": "seized", "wheels": "robot1.left", "episode": 5}
+SHORT = {
+    "study": "wheel-failure", "seeds": [7], "episodes": 10, "steps": 4, "evaluation": 0,
+    "scenario": {"failures": [SEIZED]}, "learner": {"self_model": {"enabled": True}},
+}  # fmt: skip
+
+
+def test_levels_recovery_and_area_by_hand() -> None:
+    success = np.array([[1] * 6 + [0, 0, 1, 1, 1, 1, 1, 1], [1] * 6 + [0] * 8], dtype=float)
+    steps = np.full(success.shape, 10.0)
+    course = Course("fault", "both", 6, success, steps, (0, 1))
+    recovered, episodes, spent = course.recovery()
+    assert recovered.tolist() == [1.0, 0.0]
+    assert episodes.tolist() == [2.0, 8.0]
+    assert spent.tolist() == [20.0, 80.0]
+    assert course.lost.tolist() == [2.0, 8.0]
+    assert (course.before.mean(), course.after.mean(), course.end.mean()) == (1.0, 0.3, 0.5)
+
+
+def test_cases_are_told_apart_by_what_adapts() -> None:
+    analysis = analyse(wheel_failure(ENDS))
+    assert [line.condition.rpartition(": ")[2] for line in analysis.table] == [
+        "nothing", "weights", "self-model", "both",
+    ] * 2  # fmt: skip
+    ends = {line.condition: float(line.estimates["end"].value) for line in analysis.table}
+    assert ends["4 wheels, seized: both"] > 0.85
+    assert ends["4 wheels, seized: nothing"] < 0.2
+    gains = {gain.condition: gain for gain in analysis.gains}
+    assert len(gains) == 6
+    assert gains["4 wheels, seized, both"].p < 0.001
+    assert gains["2 wheels, seized, both"].p == 1.0
+
+
+def test_what_never_succeeded_has_nothing_to_recover() -> None:
+    results = wheel_failure({"fault": dict.fromkeys(ENDS["4 wheels, seized"], 0.0)})
+    for phase in results.phases.values():
+        for arrays in phase.values():
+            arrays["success"][:] = 0
+    for line in analyse(results).table:
+        assert list(line.estimates) == ["before", "just after", "end"]
+
+
+@pytest.mark.parametrize(
+    ("columns", "faults"),
+    [
+        ({"learner.self_model.enabled": "{}"}, ["the failure"]),
+        ({"learner.self_model.enabled": "{}", "scenario.box": "circle"}, ["circle"]),
+        ({"name": "a", "scenario.hold": 4, "learner.self_model.enabled": "{}"}, ["a, hold=4"]),
+        ({"name": "a", "scenario.hold": "", "learner.self_model.enabled": "{}"}, ["a"]),
+        ({"learner.calibration.enabled": "{}"}, None),
+    ],
+)
+def test_twins_are_found_by_what_is_swept(columns: dict, faults: list | None) -> None:
+    results = wheel_failure({"fault": ENDS["4 wheels, seized"]})
+    for condition in results.training:
+        enabled = condition.rpartition("=")[2]
+        results.columns[condition] = {
+            k: v.format(enabled) if v == "{}" else v for k, v in columns.items()
+        }
+    analysis = analyse(results)
+    found = [tuple(line.condition.split(": ")) for line in analysis.table]
+    if faults is None:  # nothing is said of self-models
+        assert {adapts for _, adapts in found} == {"training", KEPT}
+        assert {fault for fault, _ in found} == set(results.training)
+        assert analysis.gains == ()
+    else:
+        cases = ("nothing", "weights", "self-model", "both")
+        assert found == [(fault, adapts) for fault in faults for adapts in cases]
+        assert len(analysis.gains) == 3
+
+
+def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
+    paths = save(draw(analyse(wheel_failure(ENDS))), tmp_path)
+    assert [path.name for path in paths] == ["wheel-failure.png", "wheel-failure.svg"]
+    assert draw(analyse(Results({}, {}))) == {}
+
+
+def test_training_goes_through_the_failure_and_a_copy_keeps_its_weights() -> None:
+    (trial,) = trials_of(Spec.of(SHORT))
+    result = measure(trial)
+    plain = run_trial(trial)
+    training = tuple(row for row in result.rows if row.phase == "training")
+    assert training == plain.rows
+    kept = [row for row in result.rows if row.phase == KEPT]
+    assert [row.episode for row in kept] == [5, 6, 7, 8, 9]
+    assert kept[0] == training[5]._replace(phase=KEPT), "no learning ends before the first episode"
+    assert result.numbers == {"onset": 5.0}
+    assert list(result.recordings) == ["first", "before", "after", "last"]
+    assert not result.recordings["before"]["failed"].any()
+    assert result.recordings["after"]["failed"][1:].any()
+
+
+def test_the_copy_keeps_weights_but_not_its_model_of_itself() -> None:
+    (trial,) = trials_of(Spec.of(SHORT))
+    session = Session(trial)
+    session.train(5)
+    copy = module._keeping_weights(session)
+    theta, effects = copy.learner.theta.copy(), copy.self_model.effects[0].copy()
+    assert (theta == session.team.learner.theta).all()
+    session.train(3, 5, phase=KEPT, team=copy)
+    assert (copy.learner.theta == theta).all()
+    assert (copy.self_model.effects[0] != effects).any()
+    assert (session.team.self_model.effects[0] == effects).all()
+
+
+@pytest.mark.parametrize(
+    ("failures", "said"),
+    [([], "needs one"), ([SEIZED | {"episode": 4}], "allowed 5 to 5 of 10"),
+     ([SEIZED | {"episode": 6}], "begins in episode 6")],
+)  # fmt: skip
+def test_a_spec_without_a_failure_in_the_midst_is_refused(failures: list, said: str) -> None:
+    with pytest.raises(SpecError, match=said):
+        check(Spec.of(SHORT | {"scenario": {"failures": failures}}))
+
+
+def test_too_few_episodes_for_the_two_levels_are_refused() -> None:
+    with pytest.raises(SpecError, match=r"episodes = 9: wheel-failure needs 10 or more"):
+        check(Spec.of(SHORT | {"episodes": 9}))
+
+
+def test_an_unfinished_condition_is_left_out() -> None:
+    results = wheel_failure(ENDS)
+    results = replace(results, phases={"training": results.training})
+    assert analyse(results).table == ()
+
+
+def test_the_spec_can_be_run_and_crosses_faults_with_self_models() -> None:
+    spec = Spec.load(Path(module.__file__).parent / "wheel_failure.toml")
+    check(spec)
+    labels = [condition.label for condition in spec.conditions()]
+    assert len(spec.seeds) >= 20
+    assert "4 wheels, seized, enabled=true" in labels
+    others = Spec.load(Path(module.__file__).parent / "wheel_faults.toml")
+    check(others)
+    assert "2 wheels, seized, enabled=false" in [c.label for c in others.conditions()]

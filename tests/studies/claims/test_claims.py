@@ -1,0 +1,250 @@
+"""Claims on made-up results whose verdict is known, and the committed results."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from made_up_results import ablation, arrays, scaling, shapes, wheel_failure
+
+from nested_agents.studies import STUDIES
+from nested_agents.studies.analysis import published
+from nested_agents.studies.analysis.results import Results
+from nested_agents.studies.analysis.statistics import Estimate
+from nested_agents.studies.catalogue.study import load_study
+from nested_agents.studies.claims import claims
+from nested_agents.studies.claims.claims import CLAIMS, AtLeast, AtMost, Within, judge
+from nested_agents.studies.claims.measures import Measured
+from nested_agents.studies.claims.table import markdown, print_claims
+from nested_agents.studies.cli.main import main
+from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.trials.trial import check
+
+ROOT = Path(claims.__file__).parent
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "claims.md"
+
+
+def found(value: float, low: float, high: float, p: float | None = None) -> Measured:
+    return Measured(Estimate(*map(np.asarray, (value, low, high))), 8, p)
+
+
+@pytest.mark.parametrize(
+    ("criterion", "measured", "verdict"),
+    [
+        (AtLeast(0.8), found(0.9, 0.8, 1.0), "holds"),
+        (AtLeast(0.8), found(0.9, 0.79, 1.0), "not decided"),
+        (AtLeast(0.8), found(0.5, 0.4, 0.79), "does not hold"),
+        (AtLeast(0.8), found(0.9, np.nan, np.nan), "not decided"),
+        (AtMost(1.0), found(0.9, 0.8, 1.0), "holds"),
+        (AtMost(1.0), found(1.0, 0.8, 1.1), "not decided"),
+        (AtMost(1.0), found(1.2, 1.1, 1.3), "does not hold"),
+        (Within(0.1), found(0.0, -0.1, 0.1), "holds"),
+        (Within(0.1), found(0.0, -0.2, 0.1, p=0.5), "not decided"),
+        (Within(0.1), found(0.0, -0.1, 0.1, p=0.04), "does not hold"),
+        (Within(0.1), found(-0.3, -0.4, -0.2), "does not hold"),
+    ],
+)
+def test_criteria_decide_by_the_whole_interval(criterion, measured, verdict) -> None:
+    assert criterion.decide(measured) == verdict
+
+
+def curves(default: float, paper: float, greedy: float) -> Results:
+    rng = np.random.default_rng(5)
+    chances = {"default": np.linspace(0.0, 4 * default, 20).clip(0, default)}
+    others = {"pose": default, "frozen": 0.02, "random": 0.0, "greedy": greedy, "paper": paper}
+    chances |= {c: np.full(20, p) for c, p in others.items()}
+    training = {c: arrays(chance, rng) for c, chance in chances.items()}
+    training["default"]["contact_fraction"][:, :5] -= 0.5 * default - 0.3
+    evaluation = {c: arrays(chance[-5:], rng) for c, chance in chances.items()}
+    phases = {"training": training, "evaluation": evaluation}
+    return Results(training, evaluation, phases, dict.fromkeys(chances, tuple(range(20))))
+
+
+def orders(chances: list[float]) -> Results:
+    return ablation({f"chain:{i}": chance for i, chance in enumerate(chances)}, seeds=100)
+
+
+GOOD = {"nothing": 0.0, "weights": 1.0, "self-model": 1.0, "both": 1.0}
+BAD = {"nothing": 0.0, "weights": 0.1, "self-model": 0.1, "both": 0.1}
+FAULTS = ("4 wheels, seized", "4 wheels, reversed")
+
+
+def everything(good: bool) -> dict[str, Results]:
+    return {
+        "learning-curve": curves(0.98, 0.9, 0.4) if good else curves(0.2, 0.0, 0.98),
+        "chain-order": orders([0.8] * 3) if good else orders([0.9, 0.9, 0.3]),
+        "scaling": scaling({2: 1.0, 64: 1.0 if good else 0.1}, 1e-4 if good else 1e-2),
+        "wheel-failure": wheel_failure(dict.fromkeys(FAULTS, GOOD if good else BAD)),
+        "shapes": shapes({"circle": 0.98, "L": 0.98 if good else 0.2}),
+        "ablation": ablation({"default": 1.0, "static predictor": 1.0 if good else 0.1}),
+    }
+
+
+@pytest.fixture(scope="module")
+def verdicts() -> dict[bool, dict[str, str]]:
+    return {
+        good: {f.claim.name: f.verdict for f in judge(everything(good))} for good in (True, False)
+    }
+
+
+@pytest.mark.parametrize("claim", [c.name for c in CLAIMS if c.name != "cost"])
+def test_every_claim_can_hold_and_can_fail(claim, verdicts) -> None:
+    assert verdicts[True][claim] == "holds"
+    assert verdicts[False][claim] == "does not hold"
+
+
+def test_the_costs_that_the_paper_prints_are_computed() -> None:
+    (finding,) = [f for f in judge({}) if f.claim.name == "cost"]
+    assert finding.verdict == "holds"
+    assert float(finding.measured.estimate.value) == pytest.approx(2.4575625 / 2.45 - 1.0)
+
+
+def test_without_results_nothing_is_decided() -> None:
+    assert {f.verdict for f in judge({}) if f.claim.name != "cost"} == {"not decided"}
+
+
+def test_few_seeds_decide_nothing() -> None:
+    results = {"ablation": ablation({"default": 1.0, "static predictor": 0.0}, seeds=4)}
+    (finding,) = [f for f in judge(results) if f.claim.name == "model"]
+    assert finding.measured.estimate.high < 0.8
+    assert finding.verdict == "not decided"
+
+
+def test_claims_name_studies_and_conditions_that_their_specs_have() -> None:
+    for study in claims.STUDIES_OF_CLAIMS:
+        for folder in (ROOT, ROOT / "quick"):
+            spec = Spec.load(folder / f"{STUDIES[study]}.toml")
+            assert spec.study == study
+            labels = {condition.label for condition in spec.conditions()}
+            wanted = {
+                "learning-curve": {"default", "frozen", "random", "greedy", "paper"},
+                "ablation": {"default", "static predictor"},
+                "wheel-failure": {f"{f}, enabled={e}" for f in FAULTS for e in ("true", "false")},
+            }.get(study, set())
+            assert wanted <= labels
+            if folder.name == "quick":
+                check(spec)
+
+
+def test_published_results_give_the_table_that_the_run_gave() -> None:
+    results = everything(good=True)
+    again = {
+        study: published.loads(published.dumps(Spec.load(ROOT / f"{STUDIES[study]}.toml"), found))
+        for study, found in results.items()
+    }
+    assert [p.spec.study for p in again.values()] == list(results)
+    once = {study: p.results for study, p in again.items()}
+    twice = {
+        study: published.loads(published.dumps(p.spec, p.results)).results
+        for study, p in again.items()
+    }
+    assert markdown(judge(once)) == markdown(judge(twice))
+    assert [f.verdict for f in judge(once)] == [f.verdict for f in judge(results)]
+
+
+def test_a_damaged_file_is_named(tmp_path: Path) -> None:
+    for text in ("{}", "not JSON", "[]"):
+        (tmp_path / "shapes.json").write_text(text)
+        with pytest.raises(ValueError, match=r"shapes\.json: holds no published results"):
+            published.read(tmp_path, ["shapes"])
+
+
+def test_results_of_another_version_are_told(tmp_path: Path, capsys, monkeypatch) -> None:
+    old = claims.PUBLISHED / "chain-order.json"
+    monkeypatch.setattr(published, "RESULTS_VERSION", 99)
+    assert main(["table", str(old)]) == 0
+    assert "chain-order.json: results of version 3, this is version 99" in capsys.readouterr().err
+    assert main(["claims", "--format", "markdown"]) == 0
+    assert "chain-order: results of version 3, this is version 99" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "path", sorted(claims.PUBLISHED.glob("*.json")), ids=lambda path: path.stem
+)
+def test_every_committed_file_is_of_this_version_and_has_a_table(path: Path, capsys) -> None:
+    assert main(["table", str(path), "--format", "markdown"]) == 0
+    out, err = capsys.readouterr()
+    assert out.count("\n") > 2
+    assert err == ""
+
+
+def test_options_that_run_need_a_directory(capsys) -> None:
+    assert main(["claims", "--quick"]) == 2
+    assert "--quick: needs --out" in capsys.readouterr().err
+
+
+def test_the_committed_results_make_the_page(capsys) -> None:
+    files = list(claims.PUBLISHED.glob("*.json"))
+    assert {path.stem for path in files} == {*claims.STUDIES_OF_CLAIMS, "tasks", "told"}
+    assert sum(path.stat().st_size for path in files) < 1_000_000
+    assert main(["claims", "--format", "markdown"]) == 0
+    table = capsys.readouterr().out.strip()
+    page = PAGE.read_text(encoding="utf-8")
+    assert table in page, (
+        "docs/claims.md: put in the table of nested-agents claims --format markdown"
+    )
+
+
+@pytest.mark.parametrize("form", ["table", "json"])
+def test_the_table_is_printed_in_every_form(form, capsys, monkeypatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    print_claims(judge(everything(good=True)), form)
+    out = capsys.readouterr().out
+    if form == "json":
+        records = json.loads(out)
+        assert [record["name"] for record in records] == [claim.name for claim in CLAIMS]
+        assert records[0]["low"] <= records[0]["value"] <= records[0]["high"]
+    else:
+        assert max(map(len, out.splitlines())) <= 80
+        assert "does not" in out
+
+
+def test_every_study_can_be_loaded() -> None:
+    for name in STUDIES:
+        study = load_study(name)
+        assert callable(study.measure)
+        assert study.analyse(Results({}, {})).table == ()
+
+
+TINY = """
+study = "{study}"
+seeds = 2
+episodes = {episodes}
+steps = 2
+evaluation = 1
+{rest}
+"""
+REST = {
+    "learning-curve": 'sweep.preset = ["default", "frozen"]',
+    "chain-order": 'sweep.topology = ["chain", "chain:reversed"]',
+    "ablation": '[[overrides]]\nname = "default"\n'
+    '[[overrides]]\nname = "static predictor"\nscenario.predictor = "static"',
+    "shapes": 'evaluations.circle.box = "circle"',
+    "scaling": '[[overrides]]\nname = "exact"\nsweep.scenario.robots = [1, 2]',
+    "wheel-failure": "scenario.failures = "
+    '[{kind = "seized", wheels = "robot1.left", episode = 5}]\n'
+    "sweep.learner.self_model.enabled = [false, true]",
+}
+
+
+@pytest.mark.slow
+def test_studies_are_run_read_again_and_published(tmp_path, capsys, monkeypatch) -> None:
+    (tmp_path / "quick").mkdir()
+    for study, module in STUDIES.items():
+        episodes = 10 if study == "wheel-failure" else 1
+        text = TINY.format(study=study, episodes=episodes, rest=REST[study])
+        (tmp_path / "quick" / f"{module}.toml").write_text(text)
+    monkeypatch.setattr(claims, "SPECS", tmp_path)
+    monkeypatch.setattr(claims, "PUBLISHED", tmp_path / "published")
+    arguments = ["claims", "--quick", "--out", str(tmp_path / "out"), "--jobs", "1"]
+    arguments += ["--publish", str(tmp_path / "published"), "--format", "markdown"]
+    assert main(arguments) == 0
+    first = capsys.readouterr()
+    assert first.out.count("**not decided**") + first.out.count("**does not hold**") >= 5
+    assert "learning-curve: 2 conditions x 2 seeds" in first.err
+    assert main(arguments) == 0
+    again = capsys.readouterr()
+    assert again.out == first.out
+    assert "4 of 4 trials were run before" in again.err
+    assert main(["claims", "--format", "markdown"]) == 0
+    assert capsys.readouterr().out == first.out

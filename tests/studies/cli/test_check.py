@@ -1,0 +1,145 @@
+"""``nested-agents check``: what it prints and how it ends."""
+
+from pathlib import Path
+
+import pytest
+
+from nested_agents import scenarios
+from nested_agents.scenarios import BoxPushing, ScenarioSettings
+from nested_agents.scenarios.checking.checker import CHECKS
+from nested_agents.studies.cli.main import main
+
+SPEC = """
+preset = "frozen"
+
+[scenario]
+hold = 2
+
+[[scenario.failures]]
+kind = "seized"
+wheels = "robot1.left"
+episode = 7
+
+[sweep]
+"scenario.box" = ["square", "circle"]
+"learner.discount" = [0.9, 0.95]
+"""
+
+
+@pytest.fixture
+def spec(tmp_path: Path) -> Path:
+    path = tmp_path / "spec.toml"
+    path.write_text(SPEC)
+    return path
+
+
+def test_each_scenario_of_a_spec_is_checked_once(
+    spec: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["check", str(spec), "--steps", "6"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split(":")[0] for line in lines] == [
+        f"passed  box={box}, discount=0.9" for box in ("square", "circle")
+    ]
+    assert all(name in lines[0] for name in CHECKS)
+
+
+def test_a_broken_scenario_is_told_in_one_line(
+    spec: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Deaf(BoxPushing):
+        def reset(self, seed, episode=0):  # type: ignore[no-untyped-def]
+            return super().reset(0, episode)
+
+    def build(settings: ScenarioSettings) -> BoxPushing:
+        return (Deaf if settings.box == "circle" else BoxPushing)(settings)
+
+    monkeypatch.setattr(scenarios, "build", build)
+    assert main(["check", str(spec), "--steps", "6"]) == 1
+    passed, fault = capsys.readouterr().out.splitlines()
+    assert passed.startswith("passed  box=square")
+    assert fault == (
+        "FAULT   box=circle, discount=0.9: different seeds: seeds 0, 1 give one and the same "
+        "episode"
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["--steps", "1"], "--steps 1: must be at least 2"),
+        (["--set", "scenario.failures=[{kind='seized', wheels='robot3.*'}]"], "no such wheel"),
+        (["--set", "scenario.failures=[{kind='siezed', wheels='*'}]"], "did you mean 'seized'?"),
+        (["--set", "scenario.failures=[{kind='seized'}]"], "failures[0].wheels: missing"),
+    ],
+)
+def test_what_the_user_can_mend(
+    spec: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], complaint: str
+) -> None:
+    assert main(["check", str(spec), *arguments]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert complaint in err
+    assert err.count("\n") == 1
+
+
+def test_a_folder_may_be_named_as_it_likes(spec: Path, tmp_path: Path, capsys) -> None:
+    moved = tmp_path / ".pyenv" / "s.toml"
+    moved.parent.mkdir()
+    moved.write_text(spec.read_text())
+    assert main(["check", str(moved)]) in (0, 1)
+    assert capsys.readouterr().err == ""
+
+
+OWN = """
+import random
+from nested_agents.scenarios.line_up import LineUp
+
+class Drifting(LineUp):
+    count = 0
+
+    def step(self, joint_action):
+        self.count += 1
+        if self.count > 1:
+            self._places = self._places + 1e-12 * random.SystemRandom().random()
+        return super().step(joint_action)
+
+def sound():
+    return LineUp(2)
+
+def drifting():
+    return Drifting(2)
+
+def failing():
+    raise ValueError("no cart")
+
+def exploding():
+    raise RuntimeError("no\\ntrack")
+
+def sized(n):
+    return LineUp(n)
+"""
+
+
+def test_a_scenario_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "own.py"
+    path.write_text(OWN)
+    assert main(["check", f"{path}:sound"]) == 0
+    assert capsys.readouterr().out.startswith("passed  sound: form, finite numbers, bounds")
+    assert main(["check", f"{path}:drifting"]) == 1
+    found = capsys.readouterr().out
+    assert found.startswith("FAULT   drifting: equal seeds: two runs with seed 0 differ at step 2")
+    assert found.count("\n") == 1
+    for name, complaint in (
+        ("failing", "own.py:failing, called without arguments, raised ValueError: no cart"),
+        ("exploding", "raised RuntimeError: no track"),
+        ("sized", "raised TypeError: sized() missing 1 required positional argument: 'n'"),
+        ("missing", "has no function 'missing'"),
+        ("", "must be written path/to/file.py:function"),
+    ):
+        assert main(["check", f"{path}:{name}"]) == 2
+        out, err = capsys.readouterr()
+        assert (out, err.count("\n")) == ("", 1)
+        assert complaint in err
+    assert main(["check", f"{path}:sound", "--set", "seeds=2"]) == 2
+    assert "not over a Python file" in capsys.readouterr().err

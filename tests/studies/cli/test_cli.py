@@ -1,0 +1,308 @@
+import csv
+import io
+import json
+import os
+import re
+import shlex
+import signal
+import subprocess
+import sys
+import time
+from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
+from types import ModuleType
+
+import made_up
+import pytest
+
+from nested_agents.studies.catalogue.learning_curve import analysis as learning_curve
+from nested_agents.studies.cli import conduct
+from nested_agents.studies.cli.main import COMMANDS, main
+from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.spec.toml import dumps
+from nested_agents.studies.store.store import DATABASE
+
+PROGRAM = Path(made_up.__file__).with_name("made_up_cli.py")
+
+
+def run_here(measure, *arguments):
+    """Run a command in this process with made-up results; return status, output and errors."""
+    out, err = io.StringIO(), io.StringIO()
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
+        patch.setattr(learning_curve, "measure", measure)
+        patch.setattr(conduct, "check", lambda spec: None)
+        patch.setenv("COLUMNS", "80")
+        status = main([str(argument) for argument in arguments])
+    return status, out.getvalue(), err.getvalue()
+
+
+def start(measure, *arguments, **options):
+    command = [sys.executable, str(PROGRAM), measure, *map(str, arguments)]
+    return subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        preexec_fn=heeding_interrupts, **options,
+    )  # fmt: skip
+
+
+def heeding_interrupts() -> None:
+    """Undo what a shell does to the commands that it begins in the background."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+def finish(process):
+    out, err = process.communicate(timeout=120)
+    return process.returncode, out, err
+
+
+@pytest.fixture(scope="module")
+def spec_file(tmp_path_factory):
+    path = tmp_path_factory.mktemp("spec") / "spec.toml"
+    path.write_text(dumps(made_up.SPEC.table()))
+    return path
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory, spec_file):
+    """A finished study, and what the run said."""
+    directory = tmp_path_factory.mktemp("study") / "out"
+    return directory, run_here(made_up.measure, "run", spec_file, "--out", directory)
+
+
+def results(directory, form="csv", *arguments, capsys=None):
+    capsys.readouterr()
+    assert main(["results", str(directory), "--format", form, *arguments]) == 0
+    return capsys.readouterr().out
+
+
+def wait_for_results(directory, process):
+    """Wait until something has finished and is kept."""
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline and process.poll() is None:
+        if list((directory / "recordings").glob("[!.]*.npz")):
+            return
+        time.sleep(0.02)
+    pytest.fail(f"nothing finished: {process.communicate()}")
+
+
+@pytest.mark.parametrize("command", ["", *COMMANDS])
+def test_help(command, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    assert main([*command.split(), "--help"]) == 0
+    out = capsys.readouterr().out
+    assert "usage: nested-agents" in out
+    assert "Parameters" not in out
+    assert "{None}" not in out
+    assert max(map(len, out.splitlines())) <= 80
+
+
+def test_help_says_what_there_is_and_imports_little(capsys):
+    program = (
+        "import sys; from nested_agents.studies.cli.main import main; main(['--help']); "
+        "print({'numpy', 'numba', 'joblib', 'matplotlib'} & set(sys.modules), file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "set()\n")
+    assert all(name in done.stdout for name in COMMANDS)
+
+
+def test_version(capsys):
+    assert main(["--version"]) == 0
+    assert re.fullmatch(r"nested-agents \d+\.\d+\.\d+\S*\n", capsys.readouterr().out)
+
+
+def test_a_study_from_spec_to_figures(study):
+    directory, (status, out, err) = study
+    assert (status, err.splitlines()[-1].split(",")[0]) == (0, "6 of 6 trials")
+    assert "default" in out
+    assert "95 % intervals" in out
+    for name in ("learning-curves.png", "learning-curves.svg"):
+        assert str(directory / "figures" / name) in out
+        assert (directory / "figures" / name).stat().st_size > 1000
+
+
+def test_it_fits_a_terminal_of_80_columns(study):
+    _, (_, out, _) = study
+    table = out.split("\n\n")[0].splitlines()
+    assert len(table) == 2 + 2 * 2
+    assert max(map(len, table)) <= 80
+
+
+def test_results_in_every_form(study, capsys):
+    directory, _ = study
+    rows = list(csv.DictReader(io.StringIO(results(directory, capsys=capsys))))
+    assert len(rows) == 2 * 3 * 4
+    assert list(rows[0]) == [
+        "condition", "preset", "seed", "phase", "episode", "steps", "success", "stopped_at_goal",
+        "final_distance_m", "final_orientation_rad", "contact_fraction", "return",
+    ]  # fmt: skip
+    objects = json.loads(results(directory, "json", capsys=capsys))
+    assert len(objects) == len(rows)
+    for row, item in zip(rows, objects, strict=True):
+        assert float(row["return"]) == item["return"]
+        assert bool(int(row["success"])) is item["success"]
+    table = results(directory, "table", "--phase", "evaluation", capsys=capsys)
+    lines = table.splitlines()
+    assert len(lines) == 2 + 2 * (2 + 3 * 2)
+    assert [line for line in lines if "evaluation" in line] == [
+        "default, evaluation", "frozen, evaluation",
+    ]  # fmt: skip
+    assert max(map(len, lines)) <= 80
+
+
+def test_the_same_command_again_runs_nothing(study, spec_file, capsys):
+    directory, _ = study
+    before = results(directory, capsys=capsys)
+    status, _, err = run_here(made_up.failing, "run", spec_file, "--out", directory)
+    assert (status, err) == (0, "6 of 6 trials were run before\n")
+    assert results(directory, capsys=capsys) == before
+
+
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGINT])
+def test_interrupted_and_continued_is_as_if_never_interrupted(
+    how, study, spec_file, tmp_path, capsys
+):
+    arguments = ["run", spec_file, "--out", tmp_path, "--jobs", 2]
+    process = start("slow", *arguments, start_new_session=True)
+    wait_for_results(tmp_path, process)
+    if how == signal.SIGINT:  # as a terminal does it: to the parent and its workers
+        os.killpg(process.pid, how)
+    else:
+        process.send_signal(how)
+    status, _, err = finish(process)
+    if how == signal.SIGINT:
+        assert status == 130
+        assert re.search(r"interrupted: [0-6] of 6 trials are kept in", err)
+        assert "Traceback" not in err
+    kept = {p.name: p.stat().st_mtime_ns for p in (tmp_path / "recordings").glob("[!.]*.npz")}
+    assert run_here(made_up.measure, "run", spec_file, "--out", tmp_path)[0] == 0
+    now = {p.name: p.stat().st_mtime_ns for p in (tmp_path / "recordings").glob("[!.]*.npz")}
+    assert len(now) == 6
+    # A kill may fall between a recording and its note in the ledger: that one runs again.
+    again = [name for name in kept if kept[name] != now[name]]
+    assert len(again) <= (1 if how == signal.SIGKILL else 0)
+    for phase in ("training", "evaluation"):
+        whole, resumed = (
+            results(d, "json", "--phase", phase, capsys=capsys) for d in (study[0], tmp_path)
+        )
+        assert whole == resumed
+    for name in now:
+        path = Path("recordings") / name
+        assert (tmp_path / path).read_bytes() == (study[0] / path).read_bytes()
+
+
+def test_failed_trials_are_told_kept_and_retried(spec_file, tmp_path, capsys):
+    out = tmp_path / "out"
+    status, _, err = run_here(made_up.failing, "run", spec_file, "--out", out)
+    assert status == 1
+    assert "failed: frozen, seed 1: RuntimeError: a wheel came off" in err
+    assert main(["status", str(out)]) == 1
+    said = capsys.readouterr().out
+    assert "done     5 of 6 trials" in said
+    assert "in failing" in said
+    assert run_here(made_up.measure, "retry", out)[0] == 0
+    assert main(["status", str(out)]) == 0
+    assert "done     6 of 6 trials" in capsys.readouterr().out
+
+
+def test_presets(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    assert main(["presets"]) == 0
+    listed = capsys.readouterr().out
+    assert max(map(len, listed.splitlines())) <= 80
+    assert main(["presets", "paper"]) == 0
+    assert "paper" in listed
+    assert "step_size = 0.00012" in capsys.readouterr().out
+
+
+def test_a_replay_of_the_first_and_the_last_episode_is_drawn_once(tmp_path, monkeypatch):
+    drawn = []
+    rendering = ModuleType("rendering")
+    rendering.animate = lambda recording, path: (drawn.append(recording), path.touch())
+    monkeypatch.setitem(
+        sys.modules, "nested_agents.scenarios.box_pushing.pictures.rendering", rendering
+    )
+    monkeypatch.setattr(learning_curve, "measure", made_up.measure)
+    monkeypatch.setattr(conduct, "check", lambda spec: None)
+    for _ in range(2):
+        assert conduct.conduct(made_up.SPEC, tmp_path, 2, replay=True) == 0
+    assert len(drawn) == 2
+    assert sorted(p.name for p in (tmp_path / "replay").iterdir()) == [
+        "first-episode.gif", "last-episode.gif",
+    ]  # fmt: skip
+
+
+def test_the_replay_of_one_episode_is_of_the_last(tmp_path):
+    spec = Spec.of({"seeds": 1, "episodes": 1, "steps": 2, "evaluation": 0})
+    assert conduct.conduct(spec, tmp_path, 1, replay=True) == 0
+    assert [p.name for p in (tmp_path / "replay").iterdir()] == ["last-episode.gif"]
+
+
+def test_the_demos_spec_is_valid_toml(capsys, tmp_path):
+    assert main(["demo", "--print-spec"]) == 0
+    spec = Spec.parse(capsys.readouterr().out)
+    assert [c.label for c in spec.conditions()] == ["default", "frozen", "random", "greedy"]
+    assert len(spec.seeds) >= 8
+
+
+BAD = {
+    "run missing.toml --out x": "missing.toml: No such file or directory",
+    "run {spec} --out x --set episodez=3": "episodez = 3: unknown key; did you mean 'episodes'",
+    "run {spec} --out x --set episodes=-3": "episodes = -3: must be at least 1",
+    "run {spec} --out x --set episodes": "--set episodes: expected key=value",
+    "run {spec} --out x --set topology=chan": "'chan'",
+    "run {spec} --out x --set steps=4 seeds=a": "seeds = 'a'",
+    "run {spec} --out x --jobs 0": "--jobs 0: must be at least 1",
+    "run {spec} --out x --jobs two": "error: --jobs two: must be a whole number",
+    "run {spec} --out x --jobs 1.5": "error: --jobs 1.5: must be a whole number",
+    "run {spec} --out ''": "error: --out '': must not be empty",
+    "run '' --out x": "error: SPEC.toml '': must not be empty",
+    "run {spec} --out x --set ''": "error: --set '': must not be empty",
+    "demo --out ''": "error: --out '': must not be empty",
+    "export '' --out x": "error: DIR '': must not be empty",
+    "explain a --seed x": "error: --seed x: must be a whole number",
+    "check '' --steps 5": "NAME '': must not be empty",
+    "check {spec} --steps 0": "error: --steps 0: must be at least 2",
+    "claims --jobs 0": "error: --jobs: needs --out",
+    "claims --jobs 0 --out x": "error: --jobs 0: must be at least 1",
+    "cost --jobs 0": "error: --jobs 0: must be at least 1",
+    "cost --learning --measured": "error: --measured: is not for --learning",
+    "cost --topology ''": "error: --topology '': must not be empty",
+    "run {spec} --out {spec}": "spec.toml: ",
+    "run {spec} --out /proc/nowhere/x": "/proc/nowhere",
+    "run {spec}": "--out",
+    "run": "SPEC",
+    "results nowhere": "nowhere: holds no study",
+    "results nowhere --format xml": "'xml'",
+    "status nowhere": "nowhere: holds no study",
+    "retry nowhere": "nowhere: holds no study",
+    "presets papr": "did you mean 'paper'",
+    "rum": "rum",
+    "demo --job 3": "--job",
+    "demo extra": "extra",
+}
+
+
+@pytest.mark.parametrize("line", BAD)
+def test_bad_input_is_one_line_and_status_2(line, spec_file, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(shlex.split(line.format(spec=spec_file))) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert re.fullmatch(r"nested-agents: error: [^\n]+\n", err)
+    assert BAD[line] in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_reader_that_goes_away_is_no_error(study):
+    command = [sys.executable, "-m", "nested_agents", "results", str(study[0])]
+    read, write = os.pipe()
+    os.close(read)
+    done = subprocess.run(command, stdout=write, stderr=subprocess.PIPE, text=True)
+    os.close(write)
+    assert (done.returncode, done.stderr) == (141, "")
+
+
+def test_a_damaged_database_is_one_line(study, tmp_path, capsys):
+    (tmp_path / DATABASE).write_bytes((study[0] / DATABASE).read_bytes()[:5000])
+    assert main(["results", str(tmp_path)]) == 2
+    assert re.fullmatch(r"nested-agents: error: [^\n]+\n", capsys.readouterr().err)

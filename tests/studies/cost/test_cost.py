@@ -1,0 +1,230 @@
+"""``nested-agents cost``: what it prints is exact, and the running system agrees with it."""
+
+import csv
+import io
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from nested_agents.core.cost import Problem
+from nested_agents.studies.cli.commands.cost import numbers
+from nested_agents.studies.cli.main import main
+from nested_agents.studies.cost.cost import (
+    CostRow,
+    Measured,
+    agents_below,
+    cost_rows,
+    exponent,
+    fitted,
+    measure,
+)
+from nested_agents.studies.cost.table import written
+
+FIVE = ("chain", "teams", "tree:2", "star", "independent")
+
+
+@pytest.fixture
+def said(capsys: pytest.CaptureFixture[str]):
+    """Run a command; return status, output and errors."""
+
+    def run(*arguments: str) -> tuple[int, str, str]:
+        status = main(["cost", *arguments])
+        return status, *capsys.readouterr()
+
+    return run
+
+
+def test_json_has_integers_as_integers(said) -> None:
+    status, out, _ = said("--format", "json")
+    assert status == 0
+    (row,) = json.loads(out)
+    assert row == {
+        "agents": 4,
+        "topology": "chain",
+        "nested_exact": 2_457_562_500_000,
+        "nested_closed_form": 2_457_562_500_000,
+        "nested_asymptotic": 2_457_600_000_000,
+        "single_agent": 450 * 78125**4 * 16**4,
+        "ratio": pytest.approx(4.4704e14, rel=1e-4),
+    }
+    assert all(type(row[key]) is int for key in row if key not in ("topology", "ratio"))
+
+
+def test_the_arguments_are_those_of_the_formula(said) -> None:
+    out = said("--agents", "2", "--rules", "7", "--actions", "3", "--iterations", "5",
+               "--format", "json")[1]  # fmt: skip
+    (row,) = json.loads(out)
+    assert row["nested_exact"] == 5 * 7 * (9 + 81)
+    assert row["single_agent"] == 5 * 49 * 81
+    assert row["nested_asymptotic"] == round(5 * 7 * 81 * 9 / 8)
+
+
+def test_other_topologies_have_no_closed_form(said) -> None:
+    rows = json.loads(said("--topology", "star", "independent", "--format", "json")[1])
+    assert [row["nested_closed_form"] for row in rows] == [None, None]
+    assert rows[0]["nested_exact"] == 450 * 78125 * (16**4 + 3 * 16)
+    # A star of two agents is a chain.
+    (row,) = json.loads(said("--topology", "star", "--agents", "2", "--format", "json")[1])
+    assert row["nested_closed_form"] == row["nested_exact"]
+
+
+def test_a_thousand_agents_in_every_format(said) -> None:
+    single = 450 * (78125 * 16) ** 1000
+    before = sys.get_int_max_str_digits()
+    outputs = {form: said("--agents", "1000", "--format", form) for form in
+               ("table", "json", "csv", "latex")}  # fmt: skip
+    assert sys.get_int_max_str_digits() == before
+    assert all(status == 0 for status, *_ in outputs.values())
+    assert "3.658e6099" in outputs["table"][1]
+    assert r"3.658\times 10^{6099}" in outputs["latex"][1]
+    try:
+        sys.set_int_max_str_digits(0)
+        (from_json,) = json.loads(outputs["json"][1])
+        (from_csv,) = csv.DictReader(io.StringIO(outputs["csv"][1]))
+        assert from_json["single_agent"] == single == int(from_csv["single_agent"])
+        assert type(from_json["ratio"]) is int  # no floating-point number holds it
+    finally:
+        sys.set_int_max_str_digits(before)
+
+
+def test_the_table_fits_a_terminal(said) -> None:
+    out = said("--agents", "1:16", "--topology", *FIVE)[1]
+    assert max(map(len, out.splitlines())) <= 80
+    assert "e+" not in out
+
+
+def test_numbers() -> None:
+    assert list(numbers("5:7")) == [5, 6, 7]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--agents", "0"), "agents = '0', allowed: 4, 1:16 or 2:64:2"),
+        (("--agents", "four"), "agents = 'four'"),
+        (("--agents", "5:2"), "agents = '5:2'"),
+        (("--agents", "1:10001"), "from 1 to 10,000"),
+        (("--actions", "1"), "actions = 1, allowed: 2 or more"),
+        (("--rules", "0"), "rules = 0, allowed: 1 or more"),
+        (("--topology", "ring"), "topology 'ring': known: chain,"),
+        (("--topology",), "topology = none, allowed: one or more"),
+        (("--topology", "--format", "csv"), "topology = none, allowed: one or more"),
+        (("--topology", "per-robot"), "what whole robots try is in: nested-agents topology show"),
+        (("--format", "xml"), "invalid choice 'xml'"),
+        (
+            ("--learning", "--agents", "3"),
+            "--agents: is not for --learning, which measures a fixed",
+        ),
+        (("--learning", "--measured"), "--measured: is not for --learning"),
+        (("--plot", "cost.txt"), "cost.txt: suffix must be"),
+    ],
+)
+def test_what_the_user_can_mend_is_one_line(said, arguments: tuple[str, ...], message: str) -> None:
+    status, out, err = said(*arguments)
+    assert (status, out) == (2, "")
+    assert message in err
+    assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize("topology", [*FIVE, "random:1"])
+@pytest.mark.parametrize("n", [1, 2, 5])
+def test_counted_is_formula(topology: str, n: int) -> None:
+    measured = measure(topology, n)
+    assert measured is not None
+    assert measured.agrees
+    below = agents_below(topology, n)
+    assert measured.joint_actions == sum(4 ** (1 + b) for b in below)
+    assert measured.weight_updates == 25 * n
+    assert measured.deciding > 0 < measured.memory
+
+
+def test_the_single_agent_counts_as_its_formula() -> None:
+    measured = measure("single-agent", 2)
+    assert measured is not None
+    assert measured.agrees
+    assert (measured.joint_actions, measured.rule_evaluations) == (16, 16 * 625)
+    assert measure("single-agent", 8) is None  # 65536 actions over 1.5e11 rules
+
+
+def made_up(n: int, power: float) -> CostRow:
+    tried = 4**n
+    measured = Measured(tried, tried, tried, tried, n, n, 1e-6 * tried**power, 1e-6, 10 * tried)
+    return CostRow(n, "chain", 1, None, None, 1, measured)
+
+
+def test_exponents_are_found() -> None:
+    rows = [made_up(n, 1.5) for n in range(1, 9)]
+    found = exponent(rows, "deciding")
+    assert found is not None
+    np.testing.assert_allclose([found.value, found.low, found.high], 1.5, atol=1e-6)
+    memory = exponent(rows, "memory")
+    assert memory is not None
+    assert memory.value == pytest.approx(1.0)
+    assert exponent(rows[:4], "deciding") is None
+
+
+@pytest.mark.parametrize(
+    ("most", "over"), [(4, []), (5, [1, 5]), (8, [4, 8]), (10, [6, 10]), (16, [9, 16])]
+)
+def test_exponents_are_of_the_larger_half_but_of_five_at_least(most: int, over: list[int]) -> None:
+    chosen = [row.agents for row in fitted([made_up(n, 1.0) for n in range(most, 0, -1)])]
+    assert chosen == (list(range(over[0], over[1] + 1)) if over else [])
+
+
+def test_the_table_says_what_exponents_are_of() -> None:
+    out = written([made_up(n, 1.5) for n in range(1, 11)], "table")
+    assert "chain, n = 6 to 10: deciding 1.50 [1.50, 1.50], memory 1.00 [1.00, 1.00]" in out
+    assert "Below that, p\nis a lower bound: what is fixed" in out
+    assert "ms: deciding and learning" in out
+    assert max(map(len, out.splitlines())) <= 80
+    assert "Exponent" not in written([made_up(n, 1.5) for n in range(1, 5)], "table")
+
+
+def test_latex_has_what_was_measured() -> None:
+    rows = [made_up(1, 1.0), made_up(10, 2.0), replace(made_up(11, 1.0), measured=None)]
+    formulas, measured = written(rows, "latex").split("\n\n")
+    assert r"\begin{tabular}{rlrrrrr}" in formulas
+    assert measured.splitlines() == [
+        r"\begin{tabular}{rlrrrrrr}",
+        r"\toprule",
+        r"$n$ & topology & formula & counted & rules valued & updates & ms & MiB \\",
+        r"\midrule",
+        r"1 & chain & 4 & 4 & 4 & 1 & 0.005 & $3.81\times 10^{-5}$ \\",
+        r"10 & chain & 1\,048\,576 & 1\,048\,576 & 1\,048\,576 & 10 & 1\,099\,511\,628 & 10 \\",
+        r"11 & chain & -- & -- & -- & -- & -- & -- \\",
+        r"\bottomrule",
+        r"\end{tabular}",
+    ]
+    assert written(rows[2:], "latex").count("tabular") == 2
+
+
+def test_csv_has_columns_of_rows_that_were_measured_later() -> None:
+    rows = [replace(made_up(1, 1.0), measured=None), made_up(2, 1.0)]
+    first, second = csv.DictReader(io.StringIO(written(rows, "csv")))
+    assert (first["memory_bytes"], second["memory_bytes"]) == ("", "160")
+
+
+@pytest.mark.parametrize("form", ["table", "json", "csv", "latex"])
+def test_having_measured_nothing_is_said(said, form: str) -> None:
+    status, out, err = said("--agents", "65", "--measured", "--format", form)
+    assert status == 0
+    assert "65" in out
+    assert err.startswith("nothing was measured: every step would take more than 400,000,000 rule")
+    assert err.count("\n") == 1
+
+
+def test_measured_tables_and_figure(said, tmp_path: Path) -> None:
+    figure = tmp_path / "cost.svg"
+    status, out, _ = said("--agents", "1:2", "--topology", "chain", "single-agent", "--measured",
+                          "--plot", str(figure))  # fmt: skip
+    assert status == 0
+    assert "All counts equal the formulas in 4 of 4 rows." in out
+    assert max(map(len, out.splitlines())) <= 80
+    assert "<svg" in figure.read_text()
+    rows = list(cost_rows(["chain"], [2], Problem(), measured=True))
+    (record,) = json.loads(written(rows, "json"))
+    assert record["joint_actions_per_step"] == record["joint_actions_formula_per_step"] == 20

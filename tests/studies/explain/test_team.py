@@ -1,0 +1,198 @@
+"""A small trial, run for real, explained; and what is refused."""
+
+import sqlite3
+
+import numpy as np
+import pytest
+
+from nested_agents.studies.cli.main import main
+from nested_agents.studies.explain import policy as explain_policy
+from nested_agents.studies.explain import team as explain
+from nested_agents.studies.explain import text as explain_text
+from nested_agents.studies.spec.conditions import ConditionSettings
+from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.store.store import DATABASE, Store
+from nested_agents.studies.trials.trial import build, run_trial, trials_of
+
+SPEC = Spec.of(
+    {
+        "seeds": [3],
+        "episodes": 3,
+        "steps": 15,
+        "evaluation": 1,
+        "scenario": {
+            "start": "easy",
+            "failures": [{"kind": "seized", "wheels": "robot1.left", "episode": 1}],
+        },
+        "learner": {"self_model": {"enabled": True}},
+        "overrides": [
+            {"name": "order 1"},
+            {"name": "a pair", "learner": {"rule_base": {"products": [["gap", "side"]]}}},
+            {"name": "random", "learner": {"kind": "frozen", "decision": {"rule": "random"}}},
+            {"name": "unfinished", "learner": {"kind": "frozen"}},
+        ],
+    }
+)
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    """Finished are all conditions but the last."""
+    directory = tmp_path_factory.mktemp("study") / "out"
+    with Store.create(directory, SPEC) as store:
+        for trial in trials_of(SPEC)[:3]:
+            store.save(trial, run_trial(trial), 1.0)
+    return directory
+
+
+def run(capsys, *arguments):
+    status = main(["explain", *map(str, arguments)])
+    return status, capsys.readouterr()
+
+
+@pytest.mark.slow
+def test_the_first_trial_in_words_and_figures(study, capsys):
+    status, said = run(capsys, study)
+    assert status == 0
+    out = said.out
+    assert out.startswith("order 1, seed 3: the team after 3 episodes\n")
+    assert "the functions below are all of f" in out
+    assert "IF gap is touching" in out
+    assert "before the first failure, after all training" in " ".join(out.split())
+    folder = study / "explain" / "order-1-seed3"
+    assert {path.name for path in folder.iterdir()} == {
+        "explanation.txt",
+        *(f"{n}.{s}" for n in ("functions", "policy", "self-model") for s in ("png", "svg")),
+    }
+    lines = [line for line in out.splitlines() if str(study) not in line]
+    assert max(map(len, lines)) <= 80
+    assert not [line for line in lines if line != line.rstrip()]
+
+
+@pytest.mark.slow
+def test_pairs_of_variables_and_nothing_learned(study, capsys):
+    status, said = run(capsys, study, "--condition", "a pair", "--seed", 3)
+    assert status == 0
+    assert "Pairs of variables beyond that: " in said.out
+    assert "Three and more" not in said.out
+    assert said.out.count(" AND side is ") == 3
+    assert (study / "explain" / "a-pair-seed3" / "pairs.png").stat().st_size > 5000
+    status, said = run(capsys, study, "--condition", "random")
+    assert status == 0
+    assert "the agents have learned nothing" in said.out
+    assert "Not drawn: actions are drawn at random." in said.out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (["--condition", "oder 1"], "did you mean 'order 1'"),
+        (["--seed", "4"], "--seed 4: allowed 3"),
+        (["--condition", "unfinished"], "unfinished, seed 3 has not finished"),
+    ],
+)
+def test_what_the_user_can_mend(arguments, complaint, study, capsys):
+    status, said = run(capsys, study, *arguments)
+    assert (status, said.out) == (2, "")
+    assert complaint in said.err.splitlines()[-1]
+
+
+def test_no_study(tmp_path, capsys):
+    status, said = run(capsys, tmp_path)
+    assert status == 2
+    assert said.err.count("\n") == 1
+
+
+def changed(study, tmp_path, statement):
+    """Return a copy of the study in which a statement has changed the database."""
+    import shutil
+
+    copy = shutil.copytree(study, tmp_path / "copy")
+    connection = sqlite3.connect(copy / DATABASE)
+    connection.execute(statement)
+    connection.commit()
+    connection.close()
+    return copy
+
+
+def test_results_of_another_version_are_refused(study, tmp_path, capsys):
+    copy = changed(study, tmp_path, "UPDATE meta SET value = '0' WHERE key = 'results_version'")
+    status, said = run(capsys, copy)
+    assert status == 2
+    assert "holds results of version 0" in said.err
+
+
+def test_another_team_than_the_one_that_was_measured_is_not_explained(study, monkeypatch):
+    with Store.open(study) as store:
+        trial = explain.choose(store, None, None)
+        kept = explain._kept(store, trial)
+        monkeypatch.setattr(explain, "_kept", lambda *_: [*kept[:2], (*kept[2][:-1], 0.0)])
+        with pytest.raises(ValueError, match="gives another episode 2 than the one that is kept"):
+            explain.explained(store, trial)
+
+
+def test_a_topology_file_that_has_changed_since(tmp_path, capsys):
+    file = tmp_path / "mine.py"
+    file.write_text("def mine(agents, groups): return list(zip(agents, agents[1:]))")
+    spec = Spec.of({"seeds": [3], "episodes": 1, "steps": 1, "topology": f"{file}:mine"})
+    (trial,) = trials_of(spec)
+    with Store.create(tmp_path / "out", spec) as store:
+        store.save(trial, run_trial(trial), 1.0)
+    file.write_text("def mine(agents, groups): return []")
+    status, said = run(capsys, tmp_path / "out")
+    assert status == 2
+    assert "has changed: its digest is" in said.err.splitlines()[-1]
+
+
+@pytest.mark.slow
+def test_an_agent_for_each_robot(tmp_path, capsys):
+    one = {"overrides": (), "topology": {"kind": "per-robot"}, "evaluation": 0, "episodes": 2}
+    spec = Spec.of({**SPEC.table(), **one})
+    (trial,) = trials_of(spec)
+    with Store.create(tmp_path, spec) as store:
+        store.save(trial, run_trial(trial), 1.0)
+    status, said = run(capsys, tmp_path)
+    assert status == 0
+    assert "Not drawn: its agents are no wheels." in said.out
+    assert "turning  built" in said.out
+
+
+def test_folders_of_conditions_differ(tmp_path):
+    from types import SimpleNamespace
+
+    names = ["a/b", "a b", "x", "§"]
+    folders = [
+        explain.folder(tmp_path, SimpleNamespace(condition=name, seed=0), names).name
+        for name in names
+    ]
+    assert folders == ["condition1-seed0", "condition2-seed0", "x-seed0", "condition4-seed0"]
+
+
+@pytest.mark.parametrize(("slope", "to_the_box"), [(-1.0, True), (1.0, False)])
+def test_a_team_that_likes_the_box_drives_to_it(slope, to_the_box):
+    scenario, team = build(ConditionSettings(), 0)
+    partitions = team.evaluator.rules.partitions
+    gap = [v.name for v in scenario.state_space.variables].index("gap")
+    begin = sum(p.size for p in partitions[:gap])
+    team.learner.theta[:, begin : begin + partitions[gap].size] = slope * np.array(
+        partitions[gap].centres
+    )
+    found = explain_policy.fields(team, scenario)
+    assert len(found) == 2
+    for field in found:
+        far = np.hypot(*field.points[:, :2].T) > 0.25
+        toward = np.array([move == "to the box" for move in field.moves])[far]
+        assert toward.mean() > 0.9 if to_the_box else toward.mean() < 0.1
+
+
+def test_sides_are_named_counter_clockwise():
+    points = np.array([[-1, 0.1, 0], [0, -1, 0], [1, 0, 0], [0, 1, 0], [-1, -0.1, 0]])
+    zeros = np.zeros(5)
+    field = explain_policy.Field(0, points, np.zeros((5, 2)), zeros, np.zeros((0, 2)))
+    assert field.sides == ["behind", "right", "ahead", "left", "behind"]
+    assert field.moves == ["rests"] * 5
+
+
+def test_percents_stay_with_their_numbers():
+    sentence = "x" * 76 + " 3 %, y"
+    assert [line.strip() for line in explain_text._wrapped(sentence)] == ["x" * 76, "3 %, y"]

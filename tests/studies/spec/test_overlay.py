@@ -1,0 +1,86 @@
+import pytest
+
+from nested_agents.studies.spec.conditions import ConditionSettings
+from nested_agents.studies.spec.overlay import (
+    assignment,
+    flat,
+    kind_of,
+    models_of,
+    nested,
+    overlay,
+)
+
+LEARNER = ConditionSettings.model_fields["learner"].annotation
+
+
+def test_neither_table_is_modified():
+    base, table = {"a": {"b": 1}}, {"a": {"c": 2}}
+    assert overlay(base, table) == {"a": {"b": 1, "c": 2}}
+    assert (base, table) == ({"a": {"b": 1}}, {"a": {"c": 2}})
+
+
+def test_a_table_replaces_a_value_and_a_value_a_table():
+    assert overlay({"a": 1}, {"a": {"b": 2}}) == {"a": {"b": 2}}
+    assert overlay({"a": {"b": 2}}, {"a": 1}) == {"a": 1}
+
+
+def test_another_kind_keeps_what_both_inherit():
+    base = {"kind": "td-lambda", "trace_decay": 0.4, "discount": 0.9}
+    assert overlay(base, {"kind": "frozen"}, LEARNER) == {"kind": "frozen", "discount": 0.9}
+
+
+def test_the_same_kind_keeps_everything():
+    base = {"kind": "td-lambda", "trace_decay": 0.4}
+    assert overlay(base, {"kind": "td-lambda", "discount": 0.9}, LEARNER) == base | {
+        "discount": 0.9
+    }
+
+
+def test_fields_that_only_share_their_name_are_not_kept():
+    base = {"kind": "batch-td", "exploration": {"kind": "burst", "decay": 0.75}}
+    table = {"exploration": {"kind": "paper"}}
+    assert overlay(base, table, LEARNER)["exploration"] == {"kind": "paper"}
+
+
+def test_an_unknown_kind_is_left_for_validation_to_refuse():
+    base = {"kind": "td-lambda", "trace_decay": 0.4}
+    assert overlay(base, {"kind": "fancy"}, LEARNER) == {"kind": "fancy"}
+
+
+def test_every_member_of_a_union_has_a_kind():
+    kinds = [kind_of(model) for model in models_of(LEARNER)]
+    assert "batch-td" in kinds
+    assert len(set(kinds)) == len(kinds)
+    assert None not in kinds
+
+
+def test_flat_undoes_nested():
+    assert list(flat(nested("a.b.c", [1]))) == [("a.b.c", [1])]
+
+
+@pytest.mark.parametrize(
+    ("text", "table"),
+    [
+        ("episodes=3", {"episodes": 3}),
+        ("learner.ridge = 0.5", {"learner": {"ridge": 0.5}}),
+        ("scenario.box=circle", {"scenario": {"box": "circle"}}),
+        ("topology=chain:reversed", {"topology": "chain:reversed"}),
+        ('scenario.box="circle"', {"scenario": {"box": "circle"}}),
+        ("seeds=[1, 2]", {"seeds": [1, 2]}),
+        ('sweep."scenario.box"=["a"]', {"sweep": {"scenario.box": ["a"]}}),
+        ("topology={kind='teams'}", {"topology": {"kind": "teams"}}),
+        ("a=b=c", None),
+        ("a", None),
+        ("=3", None),
+        ("a=", None),
+        ("a b=3", None),
+        ("a=[1", None),
+        ("a=1\nb=2", None),
+    ],
+)
+def test_assignment(text, table):
+    if table is None:
+        with pytest.raises(ValueError, match=r"expected|not valid TOML"):
+            assignment(text)
+    else:
+        assert assignment(text) == table

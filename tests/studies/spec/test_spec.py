@@ -1,0 +1,358 @@
+import tomllib
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from nested_agents.studies.spec.errors import SpecError
+from nested_agents.studies.spec.presets import PRESETS
+from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.spec.toml import dumps
+
+BAD = {
+    "": [],
+    "stepz = 3": ["stepz = 3", "did you mean 'steps'"],
+    "study = 'lerning-curve'": ["study", "did you mean 'learning-curve'"],
+    "preset = 'papr'": ["preset = 'papr'", "did you mean 'paper'"],
+    "preset = 3": ["preset = 3", "string"],
+    "seeds = -1": ["seeds = -1", "between 1 and"],
+    "seeds = 0": ["seeds = 0", "between 1 and"],
+    "seeds = true": ["seeds = true", "whole number"],
+    "seeds = 'eight'": ["seeds = 'eight'", "whole number"],
+    "seeds = []": ["seeds = []"],
+    "seeds = [1, 1]": ["seeds = [1, 1]", "distinct"],
+    "seeds = [1, -2]": ["seeds[1] = -2", "at least 0"],
+    "seeds = [1, 'x']": ["seeds[1] = 'x'", "whole number"],
+    "seeds = 1000000000000": ["seeds = 1000000000000", "between 1 and"],
+    "episodes = 0": ["episodes = 0", "at least 1"],
+    "episodes = '20'": ["episodes = '20'", "whole number"],
+    "episodes = 2.0": ["episodes = 2.0", "whole number"],
+    "steps = -450": ["steps = -450", "at least 1"],
+    "evaluation = -1": ["evaluation = -1", "at least 0"],
+    "scenario = 3": ["scenario = 3", "table"],
+    "scenario.robots = 0": ["scenario.robots = 0", "at least 1"],
+    "scenario.robots = true": ["scenario.robots = true"],
+    "scenario.start = 'medum'": ["scenario.start = 'medum'", "'easy', 'medium' or 'hard'"],
+    "scenario.reward = 3": ["scenario.reward = 3", "table"],
+    "scenario.reward.c1 = nan": ["scenario.reward.c1 = nan", "finite"],
+    "scenario.reward.receding = inf": ["scenario.reward.receding = inf", "finite"],
+    "scenario.box.vertices = [[0, 0], [inf, 0], [1, 1]]": ["vertices[1][0] = inf", "finite"],
+    "scenario.reward.c9 = 1": ["scenario.reward.c9 = 1", "unknown key"],
+    "topology = 'chan'": ["'chan'", "chain"],
+    "topology = 3": ["topology = 3", "table"],
+    "topology.kind = 'tems'": ["topology.kind = 'tems'", "did you mean 'teams'"],
+    "topology.kind = 3": ["topology.kind = 3"],
+    "learner.kind = ['frozen']": ["learner.kind = ['frozen']"],
+    "learner.rigde = 3": ["learner.rigde = 3", "did you mean 'ridge'", "batch-td"],
+    "learner.ridge = -1": ["learner.ridge = -1", "greater than 0"],
+    "learner = {kind = 'frozen', ridge = 3}": ["learner.ridge = 3", "unknown key", "frozen"],
+    "learner.exploration = 'paper'": ["learner.exploration = 'paper'", "table"],
+    "learner.rule_base.order = 1.5": ["learner.rule_base.order = 1.5", "whole number"],
+    "learner.rule_base.products = [['a'], 'b']": ["learner.rule_base.products[1] = 'b'", "list"],
+    "sweep = 3": ["sweep = 3", "table"],
+    "sweep.preset = 'paper'": ["sweep.preset = 'paper'", "list"],
+    "sweep.preset = []": ["sweep.preset = []", "list"],
+    "sweep.presett = ['paper']": ["sweep.presett", "did you mean 'preset'"],
+    "sweep.episodes = [1, 2]": ["sweep.episodes", "unknown key"],
+    "sweep.preset = ['default', 'papr']": ["preset = 'papr'", "did you mean 'paper'"],
+    "sweep.preset = ['paper', 'paper']": ["sweep", "the same"],
+    "sweep.learner.kind = ['batch-td']\nsweep.preset = [1]": ["preset = 1"],
+    "sweep.topology = ['chain', 'chain:listed']": ["'chain' and 'chain:listed' are the same"],
+    "sweep.learner.ridge = [1, -1]": ["learner.ridge = -1", "condition '-1'"],
+    "seeds = 50000\nsweep.scenario.robots = [1, 2, 3]": ["3 conditions x 50000 seeds"],
+    "overrides = 3": ["overrides = 3", "list"],
+    "overrides = [3]": ["overrides[0] = 3", "table"],
+    "[[overrides]]\npreset = 'paper'": ["overrides[0].name: missing"],
+    "overrides = [{name = ''}]": ["overrides[0].name = ''", "can be printed"],
+    'overrides = [{name = "a\\nb"}]': ["overrides[0].name = 'a\\nb'", "can be printed"],
+    "scenario.hold = 99999999999": ["scenario.hold = 99999999999", "at most 10000"],
+    "learner.sweeps = 99999999999": ["learner.sweeps = 99999999999", "at most 10000"],
+    "overrides = [{name = 'a', larner = {}}]": ["overrides[0].larner", "did you mean 'learner'"],
+    "overrides = [{name = 'a', learner = 3}]": ["overrides[0].learner = 3", "table"],
+    "overrides = [{name = 'a', topology = 'chan'}]": ["'chan'", "overrides[0]", "'chain'"],
+    "overrides = [{name = 'a', preset = 'papr'}]": ["preset = 'papr'", "'paper'", "'a'"],
+    "overrides = [{name = 'a', learner = {ridge = -1}}]": ["learner.ridge = -1", "condition 'a'"],
+    "overrides = [{name = 'a', sweep = {steps = [1]}}]": ["overrides[0].sweep.steps", "unknown"],
+    "overrides = [{name = 'a'}, {name = 'b'}]": ["overrides", "'a' and 'b' are the same"],
+    "overrides = [{name = 'a'}, {name = 'a', learner = {ridge = 1}}]": ["overrides", "the same"],
+    "evaluations = 3": ["evaluations = 3", "table"],
+    "evaluations.' ' = {}": ["evaluations", "can be printed"],
+    "evaluations.a = 3": ["evaluations.a = 3", "table"],
+    "evaluations.a.boxx = 'circle'": ["scenario.boxx = 'circle'", "unknown", "evaluation 'a'"],
+    "seeds =": ["not valid TOML"],
+    "episodes = 1979-05-27": ["episodes = 1979-05-27"],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("text", [text for text in BAD if text])
+def test_what_is_wrong_is_said_in_one_line(text):
+    with pytest.raises(SpecError) as caught:
+        Spec.parse(text)
+    message = str(caught.value)
+    assert "\n" not in message
+    for part in BAD[text]:
+        assert part in message
+
+
+def test_defaults():
+    spec = Spec.parse("")
+    assert (spec.study, spec.preset, spec.seeds) == ("learning-curve", "default", tuple(range(8)))
+    assert [c.label for c in spec.conditions()] == ["default"]
+    assert spec.conditions()[0].columns == {"preset": "default"}
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_every_preset_is_a_valid_condition(preset):
+    (condition,) = Spec.of({"preset": preset}).conditions()
+    assert condition.label == preset
+
+
+def test_the_paper_preset_holds_the_printed_constants():
+    settings = Spec.of({"preset": "paper"}).conditions()[0].settings
+    learner = settings.learner
+    assert (learner.kind, learner.step_size, learner.trace_decay) == ("td-lambda", 0.00012, 0.4)
+    assert (learner.discount, learner.exploration.decay) == (0.999, 0.005)
+    assert (learner.rule_base.order, learner.rule_base.memberships) == (7, 5)
+
+
+def test_controls_differ_from_the_default_in_the_learner_and_greedy_in_what_it_plans_by():
+    conditions = Spec.of({"sweep": {"preset": ["default", "frozen", "random", "greedy"]}})
+    default, *controls = [c.settings for c in conditions.conditions()]
+    reward = default.scenario.reward.model_copy(update={"attraction_without_contact": True})
+    planned = default.scenario.model_copy(update={"lookahead": 48, "reward": reward})
+    for control, scenario in zip(controls, [default.scenario] * 2 + [planned], strict=True):
+        assert control.scenario == scenario
+        assert control.topology == default.topology
+        assert control.learner.kind == "frozen"
+        assert control.learner.rule_base == default.learner.rule_base
+
+
+def test_the_spec_is_laid_over_the_preset_and_the_sweep_over_the_spec():
+    spec = Spec.parse(
+        "preset = 'paper'\nlearner.discount = 0.5\nlearner.step_size = 0.1\n"
+        "sweep.learner.step_size = [0.2, 0.3]"
+    )
+    learners = [c.settings.learner for c in spec.conditions()]
+    assert [(x.discount, x.step_size, x.trace_decay) for x in learners] == [
+        (0.5, 0.2, 0.4), (0.5, 0.3, 0.4),
+    ]  # fmt: skip
+
+
+def test_another_kind_over_a_preset_leaves_its_fields_behind():
+    learner = (
+        Spec.parse("preset = 'paper'\nlearner.kind = 'frozen'").conditions()[0].settings.learner
+    )
+    assert learner.kind == "frozen"
+    assert learner.discount == 0.999
+
+
+def test_the_grid_varies_the_last_key_fastest_and_labels_are_short():
+    spec = Spec.parse(
+        "sweep.preset = ['default', 'frozen']\nsweep.topology = ['chain', 'chain:reversed']\n"
+        "sweep.learner.rule_base.order = [1, 2]"
+    )
+    labels = [c.label for c in spec.conditions()]
+    assert labels[:3] == [
+        "default, topology=chain, order=1",
+        "default, topology=chain, order=2",
+        "default, topology=chain:reversed, order=1",
+    ]
+    assert len(labels) == 8
+    assert spec.conditions()[1].columns == {
+        "preset": "default", "topology": "chain", "learner.rule_base.order": 2,
+    }  # fmt: skip
+
+
+def test_a_topology_may_be_a_string_and_changed_by_key():
+    spec = Spec.parse("topology = 'chain'", ["topology.order = reversed"])
+    assert spec.conditions()[0].settings.topology.order == "reversed"
+
+
+def test_changes_are_laid_over_the_file_in_order(tmp_path):
+    path = tmp_path / "spec.toml"
+    path.write_text("episodes = 3\nlearner.ridge = 2")
+    spec = Spec.load(path, ["episodes=4", "learner.sweeps=5", "episodes=6"])
+    assert (spec.episodes, dict(spec.learner)) == (6, {"ridge": 2, "sweeps": 5})
+
+
+def test_a_change_that_is_none_is_named():
+    with pytest.raises(SpecError, match="--set episodes: expected key=value"):
+        Spec.parse("", ["episodes"])
+
+
+def test_a_missing_a_binary_and_a_directory_for_a_file(tmp_path):
+    (tmp_path / "binary").write_bytes(b"\xff\xfe")
+    for name, reason in [("missing", "No such file"), ("binary", "UTF-8"), (".", "directory")]:
+        with pytest.raises(SpecError, match=reason):
+            Spec.load(tmp_path / name)
+
+
+def test_equal_content_is_an_equal_spec_however_it_is_written():
+    one = Spec.parse("seeds = 2\ntopology = 'chain:reversed'\nlearner.ridge = 1")
+    two = Spec.parse("seeds = [0, 1]\n[topology]\nkind = 'chain'\norder = 'reversed'")
+    two = two.model_copy(update={"learner": {"ridge": 1.0}})
+    assert [c.settings for c in one.conditions()] == [c.settings for c in two.conditions()]
+    assert one.conditions()[0].settings.canonical() == two.conditions()[0].settings.canonical()
+
+
+OVERRIDES = """
+learner.discount = 0.9
+[[overrides]]
+name = "default"
+[[overrides]]
+name = "no replay"
+learner = {kind = "td-lambda", step_size = 0.1}
+topology = "chain:reversed"
+[overrides.sweep]
+"learner.trace_decay" = [0.0, 0.9]
+[[overrides]]
+name = "paper"
+preset = "paper"
+learner.ridge = 1.0
+[sweep]
+"scenario.robots" = [1, 2]
+"""
+
+
+def test_overrides_are_laid_over_the_spec_and_crossed_with_both_sweeps():
+    text = OVERRIDES.replace("learner.ridge = 1.0", "")
+    found = {c.label: c for c in Spec.parse(text).conditions()}
+    assert list(found) == [
+        "default, robots=1",
+        "default, robots=2",
+        "no replay, trace_decay=0.0, robots=1",
+        "no replay, trace_decay=0.0, robots=2",
+        "no replay, trace_decay=0.9, robots=1",
+        "no replay, trace_decay=0.9, robots=2",
+        "paper, robots=1",
+        "paper, robots=2",
+    ]
+    online = found["no replay, trace_decay=0.9, robots=2"]
+    assert online.settings.learner.trace_decay == 0.9
+    assert online.settings.topology.order == "reversed"
+    assert online.settings.learner.discount == 0.9
+    assert found["paper, robots=1"].settings.learner.rule_base.order == 7
+    assert found["paper, robots=1"].settings.learner.discount == 0.9
+    assert found["default, robots=1"].columns == {
+        "name": "default", "learner.trace_decay": "", "scenario.robots": 1,
+    }  # fmt: skip
+
+
+def test_an_override_of_another_kind_may_not_bring_the_keys_of_the_old_one():
+    with pytest.raises(SpecError, match=r"learner.ridge = 1.0: unknown key for kind 'td-lambda'"):
+        Spec.parse(OVERRIDES)
+
+
+def test_the_trials_of_all_overrides_are_counted_before_they_are_made():
+    overrides = [{"name": "a", "sweep": {"scenario.robots": [1, 2]}}, {"name": "b"}]
+    table = {"seeds": 50_000, "overrides": overrides}
+    with pytest.raises(SpecError, match="3 conditions x 50000 seeds"):
+        Spec.of(table)
+
+
+def test_evaluations_are_laid_over_the_scenario_of_every_condition():
+    spec = Spec.parse(
+        "evaluations.circle.box = 'circle'\nevaluations.hard.start = 'hard'\n"
+        "sweep.scenario.hold = [8, 4]"
+    )
+    found = [
+        (name, scenario.box, scenario.start, scenario.hold)
+        for condition in spec.conditions()
+        for name, scenario in condition.evaluations
+    ]
+    assert found == [
+        ("circle", "circle", "medium", 8), ("hard", "square", "hard", 8),
+        ("circle", "circle", "medium", 4), ("hard", "square", "hard", 4),
+    ]  # fmt: skip
+
+
+def test_a_section_may_be_a_settings_model():
+    from nested_agents.core.settings import TDLambdaSettings
+
+    spec = Spec.of({"overrides": [{"name": "online", "learner": TDLambdaSettings(step_size=0.1)}]})
+    assert spec.conditions()[0].settings.learner == TDLambdaSettings(step_size=0.1)
+    assert Spec.parse(dumps(spec.table())) == spec
+
+
+SPECS = [
+    "",
+    OVERRIDES.replace("learner.ridge = 1.0", ""),
+    "overrides = [{name = 'ä \"b\"', scenario = {failures = [{kind = 'seized', wheels = '*'}]}}]",
+    "evaluations.a = {}\nevaluations.'b c' = {box = 'circle', reward = {c1 = 1.0}}",
+    "seeds = [3, 5]\ntopology = 'chain:reversed'\nlearner.ridge = 1",
+    "sweep.preset = ['default', 'frozen']\nsweep.scenario.box = ['square', 'circle']",
+    "sweep.topology = ['chain', {kind = 'chain', order = ['a \\\\ \"b', 'c']}]",
+    "topology.order = ['ä\\u007f', 'b']",
+]
+
+
+@pytest.mark.parametrize("text", SPECS)
+def test_a_spec_survives_being_written_and_read(text):
+    spec = Spec.parse(text)
+    again = Spec.parse(dumps(spec.table()))
+    assert again == spec
+    assert again.conditions() == spec.conditions()
+
+
+KEYS = st.sampled_from(
+    ["study", "preset", "seeds", "episodes", "steps", "evaluation", "scenario", "topology",
+     "learner", "sweep", "kind", "robots", "box", "reward", "c1", "rule_base", "order", "ridge",
+     "exploration", "decision", "rule", "products", "members", "edges", "a", "", "x.y", "'\n",
+     "learner.kind", "scenario.robots", "topology.order", "overrides", "evaluations", "name"]
+)  # fmt: skip
+WORDS = st.sampled_from(
+    ["default", "paper", "frozen", "chain", "chain:reversed", "teams", "edges", "random", "file",
+     "td-lambda", "batch-td", "burst", "square", "learning-curve", "x\ny", ""]
+)  # fmt: skip
+LEAVES = st.one_of(
+    st.booleans(), st.integers(-3, 9), st.integers(), st.floats(), st.text(max_size=5), WORDS
+)
+VALUES = st.recursive(
+    LEAVES,
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(KEYS, inner, max_size=4),
+    max_leaves=12,
+)
+
+
+def is_spec_or_one_line(make):
+    try:
+        return len(make().conditions()) > 0
+    except SpecError as error:
+        message = str(error)
+    return message and "\n" not in message
+
+
+@settings(max_examples=400)
+@given(st.dictionaries(KEYS, VALUES, max_size=5))
+def test_any_table_is_a_spec_or_one_line(table):
+    assert is_spec_or_one_line(lambda: Spec.of(table))
+
+
+@settings(max_examples=100)
+@given(st.text(max_size=60), st.lists(st.text(max_size=20), max_size=2))
+def test_any_text_is_a_spec_or_one_line(text, changes):
+    assert is_spec_or_one_line(lambda: Spec.parse(text, changes))
+
+
+@settings(max_examples=200)
+@given(st.dictionaries(st.text(max_size=4), VALUES, max_size=4))
+def test_written_tables_are_read_back(table):
+    def same(a, b):
+        if isinstance(a, dict):
+            return a.keys() == b.keys() and all(same(a[k], b[k]) for k in a)
+        if isinstance(a, list):
+            return len(a) == len(b) and all(map(same, a, b))
+        return type(a) is type(b) and repr(a) == repr(b)
+
+    assert same(tomllib.loads(dumps(table)), table)
+
+
+def test_long_values_that_begin_alike_are_told_apart():
+    members = [["robot1.left", "robot1.right"], ["robot2.left", "robot2.right"]]
+    alike = [{"kind": "teams", "members": m} for m in (members, [members[0], members[1][::-1]])]
+    first, second = Spec.of({"sweep": {"topology": alike}}).conditions()
+    assert first.label != second.label
+    assert first.label[:50] == second.label[:50]
+    assert max(len(first.label), len(second.label)) <= 60
+    assert "robot2.left" in str(first.columns["topology"])
+    assert first.columns != second.columns

@@ -1,0 +1,185 @@
+import json
+import random
+import shutil
+import sqlite3
+
+import made_up
+import pytest
+
+from nested_agents.studies.cli.main import main
+from nested_agents.studies.spec.errors import SpecError
+from nested_agents.studies.store.store import DATABASE, Store
+
+
+def finish(directory):
+    """Run what is left; return what had to be said and how many trials ran."""
+    with Store.create(directory, made_up.SPEC) as store:
+        pending = store.pending(made_up.TRIALS)
+        for trial in pending:
+            store.save(trial, made_up.measure(trial), 1.5)
+        return store.notes, len(pending)
+
+
+def content(directory):
+    with Store.open(directory) as store:
+        store.verify()
+        rows = store.rows("training"), store.rows("evaluation"), store.numbers()
+    return rows, {p.name: p.read_bytes() for p in (directory / "recordings").iterdir()}
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory):
+    directory = tmp_path_factory.mktemp("sound") / "study"
+    assert finish(directory) == ([], 6)
+    return directory
+
+
+@pytest.fixture
+def study(sound, tmp_path):
+    return shutil.copytree(sound, tmp_path / "study")
+
+
+def change(directory, statement, *values):
+    with sqlite3.connect(directory / DATABASE) as db:
+        db.execute("PRAGMA writable_schema = ON")
+        db.execute(statement, values)
+    db.close()
+
+
+def test_what_is_sound_is_left_alone(study, sound):
+    before = {p: p.stat().st_mtime_ns for p in (study / "recordings").iterdir()}
+    assert finish(study) == ([], 0)
+    assert {p: p.stat().st_mtime_ns for p in (study / "recordings").iterdir()} == before
+    assert content(study) == content(sound)
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "UPDATE episodes SET steps = steps + 1 WHERE identity = ? AND phase = 'training'",
+        "UPDATE seconds SET total = 3.0 WHERE identity = ?",
+        "UPDATE trials SET seed = 7 WHERE identity = ?",
+        "UPDATE checksums SET sha256 = 'x' WHERE identity = ?",
+        "DELETE FROM episodes WHERE identity = ? AND episode = 1",
+    ],
+)
+def test_a_changed_row_is_named_and_its_trial_alone_runs_again(study, sound, statement, capsys):
+    trial = made_up.TRIALS[3]
+    change(study, statement, trial.identity)
+    where = f"{study / DATABASE}: {trial.condition}, seed "
+    for command in ("results", "export"):
+        assert main([command, str(study)]) == 2
+        out, err = capsys.readouterr()
+        assert (out, err.count("\n")) == ("", 1)
+        assert where in err
+        assert "rows are damaged" in err
+    (note,), ran = finish(study)
+    assert (note, ran) == (f"{where}{trial.seed}: rows are damaged; must run again", 1)
+    assert content(study) == content(sound)
+
+
+@pytest.mark.parametrize("damage", ["missing", "damaged"])
+def test_a_recording_is_named_and_its_trial_alone_runs_again(study, sound, damage):
+    trial = made_up.TRIALS[2]
+    path = study / "recordings" / f"{trial.identity}.npz"
+    if damage == "missing":
+        path.unlink()
+    else:
+        path.write_bytes(path.read_bytes()[:-9])
+    (note,), ran = finish(study)
+    assert ran == 1
+    assert note == f"{path}: is {damage} ({trial.condition}, seed {trial.seed}); must run again"
+    assert content(study) == content(sound)
+
+
+@pytest.mark.parametrize(
+    ("statement", "value"),
+    [
+        ("UPDATE meta SET value = ? WHERE key = 'spec'", json.dumps({"seeds": 5})),
+        ("UPDATE meta SET value = ? WHERE key = 'conditions'", "{"),
+        ("UPDATE conditions SET preset = ? WHERE position = 1", "paper"),
+        ("UPDATE sqlite_master SET sql = replace(sql, 't.seed', ?) WHERE name = 'results'", "9"),
+    ],
+)
+def test_what_concerns_the_study_as_a_whole_has_a_checksum_too(study, sound, statement, value):
+    change(study, statement, value)
+    notes, ran = finish(study)
+    assert ran == 0
+    assert notes == [
+        f"{study / DATABASE}: is damaged: what it says of the study is not what was written; "
+        f"kept as {DATABASE}.damaged-1, 6 trials taken over, the others run again"
+    ]
+    assert content(study) == content(sound)
+
+
+def test_a_truncated_database_is_set_aside_and_what_can_be_read_taken_over(study, sound, capsys):
+    part = (study / DATABASE).read_bytes()[:-5000]
+    (study / DATABASE).write_bytes(part)
+    assert main(["status", str(study)]) in (0, 2)
+    capsys.readouterr()
+    (note,), ran = finish(study)
+    assert f"{DATABASE}: is damaged: " in note
+    assert f"{6 - ran} trials taken over" in note
+    assert content(study) == content(sound)
+    assert (study / f"{DATABASE}.damaged-1").read_bytes() == part
+
+
+def test_another_study_is_refused_even_if_the_database_is_damaged(study):
+    (study / DATABASE).write_bytes(b"no database at all")
+    before = {p: p.read_bytes() for p in study.rglob("*") if p.is_file()}
+    other = made_up.Spec.of(made_up.SPEC.table() | {"episodes": 9})
+    with (
+        pytest.raises(SpecError, match="holds another study: episodes = 4 there, 9 here"),
+        Store.create(study, other),
+    ):
+        pass
+    assert {p: p.read_bytes() for p in study.rglob("*") if p.is_file()} == before
+
+
+def test_two_damaged_databases_are_both_kept(study):
+    for number in (1, 2):
+        (study / DATABASE).write_bytes(b"damage %d" % number)
+        (note,), ran = finish(study)
+        assert (f"damaged-{number}, 0 trials taken over" in note, ran) == (True, 6)
+    kept = sorted(p.read_bytes() for p in study.glob("*.damaged-*"))
+    assert kept == [b"damage 1", b"damage 2"]
+
+
+def test_a_database_that_may_not_be_read_is_not_damaged(study, monkeypatch):
+    def locked(*_, **__):
+        error = sqlite3.OperationalError("database is locked")
+        error.sqlite_errorcode = sqlite3.SQLITE_BUSY
+        raise error
+
+    monkeypatch.setattr(sqlite3, "connect", locked)
+    with pytest.raises(SpecError, match=r"database is locked$"), Store.create(study, made_up.SPEC):
+        pass
+    assert not list(study.glob("*.damaged-*"))
+
+
+@pytest.mark.slow
+def test_no_flipped_bit_anywhere_changes_what_a_study_ends_with(sound, tmp_path):
+    rng = random.Random(7)
+    expected = content(sound)
+    files = [DATABASE] * 4 + [f"recordings/{t.identity}.npz" for t in made_up.TRIALS[:2]]
+    for number in range(120):
+        study = shutil.copytree(sound, tmp_path / str(number))
+        path = study / rng.choice(files)
+        data = bytearray(path.read_bytes())
+        where = rng.randrange(len(data))
+        data[where] ^= 1 << rng.randrange(8)
+        path.write_bytes(data)
+        finish(study)
+        assert content(study) == expected, (path.name, where)
+        shutil.rmtree(study)
+
+
+def test_a_database_that_is_no_study_is_left_alone(tmp_path):
+    with sqlite3.connect(tmp_path / DATABASE) as connection:
+        connection.execute("CREATE TABLE precious (x)")
+    before = (tmp_path / DATABASE).read_bytes()
+    refused = pytest.raises(SpecError, match="is a database, but no study")
+    with refused, Store.create(tmp_path, made_up.SPEC):
+        pass
+    assert (tmp_path / DATABASE).read_bytes() == before
+    assert {path.name for path in tmp_path.iterdir()} <= {DATABASE, ".lock"}

@@ -1,0 +1,245 @@
+import os
+import shutil
+import sqlite3
+
+import made_up
+import pytest
+
+from nested_agents.studies.spec.errors import SpecError
+from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.store import store as store_module
+from nested_agents.studies.store.store import DATABASE, SPEC_FILE, Store
+from nested_agents.studies.trials.trial import RESULTS_VERSION, trials_of
+
+
+def changed(**changes):
+    return Spec.of(made_up.SPEC.table() | changes)
+
+
+@pytest.fixture
+def finished(tmp_path):
+    directory = tmp_path / "study"
+    with Store.create(directory, made_up.SPEC) as store:
+        for trial in made_up.TRIALS:
+            store.save(trial, made_up.measure(trial), 1.5)
+    return directory
+
+
+def test_what_was_saved_is_read_back_digit_by_digit(finished):
+    with Store.open(finished) as store:
+        names, rows = store.rows("training")
+        assert store.spec() == made_up.SPEC
+        for trial in made_up.TRIALS:
+            result = made_up.measure(trial)
+            expected = [tuple(row) for row in result.rows if row.phase == "training"]
+            head = (trial.condition, trial.condition, trial.seed)
+            assert [row[3:] for row in rows if row[:3] == head] == expected
+            recording = store.recording(trial, "last")
+            assert recording.keys() == result.recordings["last"].keys()
+            assert (recording["box_pose"] == result.recordings["last"]["box_pose"]).all()
+    assert names[2:] == [
+        "seed", "phase", "episode", "steps", "success", "stopped_at_goal", "final_distance_m",
+        "final_orientation_rad", "contact_fraction", "return",
+    ]  # fmt: skip
+
+
+def test_rows_are_in_order_whatever_the_order_of_arrival(tmp_path, finished):
+    with Store.create(tmp_path / "other", made_up.SPEC) as other:
+        for trial in reversed(made_up.TRIALS):
+            other.save(trial, made_up.measure(trial), 9.0)
+        with Store.open(finished) as store:
+            assert store.rows() == other.rows()
+
+
+def test_recordings_are_equal_bytes(tmp_path, finished):
+    with Store.create(tmp_path / "other", made_up.SPEC) as other:
+        other.save(made_up.TRIALS[0], made_up.measure(made_up.TRIALS[0]), 9.0)
+    name = f"recordings/{made_up.TRIALS[0].identity}.npz"
+    assert (tmp_path / "other" / name).read_bytes() == (finished / name).read_bytes()
+
+
+def test_another_tool_reads_it_with_one_query(finished):
+    connection = sqlite3.connect(finished / DATABASE)
+    rows = connection.execute('SELECT seed, "return" FROM results WHERE preset = "frozen"')
+    assert len(rows.fetchall()) == 3 * (4 + 2)
+    connection.close()
+
+
+def test_the_database_is_written_through(finished):
+    with Store.create(finished, made_up.SPEC) as store:
+        assert store._db.execute("PRAGMA journal_mode").fetchone() == ("wal",)
+        assert store._db.execute("PRAGMA synchronous").fetchone() == (2,)
+
+
+def test_a_saved_trial_replaces_what_was_there(finished):
+    trial = made_up.TRIALS[0]
+    with Store.create(finished, made_up.SPEC) as store:
+        before = store.rows()
+        store.save(trial, made_up.measure(trial), 1.0)
+        assert store.rows() == before
+        assert store.counts() == {"done": 6, "failed": 0}
+
+
+def test_seconds_are_kept_apart(finished):
+    with Store.open(finished) as store:
+        names, rows = store.seconds()
+    assert names[2:] == ["decision", "physics", "sensors", "learning", "total"]
+    assert {row[-1] for row in rows} == {1.5}
+
+
+@pytest.mark.parametrize("damage", ["missing", "truncated", "flipped"])
+def test_a_damaged_recording_is_run_again(finished, damage):
+    path = finished / "recordings" / f"{made_up.TRIALS[2].identity}.npz"
+    content = bytearray(path.read_bytes())
+    if damage == "missing":
+        path.unlink()
+    elif damage == "truncated":
+        path.write_bytes(content[:-7])
+    else:
+        content[len(content) // 2] ^= 4
+        path.write_bytes(content)
+    with Store.create(finished, made_up.SPEC) as store:
+        assert store.pending(made_up.TRIALS) == [made_up.TRIALS[2]]
+
+
+def test_a_recording_that_cannot_be_read_is_named(finished):
+    trial = made_up.TRIALS[0]
+    path = finished / "recordings" / f"{trial.identity}.npz"
+    with Store.open(finished) as store:
+        with pytest.raises(SpecError, match="holds no recording 'middle'"):
+            store.recording(trial, "middle")
+        path.write_bytes(b"PK")
+        with pytest.raises(SpecError, match="is damaged"):
+            store.recording(trial, "last")
+        path.unlink()
+        with pytest.raises(SpecError, match="no such file"):
+            store.recording(trial, "last")
+
+
+def test_seeds_may_be_added(finished):
+    more = changed(seeds=5)
+    with Store.create(finished, more) as store:
+        left = store.pending(trials_of(more))
+        assert {trial.seed for trial in left} == {3, 4}
+        assert store.spec() == more
+    assert Spec.load(finished / SPEC_FILE) == more
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"episodes": 9}, "episodes = 4 there, 9 here"),
+        ({"seeds": 2}, "seeds = [0, 1, 2] there, [0, 1] here"),
+        ({"learner": {"discount": 0.5}}, "learner.discount = 0.95 there, 0.5 here (and 1 more)"),
+        ({"sweep": {"preset": ["default"]}}, "conditions = ['default', 'frozen'] there"),
+        ({"sweep": {"learner.kind": ["batch-td", "frozen"]}}, "conditions"),
+        ({"evaluation": 3, "steps": 6}, "steps = 5 there, 6 here (and 1 more)"),
+    ],
+)
+def test_another_study_is_refused_and_nothing_changed(finished, changes, said):
+    before = {p: p.read_bytes() for p in finished.rglob("*") if p.is_file()}
+    with pytest.raises(SpecError) as caught, Store.create(finished, changed(**changes)):
+        pass
+    assert said in str(caught.value)
+    assert "use another directory" in str(caught.value)
+    assert {p: p.read_bytes() for p in finished.rglob("*") if p.is_file()} == before
+
+
+def test_results_of_another_version_are_refused(finished, monkeypatch):
+    monkeypatch.setattr(store_module, "RESULTS_VERSION", 99)
+    said = f"holds results of version {RESULTS_VERSION}, this is version 99"
+    with (
+        pytest.raises(SpecError, match=said),
+        Store.create(finished, made_up.SPEC),
+    ):
+        pass
+
+
+def test_two_writers_at_a_time_are_refused(finished):
+    with (
+        Store.create(finished, made_up.SPEC),
+        pytest.raises(SpecError, match="another process is writing"),
+        Store.create(finished, made_up.SPEC),
+    ):
+        pass
+
+
+def test_another_study_that_came_first_is_not_overwritten(tmp_path, monkeypatch):
+    take, other = store_module._take, made_up.SPEC.model_copy(update={"steps": 99})
+
+    def late(lock, directory):
+        with monkeypatch.context() as patch:
+            patch.setattr(store_module, "_take", take)
+            with Store.create(directory, other):
+                pass
+        take(lock, directory)
+
+    monkeypatch.setattr(store_module, "_take", late)
+    with (
+        pytest.raises(SpecError, match="holds another study"),
+        Store.create(tmp_path, made_up.SPEC),
+    ):
+        pass
+    with Store.open(tmp_path) as store:
+        assert store.spec() == other
+
+
+def test_one_reads_while_another_writes(finished):
+    with Store.create(finished, made_up.SPEC) as writer, Store.open(finished) as reader:
+        writer.fail(made_up.TRIALS[0], "Traceback")
+        assert reader.counts() == {"done": 5, "failed": 1}
+
+
+def test_a_run_killed_before_it_noted_its_spec_is_begun_anew(tmp_path):
+    sqlite3.connect(tmp_path / DATABASE).close()
+    (tmp_path / DATABASE).touch()
+    with Store.create(tmp_path, made_up.SPEC) as store:
+        assert store.pending(made_up.TRIALS) == list(made_up.TRIALS)
+
+
+@pytest.mark.parametrize("content", ["", "no database"])
+def test_what_is_no_study_is_named(tmp_path, content):
+    with pytest.raises(SpecError, match="holds no study"), Store.open(tmp_path):
+        pass
+    (tmp_path / DATABASE).write_text(content)
+    with pytest.raises(SpecError, match=r"results\.sqlite: "), Store.open(tmp_path) as store:
+        store.spec()
+
+
+def test_a_file_in_the_way_is_named(tmp_path):
+    (tmp_path / "file").touch()
+    for directory in (tmp_path / "file", tmp_path / "file" / "below"):
+        with pytest.raises(SpecError, match="file"), Store.create(directory, made_up.SPEC):
+            pass
+
+
+def test_a_users_own_spec_is_neither_overwritten_nor_refused(tmp_path):
+    (tmp_path / SPEC_FILE).write_text("# mine\nseeds = 2\n")
+    with Store.create(tmp_path, Spec.of({"seeds": 2})):
+        pass
+    assert (tmp_path / SPEC_FILE).read_text().startswith("# mine")
+    other = tmp_path / "other"
+    other.mkdir()
+    shutil.copy(tmp_path / SPEC_FILE, other)
+    with pytest.raises(SpecError, match="in the way"), Store.create(other, made_up.SPEC):
+        pass
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="the superuser may write anywhere")
+def test_an_unwritable_directory_is_named(tmp_path):
+    tmp_path.chmod(0o500)
+    with pytest.raises(SpecError, match="Permission denied"), Store.create(tmp_path, made_up.SPEC):
+        pass
+
+
+def test_a_full_disk_is_one_line_and_keeps_what_was_there(finished, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    with Store.create(finished, made_up.SPEC) as store:
+        before = store.rows()
+        monkeypatch.setattr(os, "fsync", full)
+        with pytest.raises(OSError, match="No space left"):
+            store.save(made_up.TRIALS[0], made_up.measure(made_up.TRIALS[0]), 1.0)
+        assert store.rows() == before
+        assert store.pending(made_up.TRIALS) == []

@@ -1,0 +1,190 @@
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from contextlib import closing, contextmanager
+from pathlib import Path
+
+import made_up
+import pytest
+
+from nested_agents.studies.catalogue.learning_curve import analysis as learning_curve
+from nested_agents.studies.cli import conduct
+from nested_agents.studies.cli.main import main
+from nested_agents.studies.spec.errors import SpecError
+from nested_agents.studies.spec.toml import dumps
+from nested_agents.studies.store.store import Store
+from nested_agents.studies.workers import dask as dask_workers
+from nested_agents.studies.workers.dask import DaskWorkers
+from nested_agents.studies.workers.runner import ATTEMPTS, run_trials
+
+DASK = Path(sys.executable).with_name("dask")
+pytestmark = pytest.mark.slow
+
+
+class Cluster:
+    """A scheduler and its workers as somebody would start them by hand."""
+
+    def __init__(self, folder):
+        self.folder, self.mark = folder, folder / "mark"
+        self.processes = []
+        self.scheduler = self.start(
+            "scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard",
+            "--scheduler-file", folder / "scheduler.json",
+        )  # fmt: skip
+        deadline = time.monotonic() + 60
+        while not (folder / "scheduler.json").exists() and time.monotonic() < deadline:
+            time.sleep(0.05)
+        self.address = json.loads((folder / "scheduler.json").read_text())["address"]
+
+    def start(self, *arguments):
+        environment = {**os.environ, "PYTHONPATH": str(Path(made_up.__file__).parent),
+                       "MADE_UP_MARK": str(self.mark)}  # fmt: skip
+        process = subprocess.Popen(
+            [DASK, *map(str, arguments)], env=environment, cwd=self.folder,
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+        self.processes.append(process)
+        return process
+
+    def add(self, *options):
+        return self.start("worker", self.address, "--no-dashboard", *options)
+
+    def close(self):
+        for process in reversed(self.processes):
+            process.terminate()
+            process.wait()
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory):
+    with closing(Cluster(tmp_path_factory.mktemp("cluster"))) as started:
+        started.add("--nthreads", "1", "--nworkers", "2")
+        yield started
+
+
+@contextmanager
+def written(directory):
+    with Store.create(directory, made_up.SPEC) as store:
+        yield store, store.pending(made_up.TRIALS)
+
+
+@pytest.fixture(scope="module")
+def expected(tmp_path_factory):
+    with written(tmp_path_factory.mktemp("expected")) as (store, trials):
+        for trial in trials:
+            store.save(trial, made_up.measure(trial), 0.0)
+        return content(store)
+
+
+def content(store):
+    """Rows and recordings, byte for byte."""
+    recordings = sorted((store.directory / "recordings").glob("*.npz"))
+    files = {path.name: path.read_bytes() for path in recordings}
+    return store.rows("training"), store.rows("evaluation"), files
+
+
+def test_a_worker_killed_in_a_cluster_costs_its_running_trial_only(cluster, tmp_path, expected):
+    with DaskWorkers.at(cluster.address, None) as workers, written(tmp_path) as (store, trials):
+        running = run_trials(trials, store, made_up.logged, workers)
+        first = next(running)
+        assert first.error is None
+        begun = [line.split() for line in cluster.mark.read_text().splitlines()]
+        victim = int(begun[-1][0])
+        os.kill(victim, signal.SIGKILL)
+        rest = list(running)
+        assert [outcome.error for outcome in rest] == [None] * 5
+        assert content(store) == expected
+    runs = Counter(line.split()[1] for line in cluster.mark.read_text().splitlines())
+    assert set(runs) == {trial.identity for trial in trials}
+    assert sum(runs.values()) <= len(trials) + 1
+
+
+def test_a_local_cluster_and_a_trial_that_kills_every_worker(tmp_path, expected):
+    with DaskWorkers.local(2) as workers, written(tmp_path) as (store, trials):
+        assert workers.processes == 2
+        outcomes = list(run_trials(trials, store, made_up.deadly, workers))
+        assert len(outcomes) == len(trials)
+        ((condition, seed, error),) = store.failed()
+        assert (condition, seed) == ("frozen", 1)
+        assert f"died {ATTEMPTS} times" in error
+        assert store.forget_failed() == 1
+        again = store.pending(trials)
+        assert [o.error for o in run_trials(again, store, made_up.measure, workers)] == [None]
+        assert content(store) == expected
+
+
+def run(tmp_path, *arguments):
+    spec = tmp_path / "spec.toml"
+    spec.write_text(dumps(made_up.SPEC.table()))
+    line = ["run", str(spec), "--out", str(tmp_path / "out"), "--backend", "dask", *arguments]
+    return main(line)
+
+
+@pytest.fixture
+def made_up_results(monkeypatch):
+    monkeypatch.setattr(learning_curve, "measure", made_up.measure)
+    monkeypatch.setattr(conduct, "check", lambda spec: None)
+
+
+@pytest.mark.usefixtures("made_up_results")
+def test_the_command_with_an_address(cluster, tmp_path, capsys, expected):
+    assert run(tmp_path, "--address", cluster.address) == 0
+    _, err = capsys.readouterr()
+    assert "2 processes" in err
+    assert "6 of 6 trials" in err
+    with Store.open(tmp_path / "out") as store:
+        assert content(store) == expected
+
+
+@pytest.mark.usefixtures("made_up_results")
+@pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "nowhere:-3", "tcp://", "http://x:1"])
+def test_no_scheduler_there_is_one_line(tmp_path, monkeypatch, capsys, address):
+    monkeypatch.setattr(dask_workers, "CONNECT", 0.5)
+    assert run(tmp_path, "--address", address) == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+    assert f"--address {address}: " in err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.usefixtures("made_up_results")
+def test_dask_not_installed_is_one_line(tmp_path, monkeypatch, capsys):
+    monkeypatch.delitem(sys.modules, "nested_agents.studies.workers.dask")
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    assert run(tmp_path) == 2
+    err = capsys.readouterr().err
+    assert "distributed is not installed; pip install 'nested-agents[dask]'" in err
+
+
+def attempt(workers, tmp_path):
+    with written(tmp_path) as (store, trials):
+        return list(run_trials(trials, store, made_up.measure, workers))
+
+
+def test_a_worker_with_other_versions_is_refused(cluster, tmp_path, monkeypatch):
+    monkeypatch.setattr(dask_workers, "versions", lambda: {"numpy": "0.1"})
+    with (
+        DaskWorkers.at(cluster.address, 1) as workers,
+        pytest.raises(SpecError, match=r"the worker tcp.* has numpy .*, must be 0\.1"),
+    ):
+        attempt(workers, tmp_path)
+
+
+def test_a_worker_with_several_threads_is_refused_and_a_lost_scheduler_is_told(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setattr(dask_workers, "PATIENCE", 1.0)
+    with closing(Cluster(tmp_path)) as other, DaskWorkers.at(other.address, None) as workers:
+        with pytest.raises(SpecError, match="has had no worker for 1 s"):
+            attempt(workers, tmp_path / "a")
+        monkeypatch.setattr(dask_workers, "PATIENCE", 30.0)
+        other.add("--nthreads", "2")
+        with pytest.raises(SpecError, match="has 2 threads, must be 1: start dask worker with"):
+            attempt(workers, tmp_path / "b")
+        other.scheduler.kill()
+        with pytest.raises(SpecError, match="is gone; what has finished is kept"):
+            attempt(workers, tmp_path / "c")

@@ -1,0 +1,124 @@
+import json
+
+import made_up
+import pytest
+
+from nested_agents.studies.cli.main import main
+from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.store import store as store_module
+from nested_agents.studies.store.running import LOCK, MARK, Running, look
+from nested_agents.studies.store.store import Store
+from nested_agents.studies.workers.progress import _estimate, progress
+
+
+@pytest.fixture
+def study(tmp_path):
+    """Four of six trials are done: both conditions, seeds 0 and 1; each took 2 s or 4 s."""
+    with Store.create(tmp_path, made_up.SPEC) as store:
+        for trial in made_up.TRIALS[:4]:
+            store.save(trial, made_up.measure(trial), 2.0 if trial.condition == "default" else 4.0)
+    return tmp_path
+
+
+def read(directory):
+    with Store.open(directory) as store:
+        return progress(store)
+
+
+def test_between_two_runs_everything_unfinished_is_left(study):
+    now = read(study)
+    assert (now.total, now.done, now.failed, now.left, now.running) == (6, 4, 0, 2, ())
+    assert now.seconds == pytest.approx((2.0 + 4.0) / now.processes)
+
+
+def test_what_a_run_has_handed_out_is_running(study):
+    with Store.create(study, made_up.SPEC) as store, Running(study, 3) as running:
+        assert look(study).seconds == {}
+        running.begin(made_up.TRIALS[5])
+        now = read(study)
+        assert (now.done, now.left, now.processes) == (4, 1, 3)
+        ((condition, seed, seconds),) = now.running
+        assert (condition, seed) == ("frozen", 2)
+        assert 0 <= seconds < 60
+        store.save(made_up.TRIALS[5], made_up.measure(made_up.TRIALS[5]), 4.0)
+        assert read(study).running == ()
+        running.end(made_up.TRIALS[5])
+        assert look(study).seconds == {}
+    assert not (study / MARK).exists()
+    assert look(study) is None
+
+
+def test_a_mark_that_outlived_its_process_is_passed_over(study):
+    mark = {"processes": 2, "begun": {made_up.TRIALS[5].identity: 0.0}}
+    (study / MARK).write_text(json.dumps(mark))
+    assert read(study).running == ()
+    (study / LOCK).unlink()
+    assert read(study).running == ()
+
+
+@pytest.mark.parametrize("content", ["", "{", "[]", '{"begun": 3}'])
+def test_a_mark_that_cannot_be_read_does_no_harm(study, content):
+    with Store.create(study, made_up.SPEC):
+        (study / MARK).write_text(content)
+        assert read(study).done == 4
+
+
+def test_looking_does_not_keep_a_run_from_beginning(study):
+    for _ in range(200):
+        look(study)
+        with Store.create(study, made_up.SPEC):
+            pass
+
+
+def test_failed_and_damaged_trials_are_counted_once(study, capsys):
+    with Store.create(study, made_up.SPEC) as store:
+        store.fail(made_up.TRIALS[4], "Traceback\nRuntimeError: a wheel came off\n")
+    path = study / "recordings" / f"{made_up.TRIALS[0].identity}.npz"
+    path.write_bytes(b"PK")
+    now = read(study)
+    assert (now.done, now.failed, now.left) == (3, 1, 2)
+    assert main(["status", str(study)]) == 1
+    said = capsys.readouterr().out
+    assert f"{path}: is damaged (default, seed 0); must run again" in said
+    assert "done     3 of 6 trials\nrunning  0\nfailed   1\nleft     2\n" in said
+    assert "default, seed 2 failed:\nTraceback\nRuntimeError: a wheel came off" in said
+
+
+def test_what_another_version_has_done_is_done(study, monkeypatch, capsys):
+    monkeypatch.setattr(store_module, "RESULTS_VERSION", 99)
+    now = read(study)
+    assert (now.done, now.left, now.seconds) == (4, 2, None)
+    assert main(["status", str(study)]) == 0
+    said = capsys.readouterr().out
+    assert "done     4 of 6 trials" in said
+    assert "nothing can be added: " in said
+    assert "this is version 99" in said
+
+
+@pytest.mark.parametrize(
+    ("means", "left", "running", "processes", "expected"),
+    [
+        ({}, ["a"], [], 2, None),
+        ({"a": 5.0}, ["a"], [], 0, None),
+        ({"a": 5.0}, [], [], 2, 0.0),
+        ({"a": 10.0}, ["a", "a"], [], 2, 10.0),
+        ({"a": 10.0, "b": 20.0}, ["a", "b", "unknown"], [], 1, 45.0),
+        ({"a": 10.0}, [], [("a", 4.0)], 2, 6.0),
+        ({"a": 10.0}, ["a"], [("a", 4.0), ("a", 99.0)], 2, 8.0),
+    ],
+)
+def test_the_time_left(means, left, running, processes, expected):
+    assert _estimate(means, left, running, processes) == expected
+
+
+def test_a_topology_that_is_drawn_otherwise_is_told(tmp_path, capsys):
+    source = tmp_path / "mine.py"
+    source.write_text("def line(agents, groups):\n    return list(zip(agents, agents[1:]))\n")
+    spec = Spec.of(made_up.SPEC.table() | {"topology": f"{source}:line"})
+    with Store.create(tmp_path / "out", spec):
+        pass
+    assert main(["status", str(tmp_path / "out")]) == 0
+    assert "nothing can be added" not in capsys.readouterr().out
+    source.write_text("def line(agents, groups):\n    return []\n")
+    assert main(["status", str(tmp_path / "out")]) == 0
+    assert "mine.py:line': has changed: its digest is" in capsys.readouterr().out

@@ -1,0 +1,250 @@
+"""A hierarchy as the user sees it: in a table, as JSON, as a picture."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from pathlib import Path
+from typing import Any, Literal
+
+from ..core.cost import below_counts
+from ..core.hierarchy import Hierarchy
+from ..core.robot_agents import MOST_ACTIONS, robot_of
+from . import KINDS, TopologySettings, build, builders, files, parse
+from .config import (
+    ChainSettings,
+    EdgesSettings,
+    FileSettings,
+    PerRobotSettings,
+    SingleAgentSettings,
+    TeamsSettings,
+)
+
+Form = Literal["table", "json"]
+
+
+MOST_AGENTS = 1000
+"""Beyond, the table has more lines than anybody reads, and takes minutes."""
+
+
+@dataclass(frozen=True)
+class Team:
+    """Agents by name, and their groups: what a topology is built over."""
+
+    agents: tuple[str, ...]
+    groups: tuple[tuple[int, ...], ...]
+
+
+@dataclass(frozen=True)
+class View:
+    """A topology over agents.
+
+    Attributes
+    ----------
+    text
+        The topology as the user wrote it.
+    hierarchy, groups
+        What it makes, and the robots.
+    tries
+        Joint actions that each agent tries per step, in agent order. An agent may be a robot.
+    """
+
+    text: str
+    hierarchy: Hierarchy
+    groups: tuple[tuple[int, ...], ...]
+    tries: tuple[int, ...]
+
+    @property
+    def title(self) -> str:
+        """What it is, in one line."""
+        n, depth = len(self.hierarchy), self.hierarchy.depth
+        agents = f"{n} agent{'s' if n > 1 else ''}"
+        count = readable(sum(self.tries))
+        return f"{self.text}: {agents}, depth {depth}, {count} joint actions a step"
+
+    def draw(self, path: Path) -> None:
+        """Write a picture."""
+        from .drawing import draw
+
+        draw(self.hierarchy, path, groups=self.groups, title=self.title)
+
+
+def view(
+    text: str, agents: int | None, robots: int | None, wheels: int | None, actions: int
+) -> View:
+    """Build the topology written as `text`, over as many agents as asked for.
+
+    Raises
+    ------
+    ValueError
+        If the topology or the numbers are refused.
+    """
+    if actions < 2:
+        raise ValueError(f"actions = {actions}, allowed: 2 or more")
+    settings = parse(text)
+    team = team_of(agents, robots, wheels, named_by(settings))
+    if isinstance(settings, SingleAgentSettings):
+        single = Hierarchy(["single"], [])
+        return View(text, single, ((0,),), (actions ** len(team.agents),))
+    if isinstance(settings, PerRobotSettings):
+        return _of_robots(text, team, actions)
+    hierarchy = build(settings, team.agents, team.groups)
+    tries = tuple(actions ** (1 + count) for count in below_counts(hierarchy))
+    return View(text, hierarchy, team.groups, tries)
+
+
+def _of_robots(text: str, team: Team, actions: int) -> View:
+    """Return the view of one agent per robot, which tries the joint actions of all its wheels."""
+    own = actions ** len(team.groups[0])
+    if own > MOST_ACTIONS:
+        raise ValueError(
+            f"topology {text!r}: {actions} ** {len(team.groups[0])} actions of a robot, allowed: "
+            f"{MOST_ACTIONS} or fewer"
+        )
+    robots = tuple(robot_of(team.agents[wheels[0]]) for wheels in team.groups)
+    hierarchy = Hierarchy(robots, builders.chain(robots).edges)
+    tries = tuple(own ** (1 + count) for count in below_counts(hierarchy))
+    return View(text, hierarchy, tuple((r,) for r in range(len(robots))), tries)
+
+
+def named_by(settings: TopologySettings) -> tuple[str, ...]:
+    """Return the agents that the settings themselves name, in order; none for most kinds."""
+    names: Sequence[str] = ()
+    if isinstance(settings, ChainSettings) and not isinstance(settings.order, str):
+        names = settings.order
+    elif isinstance(settings, TeamsSettings) and settings.members is not None:
+        names = builders.names_of(settings.members)
+    elif isinstance(settings, EdgesSettings):
+        names = [name for edge in settings.edges for name in edge] + list(settings.alone)
+    elif isinstance(settings, FileSettings):
+        names = [str(node) for node in files.read_graph(settings.path)]
+    return tuple(dict.fromkeys(names))
+
+
+def team_of(
+    agents: int | None, robots: int | None, wheels: int | None, named: Sequence[str] = ()
+) -> Team:
+    """Return agents and groups for the numbers asked for.
+
+    Agents are named ``robot1.left``, ``robot1.right`` for two wheels, ``robot1.wheel1`` for more,
+    ``agent1`` for one; but as in `named` if the topology names others.
+
+    Raises
+    ------
+    ValueError
+        If the numbers do not fit each other or the names.
+
+    Examples
+    --------
+    >>> team_of(4, None, None).agents
+    ('robot1.left', 'robot1.right', 'robot2.left', 'robot2.right')
+    """
+    for name, value in (("agents", agents), ("robots", robots), ("wheels", wheels)):
+        if value is not None and value < 1:
+            raise ValueError(f"{name} = {value}, allowed: 1 or more")
+    n = agents or (robots * (wheels or 2) if robots else 2 * wheels if wheels else len(named) or 4)
+    if n > MOST_AGENTS:
+        raise ValueError(f"agents = {n}, allowed: up to {MOST_AGENTS:,}, to be looked at")
+    if wheels is None:
+        wheels = n // robots if robots and n % robots == 0 else 1 if n % 2 else 2
+    robots = n // wheels if robots is None else robots
+    if n % robots:
+        raise ValueError(f"agents = {n} cannot be divided among robots = {robots}")
+    if robots * wheels != n:
+        raise ValueError(f"agents = {n} are not robots = {robots} times wheels = {wheels}")
+    names = [f"wheel{w + 1}" for w in range(wheels)] if wheels != 2 else ["left", "right"]
+    own = tuple(f"robot{r + 1}.{name}" for r in range(robots) for name in names)
+    if wheels == 1:
+        own = tuple(f"agent{i + 1}" for i in range(n))
+    groups = tuple(tuple(range(r * wheels, (r + 1) * wheels)) for r in range(robots))
+    if named and not set(named) <= set(own):
+        if len(named) != n:
+            raise ValueError(f"the topology names {len(named)} agents, {n} are asked for")
+        own = tuple(named)
+    return Team(own, groups)
+
+
+def kinds(form: Form) -> str:
+    """Return all topologies, built-in and installed, for printing."""
+    rows: list[dict[str, Any]] = []
+    for kind, model in KINDS.items():
+        summary = (model.__doc__ or "").splitlines()[0]
+        optional = not any(field.is_required() for field in model.model_fields.values())
+        rows.append(
+            {"kind": kind, "argument": model.argument, "optional": optional, "summary": summary}
+        )
+    for name, value in files.installed().items():
+        summary = f"Installed: {value}"
+        rows.append({"kind": name, "argument": "", "optional": True, "summary": summary})
+    if form == "json":
+        return json.dumps(rows, indent=1)
+    lines = []
+    for row in rows:
+        argument = f":{row['argument']}" if row["argument"] else ""
+        if argument and row["optional"]:
+            argument = f"[{argument}]"
+        lines += [f"{row['kind']}{argument}", f"    {row['summary']}"]
+    return "\n".join(lines)
+
+
+def printed(shown: View, form: Form) -> str:
+    """Return a view for printing."""
+    hierarchy = shown.hierarchy
+    names, n = hierarchy.agents, len(hierarchy)
+    below = [[names[j] for j in hierarchy.below(i)] for i in range(n)]
+    if form == "json":
+        content = {
+            "topology": shown.text,
+            "agents": names,
+            "edges": [(names[a], names[b]) for a, b in hierarchy.edges],
+            "order": [names[i] for i in hierarchy.order],
+            "below": dict(zip(names, below, strict=True)),
+            "depth": hierarchy.depth,
+            "joint_actions_per_step": sum(shown.tries),
+        }
+        lines = (f"{json.dumps(key)}: {json.dumps(value)}" for key, value in content.items())
+        return "{" + ",\n ".join(lines) + "}"
+    under = {i: [names[b] for a, b in hierarchy.edges if a == i] for i in range(n)}
+    rows = [("", "agent", "below", "tries", "subordinates")]
+    for rank, i in enumerate(hierarchy.order):
+        subordinates = ", ".join(under[i]) or "-"
+        tried = readable(shown.tries[i])
+        rows.append((str(rank + 1), names[i], str(len(below[i])), tried, subordinates))
+    return "\n".join(
+        [
+            shown.title,
+            "",
+            *aligned(rows, "><>><"),
+            "",
+            "In order of decision. below: agents seen; tries: joint actions tried a step.",
+        ]
+    )
+
+
+def aligned(rows: Sequence[Sequence[str]], sides: str) -> list[str]:
+    """Return rows as lines, columns aligned to `sides` (< or >), cut to a terminal's width."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    most = shutil.get_terminal_size().columns if sys.stdout.isatty() else sys.maxsize
+    lines = []
+    for row in rows:
+        cells = (f"{c:{s}{w}}" for c, s, w in zip(row, sides, widths, strict=True))
+        line = "  ".join(cells).rstrip()
+        lines.append(line if len(line) <= most else line[: most - 4] + " ...")
+    return lines
+
+
+def readable(number: int, few: int = 10**9) -> str:
+    """Return an integer with all digits if it is below `few`, else in powers of ten.
+
+    Examples
+    --------
+    >>> readable(1364), readable(4**40)
+    ('1,364', '1.209e24')
+    """
+    if number < few:
+        return f"{number:,}"
+    return f"{Decimal(number):.3e}".replace("e+", "e")
