@@ -11,7 +11,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol, runtime_checkable
+from pathlib import Path
+from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -65,6 +66,7 @@ class Blocks:
         return np.concatenate([own, shared], axis=1)
 
 
+@runtime_checkable
 class Prediction(Protocol):
     """What joint actions taken now would lead to. Valid until the scenario's next step."""
 
@@ -72,16 +74,42 @@ class Prediction(Protocol):
         """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
         ...
 
+
+@runtime_checkable
+class RewardPrediction(Prediction, Protocol):
+    """A prediction that knows the reward, too: what a planner needs."""
+
     def rewards(self, joint_actions: IntArray) -> FloatArray:
         """Return the predicted rewards ``(m,)`` of joint actions ``(m, n)``."""
         ...
+
+
+@runtime_checkable
+class TeamPrediction(Prediction, Protocol):
+    """A prediction that gives the next states of all agents for the same joint actions at once."""
+
+    def states_of_all(self, joint_actions: IntArray) -> FloatArray:
+        """Return the next states ``(n, m, d)`` of all agents for joint actions ``(m, n)``."""
+        ...
+
+
+def states_of_all(prediction: Prediction, joint_actions: IntArray) -> FloatArray:
+    """Return the next states ``(n, m, d)`` of all agents for joint actions ``(m, n)``."""
+    if isinstance(prediction, TeamPrediction):
+        return prediction.states_of_all(joint_actions)
+    return np.stack([prediction.states(i, joint_actions) for i in range(joint_actions.shape[1])])
+
+
+@runtime_checkable
+class TabulatedPrediction(Prediction, Protocol):
+    """A prediction that has tables of all joint actions: quick where few agents are free."""
 
     def blocks(self, agent: int) -> Blocks:
         """Return the next states of `agent` for all ``A ** n`` joint actions: as `states` does."""
         ...
 
     def reward_table(self) -> FloatArray:
-        """Return the rewards ``(A ** n,)`` of all joint actions by code: as `rewards` does."""
+        """Return the rewards ``(A ** n,)`` of all joint actions by index: as `rewards` does."""
         ...
 
 
@@ -109,7 +137,7 @@ class Transition:
     states
         ``(n, d)`` states of the agents after the step.
     reward
-        Reward received on entering these states, the same for every agent.
+        Reward received on entering these states: one number for all agents, or ``(n,)``.
     terminated
         Whether the task is solved (or lost) for good.
     truncated
@@ -124,7 +152,7 @@ class Transition:
     """
 
     states: FloatArray
-    reward: float
+    reward: float | FloatArray
     terminated: bool
     truncated: bool
     info: Mapping[str, Any]
@@ -132,18 +160,61 @@ class Transition:
     pushed: FloatArray | None = None
 
 
+@dataclass(frozen=True)
+class Measure:
+    """A number by which an episode is told: a column of results.
+
+    Attributes
+    ----------
+    name
+        Of the column; ``success`` is the one by which scenarios are compared.
+    title
+        Its heading in tables and figures.
+    unit
+        In words of the SI, ``"1"`` for a pure number.
+    source
+        Where it is taken from at every step: a key of `Transition.info`, or ``terminated``.
+    gathering
+        How the steps of an episode make one number: their ``last``, ``mean``, ``sum`` or ``max``.
+    better
+        Which way is better, if one is.
+    is_rate
+        Whether an episode has it or has it not: 1 or 0.
+    """
+
+    name: str
+    title: str
+    unit: str = "1"
+    source: str = ""
+    gathering: Literal["last", "mean", "sum", "max"] = "last"
+    better: Literal["higher", "lower"] | None = None
+    is_rate: bool = False
+
+    @property
+    def heading(self) -> str:
+        """Title and unit.
+
+        >>> Measure("final_distance_m", "distance", "m").heading
+        'distance [m]'
+        """
+        return self.title if self.unit == "1" else f"{self.title} [{self.unit}]"
+
+
+SUCCESS = Measure("success", "success", source="terminated", better="higher", is_rate=True)
+"""Whether the episode ended with the task solved: what is taken for success unless said otherwise."""
+
+
 @runtime_checkable
 class Scenario(Protocol):
-    """A world with a task. Everything a learner may know of it."""
+    """A world with a task. Everything a learner may know of it.
+
+    What else it may have is asked for by `groups_of`, `roles_of` and `measures_of`, which know what
+    holds without; and by the protocols below, its *capabilities*.
+    """
 
     @property
     def agents(self) -> tuple[str, ...]:
         """Names of the agents, in agent order."""
-        ...
-
-    @property
-    def groups(self) -> tuple[tuple[int, ...], ...]:
-        """Agents by body, consecutive; together all agents in order."""
         ...
 
     @property
@@ -171,8 +242,71 @@ class Scenario(Protocol):
         """Predict from the present state."""
         ...
 
+
+def groups_of(scenario: Scenario) -> tuple[tuple[int, ...], ...]:
+    """Return the agents by body, consecutive; of a scenario without ``groups``, each alone."""
+    single = tuple((i,) for i in range(len(scenario.agents)))
+    groups: tuple[tuple[int, ...], ...] = getattr(scenario, "groups", single)
+    return groups
+
+
+def roles_of(scenario: Scenario) -> tuple[str, ...]:
+    """Return the role of every agent: agents of one role may share weights.
+
+    Of a scenario without ``roles``, every agent has its own.
+    """
+    roles: tuple[str, ...] = getattr(scenario, "roles", tuple(scenario.agents))
+    return roles
+
+
+def measures_of(scenario: Scenario) -> tuple[Measure, ...]:
+    """Return what an episode of a scenario is told by, success first.
+
+    Of a scenario without ``measures`` it is success alone, see `SUCCESS`.
+    """
+    found: tuple[Measure, ...] = tuple(getattr(scenario, "measures", ()))
+    own = [m for m in found if m.name == SUCCESS.name] or [SUCCESS]
+    return (*own, *(m for m in found if m.name != SUCCESS.name))
+
+
+@runtime_checkable
+class MeasuredScenario(Scenario, Protocol):
+    """A scenario that can be measured between steps, as before the first one."""
+
     def measure(self) -> Mapping[str, Any]:
         """Return the measurements of the present state, as in `Transition.info`."""
+        ...
+
+
+@runtime_checkable
+class RecordedScenario(MeasuredScenario, Protocol):
+    """A scenario whose episodes are worth keeping step by step."""
+
+    @property
+    def recorded(self) -> tuple[str, ...]:
+        """Names of the measurements that are kept, one array ``(T + 1, ...)`` each."""
+        ...
+
+    def constants_of_episode(self) -> Mapping[str, Any]:
+        """Return what is kept once an episode: numbers, texts, arrays."""
+        ...
+
+
+@runtime_checkable
+class DrawnScenario(RecordedScenario, Protocol):
+    """A scenario whose recordings can be drawn."""
+
+    def animate(self, recording: Mapping[str, FloatArray], path: Path) -> None:
+        """Draw a recorded episode as an animation, GIF or MP4 by the suffix of `path`."""
+        ...
+
+
+@runtime_checkable
+class ExactlyPredictedScenario(Scenario, Protocol):
+    """A scenario of which there is a like whose predictions come true to rounding."""
+
+    def with_exact_prediction(self) -> Scenario:
+        """Return a scenario alike that predicts exactly; perhaps this one."""
         ...
 
 

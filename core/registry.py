@@ -291,5 +291,9 @@ class Plugged:
 def _relative(path: str) -> str:
     """Return a path as it is written from the working directory."""
     here = os.path.realpath(os.getcwd())
-    there = os.path.realpath(inspect.getsourcefile(sys.modules["__main__"]) or path) if not path else os.path.realpath(path)
+    there = (
+        os.path.realpath(inspect.getsourcefile(sys.modules["__main__"]) or path)
+        if not path
+        else os.path.realpath(path)
+    )
     return os.path.relpath(there, here) if there.startswith(here + os.sep) else there

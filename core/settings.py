@@ -20,6 +20,17 @@ class Settings(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
+class ScenarioSettings(Settings):
+    """What the settings of all scenarios inherit."""
+
+    kind: str = ""
+
+    @property
+    def onset(self) -> int | None:
+        """Episode in which something is scheduled to change, such as a failure; none: never."""
+        return None
+
+
 class RuleBaseSettings(Settings):
     """The fuzzy rule base that every agent holds (Section IV-B)."""
 
