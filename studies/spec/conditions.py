@@ -17,7 +17,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, Field, ValidationError
 
 from ...core.settings import BatchTDSettings, Learner, Settings
-from ...scenarios.box_pushing.config import ScenarioSettings
+from ...scenarios.box_pushing.config import BoxPushingSettings
 from ...topologies.config import ChainSettings, Topology, parse
 from .errors import SpecError, closest, explain, show
 from .overlay import Table, nested, overlay
@@ -29,7 +29,7 @@ SECTIONS = ("scenario", "topology", "learner")
 class ConditionSettings(Settings):
     """All that a trial depends on besides its seed and its length."""
 
-    scenario: ScenarioSettings = ScenarioSettings()
+    scenario: BoxPushingSettings = BoxPushingSettings()
     topology: Topology = ChainSettings()
     learner: Learner = BatchTDSettings()
 
@@ -89,7 +89,7 @@ class Condition:
     label: str
     columns: Mapping[str, Any]
     settings: ConditionSettings
-    evaluations: tuple[tuple[str, ScenarioSettings], ...] = ()
+    evaluations: tuple[tuple[str, BoxPushingSettings], ...] = ()
 
 
 def grid(
@@ -171,7 +171,7 @@ def resolve(
 
 def _elsewhere(
     settings: ConditionSettings, evaluations: Mapping[str, Mapping[str, Any]], where: str
-) -> tuple[tuple[str, ScenarioSettings], ...]:
+) -> tuple[tuple[str, BoxPushingSettings], ...]:
     table = settings.model_dump()
     found = []
     for name, changes in evaluations.items():

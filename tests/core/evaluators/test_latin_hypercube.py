@@ -11,7 +11,7 @@ from nested_agents.core.hierarchy import Hierarchy
 from nested_agents.core.rules.rule_base import RuleBase
 from nested_agents.core.settings import BatchTDSettings, Decision, RuleBaseSettings
 from nested_agents.core.team import _build_evaluator
-from nested_agents.scenarios import ScenarioSettings, build
+from nested_agents.scenarios import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.prediction.prediction import BoxPrediction
 
 A, DISCOUNT, UNBOUNDED = 4, 0.9, 10**9
@@ -28,7 +28,7 @@ def chain(agents: tuple[str, ...]) -> Hierarchy:
 
 
 def pushing_in(state_space: str):
-    scenario = build(ScenarioSettings(robots=3, state_space=state_space))
+    scenario = BoxPushingSettings(robots=3, state_space=state_space).build()
     scenario.reset(2)
     rng = np.random.default_rng(2)
     for _ in range(8):
