@@ -14,7 +14,7 @@ from nested_agents.core.hierarchy import Hierarchy
 from nested_agents.core.loop import control_loop, policy_seed, world_seed
 from nested_agents.core.settings import Decision, TDLambdaSettings
 from nested_agents.core.team import Team
-from nested_agents.scenarios import ScenarioSettings, build
+from nested_agents.scenarios import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.pictures.rendering import snapshot
 from nested_agents.studies.trials.episodes import EpisodeRecorder, Stopwatch
 
@@ -27,8 +27,8 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=60)
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
-    settings = ScenarioSettings(robots=options.robots)
-    scenario = build(settings)
+    settings = BoxPushingSettings(robots=options.robots)
+    scenario = settings.build()
     hierarchy = Hierarchy(scenario.agents, list(pairwise(scenario.agents)))
     learner = TDLambdaSettings(step_size=0.05, decision=Decision(others="mean"))
     team = Team.build(learner, scenario, hierarchy, policy_seed(options.seed))

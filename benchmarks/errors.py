@@ -36,7 +36,7 @@ from nested_agents.core.hierarchy import Hierarchy
 from nested_agents.core.loop import control_loop, policy_seed
 from nested_agents.core.settings import BatchTDSettings, Decision
 from nested_agents.core.team import Team
-from nested_agents.scenarios import ScenarioSettings, build
+from nested_agents.scenarios import BoxPushingSettings
 
 from .situations import ADDITIVE, situation
 from .timing import paired
@@ -60,7 +60,7 @@ def errors(
     others: Any, scenario_settings: dict[str, Any], steps: int, seeds: int
 ) -> dict[str, FloatArray]:
     """Return per evaluator ``(cases, 2)`` errors and regrets."""
-    scenario = build(ScenarioSettings(**scenario_settings))
+    scenario = BoxPushingSettings(**scenario_settings).build()
     hierarchy = Hierarchy(scenario.agents, list(pairwise(scenario.agents)))
     n, neutral = len(scenario.agents), scenario.action_set.neutral
     decision = Decision(evaluator="sampling", samples=8, others=others)

@@ -13,7 +13,7 @@ from statistics import median
 from rich.console import Console
 from rich.table import Table
 
-from nested_agents.scenarios import ScenarioSettings, build
+from nested_agents.scenarios import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scripted.controller import decisions_to_goal
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 
@@ -33,7 +33,7 @@ def main() -> None:
     for box in options.boxes:
         cells = []
         for start in options.starts:
-            scenario = build(ScenarioSettings(box=box, start=start, robots=options.robots))
+            scenario = BoxPushingSettings(box=box, start=start, robots=options.robots).build()
             taken = [decisions_to_goal(scenario, seed, STEPS) for seed in range(options.seeds)]
             solved = [steps for steps in taken if steps is not None]
             cells.append(f"{len(solved)} ({median(solved):.0f})" if solved else "0")

@@ -16,7 +16,7 @@ from nested_agents.core.learners import TDLambda
 from nested_agents.core.protocols import Prediction
 from nested_agents.core.settings import Learner as LearnerSettings
 from nested_agents.core.team import Team
-from nested_agents.scenarios import BoxPushing, ScenarioSettings, build
+from nested_agents.scenarios import BoxPushing, BoxPushingSettings
 
 SETTLING = 12
 """Random steps taken before anything is timed, so that robots are in motion."""
@@ -84,7 +84,7 @@ def situation(
     seed: int = 6,
 ) -> Situation:
     """Bring `n_agents` wheel agents, two to an e-puck, into the middle of an episode."""
-    scenario = build(ScenarioSettings(robots=n_agents // 2, state_space="paper"))
+    scenario = BoxPushingSettings(robots=n_agents // 2, state_space="paper").build()
     hierarchy = Hierarchy(scenario.agents, list(pairwise(scenario.agents)))
     settings = TypeAdapter(LearnerSettings).validate_python(
         {

@@ -16,7 +16,7 @@ import numpy as np
 from nested_agents.core.loop import policy_seed, world_seed
 from nested_agents.core.settings import BatchTDSettings, CalibrationSettings, SelfModelSettings
 from nested_agents.core.team import Team
-from nested_agents.scenarios import BoxPushing, ScenarioSettings
+from nested_agents.scenarios import BoxPushing, BoxPushingSettings
 from nested_agents.topologies import build, parse
 
 BELIEFS = {
@@ -34,7 +34,7 @@ def calibrated(robot: str, believed: str, episodes: int) -> tuple[Any, Any]:
     Errors are those of what was believed, of what was calibrated, and of the right constants.
     """
     belief = BELIEFS[believed]
-    scenario = BoxPushing(ScenarioSettings.model_validate({"robot": robot, "belief": belief}))
+    scenario = BoxPushing(BoxPushingSettings.model_validate({"robot": robot, "belief": belief}))
     settings = BatchTDSettings(
         calibration=CalibrationSettings(enabled=True),
         self_model=SelfModelSettings(enabled=robot != "e-puck"),

@@ -14,7 +14,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
-from nested_agents.scenarios import BoxPushing, ScenarioSettings
+from nested_agents.scenarios import BoxPushing, BoxPushingSettings
 from nested_agents.scenarios.box_pushing.pictures.rendering import AXES, SIDES
 from nested_agents.scenarios.box_pushing.pictures.screen import Screen
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
@@ -36,7 +36,7 @@ columns = slice(round(left * SIDES[0]) + 2, round((left + width) * SIDES[0]))
 figure, grid = plt.subplots(len(BOXES), len(ROBOTS), figsize=(9, 1.8 * len(BOXES)))
 for row, name in zip(grid, BOXES, strict=True):
     for axes, robots in zip(row, ROBOTS, strict=True):
-        settings = ScenarioSettings(box=name, robots=robots, start="hard")
+        settings = BoxPushingSettings(box=name, robots=robots, start="hard")
         scenario, screen = BoxPushing(settings), Screen(settings, "rgb_array")
         scenario.reset(1)
         screen.begin(scenario.measure())

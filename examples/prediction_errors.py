@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from nested_agents.scenarios import BoxPushing, ScenarioSettings
+from nested_agents.scenarios import BoxPushing, BoxPushingSettings
 from nested_agents.scenarios.box_pushing.prediction.predictors import push_model
 from nested_agents.scenarios.box_pushing.scripted.controller import ScriptedController
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
@@ -38,7 +38,7 @@ def errors(**scenario: Any) -> tuple[int, list[float]]:
     How far the box went; then, predictor by predictor, how far its predicted place was off, and
     how much its predicted orientation; and last the yaw error of the robots, of push alone.
     """
-    world = BoxPushing(ScenarioSettings.model_validate({"start": "easy"} | scenario))
+    world = BoxPushing(BoxPushingSettings.model_validate({"start": "easy"} | scenario))
     robots = list(world.world.robots)
     controller = ScriptedController(robots, world.box)
     models = [push_model(name, robots, world.box) for name in PREDICTORS]

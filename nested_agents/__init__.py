@@ -7,7 +7,7 @@ Examples
 Two e-Pucks, their four wheels in a chain, learning by the default settings:
 
 >>> import nested_agents as na
->>> scenario = na.BoxPushing(na.ScenarioSettings())
+>>> scenario = na.BoxPushingSettings().build()
 >>> hierarchy = na.build_hierarchy(na.parse_topology("chain"), scenario.agents)
 >>> team = na.Team.build(na.BatchTDSettings(), scenario, hierarchy, na.policy_seed(0))
 >>> steps = na.control_loop(scenario, team, episodes=1, steps=3, seed=0)
@@ -27,6 +27,7 @@ _PLACES = {
     "BatchTDSettings": ("core.settings", "BatchTDSettings"),
     "Blocks": ("core.protocols", "Blocks"),
     "BoxPushing": ("scenarios.box_pushing.scenario", "BoxPushing"),
+    "BoxPushingSettings": ("scenarios.box_pushing.config", "BoxPushingSettings"),
     "FittedValueSettings": ("core.settings", "FittedValueSettings"),
     "FrozenSettings": ("core.settings", "FrozenSettings"),
     "GradientTDSettings": ("core.settings", "GradientTDSettings"),
@@ -34,18 +35,20 @@ _PLACES = {
     "Partition": ("core.rules.fuzzy", "Partition"),
     "RuleBase": ("core.rules.rule_base", "RuleBase"),
     "Scenario": ("core.protocols", "Scenario"),
-    "ScenarioSettings": ("scenarios.box_pushing.config", "ScenarioSettings"),
+    "ScenarioSettings": ("core.settings", "ScenarioSettings"),
     "Spec": ("studies.spec.spec", "Spec"),
     "StateSpace": ("core.spaces", "StateSpace"),
     "TDLambdaSettings": ("core.settings", "TDLambdaSettings"),
     "Team": ("core.team", "Team"),
     "Transition": ("core.protocols", "Transition"),
     "Variable": ("core.spaces", "Variable"),
+    "View": ("scenarios.box_pushing.states.view", "View"),
     "build_hierarchy": ("topologies", "build"),
     "check_scenario": ("scenarios.checking.checker", "check_scenario"),
     "control_loop": ("core.loop", "control_loop"),
     "parse_topology": ("topologies", "parse"),
     "policy_seed": ("core.loop", "policy_seed"),
+    "state_variable": ("scenarios.box_pushing.states.variables", "state_variable"),
 }
 
 __all__ = ["__version__", *_PLACES]

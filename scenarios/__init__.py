@@ -1,28 +1,41 @@
-"""Where agents act: robots, boxes, sensors, failures and tasks."""
+"""Where agents act: scenarios, by name.
+
+A scenario is known by its settings, whose method ``build`` makes it. Settings can be read and
+checked without what a scenario needs to run: Box2D and numba take a second to import.
+
+Examples
+--------
+>>> SCENARIOS.parsed("line-up").build().agents
+('cart1', 'cart2')
+"""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from .box_pushing.config import ScenarioSettings
+from ..core.registry import SettingsRegistry
+from ..core.settings import ScenarioSettings
+from .box_pushing.config import BoxPushingSettings
 
 if TYPE_CHECKING:
     from .box_pushing.scenario import BoxPushing
 
-__all__ = ["BoxPushing", "ScenarioSettings", "build"]
+__all__ = ["SCENARIOS", "BoxPushing", "BoxPushingSettings"]
+
+SCENARIOS = SettingsRegistry(
+    "scenario",
+    {
+        "box-pushing": "nested_agents.scenarios.box_pushing.config:BoxPushingSettings",
+        "line-up": "nested_agents.scenarios.line_up:LineUpSettings",
+    },
+    ScenarioSettings,
+)
+"""Scenarios by the name that specs use."""
 
 
 def __getattr__(name: str) -> Any:
-    # Box2D and numba take a second to import: only when a world is wanted, not to check a spec.
     if name == "BoxPushing":
         from .box_pushing.scenario import BoxPushing
 
         return BoxPushing
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-
-
-def build(settings: ScenarioSettings) -> BoxPushing:
-    """Build the scenario that `settings` describe."""
-    from .box_pushing.scenario import BoxPushing
-
-    return BoxPushing(settings)

@@ -15,12 +15,14 @@ u, ``m dv/dt = k (u - v)``. With ``tau = m / k`` and u held for a period T this 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from pydantic import Field
 
 from ..core.arrays import FloatArray, IntArray
-from ..core.protocols import Blocks, Transition
+from ..core.protocols import SUCCESS, Blocks, Measure, Transition
+from ..core.settings import ScenarioSettings
 from ..core.spaces import ActionSet, StateSpace, Variable
 
 PERIOD = 0.25
@@ -38,26 +40,49 @@ DISTANCE = Variable("distance", "m", -1.0, 1.0, centres=(-1.0, -0.3, 0.0, 0.3, 1
 LEAD = Variable("lead", "m", -0.8, 0.8, centres=(-0.8, -0.2, 0.0, 0.2, 0.8))
 
 
+MEASURES = (
+    SUCCESS,
+    Measure("final_distance_m", "mean distance", "m", "distance_m", better="lower"),
+    Measure("final_spread_m", "spread", "m", "spread_m", better="lower"),
+)
+
+
+class LineUpSettings(ScenarioSettings):
+    """The line-up scenario."""
+
+    kind: Literal["line-up"] = "line-up"
+    carts: Annotated[int, Field(ge=1, le=10_000)] = 2
+    """Number of carts, one agent each."""
+
+    def build(self) -> LineUp:
+        """Build the scenario."""
+        return LineUp(self)
+
+
 class LineUp:
     """The line-up scenario; a `nested_agents.core.protocols.Scenario`.
 
     Parameters
     ----------
-    n_agents
-        Number of carts, at least 1.
+    settings
+        See `LineUpSettings`.
 
     Examples
     --------
-    >>> scenario = LineUp(2)
+    >>> scenario = LineUpSettings(carts=2).build()
     >>> scenario.agents, scenario.reset(0).shape
     (('cart1', 'cart2'), (2, 2))
     """
 
-    def __init__(self, n_agents: int) -> None:
-        if n_agents < 1:
-            raise ValueError(f"line-up: n_agents = {n_agents}, allowed: 1 or more")
+    measures = MEASURES
+    recorded = ("places",)
+
+    def __init__(self, settings: LineUpSettings) -> None:
+        self.settings = settings
+        n_agents = settings.carts
         self.agents = tuple(f"cart{i + 1}" for i in range(n_agents))
         self.groups = tuple((i,) for i in range(n_agents))
+        self.roles = ("cart",) * n_agents
         self.action_set = ActionSet()
         self.state_space = StateSpace("line-up", (DISTANCE, LEAD), n_own=1)
         self._places: FloatArray = np.zeros(n_agents)
@@ -90,12 +115,21 @@ class LineUp:
         return LineUpPrediction(places.T.copy())
 
     def measure(self) -> Mapping[str, Any]:
-        """Return the mean distance from the line and the spread of the carts [m]."""
+        """Return the places of the carts, their mean distance from the line and spread [m]."""
         return {
+            "places": self._places.copy(),
             "distance_m": float(np.abs(self._places).mean()),
             "spread_m": float(np.ptp(self._places)),
             "seconds": {"physics": 0.0, "sensors": 0.0},
         }
+
+    def constants_of_episode(self) -> Mapping[str, Any]:
+        """Return the seconds between two recorded steps."""
+        return {"dt": PERIOD}
+
+    def with_exact_prediction(self) -> LineUp:
+        """Return this scenario: its predictions are exact."""
+        return self
 
     def _commanded(self, joint_actions: IntArray) -> FloatArray:
         n = len(self.agents)
@@ -122,13 +156,18 @@ class LineUpPrediction:
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, 2)`` of `agent` for joint actions ``(m, n)``."""
-        places = self._places[np.arange(len(self._places)), joint_actions]
+        places = self._after(joint_actions)
         own = places[:, agent]
         return np.stack([own, own - places.mean(axis=1)], axis=1)
 
+    def states_of_all(self, joint_actions: IntArray) -> FloatArray:
+        """Return the next states ``(n, m, 2)`` of all agents for joint actions ``(m, n)``."""
+        places = self._after(joint_actions)
+        return np.stack([places.T, (places - places.mean(axis=1, keepdims=True)).T], axis=2)
+
     def rewards(self, joint_actions: IntArray) -> FloatArray:
         """Return the rewards ``(m,)`` of joint actions ``(m, n)``."""
-        return reward(self._places[np.arange(len(self._places)), joint_actions])
+        return reward(self._after(joint_actions))
 
     def blocks(self, agent: int) -> Blocks:
         """Return the next states of `agent` for all joint actions."""
@@ -143,11 +182,15 @@ class LineUpPrediction:
         return Blocks(own.copy(), lead.reshape(-1, 1), divisor)
 
     def reward_table(self) -> FloatArray:
-        """Return the rewards ``(A ** n,)`` of all joint actions by code."""
+        """Return the rewards ``(A ** n,)`` of all joint actions by index."""
         n, n_actions = self._places.shape
-        codes = np.arange(n_actions**n)
-        digits = codes[:, None] // n_actions ** np.arange(n - 1, -1, -1) % n_actions
+        indices = np.arange(n_actions**n)
+        digits = indices[:, None] // n_actions ** np.arange(n - 1, -1, -1) % n_actions
         return self.rewards(digits)
+
+    def _after(self, joint_actions: IntArray) -> FloatArray:
+        """Return the places ``(m, n)`` [m] after joint actions ``(m, n)``."""
+        return self._places[np.arange(len(self._places)), joint_actions]
 
 
 def advance(

@@ -1,12 +1,15 @@
-"""The settings of a scenario, as they stand in the ``[scenario]`` table of a spec."""
+"""The settings of box pushing, as they stand in the ``[scenario]`` table of a spec."""
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from ...core.settings import NonNegative, Positive, Settings
+from ...core.settings import NonNegative, Positive, ScenarioSettings, Settings
+
+if TYPE_CHECKING:
+    from .scenario import BoxPushing
 
 CONTROL_PERIOD = 0.064
 """Time between commands to the wheels [s]; the basic time step of the e-puck in Webots."""
@@ -230,7 +233,7 @@ def label(thing: str | Settings) -> str:
     return thing if isinstance(thing, str) else thing.model_dump_json()
 
 
-class ScenarioSettings(Settings):
+class BoxPushingSettings(ScenarioSettings):
     """The box-pushing scenario (Section IX)."""
 
     kind: Literal["box-pushing"] = "box-pushing"
@@ -246,8 +249,8 @@ class ScenarioSettings(Settings):
     failures: tuple[Failure, ...] = ()
     """Failures of wheels, as ``[[scenario.failures]]`` tables."""
     state_space: Literal["paper", "relational", "pose"] | tuple[str, ...] = "relational"
-    """Eq. 1, the relational variables, those and the orientation of the box, or relational
-    variables by name, see `box_pushing.states.relational`."""
+    """Eq. 1, the relational variables, those and the orientation of the box, or state variables by
+    name, one's own included, see `box_pushing.states.variables`."""
     predictor: Literal["push", "rigid", "static", "exact"] = "push"
     """What predictions take the world for, see `box_pushing.prediction.predictors`."""
     belief: BeliefSettings = BeliefSettings()
@@ -266,11 +269,34 @@ class ScenarioSettings(Settings):
     orientation_tolerance: Positive | None = None
     """Orientation error that still counts as reached [rad]; none: any."""
 
+    @field_validator("state_space", mode="before")
+    @classmethod
+    def _by_name(cls, value: object) -> object:
+        from .states.variables import STATE_VARIABLES, StateVariable
+
+        if not isinstance(value, list | tuple):
+            return value
+        return tuple(
+            STATE_VARIABLES.reference_to(v) if isinstance(v, StateVariable) else v for v in value
+        )
+
     @model_validator(mode="after")
     def _believes(self) -> Self:
         if self.predictor != "push" and self.belief != BeliefSettings():
             raise ValueError(f"belief is for predictor = 'push', received {self.predictor!r}")
         return self
+
+    def build(self) -> BoxPushing:
+        """Build the scenario.
+
+        Raises
+        ------
+        ValueError
+            If there is none of these settings, see `BoxPushing`.
+        """
+        from .scenario import BoxPushing
+
+        return BoxPushing(self)
 
     @property
     def onset(self) -> int | None:

@@ -23,14 +23,14 @@ from pettingzoo import ParallelEnv
 
 from ...core.arrays import FloatArray, IntArray
 from ...core.protocols import Transition
-from .config import ScenarioSettings
+from .config import BoxPushingSettings
 from .pictures.screen import Screen
 from .scenario import BoxPushing
 
 ENV_ID = "NestedAgents/BoxPushing-v0"
 RENDER_MODES = ["rgb_array", "human"]
 
-SettingsLike = ScenarioSettings | Mapping[str, Any] | None
+SettingsLike = BoxPushingSettings | Mapping[str, Any] | None
 
 
 class Seat:
@@ -97,8 +97,8 @@ class Game:
             raise ValueError(f"steps = {steps}, must be at least 1")
         if render_mode not in (None, *RENDER_MODES):
             raise ValueError(f"render_mode = {render_mode!r}, allowed None, {RENDER_MODES}")
-        if not isinstance(settings, ScenarioSettings):
-            settings = ScenarioSettings.model_validate(settings or {})
+        if not isinstance(settings, BoxPushingSettings):
+            settings = BoxPushingSettings.model_validate(settings or {})
         self.scenario = BoxPushing(settings)
         self.steps = steps
         self.screen = Screen(settings, render_mode, sensors=sensors) if render_mode else None

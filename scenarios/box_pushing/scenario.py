@@ -6,21 +6,22 @@ episode), the sensing (states) and the servo layer, which turns actions into whe
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import pi
+from pathlib import Path
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 from ...core.arrays import BoolArray, FloatArray, IntArray
-from ...core.protocols import Transition
+from ...core.protocols import SUCCESS, Measure, Transition
 from ...core.spaces import ActionSet, StateSpace
-from .config import CONTROL_PERIOD, ScenarioSettings
+from .config import CONTROL_PERIOD, BeliefSettings, BoxPushingSettings
 from .prediction.belief import APART, CONSTANTS, PushBelief, least_gap
 from .prediction.prediction import BoxPrediction, mean_twists
 from .prediction.predictors import ExactPrediction, Future, push_model
-from .prediction.situation import Situation
+from .prediction.situation import Premises, Situation
 from .reward import Task, reward
 from .starts import place
 from .states.state_spaces import state_space_for
@@ -34,16 +35,36 @@ from .world.world import World, WorldState
 SENSING = 2**32 - 1
 """Key of the stream of sensor noise under the seed of an episode; failures have 0, 1, ..."""
 
+MEASURES = (
+    SUCCESS,
+    Measure(
+        "stopped_at_goal", "stopped at goal", source="stopped_at_goal", better="higher",
+        is_rate=True,
+    ),
+    Measure("final_distance_m", "final distance", "m", "distance_m", better="lower"),
+    Measure(
+        "final_orientation_rad", "final orientation error", "rad", "orientation_error_rad",
+        better="lower",
+    ),
+    Measure(
+        "contact_fraction", "time in contact", source="contact_fraction", gathering="mean",
+        better="higher",
+    ),
+)  # fmt: skip
+"""What an episode is told by: whether the box came within the tolerance of the goal at whatever
+speed, whether it was there once the robots had stopped, ..."""
+
 
 class BoxPushing:
     """A box, a goal, and robots whose wheels are the agents.
 
-    Fulfils `nested_agents.core.protocols.Scenario`.
+    Fulfils `nested_agents.core.protocols.Scenario`, and can be drawn, calibrated and predicted
+    exactly.
 
     Parameters
     ----------
     settings
-        See `ScenarioSettings`.
+        See `BoxPushingSettings`.
 
     Raises
     ------
@@ -52,14 +73,17 @@ class BoxPushing:
 
     Examples
     --------
-    >>> scenario = BoxPushing(ScenarioSettings())
+    >>> scenario = BoxPushingSettings().build()
     >>> scenario.agents
     ('robot1.left', 'robot1.right', 'robot2.left', 'robot2.right')
     >>> scenario.reset(0).shape
     (4, 8)
     """
 
-    def __init__(self, settings: ScenarioSettings) -> None:
+    measures = MEASURES
+    recorded = ("robot_poses", "box_pose", "wheel_speeds", "contact", "failed")
+
+    def __init__(self, settings: BoxPushingSettings) -> None:
         self.settings = settings
         self.robot = robot_for(settings.robot)
         self.box = box_for(settings.box, settings.robots)
@@ -74,6 +98,7 @@ class BoxPushing:
             for r in range(settings.robots)
             for name in self.robot.wheel_names
         )
+        self.roles = self.robot.wheel_names * settings.robots
         self.action_set = ActionSet()
         self.infrared = InfraredSpec(**settings.infrared.model_dump())
         self.world = World([self.robot] * settings.robots, self.box, infrared=self.infrared)
@@ -82,12 +107,16 @@ class BoxPushing:
         self._effects = (nominal_effect(self.robot),) * settings.robots
         robots = [self.robot] * settings.robots
         self._model = push_model(settings.predictor, robots, self.box, settings.belief)
-        self._belief = PushBelief.of(self._model, robots, settings.belief.stiffness)
         self._playground = World(robots, self.box) if settings.predictor == "exact" else None
         self._failures = (
             Failures(settings.failures, self.agents, self._limits) if settings.failures else None
         )
         self._task = Task(settings.reward, settings.tolerance, settings.orientation_tolerance)
+        self._belief = PushBelief.of(self._model, robots, settings.belief.stiffness)
+        self._premises = Premises(
+            self._belief, self._space, self.action_set, settings.speed_increment, self._limits,
+            self._task, self.infrared, settings.period, settings.lookahead * CONTROL_PERIOD,
+        )  # fmt: skip
         self._goal: FloatArray = np.zeros(3)
         self._sensing = np.random.default_rng(0)  # until reset
         self._speeds: FloatArray = np.zeros(len(self.agents))
@@ -112,6 +141,8 @@ class BoxPushing:
         for variable in self.state_space.variables:
             if variable.periodic:
                 limits.append((variable.low, variable.high))
+            elif self._space.is_own(variable.name):
+                limits.append((-np.inf, np.inf))
             elif variable.unit == "m/s":
                 limits.append((-self.robot.max_speed, self.robot.max_speed))
             else:
@@ -207,17 +238,28 @@ class BoxPushing:
             self._speeds, tuple(effects), self.groups,
         )  # fmt: skip
         model = self._model if constants is None else self._belief.believing(constants)
-        believed = (
-            situation, model, self._belief, self._space, self.action_set, self._task,
-            self.settings.period, self.settings.lookahead * CONTROL_PERIOD,
-            self.settings.speed_increment, self._limits, self.infrared,
-        )  # fmt: skip
         if self._playground is None or self._saved is None:
-            return BoxPrediction(*believed)
+            return BoxPrediction(situation, model, self._premises)
         future = Future(
             self._playground, self._saved, self._failures, self._step, self.settings.hold
         )
-        return ExactPrediction(*believed, future)
+        return ExactPrediction(situation, model, self._premises, future)
+
+    def with_exact_prediction(self) -> BoxPushing:
+        """Return a scenario alike that predicts one decision period by playing it."""
+        exactly = {"predictor": "exact", "lookahead": self.settings.hold}
+        settings = self.settings.model_copy(update={**exactly, "belief": BeliefSettings()})
+        return type(self)(settings)
+
+    def constants_of_episode(self) -> dict[str, Any]:
+        """Return the goal pose of the episode, and what is drawn."""
+        return {"goal_pose": self._goal, **self.settings.drawn}
+
+    def animate(self, recording: Mapping[str, FloatArray], path: Path) -> None:
+        """Draw a recorded episode as an animation, GIF or MP4 by the suffix of `path`."""
+        from .pictures.rendering import animate
+
+        animate(recording, path)
 
     def _save(self) -> None:
         # After every step, asked for or not, as saving costs the world its order of contacts.
@@ -228,9 +270,12 @@ class BoxPushing:
 
         Keys: ``robot_poses`` (M, 3), ``box_pose``, ``goal_pose`` [m, m, rad], ``wheel_speeds``
         (n,) as commanded [m/s], ``contact`` (M,) now, ``contact_time`` (M,) as a fraction of the
-        last decision period, ``failed`` (n,) wheels, ``distance_m``, ``orientation_rad`` of the box
-        from the goal pose.
+        last decision period, ``contact_fraction`` its mean, ``failed`` (n,) wheels,
+        ``distance_m``, ``orientation_rad`` of the box from the goal pose,
+        ``orientation_error_rad`` its size, ``stopped_at_goal`` whether the box stayed there once
+        the wheels had stopped: known after the step that ends the episode.
         """
+        orientation = self._orientation()
         return {
             "robot_poses": self.world.robot_poses.copy(),
             "box_pose": self.world.box_pose.copy(),
@@ -238,9 +283,12 @@ class BoxPushing:
             "wheel_speeds": self._speeds,
             "contact": self.world.contact.copy(),
             "contact_time": self.world.contact_time.copy(),
+            "contact_fraction": float(np.mean(self.world.contact_time)),
             "failed": self.failed,
             "distance_m": self._distance(),
-            "orientation_rad": self._orientation(),
+            "orientation_rad": orientation,
+            "orientation_error_rad": abs(orientation),
+            "stopped_at_goal": False,
         }
 
     @property

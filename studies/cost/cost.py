@@ -27,7 +27,7 @@ from ...core.loop import control_loop, policy_seed
 from ...core.protocols import Scenario
 from ...core.settings import Decision, RuleBaseSettings, TDLambdaSettings
 from ...core.team import Team
-from ...scenarios.line_up import LineUp
+from ...scenarios.line_up import LineUpSettings
 from ...topologies import arrange, build, parse
 from ...topologies.config import (
     ChainSettings,
@@ -175,7 +175,7 @@ def pairs(n: int) -> tuple[tuple[int, ...], ...]:
 def measure(text: str, n: int) -> Measured | None:
     """Count and time a step of n agents; none where it would take too long or too much memory."""
     settings = parse(text)
-    line_up, rules = LineUp(n), RULES
+    line_up, rules = LineUpSettings(carts=n).build(), RULES
     actions = len(line_up.action_set)
     if isinstance(settings, SingleAgentSettings):
         joint, rules, updates = actions**n, rules**n, rules**n
@@ -257,7 +257,7 @@ def exponent(
 @cache
 def _warm_up() -> None:
     """Have everything imported and compiled before memory is traced and time taken."""
-    line_up = LineUp(2)
+    line_up = LineUpSettings(carts=2).build()
     for settings in (ChainSettings(), IndependentSettings()):
         hierarchy = build(settings, line_up.agents)
         _steps(Team.build(LEARNER, line_up, hierarchy, policy_seed(0)), line_up, 1)

@@ -19,7 +19,7 @@ from ...core.cost import Problem
 from ...core.loop import control_loop, policy_seed
 from ...core.settings import FrozenSettings, TDLambdaSettings
 from ...core.team import Team
-from ...scenarios.line_up import LineUp
+from ...scenarios.line_up import LineUpSettings
 from ...topologies import arrange, parse
 from ..analysis.statistics import Estimate, rate
 from ..trials.trial import EVALUATION_WORLDS
@@ -130,7 +130,7 @@ def compare(
 def run(n: int, contender: str, step_size: float, seed: int, episodes: int) -> Run:
     """Train one contender on one seed, then evaluate it greedily."""
     topology = parse("single-agent" if contender == "single" else "chain")
-    scenario, hierarchy = arrange(topology, LineUp(n))
+    scenario, hierarchy = arrange(topology, LineUpSettings(carts=n).build())
     base = LEARNER.rule_base.model_copy(update={"order": scenario.state_space.n_variables})
     learner: TDLambdaSettings | FrozenSettings = TDLambdaSettings(
         rule_base=base, decision=LEARNER.decision, step_size=step_size, normalised=True

@@ -16,7 +16,6 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import track
 
-from ... import scenarios
 from ...core.protocols import Scenario
 from ...core.rules.rule_base import RuleBase
 from ...core.spaces import Variable
@@ -113,7 +112,7 @@ def explained(store: Store, trial: Trial) -> Explained:
         except ValueError as error:
             fields = str(error)
     variables = scenario.state_space.variables
-    wheels = scenarios.build(trial.settings.scenario).agents
+    wheels = trial.settings.scenario.build().agents
     return Explained(trial, scenario.agents, wheels, rules, variables, parts, fields, bodies)
 
 

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ... import scenarios, topologies
+from ... import topologies
 from ...core.loop import control_loop, policy_seed, world_seed
 from ...core.protocols import Scenario
 from ...core.team import Team
-from ...scenarios.box_pushing.config import ScenarioSettings
+from ...scenarios.box_pushing.config import BoxPushingSettings
 from ..spec.conditions import ConditionSettings
 from ..spec.errors import SpecError
 from ..spec.spec import Spec
@@ -54,7 +54,7 @@ class Trial:
     episodes: int
     steps: int
     evaluation: int
-    evaluations: tuple[tuple[str, ScenarioSettings], ...] = ()
+    evaluations: tuple[tuple[str, BoxPushingSettings], ...] = ()
 
     @cached_property
     def identity(self) -> str:
@@ -140,7 +140,7 @@ def build(settings: ConditionSettings, seed: int) -> tuple[Scenario, Team]:
     ValueError
         If the settings do not fit together; one line.
     """
-    scenario, hierarchy = topologies.arrange(settings.topology, scenarios.build(settings.scenario))
+    scenario, hierarchy = topologies.arrange(settings.topology, settings.scenario.build())
     return scenario, Team.build(settings.learner, scenario, hierarchy, policy_seed(seed))
 
 
@@ -287,6 +287,6 @@ def run_trial(trial: Trial) -> TrialResult:
 
 def _opening(trial: Trial, episode: int) -> Mapping[str, Any]:
     """Return the measurements before an episode's first step, which no step record holds."""
-    scenario = scenarios.build(trial.settings.scenario)
+    scenario = trial.settings.scenario.build()
     scenario.reset(world_seed(trial.seed, episode), episode)
     return scenario.measure()

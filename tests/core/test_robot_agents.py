@@ -8,7 +8,7 @@ from nested_agents.core.protocols import EmbodiedScenario
 from nested_agents.core.robot_agents import RobotAgents, per_robot
 from nested_agents.core.settings import BatchTDSettings, Decision, SelfModelSettings
 from nested_agents.core.team import Team
-from nested_agents.scenarios.box_pushing.config import ScenarioSettings
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.checking.checker import CHECKS, check_scenario
 from nested_agents.topologies import arrange, parse
@@ -44,13 +44,13 @@ def test_predictions_by_blocks_are_those_by_states(line_world) -> None:
 
 def test_the_scenario_keeps_its_promises() -> None:
     def make() -> RobotAgents:
-        return per_robot(BoxPushing(ScenarioSettings()))
+        return per_robot(BoxPushing(BoxPushingSettings()))
 
     assert check_scenario(make, steps=10) == tuple(CHECKS)
 
 
 def test_both_evaluators_and_a_self_model_work_on_it() -> None:
-    settings = ScenarioSettings()
+    settings = BoxPushingSettings()
     weights = []
     for evaluator in ("exact", "sampling"):
         learner = BatchTDSettings(

@@ -14,7 +14,7 @@ from nested_agents.core.hierarchy import Hierarchy
 from nested_agents.core.loop import control_loop, policy_seed
 from nested_agents.core.settings import Decision, RuleBaseSettings, TDLambdaSettings
 from nested_agents.core.team import Team
-from nested_agents.scenarios.line_up import LineUp
+from nested_agents.scenarios.line_up import LineUp, LineUpSettings
 from nested_agents.topologies import BUILDERS, KINDS, Topology, arrange, build
 
 ADAPTER = TypeAdapter(Topology)
@@ -46,7 +46,7 @@ def pairs(n: int) -> tuple[tuple[int, ...], ...]:
                 ids=lambda p: f"{p[0]}-{p[1]}")  # fmt: skip
 def case(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[LineUp, Hierarchy]:
     kind, n = request.param
-    scenario = LineUp(n)
+    scenario = LineUp(LineUpSettings(carts=n))
     settings = ADAPTER.validate_python(required(kind, scenario.agents, tmp_path))
     return scenario, build(settings, scenario.agents, pairs(n))
 
@@ -96,7 +96,7 @@ def test_listing_the_agents_otherwise_changes_nothing_but_the_order(
 
     class Listed(LineUp):
         def __init__(self) -> None:
-            super().__init__(n)
+            super().__init__(LineUpSettings(carts=n))
             self.agents = tuple(scenario.agents[i] for i in permutation)
 
     other = Listed()
@@ -133,7 +133,7 @@ def decided_values(team: Team, theta: np.ndarray, prediction) -> np.ndarray:
 
 @pytest.mark.parametrize("n", [2, 4])
 def test_the_single_agent_acts_learns_saves_and_loads(n: int, tmp_path: Path) -> None:
-    scenario, hierarchy = arrange(KINDS["single-agent"](), LineUp(n))
+    scenario, hierarchy = arrange(KINDS["single-agent"](), LineUp(LineUpSettings(carts=n)))
     team = Team.build(LEARNER, scenario, hierarchy, policy_seed(0))
     joint_actions = steps(scenario, team)
     assert max(map(max, joint_actions)) < 4**n
@@ -162,7 +162,7 @@ class Told(LineUp):
 
 
 def test_agents_that_are_not_seen_maintain() -> None:
-    scenario = Told(4)
+    scenario = Told(LineUpSettings(carts=4))
     maintain = scenario.action_set.neutral
     hierarchy = Hierarchy(scenario.agents, [("cart1", "cart2")])  # cart3, cart4 unseen by both
     team = team_of(scenario, hierarchy)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ....core.protocols import Transition
-from ..config import ScenarioSettings
+from ..config import BoxPushingSettings
 
 SHOWN = ("robot_poses", "box_pose", "wheel_speeds", "contact", "failed")
 
@@ -26,7 +26,7 @@ class Screen:
         Whether rays of infrared sensors are drawn.
     """
 
-    def __init__(self, settings: ScenarioSettings, mode: str, *, sensors: bool = False) -> None:
+    def __init__(self, settings: BoxPushingSettings, mode: str, *, sensors: bool = False) -> None:
         self.mode, self.sensors = mode, sensors
         self._constants = {name: np.array(value) for name, value in settings.drawn.items()}
         self._frames: dict[str, list[Any]] = {}

@@ -4,7 +4,7 @@ Robots that push together do not add up from nothing: two that push a box side b
 hardly faster than one. So contributions are counted from a *reference* in which every robot moves
 at the mean of its possible twists: a robot's contribution is by how much the box goes further when
 it alone departs from the reference. Departures of several robots at once are taken to add up. That
-needs one push per robot and drive, in place of one for every combination of drives.
+needs one push per robot and wheel command, in place of one for every combination of them.
 """
 
 from __future__ import annotations
@@ -15,13 +15,12 @@ import numpy as np
 from numba import njit
 
 from ....core.arrays import BoolArray, FloatArray, IntArray
-from ..states.state_spaces import BoxStateSpace
 from ..states.view import View
 from ..world.geometry import surface
 from .push import PushModel, push
 from .push_lanes import MARGIN
-from .situation import Situation
-from .wheel_commands import Drives
+from .situation import Premises, Situation
+from .wheel_commands import WheelCommands
 
 TOUCH = 0.02
 """Gap [m] now or in the reference below which a robot is among those that may move the box."""
@@ -37,13 +36,10 @@ class Predicted(Protocol):
     def model(self) -> PushModel: ...  # noqa: D102
 
     @property
-    def space(self) -> BoxStateSpace: ...  # noqa: D102
+    def premises(self) -> Premises: ...  # noqa: D102
 
     @property
-    def seconds(self) -> float: ...  # noqa: D102
-
-    @property
-    def drives(self) -> Drives: ...  # noqa: D102
+    def wheel_commands(self) -> WheelCommands: ...  # noqa: D102
 
     @property
     def alike(self) -> IntArray: ...  # noqa: D102
@@ -61,7 +57,7 @@ class PushSuperposition:
     """A `nested_agents.core.protocols.Superposition` of box pushing.
 
     The sum is the pose of the box relative to the reference; the robot of the deciding agent
-    stands where its drive takes it, the others where theirs do in the mean.
+    stands where its wheel command takes it, the others where theirs do in the mean.
 
     Parameters
     ----------
@@ -71,34 +67,35 @@ class PushSuperposition:
 
     def __init__(self, prediction: Predicted) -> None:
         self._prediction = prediction
-        drives = prediction.drives
-        twists, which = drives.twists, drives.which
-        n, n_drives = twists.shape[:2]
-        n_codes = which.shape[1]
-        self.contributions: FloatArray = np.zeros((n, n_codes, 3))
+        commands = prediction.wheel_commands
+        twists, which = commands.twists, commands.which
+        n, n_commands = twists.shape[:2]
+        n_indices = which.shape[1]
+        self.contributions: FloatArray = np.zeros((n, n_indices, 3))
         self.alike: IntArray = prediction.alike
-        self._poses: FloatArray = np.zeros((n, n_codes, 3))
-        self._gaps: FloatArray = np.zeros((n, n_codes))
+        self._poses: FloatArray = np.zeros((n, n_indices, 3))
+        self._gaps: FloatArray = np.zeros((n, n_indices))
         every = np.arange(n)
         mean = twists[every[:, None], which].mean(axis=1)
         near = self._near(twists)
         far = np.flatnonzero(~near)
         twists = np.concatenate([twists, mean[:, None]], axis=1)
-        robots, box, gaps = self._push(every, twists, np.full((1, n), n_drives))
+        robots, box, gaps = self._push(every, twists, np.full((1, n), n_commands))
         self._box = box[0]
         # A robot departs from the reference among those only that touch the box in it.
         touching = np.minimum(self._present_gaps(), gaps[0]) < TOUCH
         for r in np.flatnonzero(near).tolist():
             crowd = np.flatnonzero(touching | (every == r))
             column = int(np.searchsorted(crowd, r))
-            choices = np.full((drives.counts[r], len(crowd)), n_drives)
+            choices = np.full((commands.counts[r], len(crowd)), n_commands)
             choices[:, column] = np.arange(len(choices))
             robots, box, gaps = self._push(crowd, twists, choices)
             self.contributions[r] = box[which[r]] - self._box
             self._poses[r] = robots[which[r], column]
             self._gaps[r] = gaps[which[r], column]
         # Robots that cannot reach the box do not depend on each other.
-        robots, _, gaps = self._push(far, twists, np.tile(np.arange(n_drives)[:, None], len(far)))
+        every_command = np.tile(np.arange(n_commands)[:, None], len(far))
+        robots, _, gaps = self._push(far, twists, every_command)
         for column, r in enumerate(far.tolist()):
             self._poses[r] = robots[which[r], column]
             self._gaps[r] = gaps[which[r], column]
@@ -106,7 +103,7 @@ class PushSuperposition:
     def _near(self, twists: FloatArray) -> BoolArray:
         """Return which robots ``(M,)`` might touch the box, were it to come as fast as they."""
         speeds = np.hypot(twists[:, :, 0], twists[:, :, 1]).max(axis=1)
-        travel = self._prediction.seconds * (speeds + speeds.max()) + 2.0 * MARGIN
+        travel = self._prediction.premises.seconds * (speeds + speeds.max()) + 2.0 * MARGIN
         return self._present_gaps() <= travel
 
     def _present_gaps(self) -> FloatArray:
@@ -120,7 +117,7 @@ class PushSuperposition:
         situation, model = self._prediction.situation, self._prediction.model
         found: tuple[FloatArray, FloatArray, FloatArray] = push(
             situation.robots[robots], situation.box, twists[robots], choices,
-            self._prediction.seconds,
+            self._prediction.premises.seconds,
             model._replace(radii=model.radii[robots], compliance=model.compliance[robots]),
         )  # fmt: skip
         return found
@@ -140,8 +137,9 @@ class PushSuperposition:
         model = prediction.model
         gaps[r] = _gaps(robots[r].T, box, model.edges, model.rounding, np.full(m, model.radii[r]))
         own, which = prediction.own_block(agent)
-        view = prediction.seen(robots.transpose(2, 0, 1), box, gaps.T, prediction.seconds)
-        return np.concatenate([own[which[local]], prediction.space.shared_of(view, [r])[0]], axis=1)
+        view = prediction.seen(robots.transpose(2, 0, 1), box, gaps.T, prediction.premises.seconds)
+        shared = prediction.premises.space.shared_of(view, [r])[0]
+        return np.concatenate([own[which[local]], shared], axis=1)
 
 
 @njit(cache=True)

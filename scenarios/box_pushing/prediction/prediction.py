@@ -7,7 +7,6 @@ own block is the wheel speed that is exact.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
 
@@ -15,59 +14,57 @@ import numpy as np
 
 from ....core.arrays import FloatArray, IntArray
 from ....core.protocols import Blocks
-from ....core.spaces import ActionSet
-from ..reward import Task, reward
-from ..states.state_spaces import BoxStateSpace
+from ..reward import reward
 from ..states.view import View, wrap
-from ..world.infrared import InfraredSpec, expected_reading
+from ..world.infrared import expected_reading
 from .additive import PushSuperposition
-from .belief import PushBelief, outcomes
+from .belief import outcomes
 from .push import PushModel, push
-from .situation import Situation
-from .wheel_commands import Drives, choices_of, drives_of, motion_table
+from .situation import Premises, Situation
+from .wheel_commands import WheelCommands, choices_of, twist_table, wheel_commands_of
 
 
-@dataclass(frozen=True)
 class BoxPrediction:
     """Predicts from one situation; see `nested_agents.core.protocols.Prediction`.
 
-    A decision stands for `hold` seconds; predictions look `seconds` ahead.
+    Parameters
+    ----------
+    situation
+        The present.
+    model
+        What is believed of robots and box.
+    premises
+        What all predictions of the scenario rest on.
     """
 
-    situation: Situation
-    model: PushModel
-    belief: PushBelief
-    space: BoxStateSpace
-    action_set: ActionSet
-    task: Task
-    hold: float
-    seconds: float
-    increment: float
-    limits: FloatArray
-    infrared: InfraredSpec
-
     merges: ClassVar[bool] = True
-    """Whether drives of one twist are taken to lead to the same place."""
+    """Whether wheel commands of one twist are taken to lead to the same place."""
+
+    def __init__(self, situation: Situation, model: PushModel, premises: Premises) -> None:
+        self.situation, self.model, self.premises = situation, model, premises
+        # What was asked for last, and what is known of own blocks, by agent.
+        self._last: tuple[IntArray, View] | None = None
+        self._own: dict[int, tuple[FloatArray, IntArray]] = {}
 
     @cached_property
-    def drives(self) -> Drives:
+    def wheel_commands(self) -> WheelCommands:
         """What the wheels may be told."""
-        speeds, n_actions = self.situation.speeds, len(self.action_set)
-        commands = self.action_set.apply(
-            speeds[:, None], np.arange(n_actions),
-            (self.increment * self.limits)[:, None], self.limits[:, None],
-        ).reshape(len(self.situation.groups), -1, n_actions)  # fmt: skip
-        return drives_of(commands, np.array(self.situation.effects), self.merges)
+        speeds, actions = self.situation.speeds, self.premises.action_set
+        limits = self.premises.limits[:, None]
+        commands = actions.apply(
+            speeds[:, None], np.arange(len(actions)), self.premises.increment * limits, limits
+        ).reshape(len(self.situation.groups), -1, len(actions))
+        return wheel_commands_of(commands, np.array(self.situation.effects), self.merges)
 
     def _view(self, choices: IntArray) -> View:
-        """Return where the robots' drives ``(m, M)`` lead."""
-        return self._after(choices, self.seconds)
+        """Return where the robots' wheel commands ``(m, M)`` lead."""
+        return self._after(choices, self.premises.seconds)
 
     def _after(self, choices: IntArray, seconds: float) -> View:
         robots, box, gaps = push(
             self.situation.robots,
             self.situation.box,
-            self.drives.twists,
+            self.wheel_commands.twists,
             choices,
             seconds,
             self.model,
@@ -76,53 +73,49 @@ class BoxPrediction:
 
     def _view_again(self, choices: IntArray) -> View:
         """Return the view of `choices`: the last one, if they are the same."""
-        last = self._last
-        if not (last and np.array_equal(last[0][0], choices)):
-            last[:] = [(choices, self._view(choices))]
-        return last[0][1]
-
-    @cached_property
-    def _last(self) -> list[tuple[IntArray, View]]:
-        return []
+        if self._last is None or not np.array_equal(self._last[0], choices):
+            self._last = choices, self._view(choices)
+        return self._last[1]
 
     def seen(self, robots: FloatArray, box: FloatArray, gaps: FloatArray, seconds: float) -> View:
         """Return a view of situations that the present leads to in `seconds`."""
         goal, now = self.situation.goal, self.situation.box
         before = float(np.hypot(goal[0] - now[0], goal[1] - now[1]))
-        return View(robots, box, gaps, goal, before, seconds / self.hold)
+        return View(robots, box, gaps, goal, before, seconds / self.premises.hold)
 
     def _choices(self, joint_actions: IntArray) -> IntArray:
-        """Return the drive ``(m, M)`` of each robot in joint actions ``(m, n)``."""
-        return choices_of(joint_actions, self.drives.which, len(self.action_set))
+        """Return the wheel command ``(m, M)`` of each robot in joint actions ``(m, n)``."""
+        return choices_of(joint_actions, self.wheel_commands.which, len(self.premises.action_set))
 
     @cached_property
     def alike(self) -> IntArray:
-        """The first local code of a robot ``(M, A ** w)`` that gives the same wheel speeds."""
-        return first_alike(self.drives.which)
+        """The first robot-action index ``(M, A ** w)`` that gives the same wheel speeds."""
+        return first_alike(self.wheel_commands.which)
 
     @cached_property
     def alike_elsewhere(self) -> IntArray:
-        """The first local code of a robot ``(M, A ** w)`` that gives the same motion."""
-        drives = self.drives
-        return first_alike(np.take_along_axis(drives.motions, drives.which, axis=1))
+        """The first robot-action index ``(M, A ** w)`` that gives the same twist."""
+        commands = self.wheel_commands
+        return first_alike(np.take_along_axis(commands.distinct, commands.which, axis=1))
 
     @cached_property
     def _table(self) -> tuple[View, IntArray]:
-        """Where all combinations of motions lead, and the row of every joint-action code."""
-        choices, row = motion_table(self.drives)
+        """Where all combinations of twists lead, and the row of every joint-action index."""
+        choices, row = twist_table(self.wheel_commands)
         return self._view(choices), row
 
     @cached_property
     def _alone(self) -> list[FloatArray]:
-        """Per robot ``(K, 3)``: its pose after every drive if it pushed alone."""
+        """Per robot ``(K, 3)``: its pose after every wheel command if it pushed alone."""
         poses = []
-        for r, count in enumerate(self.drives.counts):
+        for r, count in enumerate(self.wheel_commands.counts):
             model = self.model._replace(
                 radii=self.model.radii[r : r + 1], compliance=self.model.compliance[r : r + 1]
             )
             robots, _, _ = push(
                 self.situation.robots[r : r + 1], self.situation.box,
-                self.drives.twists[r : r + 1], np.arange(count)[:, None], self.seconds, model,
+                self.wheel_commands.twists[r : r + 1], np.arange(count)[:, None],
+                self.premises.seconds, model,
             )  # fmt: skip
             poses.append(robots[:, 0])
         return poses
@@ -130,7 +123,7 @@ class BoxPrediction:
     @cached_property
     def _shared(self) -> list[FloatArray]:
         """The shared block ``(m, d - n_own)`` of every robot in the situations of the table."""
-        return self.space.shared_of(self._table[0], range(len(self.situation.groups)))
+        return self.premises.space.shared_of(self._table[0], range(len(self.situation.groups)))
 
     def robot_of(self, agent: int) -> int:
         """Return the robot of an agent."""
@@ -142,31 +135,30 @@ class BoxPrediction:
         groups = self.situation.groups
         return [(r, wheel) for r, group in enumerate(groups) for wheel in range(len(group))]
 
-    @cached_property
-    def _own(self) -> dict[int, tuple[FloatArray, IntArray]]:
-        return {}
-
     def blocks(self, agent: int) -> Blocks:
         """Return the next states of `agent` for all joint actions, own block as if alone."""
         r, _ = self._places[agent]
         row = self._table[1]
         own, which = self.own_block(agent)
         behind = sum(len(group) for group in self.situation.groups[r + 1 :])
-        divisor, alone = len(self.action_set) ** behind, self.space.own_needs_pose
+        divisor = len(self.premises.action_set) ** behind
+        alone = self.premises.space.own_needs_pose
         return Blocks(own, self._shared[r], divisor, which, row, alone)
 
     def own_block(self, agent: int) -> tuple[FloatArray, IntArray]:
-        """Return the own variables that occur, as if alone, and which each local code leads to."""
+        """Return the own variables that occur, as if alone, and the row of each robot action."""
         if agent not in self._own:
-            (r, wheel), drives, goal = self._places[agent], self.drives, self.situation.goal
-            if self.space.own_needs_pose:
-                speeds = drives.speeds[r, : drives.counts[r], wheel]
-                self._own[agent] = self.space.own(self._alone[r], speeds, goal), drives.which[r]
-            else:
-                speeds = drives.levels[r, wheel, : drives.n_levels[r, wheel]]
-                own = self.space.own(np.zeros((len(speeds), 3)), speeds, goal)
-                self._own[agent] = own, drives.level[r, wheel]
+            self._own[agent] = self._new_own_block(*self._places[agent])
         return self._own[agent]
+
+    def _new_own_block(self, r: int, wheel: int) -> tuple[FloatArray, IntArray]:
+        commands, space, goal = self.wheel_commands, self.premises.space, self.situation.goal
+        if space.own_needs_pose:
+            speeds = commands.speeds[r, : commands.counts[r], wheel]
+            return space.own(self._alone[r], speeds, goal), commands.which[r]
+        speeds = commands.levels[r, wheel, : commands.n_levels[r, wheel]]
+        own = space.own(np.zeros((len(speeds), 3)), speeds, goal)
+        return own, commands.level[r, wheel]
 
     @cached_property
     def superposition(self) -> PushSuperposition:
@@ -175,16 +167,32 @@ class BoxPrediction:
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
-        r, wheel = self._places[agent]
         choices = self._choices(joint_actions)
         view = self._view_again(choices)
-        speeds = self.drives.speeds[r, choices[:, r], wheel]
-        own = self.space.own(view.robots[:, r], speeds, self.situation.goal)
-        return np.concatenate([own, self.space.shared_of(view, [r])[0]], axis=1)
+        shared = self.premises.space.shared_of(view, [self.robot_of(agent)])[0]
+        return np.concatenate([self._own_after(agent, choices, view), shared], axis=1)
+
+    def states_of_all(self, joint_actions: IntArray) -> FloatArray:
+        """Return the next states ``(n, m, d)`` of all agents for joint actions ``(m, n)``."""
+        choices = self._choices(joint_actions)
+        view = self._view_again(choices)
+        shared = self.premises.space.shared_of(view, range(len(self.situation.groups)))
+        n, n_own = len(self._places), self.premises.space.space.n_own
+        found = np.empty((n, len(choices), self.premises.space.space.n_variables))
+        for agent, states in enumerate(found):
+            states[:, :n_own] = self._own_after(agent, choices, view)
+            states[:, n_own:] = shared[self.robot_of(agent)]
+        return found
+
+    def _own_after(self, agent: int, choices: IntArray, view: View) -> FloatArray:
+        """Return the own variables ``(m, n_own)`` of an agent after wheel commands ``(m, M)``."""
+        r, wheel = self._places[agent]
+        speeds = self.wheel_commands.speeds[r, choices[:, r], wheel]
+        return self.premises.space.own(view.robots[:, r], speeds, self.situation.goal)
 
     def poses(self, joint_actions: IntArray) -> View:
         """Return the situations that joint actions ``(m, n)`` lead to in a decision period."""
-        return self._after(self._choices(joint_actions), self.hold)
+        return self._after(self._choices(joint_actions), self.premises.hold)
 
     @property
     def groups(self) -> tuple[tuple[int, ...], ...]:
@@ -194,7 +202,7 @@ class BoxPrediction:
     def commands(self, joint_action: IntArray) -> FloatArray:
         """Return the wheel speeds ``(n,)`` that a joint action ``(n,)`` would command [m/s]."""
         choices = self._choices(joint_action[None])[0]
-        return self.drives.speeds[np.arange(len(choices)), choices].ravel()
+        return self.wheel_commands.speeds[np.arange(len(choices)), choices].ravel()
 
     def slips(self, joint_action: IntArray) -> FloatArray:
         """Return by how much contact is predicted to change the robots' twists, ``(M, 3)``.
@@ -202,9 +210,10 @@ class BoxPrediction:
         Over the decision period, to be held against what is measured in it.
         """
         choices = self._choices(joint_action[None])
-        after = self._after(choices, self.hold).robots[0]
-        free = self.drives.twists[np.arange(len(after)), choices[0]]
-        return mean_twists(self.situation.robots, after, self.hold) - free
+        hold = self.premises.hold
+        after = self._after(choices, hold).robots[0]
+        free = self.wheel_commands.twists[np.arange(len(after)), choices[0]]
+        return mean_twists(self.situation.robots, after, hold) - free
 
     def outcomes(self, joint_action: IntArray, constants: FloatArray) -> FloatArray:
         """Return mean twists ``(k, M + 1, 3)``, the box's first, under constants ``(k, 3)``.
@@ -212,10 +221,11 @@ class BoxPrediction:
         Over the decision period, to be held against what is measured in it.
         """
         choices = self._choices(joint_action[None])[0]
-        twists = self.drives.twists[np.arange(len(choices)), choices]
+        twists = self.wheel_commands.twists[np.arange(len(choices)), choices]
         found: FloatArray = outcomes(
-            self.situation.robots, self.situation.box, twists, self.hold, self.belief, constants
-        )
+            self.situation.robots, self.situation.box, twists,
+            self.premises.hold, self.premises.belief, constants,
+        )  # fmt: skip
         return found
 
     def rewards(self, joint_actions: IntArray) -> FloatArray:
@@ -229,12 +239,12 @@ class BoxPrediction:
 
     def _rewards(self, view: View) -> FloatArray:
         return reward(
-            self.task,
+            self.premises.task,
             view.distance,
             -view.approach,
             view.turn,
             view.gaps < CONTACT_GAP,
-            expected_reading(view.gaps, self.infrared),
+            expected_reading(view.gaps, self.premises.infrared),
         )
 
 

@@ -29,6 +29,7 @@ from ..world.robots import RobotSpec, compliance
 from ..world.world import World, WorldState
 from .prediction import BoxPrediction
 from .push import PushModel
+from .situation import Premises, Situation
 
 IMMOBILE = 1e6
 """Ground friction [N] against which nothing moves."""
@@ -91,20 +92,31 @@ class Future:
         return np.vstack([self.world.box_pose, self.world.robot_poses]), self.world.gaps.copy()
 
 
-@dataclass(frozen=True)
 class ExactPrediction(BoxPrediction):
-    """Predicts by playing; but for the own block, which is that of a robot pushing alone."""
+    """Predicts by playing; but for own blocks in tables, which are those of a robot alone.
 
-    future: Future
+    Parameters
+    ----------
+    situation, model, premises
+        As of `BoxPrediction`.
+    future
+        What is played.
+    """
 
     merges: ClassVar[bool] = False  # wheels that command one twist may yet slip differently
+
+    def __init__(
+        self, situation: Situation, model: PushModel, premises: Premises, future: Future
+    ) -> None:
+        super().__init__(situation, model, premises)
+        self.future = future
 
     def _after(self, choices: IntArray, seconds: float) -> View:
         periods = round(seconds / CONTROL_PERIOD)
         rows, which = np.unique(choices, axis=0, return_inverse=True)
         poses, gaps = [], []
         for row in rows:
-            commands = self.drives.speeds[np.arange(len(row)), row].ravel()
+            commands = self.wheel_commands.speeds[np.arange(len(row)), row].ravel()
             pose, gap = self.future.after(commands, periods)
             poses.append(pose)
             gaps.append(gap)

@@ -1,10 +1,15 @@
-"""The present, as far as predictions of the push need it."""
+"""What predictions of the push start from: the present, and what is the same in all of them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from ....core.arrays import FloatArray
+from ....core.spaces import ActionSet
+from ..reward import Task
+from ..states.state_spaces import BoxStateSpace
+from ..world.infrared import InfraredSpec
+from .belief import PushBelief
 
 
 @dataclass(frozen=True)
@@ -29,3 +34,32 @@ class Situation:
     speeds: FloatArray
     effects: tuple[FloatArray, ...]
     groups: tuple[tuple[int, ...], ...]
+
+
+@dataclass(frozen=True)
+class Premises:
+    """What all predictions of a scenario rest on.
+
+    Attributes
+    ----------
+    belief
+        Push models by constants, for `outcomes`.
+    space
+        State variables.
+    action_set, increment, limits
+        What actions tell the wheels: an increment is a fraction of the ``(n,)`` limits [m/s].
+    task, infrared
+        What is rewarded, and what the sensors read.
+    hold, seconds
+        How long a decision stands, and how far predictions look ahead [s].
+    """
+
+    belief: PushBelief
+    space: BoxStateSpace
+    action_set: ActionSet
+    increment: float
+    limits: FloatArray
+    task: Task
+    infrared: InfraredSpec
+    hold: float
+    seconds: float

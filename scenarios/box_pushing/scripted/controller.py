@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise, product
-from math import atan2, cos, pi, sin
+from math import atan2, cos, pi, prod, sin
 from typing import Any
 
 import numpy as np
@@ -50,8 +50,8 @@ class ScriptedController:
 
     Examples
     --------
-    >>> from nested_agents.scenarios import ScenarioSettings, build
-    >>> scenario = build(ScenarioSettings(start="easy"))
+    >>> from nested_agents.scenarios import BoxPushingSettings
+    >>> scenario = BoxPushingSettings(start="easy").build()
     >>> _ = scenario.reset(1)
     >>> controller = ScriptedController(scenario.world.robots, scenario.box)
     >>> for step in range(60):
@@ -76,7 +76,7 @@ class ScriptedController:
         self.increment = increment
         self.seconds = seconds
         self._radii: FloatArray = np.array([robot.radius for robot in robots])
-        self._choices = [_local_actions(robot, len(self.actions)) for robot in robots]
+        self._choices = [_robot_actions(robot, len(self.actions)) for robot in robots]
         self._effects = [nominal_effect(robot) for robot in robots]
         counts = np.cumsum([0] + [len(robot.wheels) for robot in robots])
         self._wheels = [slice(a, b) for a, b in pairwise(counts)]
@@ -182,7 +182,7 @@ class ScriptedController:
         return bool(-0.05 < along < 0.04 and abs(aside) < allowed and turn < 0.7)
 
     def _next(self, robot: int, speeds: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return wheel speeds ``(m, k, w)`` and twists ``(m, k, 3)`` after the k local actions.
+        """Return wheel speeds ``(m, k, w)`` and twists ``(m, k, 3)`` after the k robot actions.
 
         `speeds` is ``(m, w)``.
         """
@@ -203,7 +203,7 @@ class ScriptedController:
         *,
         wait: bool,
     ) -> int:
-        """Return the local action that leads a robot towards a pose, or stops it if it waits."""
+        """Return the robot action that leads a robot towards a pose, or stops it if it waits."""
         now = speeds[self._wheels[robot]][None]
         if wait:
             after, _ = self._next(robot, now)
@@ -243,7 +243,7 @@ class ScriptedController:
         side: Side,
         slots: FloatArray,
     ) -> list[int]:
-        """Return the local actions that push best, as far as the push predictor can tell."""
+        """Return the robot actions that push best, as far as the push predictor can tell."""
         tables = [self._next(r, speeds[w][None])[1][0] for r, w in enumerate(self._wheels)]
         twists = np.zeros((len(tables), max(map(len, tables)), 3))
         for r, table in enumerate(tables):
@@ -258,7 +258,7 @@ class ScriptedController:
             return options[int(costs.argmin())]
 
         sizes = [range(len(table)) for table in tables]
-        if np.prod([len(size) for size in sizes]) <= WIDEST_JOINT:
+        if prod(map(len, sizes)) <= WIDEST_JOINT:
             return list(best(np.array(list(product(*sizes)))))
         # Coordinate ascent: everyone ahead at first, then each improves on the others' choice.
         choice = np.array([int(table[:, 0].argmax()) for table in tables])
@@ -324,7 +324,7 @@ def decisions_to_goal(scenario: BoxPushing, seed: int, steps: int) -> int | None
     return None
 
 
-def _local_actions(robot: RobotSpec, n_actions: int) -> IntArray:
+def _robot_actions(robot: RobotSpec, n_actions: int) -> IntArray:
     """Return the combinations ``(k, w)`` of actions to try: wheels of one side act alike."""
     sides = [int(np.sign(wheel.y)) for wheel in robot.wheels]
     groups = sorted(set(sides))

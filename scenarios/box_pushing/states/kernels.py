@@ -7,32 +7,56 @@ they also serve sensing, where there is one situation only.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import pi
 
 import numpy as np
 from numba import njit
 
 from ....core.arrays import FloatArray, IntArray
+from .view import View
 
 LANES = 32
 """Situations side by side."""
 _EXACT = {"contract", "nsz"}
 
-# Columns, in the order of `relational.VARIABLES`: a row of scratch each.
-GAP, BEARING, SIDE, OTHERS, PUSH, MISS, DISTANCE, APPROACH, TURN, BEND = (
-    0,
-    1,
-    2,
-    3,
-    4,
-    5,
-    6,
-    7,
-    8,
-    9,
-)
-_COURSE, _X, _Y = 10, 11, 12
-_ROWS = 13
+COMPILED = (
+    "gap", "box_bearing", "side", "others_gap", "push_bearing", "miss", "box_distance", "approach",
+    "box_turn", "bend",
+)  # fmt: skip
+"""The built-in variables that are computed here, each in a row of scratch of its own."""
+GAP, BEARING, SIDE, OTHERS, PUSH, MISS, DISTANCE, APPROACH, TURN, BEND = range(len(COMPILED))
+# Rows of what several variables need; no column can name them.
+_COURSE, _X, _Y = len(COMPILED), len(COMPILED) + 1, len(COMPILED) + 2
+_ROWS = len(COMPILED) + 3
+
+
+class Columns:
+    """Compiled variables, one column each.
+
+    Parameters
+    ----------
+    names
+        Of `COMPILED`.
+
+    Examples
+    --------
+    >>> Columns(["miss", "gap"]).rows.tolist()
+    [5, 0]
+    """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        assert set(names) <= set(COMPILED), f"{list(names)}: not all of them are compiled"
+        self.rows: IntArray = np.array([COMPILED.index(name) for name in names], dtype=np.int64)
+
+    def of(self, view: View, robots: Sequence[int]) -> FloatArray:
+        """Return the variables ``(len(robots), m, columns)`` of robots in the view's situations."""
+        found: FloatArray = _relational(
+            np.ascontiguousarray(view.robots.transpose(1, 2, 0)),
+            np.ascontiguousarray(view.box.T), np.ascontiguousarray(view.gaps.T),
+            view.goal, view.before, view.periods, np.array(robots), self.rows,
+        )  # fmt: skip
+        return found
 
 
 @njit(cache=True, error_model="numpy", fastmath=_EXACT)
@@ -139,7 +163,7 @@ def _of_others(gaps, robot, first, count, work):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def relational(  # type: ignore[no-untyped-def]
+def _relational(  # type: ignore[no-untyped-def]
     robots, box, gaps, goal, before: float, periods: float, wanted: IntArray, columns: IntArray
 ) -> FloatArray:
     """Return relational shared blocks ``(robots wanted, m, columns)``.
@@ -153,7 +177,7 @@ def relational(  # type: ignore[no-untyped-def]
     wanted
         Indices of robots.
     columns
-        Indices of variables.
+        Rows of scratch of variables, see `Columns`.
     """
     m = box.shape[1]
     out, work = np.empty((len(wanted), m, len(columns))), np.empty(_ROWS * LANES)

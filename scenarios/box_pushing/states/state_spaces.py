@@ -4,7 +4,7 @@ A state space pairs the description that learners see (`StateSpace`) with two fu
 compute it: the own block from the pose of the agent's robot and the speed of its wheel, the shared
 block from the whole `View`. Both serve sensing and prediction alike and work on many situations at
 once. A further state space is one `BoxStateSpace` and one line in `STATE_SPACES`; a spec may also
-list the names of relational variables.
+list state variables by name, one's own among them, see `variables`.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ import numpy as np
 
 from ....core.arrays import FloatArray
 from ....core.spaces import StateSpace, Variable
-from . import kernels as shared_blocks
-from .relational import VARIABLES, angle
+from .kernels import COMPILED, Columns
+from .variables import StateVariable, found
 from .view import View, wrap
 
 
@@ -38,9 +38,8 @@ class BoxStateSpace:
         Whether `own` reads the poses; if not, none need be predicted for it.
     alike
         Whether the shared block is the same for all robots.
-    columns
-        Relational variables of the shared block, by their place in `relational.VARIABLES`;
-        empty: `shared` is no such block.
+    listed
+        Shared variables that stand side by side, if the shared block is such a list.
     """
 
     space: StateSpace
@@ -48,19 +47,67 @@ class BoxStateSpace:
     shared: Callable[[View, int], FloatArray]
     own_needs_pose: bool
     alike: bool = False
-    columns: tuple[int, ...] = ()
+    listed: Listed | None = None
 
     def shared_of(self, view: View, robots: Sequence[int]) -> list[FloatArray]:
         """Return the shared block ``(m, d - n_own)`` of each robot, fast for many situations."""
         if self.alike:
             return [self.shared(view, robots[0])] * len(robots)
-        if not self.columns:
+        if self.listed is None:
             return [self.shared(view, r) for r in robots]
-        blocks = shared_blocks.relational(
-            np.ascontiguousarray(view.robots.transpose(1, 2, 0)),
-            np.ascontiguousarray(view.box.T), np.ascontiguousarray(view.gaps.T),
-            view.goal, view.before, view.periods, np.array(robots), np.array(self.columns),
-        )  # fmt: skip
+        return self.listed.predicted(view, robots)
+
+    def is_own(self, variable: str) -> bool:
+        """Return whether a variable is one of the user's own, of which nothing else is known."""
+        own = () if self.listed is None else self.listed.functions
+        return variable in [function.variable.name for function in own]
+
+
+class Listed:
+    """Shared variables in the order in which they are listed.
+
+    Parameters
+    ----------
+    names
+        Of the variables, see `variables.STATE_VARIABLES`. The compiled ones are trusted; what
+        functions of users return is checked.
+
+    Raises
+    ------
+    ValueError
+        If one is unknown; one line.
+    """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self._all = [(found(name), name in COMPILED) for name in names]
+        self.variables = tuple(thing.variable for thing, _ in self._all)
+        self._columns = Columns([name for name in names if name in COMPILED])
+        self.functions: tuple[StateVariable, ...] = tuple(
+            thing for thing, is_compiled in self._all if not is_compiled
+        )
+        compiled = [is_compiled for _, is_compiled in self._all]
+        self._compiled, self._others = np.flatnonzero(compiled), np.flatnonzero(~np.array(compiled))
+
+    def sensed(self, view: View, robot: int) -> FloatArray:
+        """Return the shared block ``(m, variables)`` of a robot, by the functions alone."""
+        guarded = view.guarded() if self.functions else view
+        columns = [
+            thing(view, robot) if is_compiled else thing.checked(guarded, robot)
+            for thing, is_compiled in self._all
+        ]
+        return np.stack(columns, axis=1)
+
+    def predicted(self, view: View, robots: Sequence[int]) -> list[FloatArray]:
+        """Return the shared block ``(m, variables)`` of each robot, compiled where it can be."""
+        compiled = self._columns.of(view, robots)
+        if not self.functions:
+            return list(compiled)
+        blocks = np.empty((len(robots), len(view.box), len(self._all)))
+        blocks[:, :, self._compiled] = compiled
+        guarded = view.guarded()
+        for block, robot in zip(blocks, robots, strict=True):
+            for column, function in zip(self._others, self.functions, strict=True):
+                block[:, column] = function.checked(guarded, robot)
         return list(blocks)
 
 
@@ -88,31 +135,30 @@ _SPEED = Variable(
 )
 
 
-def relational(name: str, *shared: str) -> BoxStateSpace:
-    """Return a state space of relational variables by name, behind the speed of the own wheel.
+def _angle(name: str, centres: tuple[float, ...] = ()) -> Variable:
+    return Variable(name, "rad", -pi, pi, True, centres)
+
+
+def listed(name: str, *shared: str) -> BoxStateSpace:
+    """Return a state space of variables by name, behind the speed of the own wheel.
 
     Raises
     ------
     ValueError
         If there is none, one is unknown or named twice.
     """
-    for variable in shared:
-        if variable not in VARIABLES:
-            raise ValueError(
-                f"scenario.state_space: unknown variable {variable!r}, known: "
-                f"{', '.join(VARIABLES)}"
-            )
-    if not shared or len(set(shared)) != len(shared):
+    variables = Listed(shared)
+    names = [_SPEED.name, *(variable.name for variable in variables.variables)]
+    if not shared or len(set(names)) != len(names):
         raise ValueError(
             f"scenario.state_space = {list(shared)}: variables must be distinct and at least one"
         )
-    functions = [VARIABLES[variable][1] for variable in shared]
     return BoxStateSpace(
-        StateSpace(name, (_SPEED, *(VARIABLES[variable][0] for variable in shared)), n_own=1),
+        StateSpace(name, (_SPEED, *variables.variables), n_own=1),
         lambda poses, speeds, goal: speeds[:, None],
-        lambda view, robot: np.stack([f(view, robot) for f in functions], axis=1),
+        variables.sensed,
         own_needs_pose=False,
-        columns=tuple(list(VARIABLES).index(variable) for variable in shared),
+        listed=variables,
     )
 
 
@@ -124,12 +170,12 @@ STATE_SPACES: dict[str, BoxStateSpace] = {
         StateSpace(
             "paper",
             (
-                angle("heading", _EVEN, ()),
-                angle("goal_bearing", _EVEN, ()),
+                _angle("heading", _EVEN),
+                _angle("goal_bearing", _EVEN),
                 Variable("goal_distance", "m", 0.0, 1.5),
                 _SPEED,
-                angle("box_orientation", _EVEN, ()),
-                angle("box_goal_bearing", _EVEN, ()),
+                _angle("box_orientation", _EVEN),
+                _angle("box_goal_bearing", _EVEN),
                 Variable("box_distance", "m", 0.0, 1.2),
             ),
             n_own=4,
@@ -140,8 +186,8 @@ STATE_SPACES: dict[str, BoxStateSpace] = {
         alike=True,
     ),
     # What matters for bringing the box to the goal, and for turning it into the goal pose besides.
-    "relational": relational("relational", *_PUSHING),
-    "pose": relational("pose", *_PUSHING, "bend", "box_turn"),
+    "relational": listed("relational", *_PUSHING),
+    "pose": listed("pose", *_PUSHING, "bend", "box_turn"),
 }
 """State spaces by the name that specs use."""
 
@@ -152,7 +198,7 @@ def state_space_for(chosen: str | tuple[str, ...], max_speed: float) -> BoxState
     Parameters
     ----------
     chosen
-        Key in `STATE_SPACES`, or names of relational variables.
+        Key in `STATE_SPACES`, or names of state variables.
     max_speed
         Greatest wheel speed of the robot [m/s].
 
@@ -162,12 +208,12 @@ def state_space_for(chosen: str | tuple[str, ...], max_speed: float) -> BoxState
     (-0.26, -0.13, 0.0, 0.13, 0.26)
     """
     if isinstance(chosen, str):
-        found = STATE_SPACES[chosen]
+        space = STATE_SPACES[chosen]
     else:
-        found = relational("+".join(chosen), *chosen)
+        space = listed("+".join(chosen), *chosen)
     factor = max_speed / _MAX_SPEED
     if factor == 1.0:
-        return found
+        return space
     variables = tuple(
         replace(
             variable,
@@ -177,6 +223,6 @@ def state_space_for(chosen: str | tuple[str, ...], max_speed: float) -> BoxState
         )
         if variable.name == _SPEED.name
         else variable
-        for variable in found.space.variables
+        for variable in space.space.variables
     )
-    return replace(found, space=replace(found.space, variables=variables))
+    return replace(space, space=replace(space.space, variables=variables))

@@ -38,13 +38,18 @@ class View:
     before: float
     periods: float
 
-    # What all robots share is computed once.
+    # What all robots share is computed once, and must stay as it is.
+
+    def guarded(self) -> View:
+        """Return the same situations, not to be written to."""
+        robots, box, gaps = (_fixed(a.view()) for a in (self.robots, self.box, self.gaps))
+        return View(robots, box, gaps, _fixed(self.goal.view()), self.before, self.periods)
 
     @cached_property
     def distance(self) -> FloatArray:
         """Distance ``(m,)`` of the box from the goal [m]."""
         ahead = self.goal[:2] - self.box[:, :2]
-        return np.hypot(ahead[:, 0], ahead[:, 1])
+        return _fixed(np.hypot(ahead[:, 0], ahead[:, 1]))
 
     @property
     def approach(self) -> FloatArray:
@@ -54,23 +59,31 @@ class View:
     @cached_property
     def course(self) -> FloatArray:
         """Direction ``(m,)`` from the box to the goal [rad]."""
-        return np.arctan2(self.goal[1] - self.box[:, 1], self.goal[0] - self.box[:, 0])
+        ahead = self.goal[:2] - self.box[:, :2]
+        return _fixed(np.arctan2(ahead[:, 1], ahead[:, 0]))
 
     @cached_property
     def push(self) -> FloatArray:
         """Direction ``(m,)`` in which the robots' middle would push the box [rad]."""
         middle = self.robots[:, :, :2].mean(axis=1)
-        return np.arctan2(self.box[:, 1] - middle[:, 1], self.box[:, 0] - middle[:, 0])
+        ahead = self.box[:, :2] - middle
+        return _fixed(np.arctan2(ahead[:, 1], ahead[:, 0]))
 
     @cached_property
     def turn(self) -> FloatArray:
         """Turn ``(m,)`` of the box from the goal pose [rad]."""
-        return wrap(self.box[:, 2] - self.goal[2])
+        return _fixed(wrap(self.box[:, 2] - self.goal[2]))
 
     def azimuth(self, robot: int) -> FloatArray:
         """Direction ``(m,)`` from a robot to the box [rad]."""
         pose = self.robots[:, robot]
         return np.arctan2(self.box[:, 1] - pose[:, 1], self.box[:, 0] - pose[:, 0])
+
+
+def _fixed(array: FloatArray) -> FloatArray:
+    """Make an array read-only, and return it."""
+    array.flags.writeable = False
+    return array
 
 
 _TURN = 2.0 * pi

@@ -71,14 +71,13 @@ class BoxSpec:
     contact_friction: float = 0.3
 
     def __post_init__(self) -> None:
-        for field in ("mass", "friction", "contact_friction", "radius"):
-            value = getattr(self, field)
-            if not (isfinite(value) and (value > 0 or (value == 0 and field != "mass"))):
-                raise ValueError(f"box {self.name!r}: {field} = {value}, out of range")
+        for name in ("mass", "friction", "contact_friction", "radius"):
+            value = getattr(self, name)
+            if not (isfinite(value) and (value > 0 or (value == 0 and name != "mass"))):
+                raise ValueError(f"box {self.name!r}: {name} = {value}, out of range")
         if bool(self.vertices) == bool(self.radius):
             raise ValueError(f"box {self.name!r}: needs either vertices or a radius")
-        if self.vertices:
-            self.__dict__["polygon"] = centred(self.name, self.vertices, self.holes)
+        _ = self.polygon  # what cannot be one is refused at once
 
     @classmethod
     def of(cls, name: str, geometry: Polygon, **quantities: float) -> BoxSpec:
@@ -103,7 +102,7 @@ class BoxSpec:
     @cached_property
     def polygon(self) -> Polygon | None:
         """The centred polygon; None for a disc."""
-        return None
+        return centred(self.name, self.vertices, self.holes) if self.vertices else None
 
     @cached_property
     def outline(self) -> Outline:

@@ -52,9 +52,6 @@ def command(
 
 def _cases(source: str, changes: Changes) -> Iterator[Case]:
     """Yield what is to be checked, each scenario of a spec once."""
-    from functools import partial
-
-    from .... import scenarios
     from ....topologies.files import from_python
     from ...spec.errors import SpecError
     from ...spec.spec import Spec
@@ -83,7 +80,7 @@ def _cases(source: str, changes: Changes) -> Iterator[Case]:
             # Played are the first episode and those in which failures begin.
             episodes = sorted({0, *(failure.episode for failure in settings.failures)})
             try:
-                scenarios.build(settings)
+                settings.build()
             except ValueError as error:
                 raise SpecError(str(error)) from None
-            yield condition.label, partial(scenarios.build, settings), episodes
+            yield condition.label, settings.build, episodes

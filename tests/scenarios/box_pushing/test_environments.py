@@ -10,7 +10,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from pettingzoo.test import parallel_api_test, parallel_seed_test
 
-from nested_agents.scenarios import BoxPushing, ScenarioSettings
+from nested_agents.scenarios import BoxPushing, BoxPushingSettings
 from nested_agents.scenarios.box_pushing.config import SeizedSettings
 from nested_agents.scenarios.box_pushing.environments import (
     ENV_ID,
@@ -22,15 +22,15 @@ from nested_agents.scenarios.box_pushing.pictures.rendering import SIDES
 
 PARALLEL = [WheelsEnv, RobotsEnv]
 SETTINGS = [
-    ScenarioSettings(hold=2),
-    ScenarioSettings(robots=3, robot="three-wheel", start="hard", state_space="paper", hold=2),
-    ScenarioSettings(failures=(SeizedSettings(wheels=("robot1.*",), episode=1),), hold=2),
+    BoxPushingSettings(hold=2),
+    BoxPushingSettings(robots=3, robot="three-wheel", start="hard", state_space="paper", hold=2),
+    BoxPushingSettings(failures=(SeizedSettings(wheels=("robot1.*",), episode=1),), hold=2),
 ]
 
 
 @pytest.mark.parametrize("kind", PARALLEL)
 @pytest.mark.parametrize("settings", SETTINGS)
-def test_pettingzoo_finds_nothing(kind: type[WheelsEnv], settings: ScenarioSettings) -> None:
+def test_pettingzoo_finds_nothing(kind: type[WheelsEnv], settings: BoxPushingSettings) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         parallel_api_test(kind(settings, steps=30), num_cycles=50)
@@ -38,7 +38,7 @@ def test_pettingzoo_finds_nothing(kind: type[WheelsEnv], settings: ScenarioSetti
 
 
 @pytest.mark.parametrize("settings", SETTINGS)
-def test_gymnasium_finds_nothing(settings: ScenarioSettings) -> None:
+def test_gymnasium_finds_nothing(settings: BoxPushingSettings) -> None:
     env = gymnasium.make(ENV_ID, settings=settings, steps=20, render_mode="rgb_array")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
@@ -101,7 +101,7 @@ def test_the_three_views_show_one_scenario() -> None:
 
 
 @pytest.mark.parametrize("settings", SETTINGS)
-def test_observations_stay_within_their_spaces(settings: ScenarioSettings) -> None:
+def test_observations_stay_within_their_spaces(settings: BoxPushingSettings) -> None:
     env = BoxPushingEnv(settings, steps=60)
     env.action_space.seed(0)
     for seed in range(4):

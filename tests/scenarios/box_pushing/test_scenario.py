@@ -6,14 +6,14 @@ import pytest
 from nested_agents.core.loop import control_loop, policy_seed
 from nested_agents.core.settings import BatchTDSettings, Decision, SelfModelSettings
 from nested_agents.core.team import Team
-from nested_agents.scenarios import BoxPushing, ScenarioSettings
+from nested_agents.scenarios import BoxPushing, BoxPushingSettings
 from nested_agents.topologies import build, parse
 
 
 @pytest.mark.parametrize("robots", [1, 2, 3, 4])
 @pytest.mark.parametrize("space", ["paper", "relational"])
 def test_teams_of_one_to_four_robots_act_and_learn(robots: int, space: str) -> None:
-    scenario = BoxPushing(ScenarioSettings(robots=robots, state_space=space))
+    scenario = BoxPushing(BoxPushingSettings(robots=robots, state_space=space))
     hierarchy = build(parse("chain"), scenario.agents)
     team = Team.build(BatchTDSettings(), scenario, hierarchy, policy_seed(0))
     for record in control_loop(scenario, team, episodes=1, steps=4, seed=0):
@@ -24,7 +24,7 @@ def test_teams_of_one_to_four_robots_act_and_learn(robots: int, space: str) -> N
 
 def test_equal_seeds_give_equal_episodes() -> None:
     def episode(seed: int) -> np.ndarray:
-        scenario = BoxPushing(ScenarioSettings())
+        scenario = BoxPushing(BoxPushingSettings())
         scenario.reset(seed)
         actions = np.random.default_rng(0).integers(4, size=(10, 4))
         return np.array([scenario.step(joint).states for joint in actions])
@@ -33,7 +33,7 @@ def test_equal_seeds_give_equal_episodes() -> None:
     assert np.any(episode(5) != episode(6))
 
 
-def with_box_at(x: float, settings: ScenarioSettings) -> BoxPushing:
+def with_box_at(x: float, settings: BoxPushingSettings) -> BoxPushing:
     scenario = BoxPushing(settings)
     scenario.reset(0)
     scenario.world.place(np.array([[x - 0.3, 0.1, 0.0], [x - 0.3, -0.1, 0.0]]), np.array([x, 0, 1]))
@@ -41,25 +41,25 @@ def with_box_at(x: float, settings: ScenarioSettings) -> BoxPushing:
 
 
 def test_the_goal_ends_the_episode_and_tells_whether_the_box_stays() -> None:
-    end = with_box_at(0.97, ScenarioSettings()).step(np.full(4, 3))
+    end = with_box_at(0.97, BoxPushingSettings()).step(np.full(4, 3))
     assert end.terminated
     assert not end.truncated
     assert end.info["stopped_at_goal"]
 
 
 def test_a_turned_box_is_not_there_if_orientation_counts() -> None:
-    settings = ScenarioSettings(orientation_tolerance=0.26)
+    settings = BoxPushingSettings(orientation_tolerance=0.26)
     assert not with_box_at(0.97, settings).step(np.full(4, 3)).terminated
 
 
 def test_an_episode_is_broken_off_when_the_box_leaves_the_arena() -> None:
-    end = with_box_at(-0.6, ScenarioSettings()).step(np.full(4, 3))
+    end = with_box_at(-0.6, BoxPushingSettings()).step(np.full(4, 3))
     assert end.truncated
     assert not end.terminated
 
 
 def test_wheel_speeds_follow_the_actions() -> None:
-    scenario = BoxPushing(ScenarioSettings(speed_increment=0.5))
+    scenario = BoxPushing(BoxPushingSettings(speed_increment=0.5))
     scenario.reset(0)
     top = scenario.robot.max_speed
     for joint, expected in (
@@ -73,7 +73,7 @@ def test_wheel_speeds_follow_the_actions() -> None:
 
 def test_a_team_finds_out_that_a_wheel_has_seized() -> None:
     failure = {"kind": "seized", "wheels": ["robot1.front-left"]}
-    scenario = BoxPushing(ScenarioSettings(robot="four-wheel", robots=1, failures=[failure]))
+    scenario = BoxPushing(BoxPushingSettings(robot="four-wheel", robots=1, failures=[failure]))
     hierarchy = build(parse("chain"), scenario.agents)
     settings = BatchTDSettings(
         self_model=SelfModelSettings(enabled=True), decision=Decision(rule="random")

@@ -14,7 +14,7 @@ from nested_agents.core.protocols import Blocks, Scenario
 from nested_agents.core.robot_agents import per_robot
 from nested_agents.core.single_agent import SingleAgent
 from nested_agents.core.spaces import StateSpace
-from nested_agents.scenarios import BoxPushing, ScenarioSettings
+from nested_agents.scenarios import BoxPushing, BoxPushingSettings
 from nested_agents.scenarios.box_pushing.config import (
     DelayedSettings,
     NoisySettings,
@@ -42,10 +42,10 @@ def line(**changes: Callable[..., Any]) -> Callable[[], Scenario]:
     [
         lambda: LineUp(3),
         lambda: SingleAgent(LineUp(2)),
-        lambda: BoxPushing(ScenarioSettings()),
-        lambda: BoxPushing(ScenarioSettings(state_space="paper", start="hard", box="bar")),
-        lambda: BoxPushing(ScenarioSettings(failures=FAILURES)),
-        lambda: per_robot(BoxPushing(ScenarioSettings(state_space="paper"))),
+        lambda: BoxPushing(BoxPushingSettings()),
+        lambda: BoxPushing(BoxPushingSettings(state_space="paper", start="hard", box="bar")),
+        lambda: BoxPushing(BoxPushingSettings(failures=FAILURES)),
+        lambda: per_robot(BoxPushing(BoxPushingSettings(state_space="paper"))),
     ],
     ids=["line-up", "single agent", "box pushing", "paper", "failures", "robots"],
 )

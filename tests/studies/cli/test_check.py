@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from nested_agents import scenarios
-from nested_agents.scenarios import BoxPushing, ScenarioSettings
+from nested_agents.scenarios import BoxPushing, BoxPushingSettings
 from nested_agents.scenarios.checking.checker import CHECKS
 from nested_agents.studies.cli.main import main
 
@@ -51,10 +50,10 @@ def test_a_broken_scenario_is_told_in_one_line(
         def reset(self, seed, episode=0):  # type: ignore[no-untyped-def]
             return super().reset(0, episode)
 
-    def build(settings: ScenarioSettings) -> BoxPushing:
+    def build(settings: BoxPushingSettings) -> BoxPushing:
         return (Deaf if settings.box == "circle" else BoxPushing)(settings)
 
-    monkeypatch.setattr(scenarios, "build", build)
+    monkeypatch.setattr(BoxPushingSettings, "build", build)
     assert main(["check", str(spec), "--steps", "6"]) == 1
     passed, fault = capsys.readouterr().out.splitlines()
     assert passed.startswith("passed  box=square")
@@ -93,7 +92,7 @@ def test_a_folder_may_be_named_as_it_likes(spec: Path, tmp_path: Path, capsys) -
 
 OWN = """
 import random
-from nested_agents.scenarios.line_up import LineUp
+from nested_agents.scenarios.line_up import LineUp, LineUpSettings
 
 class Drifting(LineUp):
     count = 0
@@ -105,10 +104,10 @@ class Drifting(LineUp):
         return super().step(joint_action)
 
 def sound():
-    return LineUp(2)
+    return LineUpSettings().build()
 
 def drifting():
-    return Drifting(2)
+    return Drifting(LineUpSettings())
 
 def failing():
     raise ValueError("no cart")
@@ -117,7 +116,7 @@ def exploding():
     raise RuntimeError("no\\ntrack")
 
 def sized(n):
-    return LineUp(n)
+    return LineUpSettings(carts=n).build()
 """
 
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from nested_agents.scenarios import ScenarioSettings, build
+from nested_agents.scenarios import BoxPushingSettings
 
 
 def moved(robots: int, seed: int, **settings):
-    scenario = build(ScenarioSettings(robots=robots, **settings))
+    scenario = BoxPushingSettings(robots=robots, **settings).build()
     scenario.reset(seed)
     rng = np.random.default_rng(seed)
     for _ in range(6):

@@ -9,7 +9,7 @@ from nested_agents.core.protocols import CalibratedScenario
 from nested_agents.core.robot_agents import per_robot
 from nested_agents.core.settings import BatchTDSettings, CalibrationSettings, Decision
 from nested_agents.core.team import Team
-from nested_agents.scenarios import BoxPushing, ScenarioSettings
+from nested_agents.scenarios import BoxPushing, BoxPushingSettings
 from nested_agents.scenarios.box_pushing.prediction.belief import (
     CONSTANTS,
     believing,
@@ -29,7 +29,7 @@ TWISTS = np.array([[0.13, 0.0, 0.3], [0.1, 0.0, -0.4]])
 
 
 def scenario(**table):
-    return BoxPushing(ScenarioSettings.model_validate(table))
+    return BoxPushing(BoxPushingSettings.model_validate(table))
 
 
 def calibrating(world, topology="chain"):

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from nested_agents.scenarios import BoxPushing, ScenarioSettings
+from nested_agents.scenarios import BoxPushing, BoxPushingSettings
 from nested_agents.scenarios.box_pushing.prediction.prediction import mean_twists
 
 
 def moving(**settings) -> BoxPushing:
-    scenario = BoxPushing(ScenarioSettings(**settings))
+    scenario = BoxPushing(BoxPushingSettings(**settings))
     scenario.reset(3)
     scenario.step(np.arange(len(scenario.agents)) % 2)
     return scenario
@@ -27,22 +27,22 @@ def test_relational_blocks_are_the_states_of_every_joint_action(robots: int) -> 
         np.testing.assert_array_equal(tables, prediction.states(agent, joint))
 
 
-def test_drives_of_one_twist_are_pushed_once() -> None:
+def test_wheel_commands_of_one_twist_are_pushed_once() -> None:
     scenario = moving(robot="four-wheel", robots=1)
     prediction, joint = scenario.predict(), all_joint_actions(4)
     for agent in range(4):
         blocks = prediction.blocks(agent)
         # Three speeds of each wheel, so six sums at most on each side; two are at rest.
-        assert len(blocks.shared) <= 36 < prediction.drives.counts[0]
+        assert len(blocks.shared) <= 36 < prediction.wheel_commands.counts[0]
         assert len(blocks.own) <= 3
         tables = blocks.states(np.arange(len(joint)))
         np.testing.assert_allclose(tables, prediction.states(agent, joint), rtol=0, atol=1e-12)
 
 
-def test_played_predictions_keep_drives_of_one_twist_apart() -> None:
+def test_played_predictions_keep_wheel_commands_of_one_twist_apart() -> None:
     scenario = moving(robot="four-wheel", robots=1, predictor="exact")
     prediction = scenario.predict()
-    assert len(prediction.blocks(0).shared) == prediction.drives.counts[0]
+    assert len(prediction.blocks(0).shared) == prediction.wheel_commands.counts[0]
 
 
 def test_the_own_block_of_the_paper_is_that_of_the_robot_alone() -> None:
@@ -63,7 +63,7 @@ def test_predicted_rewards_know_the_sensors() -> None:
     assert (short < usual).any()
 
 
-def test_rewards_by_code_are_the_rewards_of_every_joint_action() -> None:
+def test_rewards_by_index_are_the_rewards_of_every_joint_action() -> None:
     prediction = moving().predict()
     np.testing.assert_array_equal(
         prediction.reward_table(), prediction.rewards(all_joint_actions(4))
@@ -79,7 +79,7 @@ def test_commands_are_what_the_servo_layer_commands() -> None:
 
 
 def test_free_robots_do_not_slip() -> None:
-    scenario = BoxPushing(ScenarioSettings())
+    scenario = BoxPushing(BoxPushingSettings())
     scenario.reset(3)
     scenario.world.place(
         np.array([[-1.0, 0.3, 0.4], [-1.0, -0.3, 1.0]]), scenario.world.box_pose.copy()

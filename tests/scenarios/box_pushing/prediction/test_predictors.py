@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from nested_agents.core.loop import world_seed
-from nested_agents.scenarios import BoxPushing, ScenarioSettings
+from nested_agents.scenarios import BoxPushing, BoxPushingSettings
 from nested_agents.scenarios.box_pushing.config import (
     DelayedSettings,
     NoisySettings,
@@ -21,7 +21,7 @@ FAILURES = (
 
 
 def scenario(predictor: str, **table: object) -> BoxPushing:
-    return BoxPushing(ScenarioSettings.model_validate({"predictor": predictor, **table}))
+    return BoxPushing(BoxPushingSettings.model_validate({"predictor": predictor, **table}))
 
 
 @pytest.mark.parametrize("failures", [(), FAILURES], ids=["healthy", "failures"])
@@ -58,7 +58,7 @@ def test_the_exact_one_foresees_to_the_bit(failures: tuple[object, ...], periods
 
 @pytest.mark.parametrize("failures", [(), FAILURES], ids=["healthy", "failures"])
 def test_looking_ahead_changes_nothing(failures: tuple[object, ...]) -> None:
-    settings = ScenarioSettings.model_validate(
+    settings = BoxPushingSettings.model_validate(
         {"predictor": "exact", "lookahead": 4, "hold": 4, "failures": failures}
     )
     assert check_scenario(lambda: BoxPushing(settings), steps=4) == tuple(CHECKS)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nested_agents.scenarios import BoxPushing, ScenarioSettings
+from nested_agents.scenarios import BoxPushing, BoxPushingSettings
 from nested_agents.scenarios.box_pushing.prediction.push import PushModel, push
 from nested_agents.scenarios.box_pushing.prediction.push_lanes import (
     BOX_ROWS,
@@ -122,7 +122,7 @@ def test_headings_are_exact_to_the_last_bit_but_one(angles: list[float]) -> None
 
 
 def test_it_predicts_the_world_within_millimetres() -> None:
-    scenario = BoxPushing(ScenarioSettings(start="easy"))
+    scenario = BoxPushing(BoxPushingSettings(start="easy"))
     rng = np.random.default_rng(1)
     errors, moves = [], []
     for episode in range(6):

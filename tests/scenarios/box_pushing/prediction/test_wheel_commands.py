@@ -1,4 +1,4 @@
-"""Drives and motions against every local code written out."""
+"""Wheel commands and twists against every robot-action index written out."""
 
 from itertools import product
 
@@ -7,8 +7,8 @@ import pytest
 
 from nested_agents.scenarios.box_pushing.prediction.wheel_commands import (
     choices_of,
-    drives_of,
-    motion_table,
+    twist_table,
+    wheel_commands_of,
 )
 
 COMMANDS = np.array(
@@ -23,29 +23,29 @@ SKID = np.array([[0.5, 0.5, 0.0], [0.0, 0.0, 0.0], [7.0, 7.0, 0.0]])
 
 @pytest.mark.parametrize("merge", [False, True])
 @pytest.mark.parametrize("effect", [EFFECT, SKID])
-def test_every_code_finds_its_speeds_and_its_twist(effect: np.ndarray, merge: bool) -> None:
-    found = drives_of(COMMANDS, np.array([effect, effect]), merge)
+def test_every_index_finds_its_speeds_and_its_twist(effect: np.ndarray, merge: bool) -> None:
+    found = wheel_commands_of(COMMANDS, np.array([effect, effect]), merge)
     for r in range(2):
-        for local, (left, right) in enumerate(product(range(4), repeat=2)):
-            drive = found.which[r, local]
+        for index, (left, right) in enumerate(product(range(4), repeat=2)):
+            command = found.which[r, index]
             expected = [COMMANDS[r, 0, left], COMMANDS[r, 1, right]]
-            assert found.speeds[r, drive].tolist() == expected
-            assert [found.levels[r, j, found.level[r, j, local]] for j in range(2)] == expected
-            twist = found.twists[r, found.first[r, found.motions[r, drive]]]
+            assert found.speeds[r, command].tolist() == expected
+            assert [found.levels[r, j, found.level[r, j, index]] for j in range(2)] == expected
+            twist = found.twists[r, found.first[r, found.distinct[r, command]]]
             np.testing.assert_allclose(twist, effect @ [*expected, 1.0], atol=1e-10)
-        distinct = len(np.unique(found.speeds[r, : found.counts[r]], axis=0))
-        assert found.counts[r] == distinct == len(set(found.which[r]))
+        told = len(np.unique(found.speeds[r, : found.counts[r]], axis=0))
+        assert found.counts[r] == told == len(set(found.which[r]))
     if effect is SKID and merge:
-        assert (found.n_motions < found.counts).all()
+        assert (found.n_distinct < found.counts).all()
     else:
-        assert (found.n_motions == found.counts).all()
+        assert (found.n_distinct == found.counts).all()
 
 
-def test_the_table_holds_the_motions_of_every_joint_action() -> None:
-    drives = drives_of(COMMANDS, np.array([SKID, SKID]), True)
+def test_the_table_holds_the_twists_of_every_joint_action() -> None:
+    commands = wheel_commands_of(COMMANDS, np.array([SKID, SKID]), True)
     joint = np.indices((4,) * 4).reshape(4, -1).T
-    choices, row = motion_table(drives)
-    assert len(choices) == drives.n_motions.prod()
+    choices, row = twist_table(commands)
+    assert len(choices) == commands.n_distinct.prod()
     robots = np.arange(2)
-    expected = drives.twists[robots, choices_of(joint, drives.which, 4)]
-    np.testing.assert_allclose(drives.twists[robots, choices[row]], expected, atol=1e-10)
+    expected = commands.twists[robots, choices_of(joint, commands.which, 4)]
+    np.testing.assert_allclose(commands.twists[robots, choices[row]], expected, atol=1e-10)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nested_agents.scenarios import BoxPushing, ScenarioSettings, build
+from nested_agents.scenarios import BoxPushing, BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scripted.controller import (
     ScriptedController,
     decisions_to_goal,
@@ -22,37 +22,37 @@ def solved(scenario: BoxPushing, seed: int) -> bool:
 
 @pytest.mark.parametrize("start", ["easy", "medium", "hard"])
 def test_two_robots_and_a_square(start: str) -> None:
-    scenario = build(ScenarioSettings(start=start))  # type: ignore[arg-type]
+    scenario = BoxPushingSettings(start=start).build()  # type: ignore[arg-type]
     assert all(solved(scenario, seed) for seed in range(6))
 
 
 @pytest.mark.parametrize("box", BOXES)
 def test_every_box(box: str) -> None:
-    scenario = build(ScenarioSettings(box=box))
+    scenario = BoxPushingSettings(box=box).build()
     assert all(solved(scenario, seed) for seed in range(3))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("box", BOXES)
 def test_every_box_from_anywhere(box: str) -> None:
-    scenario = build(ScenarioSettings(box=box, start="hard"))
+    scenario = BoxPushingSettings(box=box, start="hard").build()
     assert all(solved(scenario, seed) for seed in range(100, 105))
 
 
 @pytest.mark.parametrize("robots", [1, 3, 4])
 def test_other_numbers_of_robots(robots: int) -> None:
-    scenario = build(ScenarioSettings(robots=robots))
+    scenario = BoxPushingSettings(robots=robots).build()
     assert np.mean([solved(scenario, seed) for seed in range(4)]) >= 0.75
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_every_robot(robot: str) -> None:
-    scenario = build(ScenarioSettings(robot=robot))
+    scenario = BoxPushingSettings(robot=robot).build()
     assert np.mean([solved(scenario, seed) for seed in range(3)]) > 0.5
 
 
 def test_it_remembers_nothing() -> None:
-    scenario = build(ScenarioSettings(start="hard"))
+    scenario = BoxPushingSettings(start="hard").build()
     old = ScriptedController(scenario.world.robots, scenario.box)
     scenario.reset(3)
     for _ in range(10):

@@ -7,7 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from nested_agents.core.loop import world_seed
-from nested_agents.scenarios import BoxPushing, ScenarioSettings
+from nested_agents.scenarios import BoxPushing, BoxPushingSettings
 from nested_agents.scenarios.box_pushing.config import BoxSettings, RobotSettings, label
 from nested_agents.scenarios.box_pushing.world.robots import (
     E_PUCK_SENSORS,
@@ -87,7 +87,7 @@ def test_quantities_out_of_range_are_refused() -> None:
 @pytest.mark.parametrize("start", ["easy", "hard"])
 @pytest.mark.parametrize("robots", [1, 2, 8, 64])
 def test_robots_in_number_stand_free_of_each_other_and_of_the_box(robots: int, start: str) -> None:
-    scenario = BoxPushing(ScenarioSettings(robots=robots, start=start))  # type: ignore[arg-type]
+    scenario = BoxPushing(BoxPushingSettings(robots=robots, start=start))  # type: ignore[arg-type]
     for number in range(3):
         scenario.reset(world_seed(5, number), number)
         places = scenario.measure()["robot_poses"][:, :2]

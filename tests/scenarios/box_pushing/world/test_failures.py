@@ -9,7 +9,7 @@ from scipy.linalg import expm
 
 from nested_agents.core.arrays import FloatArray
 from nested_agents.core.loop import world_seed
-from nested_agents.scenarios import BoxPushing, ScenarioSettings
+from nested_agents.scenarios import BoxPushing, BoxPushingSettings
 from nested_agents.scenarios.box_pushing.config import Failure, FailureSettings
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.failures import Failures
@@ -34,7 +34,7 @@ def failures(*settings: FailureSettings) -> Failures:
 
 
 def scenario(*settings: FailureSettings, **table: Any) -> BoxPushing:
-    return BoxPushing(ScenarioSettings(failures=settings, **table))
+    return BoxPushing(BoxPushingSettings(failures=settings, **table))
 
 
 def episode(world: BoxPushing, seed: int = 4, number: int = 0, steps: int = 8) -> FloatArray:

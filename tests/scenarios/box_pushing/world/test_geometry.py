@@ -1,4 +1,4 @@
-"""Signed distance and rays: known answers, and the compiled kernels against their NumPy twins."""
+"""Signed distance and rays: known answers, and the compiled kernels against their NumPy references."""
 
 import numpy as np
 import pytest
@@ -60,13 +60,13 @@ def test_rays() -> None:
 
 
 @given(x=coordinates, y=coordinates, which=st.integers(0, len(OUTLINES) - 1))
-def test_surface_equals_its_twin(x: float, y: float, which: int) -> None:
+def test_surface_equals_its_reference(x: float, y: float, which: int) -> None:
     edges, rounding = OUTLINES[which]
-    got, twin = surface(edges, rounding, x, y), surface_numpy(edges, rounding, x, y)
-    assert got[0] == pytest.approx(twin[0], abs=1e-12)
-    for distance, nx, ny, px, py in (got, twin):
+    got, reference = surface(edges, rounding, x, y), surface_numpy(edges, rounding, x, y)
+    assert got[0] == pytest.approx(reference[0], abs=1e-12)
+    for distance, nx, ny, px, py in (got, reference):
         assert np.hypot(nx, ny) == pytest.approx(1.0, abs=1e-12)
-        # The point is its nearest surface point plus the distance along the normal. (Twins may
+        # The point is its nearest surface point plus the distance along the normal. (The two may
         # choose another one of two nearest points.)
         np.testing.assert_allclose([px + distance * nx, py + distance * ny], [x, y], atol=1e-11)
 
@@ -77,14 +77,14 @@ def test_surface_equals_its_twin(x: float, y: float, which: int) -> None:
     angle=st.floats(0, 6.28),
     which=st.integers(0, len(OUTLINES) - 1),
 )
-def test_ray_equals_its_twin(x: float, y: float, angle: float, which: int) -> None:
+def test_ray_equals_its_reference(x: float, y: float, angle: float, which: int) -> None:
     edges, rounding = OUTLINES[which]
     direction = np.cos(angle), np.sin(angle)
     got = ray(edges, rounding, x, y, *direction, 0.3)
-    twin = ray_numpy(edges, rounding, x, y, *direction, 0.3)
-    if abs(got - twin) > 1e-7:
+    reference = ray_numpy(edges, rounding, x, y, *direction, 0.3)
+    if abs(got - reference) > 1e-7:
         # Only a ray that grazes the surface may be judged differently.
-        travelled = min(got, twin)
+        travelled = min(got, reference)
         point = x + travelled * direction[0], y + travelled * direction[1]
         assert abs(surface(edges, rounding, *point)[0]) < 1e-6
 

@@ -1,4 +1,4 @@
-"""Infrared sensors: known readings, and the kernel against its NumPy twin."""
+"""Infrared sensors: known readings, and the kernel against its NumPy reference."""
 
 from dataclasses import replace
 from math import exp
@@ -6,7 +6,7 @@ from math import exp
 import numpy as np
 import pytest
 
-from nested_agents.scenarios import BoxPushing, ScenarioSettings
+from nested_agents.scenarios import BoxPushing, BoxPushingSettings
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.infrared import (
     NORMALISATIONS,
@@ -28,7 +28,7 @@ RNG = np.random.default_rng(0)
 
 @pytest.mark.parametrize("normalisation", NORMALISATIONS)
 @pytest.mark.parametrize("box", ["square", "circle", "triangle"])
-def test_kernel_equals_its_twin(box: str, normalisation: str) -> None:
+def test_kernel_equals_its_reference(box: str, normalisation: str) -> None:
     spec = InfraredSpec(normalisation=normalisation)
     rng = np.random.default_rng(7)
     outline = BOXES[box].outline
@@ -42,8 +42,8 @@ def test_kernel_equals_its_twin(box: str, normalisation: str) -> None:
             robots, radii, sensors, pose, outline.edges, outline.rounding,
             spec.reach, spec.decay, spec.kind,
         )  # fmt: skip
-        twin = infrared_readings_numpy(robots, radii, sensors, pose, outline, spec)
-        np.testing.assert_allclose(got, twin, atol=1e-6)
+        reference = infrared_readings_numpy(robots, radii, sensors, pose, outline, spec)
+        np.testing.assert_allclose(got, reference, atol=1e-6)
         assert ((got >= 0) & (got <= 1)).all()
         seen += int(np.count_nonzero(got))
     assert seen > 100
@@ -94,7 +94,7 @@ def test_noise_is_a_fraction_of_the_reading() -> None:
 
 def rewards(infrared: dict[str, object], seed: int = 1) -> list[float]:
     """Return the rewards of an episode of robots that hover near the box."""
-    settings = ScenarioSettings.model_validate({"start": "easy", "infrared": infrared})
+    settings = BoxPushingSettings.model_validate({"start": "easy", "infrared": infrared})
     scenario = BoxPushing(settings)
     scenario.reset(seed)
     return [scenario.step(np.full(4, 3)).reward for _ in range(5)]  # all wheels at rest

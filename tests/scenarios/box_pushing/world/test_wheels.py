@@ -1,4 +1,4 @@
-"""Wheel forces: the kernel against its twin, the friction circle, exactness under steady load."""
+"""Wheel forces: the kernel against its reference, the friction circle, exactness under steady load."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ from nested_agents.scenarios.box_pushing.world.wheels import (
 DT = 0.016
 
 
-def test_kernel_equals_its_twin() -> None:
+def test_kernel_equals_its_reference() -> None:
     rng = np.random.default_rng(3)
     robots = [ROBOTS[name] for name in ("e-puck", "three-wheel", "four-wheel", "six-wheel")]
     n = sum(len(robot.wheels) for robot in robots)
