@@ -6,15 +6,16 @@ episode), the sensing (states) and the servo layer, which turns actions into whe
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import pi
+from pathlib import Path
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
 from ...core.arrays import BoolArray, FloatArray, IntArray
-from ...core.protocols import Transition
+from ...core.protocols import SUCCESS, Measure, Transition
 from ...core.spaces import ActionSet, StateSpace
 from .config import CONTROL_PERIOD, ScenarioSettings
 from .prediction.belief import APART, CONSTANTS, PushBelief, least_gap
@@ -33,6 +34,24 @@ from .world.world import World, WorldState
 
 SENSING = 2**32 - 1
 """Key of the stream of sensor noise under the seed of an episode; failures have 0, 1, ..."""
+MEASURES = (
+    SUCCESS,
+    Measure(
+        "stopped_at_goal", "stopped at goal", source="stopped_at_goal",
+        better="higher", is_rate=True,
+    ),
+    Measure("final_distance_m", "final distance", "m", "distance_m", better="lower"),
+    Measure(
+        "final_orientation_rad", "final orientation error", "rad", "orientation_error_rad",
+        better="lower",
+    ),
+    Measure("contact_fraction", "time in contact", "1", "contact_fraction", "mean", "higher"),
+)  # fmt: skip
+"""What an episode is told by: whether the box came within the tolerance of the goal, and was there,
+nearly at rest, once the robots had stopped; its errors at the end; the fraction of the time that a
+robot touches it, averaged over the robots."""
+RECORDED = ("robot_poses", "box_pose", "wheel_speeds", "contact", "failed")
+"""What a recording holds of every moment, see `BoxPushing.measure`."""
 
 
 class BoxPushing:
@@ -93,6 +112,26 @@ class BoxPushing:
         self._speeds: FloatArray = np.zeros(len(self.agents))
         self._step = 0
         self._saved: WorldState | None = None
+
+    @property
+    def measures(self) -> tuple[Measure, ...]:
+        """What an episode is told by."""
+        return MEASURES
+
+    @property
+    def recorded(self) -> tuple[str, ...]:
+        """What a recording holds of every moment."""
+        return RECORDED
+
+    def constants_of_episode(self) -> Mapping[str, Any]:
+        """Return the goal pose, and what a drawing needs: period, robot, box, infrared."""
+        return {"goal_pose": self._goal.copy()} | self.settings.drawn
+
+    def animate(self, recording: Mapping[str, FloatArray], path: Path) -> None:
+        """Draw a recorded episode as GIF or MP4."""
+        from .pictures.rendering import animate  # matplotlib takes its time
+
+        animate(recording, path)
 
     @property
     def superposes(self) -> bool:
@@ -228,19 +267,24 @@ class BoxPushing:
 
         Keys: ``robot_poses`` (M, 3), ``box_pose``, ``goal_pose`` [m, m, rad], ``wheel_speeds``
         (n,) as commanded [m/s], ``contact`` (M,) now, ``contact_time`` (M,) as a fraction of the
-        last decision period, ``failed`` (n,) wheels, ``distance_m``, ``orientation_rad`` of the box
-        from the goal pose.
+        last decision period, ``contact_fraction`` its mean, ``failed`` (n,) wheels, ``distance_m``,
+        ``orientation_rad`` of the box from the goal pose, ``orientation_error_rad`` its size,
+        ``stopped_at_goal``, which only the last step of an episode measures.
         """
+        contact_time, orientation = self.world.contact_time.copy(), self._orientation()
         return {
             "robot_poses": self.world.robot_poses.copy(),
             "box_pose": self.world.box_pose.copy(),
             "goal_pose": self._goal,
             "wheel_speeds": self._speeds,
             "contact": self.world.contact.copy(),
-            "contact_time": self.world.contact_time.copy(),
+            "contact_time": contact_time,
+            "contact_fraction": float(np.mean(contact_time)),
             "failed": self.failed,
             "distance_m": self._distance(),
-            "orientation_rad": self._orientation(),
+            "orientation_rad": orientation,
+            "orientation_error_rad": abs(orientation),
+            "stopped_at_goal": False,
         }
 
     @property
