@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 
+from ... import scenarios
+from ...core.protocols import DrawnScenario
 from ..analysis.results import read
 from ..catalogue.study import load_study
 from ..presentation import figures
@@ -83,11 +85,11 @@ def carried_out(
 ) -> Iterator[Store]:
     """Run what is left of a study, and open its store; parameters as those of `conduct`."""
     study, trials = load_study(spec.study), trials_of(spec)
-    check(spec)
+    measures = check(spec)
     getattr(study, "check", lambda spec: None)(spec)
     with (
         hire(backend, jobs, address, len(trials)) as workers,
-        Store.create(directory, spec) as store,
+        Store.create(directory, spec, measures) as store,
     ):
         if retry_failed:
             store.forget_failed()
@@ -109,8 +111,11 @@ def carried_out(
 
 
 def _replay(store: Store, trial: Trial) -> list[Path]:
-    from ...scenarios.box_pushing.pictures.rendering import animate
-
+    """Draw what is recorded of a trial, if its scenario knows how."""
+    scenario = scenarios.build(trial.settings.scenario)
+    if not isinstance(scenario, DrawnScenario):
+        display.say(f"no replay: {type(scenario).__name__} does not draw its episodes")
+        return []
     folder = store.directory / "replay"
     folder.mkdir(exist_ok=True)
     paths = []
@@ -119,6 +124,6 @@ def _replay(store: Store, trial: Trial) -> list[Path]:
             continue
         path = folder / f"{name}-episode.gif"
         if not path.exists():
-            animate(store.recording(trial, name), path)
+            scenario.animate(store.recording(trial, name), path)
         paths.append(path)
     return paths

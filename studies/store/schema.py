@@ -9,9 +9,11 @@ from __future__ import annotations
 import hashlib
 import json
 import sqlite3
+from collections.abc import Sequence
 
+from ...core.protocols import Measure
 from ..spec.spec import Spec
-from ..trials.episodes import COLUMNS
+from ..trials.measures import columns, tables
 from ..trials.trial import RESULTS_VERSION
 from .database import insert, quoted
 
@@ -26,12 +28,6 @@ SCHEMA = (
         identity TEXT PRIMARY KEY, condition TEXT NOT NULL, seed INTEGER NOT NULL,
         state TEXT NOT NULL CHECK (state IN ('done', 'failed')), error TEXT,
         recording_sha256 TEXT)""",
-    """CREATE TABLE IF NOT EXISTS episodes (
-        identity TEXT NOT NULL REFERENCES trials ON DELETE CASCADE, phase TEXT NOT NULL,
-        episode INTEGER NOT NULL, steps INTEGER NOT NULL, success INTEGER NOT NULL,
-        stopped_at_goal INTEGER NOT NULL, final_distance_m REAL NOT NULL,
-        final_orientation_rad REAL NOT NULL, contact_fraction REAL NOT NULL,
-        "return" REAL NOT NULL, PRIMARY KEY (identity, phase, episode)) WITHOUT ROWID""",
     f"""CREATE TABLE IF NOT EXISTS seconds (
         identity TEXT PRIMARY KEY REFERENCES trials ON DELETE CASCADE,
         {", ".join(f"{part} REAL NOT NULL" for part in SECONDS)})""",
@@ -42,30 +38,42 @@ SCHEMA = (
     """CREATE TABLE IF NOT EXISTS checksums (
         identity TEXT PRIMARY KEY REFERENCES trials ON DELETE CASCADE, sha256 TEXT NOT NULL)""",
 )
+"""Tables that all studies have alike; beside them `conditions` and `episodes`, whose columns differ."""
 
 
-def prepare(db: sqlite3.Connection, spec: Spec) -> None:
-    """Make the tables, and note what the study consists of; within a transaction."""
+def prepare(db: sqlite3.Connection, spec: Spec, measures: Sequence[Measure]) -> None:
+    """Make the tables, and note what the study consists of and measures; within a transaction."""
     conditions = spec.conditions()
     settings = {c.label: c.settings.model_dump(mode="json") for c in conditions}
     swept = [quoted(key) for key in conditions[0].columns]
-    columns = ", ".join(["position INTEGER", "condition TEXT PRIMARY KEY", *swept])
+    told = ", ".join(["position INTEGER", "condition TEXT PRIMARY KEY", *swept])
     for statement in SCHEMA:
         db.execute(statement)
-    db.execute(f"CREATE TABLE IF NOT EXISTS conditions ({columns})")
+    db.execute(_episodes(measures))
+    db.execute(f"CREATE TABLE IF NOT EXISTS conditions ({told})")
     db.execute("DELETE FROM conditions")
     insert(db, "conditions", [(i, c.label, *c.columns.values()) for i, c in enumerate(conditions)])
     db.execute(
         f"""CREATE VIEW IF NOT EXISTS results AS
         SELECT c.condition, {"".join(f"c.{key}, " for key in swept)}t.seed,
-            {", ".join(f"e.{quoted(name)}" for name in COLUMNS)}
+            {", ".join(f"e.{quoted(name)}" for name in columns(measures))}
         FROM episodes e JOIN trials t USING (identity) JOIN conditions c USING (condition)
         WHERE t.state = 'done' ORDER BY c.position, t.seed, e.phase DESC, e.episode"""
     )
     db.execute("DELETE FROM meta")
     meta = {"results_version": str(RESULTS_VERSION), "spec": json.dumps(spec.table())}
-    insert(db, "meta", [*meta.items(), ("conditions", json.dumps(settings))])
+    meta |= {"conditions": json.dumps(settings), "measures": json.dumps(tables(measures))}
+    insert(db, "meta", list(meta.items()))
     insert(db, "meta", [("sha256", study_checksum(db))])
+
+
+def _episodes(measures: Sequence[Measure]) -> str:
+    """Return what makes the table of episodes: a measure is NULL where a scenario has it not."""
+    measured = "".join(f"{quoted(m.name)} {'INTEGER' if m.is_rate else 'REAL'}, " for m in measures)
+    return f"""CREATE TABLE IF NOT EXISTS episodes (
+        identity TEXT NOT NULL REFERENCES trials ON DELETE CASCADE, phase TEXT NOT NULL,
+        episode INTEGER NOT NULL, steps INTEGER NOT NULL, {measured}"return" REAL NOT NULL,
+        PRIMARY KEY (identity, phase, episode)) WITHOUT ROWID"""
 
 
 def study_checksum(db: sqlite3.Connection) -> str:

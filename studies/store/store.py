@@ -17,16 +17,18 @@ import fcntl
 import json
 import sqlite3
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TextIO
 
+from ...core.protocols import Measure
 from ..spec.difference import difference
 from ..spec.errors import SpecError
 from ..spec.spec import Spec
 from ..spec.toml import dumps
 from ..trials.episodes import Recording
+from ..trials.measures import column_of, measures_from
 from ..trials.trial import RESULTS_VERSION, Trial, TrialResult
 from . import database, durable, integrity
 from .running import LOCK
@@ -54,10 +56,19 @@ class Store:
 
     @classmethod
     @contextmanager
-    def create(cls, directory: Path, spec: Spec) -> Iterator[Store]:
+    def create(cls, directory: Path, spec: Spec, measures: Sequence[Measure]) -> Iterator[Store]:
         """Open a directory to run `spec` in; make it if it does not exist.
 
         A damaged database is set aside under another name, and what can be trusted of it copied.
+
+        Parameters
+        ----------
+        directory
+            The directory.
+        spec
+            The study.
+        measures
+            What it measures of its episodes, see `nested_agents.studies.trials.trial.check`.
 
         Raises
         ------
@@ -65,7 +76,7 @@ class Store:
             If it cannot be written, holds a study that differs by more than additional seeds, or
             another process is writing to it. Nothing has been changed then.
         """
-        _examined(directory, spec)  # what is refused leaves nothing behind
+        _examined(directory, spec, measures)  # what is refused leaves nothing behind
         path = directory / DATABASE
         try:
             (directory / "recordings").mkdir(parents=True, exist_ok=True)
@@ -74,12 +85,12 @@ class Store:
             raise SpecError(f"{directory}: {error.strerror or error}") from None
         with lock:
             _take(lock, directory)
-            damage = _examined(directory, spec)  # again: nobody else writes from here on
+            damage = _examined(directory, spec, measures)  # again: nobody else writes from here on
             aside = integrity.set_aside(path) if damage is not None else None
             with database.writing(path) as connection:
                 store = cls(directory, connection)
                 with database.transaction(connection):
-                    prepare(connection, spec)
+                    prepare(connection, spec, measures)
                     recovered = 0 if aside is None else integrity.recover(aside, connection)
                 if aside is not None:
                     store.notes.append(
@@ -110,13 +121,30 @@ class Store:
         """Return the spec that the study runs."""
         return Spec.of(self._table("spec"))
 
-    def refusal(self, spec: Spec) -> str | None:
-        """Return why `spec` may not be run here by this version, in one line; None if it may."""
+    def measures(self) -> tuple[Measure, ...]:
+        """Return what the study measures of its episodes, of any condition."""
         if (version := self.meta("results_version")) != str(RESULTS_VERSION):
-            return (
-                f"{self.directory}: holds results of version {version}, this is version "
-                f"{RESULTS_VERSION}; use another directory"
-            )
+            raise SpecError(f"{self._version(version)}; run it again to read it")
+        try:
+            return measures_from(json.loads(self.meta("measures")))
+        except (ValueError, TypeError):
+            raise SpecError(
+                f"{self.directory / DATABASE}: is damaged: measures cannot be read"
+            ) from None
+
+    def _version(self, version: str) -> str:
+        return (
+            f"{self.directory}: holds results of version {version}, this is version "
+            f"{RESULTS_VERSION}"
+        )
+
+    def refusal(self, spec: Spec, measures: Sequence[Measure] | None = None) -> str | None:
+        """Return why `spec` may not be run here by this version, in one line; None if it may.
+
+        `measures` are what it would measure, if that is known.
+        """
+        if (version := self.meta("results_version")) != str(RESULTS_VERSION):
+            return f"{self._version(version)}; use another directory"
         if found := difference(self.spec(), self._table("conditions"), spec):
             return f"{self.directory}: holds another study: {found}"
         for condition in spec.conditions():
@@ -125,10 +153,21 @@ class Store:
             except ValueError as error:
                 title = condition.settings.topology.title
                 return f"{self.directory}: topology {title!r}: {error}"
-        return None
+        return None if measures is None else self._other_measures(measures)
+
+    def _other_measures(self, measures: Sequence[Measure]) -> str | None:
+        """Return in one line that episodes are measured otherwise here; None if they are not."""
+        kept = self.measures()
+        if list(map(column_of, kept)) == list(map(column_of, measures)):
+            return None
+        told, now = (", ".join(m.name for m in group) for group in (kept, measures))
+        return (
+            f"{self.directory}: holds episodes measured by {told}; its scenarios now declare "
+            f"{now}, or mean something else by it; use another directory"
+        )
 
     def meta(self, key: str) -> str:
-        """Return what is noted under `key`: ``spec``, ``conditions`` or ``results_version``."""
+        """Return what is noted under `key`, as ``spec``, ``conditions`` or ``results_version``."""
         found = self._db.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
         if found is None:
             raise SpecError(f"{self.directory / DATABASE}: is no study: it has no {key}")
@@ -191,15 +230,23 @@ class Store:
         return noted is None or noted[0] == trial_checksum(self._db, identity)
 
     def save(self, trial: Trial, result: TrialResult, total: float) -> None:
-        """Keep the result of a trial that took `total` seconds; durable on return."""
-        identity = trial.identity
+        """Keep the result of a trial that took `total` seconds; durable on return.
+
+        Raises
+        ------
+        ValueError
+            If it has a measure that the study has not.
+        """
+        identity, names = trial.identity, [m.name for m in self.measures()]
+        if unknown := {m.name for m in result.measures} - set(names):
+            raise ValueError(f"measures {sorted(unknown)}: the study has {names}")
         digest = durable.write_recordings(self._recordings(identity), result.recordings)
         seconds = {**result.seconds, "total": total}
         numbers = [(n, v, 1) for n, v in result.numbers.items()]
         numbers += [(n, v, 0) for n, v in result.usage.items()]
         with database.transaction(self._db):
             self._note(trial, "done", None, digest)
-            self._insert("episodes", [(identity, *row) for row in result.rows])
+            self._insert("episodes", [(identity, *row.flat(names)) for row in result.rows])
             self._insert("seconds", [(identity, *(seconds[part] for part in SECONDS))])
             self._insert("numbers", [(identity, *number) for number in numbers])
             self._insert("checksums", [(identity, trial_checksum(self._db, identity))])
@@ -312,21 +359,23 @@ class Store:
         self._insert("trials", [row])
 
 
-def _examined(directory: Path, spec: Spec) -> str | None:
+def _examined(directory: Path, spec: Spec, measures: Sequence[Measure]) -> str | None:
     """Return what is wrong with a directory's database, if anything is; refuse another study."""
     path = directory / DATABASE
     damage = integrity.damage(path) if path.exists() else None
-    refusal = _refusal(directory, spec, damaged=damage is not None)
+    refusal = _refusal(directory, spec, measures, damaged=damage is not None)
     if refusal is not None:
         raise SpecError(refusal)
     return damage
 
 
-def _refusal(directory: Path, spec: Spec, *, damaged: bool) -> str | None:
+def _refusal(
+    directory: Path, spec: Spec, measures: Sequence[Measure], *, damaged: bool
+) -> str | None:
     """Return why `spec` may not be added to what a directory holds, in one line."""
     if not damaged and _holds_tables(directory):
         with Store.open(directory) as store:
-            return store.refusal(spec)
+            return store.refusal(spec, measures)
     path = directory / SPEC_FILE
     if not path.exists() or (old := Spec.load(path)) == spec:
         return None

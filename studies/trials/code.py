@@ -16,7 +16,15 @@ PACKAGE = Path(__file__).parents[2]
 """Where the package is installed."""
 COMPUTING = ("core", "topologies", "scenarios", "studies/trials", "studies/catalogue")
 """Folders whose modules compute results."""
-SILENT = ("checking", "pictures", "scripted", "environments.py", "figure.py", "view.py", "drawing.py")
+SILENT = (
+    "checking",
+    "pictures",
+    "scripted",
+    "environments.py",
+    "figure.py",
+    "view.py",
+    "drawing.py",
+)
 """Parts of them that do not."""
 
 Code = dict[str, tuple[str, str]]
