@@ -6,9 +6,11 @@ when it is built; every field is documented beside it, with its unit.
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field
+
+from .places import located
 
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -25,6 +27,18 @@ class ScenarioSettings(Settings):
     """What the settings of all scenarios inherit."""
 
     kind: str = ""
+    factory: ClassVar[str] = ""
+    """Where the class is that is built of them, imported when it is wanted."""
+
+    def build(self) -> Any:
+        """Return the scenario.
+
+        Raises
+        ------
+        ValueError
+            If there can be none of these settings; one line.
+        """
+        return located(self.factory)(self)
 
     @property
     def onset(self) -> int | None:

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...core.protocols import SUCCESS, Measure
 from ..spec.errors import SpecError
-from ..spec.spec import Spec
+from ..spec.outline import Outline
 from ..store import durable
 from ..trials.measures import measures_from, tables
 from ..trials.trial import RESULTS_VERSION
@@ -27,13 +27,14 @@ SUCCESS_ALONE = ("ablation", "chain-order", "scaling", "wheel-failure")
 DECIMALS = 3
 
 
-def dumps(spec: Spec, results: Results, version: int = RESULTS_VERSION) -> str:
+def dumps(outline: Outline, results: Results, version: int = RESULTS_VERSION) -> str:
     """Return results, their spec and the version that they are of as JSON text."""
-    measures = _kept(spec.study, results)
+    measures = _kept(outline.study, results)
     rates = {measure.name: measure.is_rate for measure in measures} | {"steps": False}
     content = {
         "results_version": version,
-        "spec": spec.table(),
+        "spec": outline.table,
+        "columns": results.columns,
         "measures": tables(measures),
         "seeds": results.seeds,
         "phases": {
@@ -55,9 +56,9 @@ def dumps(spec: Spec, results: Results, version: int = RESULTS_VERSION) -> str:
 
 
 class Published(NamedTuple):
-    """Results with their spec, and the version of the code that they are of."""
+    """Results with their spec as a table, and the version of the code that they are of."""
 
-    spec: Spec
+    outline: Outline
     results: Results
     version: int
 
@@ -89,15 +90,15 @@ def loads(text: str) -> Published:
         for key in ("numbers", "usage")
     )
     training, evaluation = phases.get("training", {}), phases.get("evaluation", {})
-    spec = Spec.of(content["spec"])
-    columns = {c.label: c.columns for c in spec.conditions()}
+    columns = content["columns"]
+    outline = Outline.noted(content["spec"], columns)
     results = Results(training, evaluation, phases, seeds, numbers, usage, columns, measures)
-    return Published(spec, results, int(content["results_version"]))
+    return Published(outline, results, int(content["results_version"]))
 
 
-def write(path: Path, spec: Spec, results: Results, version: int = RESULTS_VERSION) -> None:
+def write(path: Path, outline: Outline, results: Results, version: int = RESULTS_VERSION) -> None:
     """Write the same to a file, which is there whole or not at all."""
-    durable.write(path, dumps(spec, results, version).encode())
+    durable.write(path, dumps(outline, results, version).encode())
 
 
 def read(folder: Path, studies: Iterable[str]) -> dict[str, Published]:

@@ -1,7 +1,8 @@
 """What a study is: a measure of one trial, an analysis of all, and figures of the analysis.
 
 A study is a module, or a class, that offers these, and one line in `nested_agents.studies.STUDIES`
-or ``study = "mine.py:Mine"`` in a spec. It may also offer ``check(spec)``, which raises `SpecError` if the spec has not what it needs.
+or ``study = "mine.py:Mine"`` in a spec. It may also offer ``check(spec)``, which raises `SpecError`
+if the spec has not what it needs.
 """
 
 from __future__ import annotations
@@ -55,3 +56,8 @@ def load_study(name: str) -> Study:
     if missing:
         raise SpecError(f"study = {name!r}: has no {missing[0]}, needs {', '.join(PARTS)}")
     return cast(Study, study)
+
+
+def measured(trial: Trial) -> TrialResult:
+    """Run a trial by the study that it names; imported by name in worker processes."""
+    return load_study(trial.study).measure(trial)

@@ -62,7 +62,9 @@ def _writers(store: Store, form: Form) -> dict[str, Callable[[Path], None]]:
     """Return what writes each file, by its name."""
     if form == "json":
         version = int(store.meta("results_version"))
-        return {"results": lambda path: published.write(path, store.spec(), read(store), version)}
+        return {
+            "results": lambda path: published.write(path, store.outline(), read(store), version)
+        }
     rates = {measure.name for measure in store.measures() if measure.is_rate}
     write_table = _write_csv if form == "csv" else _parquet_writer(rates)
     return {

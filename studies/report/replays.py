@@ -23,9 +23,8 @@ from ...scenarios.box_pushing.world.boxes import box_for
 from ...scenarios.box_pushing.world.robots import robot_for
 from ..spec.errors import SpecError
 from ..store.durable import NotRecordedError
-from ..store.store import Store
+from ..store.store import Planned, Store
 from ..trials.episodes import Recording
-from ..trials.trial import Trial
 from .words import runs
 
 NEEDED = (
@@ -70,7 +69,7 @@ class Replays:
         return said
 
 
-def replays(store: Store, trials: Iterable[Trial], most_bytes: int = MOST_BYTES) -> Replays:
+def replays(store: Store, trials: Iterable[Planned], most_bytes: int = MOST_BYTES) -> Replays:
     """Pack the recordings of finished trials, in their order, until there is no more room."""
     reached = _reached(store)
     done = {(condition, seed) for condition, seed, _ in reached}
@@ -78,7 +77,7 @@ def replays(store: Store, trials: Iterable[Trial], most_bytes: int = MOST_BYTES)
     found = Replays([], [], {})
     size = 0
 
-    def miss(trial: Trial, reason: str) -> None:
+    def miss(trial: Planned, reason: str) -> None:
         trials = found.missing.setdefault(reason, {})
         trials.setdefault(trial.condition, []).append(trial.seed)
 

@@ -1,7 +1,8 @@
 """The installed code that computes results: an edit of it is noticed, and told.
 
-Every module on which a trial's numbers depend has a digest of its text, to see at once whether it may
-have changed, and one of its syntax tree, to see whether it has: comments and layout do not count.
+Every module on which a trial's numbers depend has a digest of its text, to see at once whether it
+may have changed, and one of its syntax tree, to see whether it has: comments and layout do not
+count.
 """
 
 from __future__ import annotations
@@ -55,6 +56,11 @@ def changed(known: Mapping[str, tuple[str, str]]) -> list[str]:
         if name in known and _digest(text) != known[name][0]:
             found += [name] * (meaning(text, name) != known[name][1])
     return found
+
+
+def digest(code: Mapping[str, tuple[str, str]]) -> str:
+    """Return one short digest of what all modules mean."""
+    return _digest("".join(f"{name} {tree} " for name, (_, tree) in sorted(code.items())))
 
 
 def _digest(text: str) -> str:
