@@ -8,7 +8,8 @@ may leave for good. All agents get the team's reward. Episodes end when the box 
 
 Importing this module registers ``NestedAgents/BoxPushing-v0`` with Gymnasium::
 
-    gymnasium.make("nested_agents.scenarios.box_pushing.environments:NestedAgents/BoxPushing-v0", steps=200)
+    module = "nested_agents.scenarios.box_pushing.environments"
+    gymnasium.make(f"{module}:NestedAgents/BoxPushing-v0", steps=200)
 """
 
 from __future__ import annotations

@@ -2,8 +2,9 @@
 
 Whole episodes of random actions are played and compared to the last bit: states, reward, end of the
 episode, motions and measurements of every step. Not compared are the measured times, ``seconds``.
-Predictions are held against each other (see `checked_predictions`), not against what comes true:
-how good they are is not checked. A further check is one function and one line in `CHECKS`; it
+Predictions are held against each other (see `predictions`), and, of scenarios that can be predicted
+exactly, against what is then sensed (see `sensing`); how good others are is not checked. What a
+scenario need not have, such as measures or tables, is checked where it is there. A further check is one function and one line in `CHECKS`; it
 returns what is wrong, in one line, or nothing. What a scenario raises is what is wrong with it.
 """
 
@@ -20,7 +21,13 @@ from typing import Any
 import numpy as np
 
 from ...core.arrays import IntArray
-from ...core.protocols import Scenario
+from ...core.protocols import (
+    ExactlyPredictedScenario,
+    RecordedScenario,
+    Scenario,
+    groups_of,
+    roles_of,
+)
 from .frames import (
     FIELDS,
     Frame,
@@ -29,16 +36,16 @@ from .frames import (
     difference,
     ended,
     fields,
+    measured,
     opening,
     play,
     random_actions,
     stepped,
 )
 from .predictions import fault_of_prediction
+from .sensing import fault_at_rest, fault_of_exact
 
-MEMBERS = (
-    "agents", "groups", "state_space", "action_set", "reset", "step", "predict", "measure",
-)  # fmt: skip
+MEMBERS = ("agents", "state_space", "action_set", "reset", "step", "predict")
 """Of the protocol `Scenario`."""
 LEAST_STEPS = 2
 """Steps of the shortest episodes by which equal and different seeds can be told."""
@@ -107,8 +114,8 @@ def check_scenario(
 
     Examples
     --------
-    >>> from nested_agents.scenarios.line_up import LineUp
-    >>> len(check_scenario(lambda: LineUp(2))) == len(CHECKS)
+    >>> from nested_agents.scenarios.line_up import LineUpSettings
+    >>> len(check_scenario(LineUpSettings(carts=2).build)) == len(CHECKS)
     True
     """
     if steps < LEAST_STEPS:
@@ -143,8 +150,11 @@ def _form(of: Examination) -> str | None:
     n, d = len(scenario.agents), scenario.state_space.n_variables
     if not n or len(set(scenario.agents)) != n:
         return f"agents {scenario.agents} must be at least one, of different names"
-    if [i for group in scenario.groups for i in group] != list(range(n)):
-        return f"groups {scenario.groups} must hold the {n} agents once each, in order"
+    groups, roles = groups_of(scenario), roles_of(scenario)
+    if [i for group in groups for i in group] != list(range(n)):
+        return f"groups {groups} must hold the {n} agents once each, in order"
+    if len(roles) != n:
+        return f"roles {roles} must be one for each of the {n} agents"
     opening(scenario, of.seeds[0], of.episodes[0])
     transition = scenario.step(of.actions(scenario, of.seeds[0])[0])
     missing = [field for field in FIELDS if not hasattr(transition, field)]
@@ -153,16 +163,39 @@ def _form(of: Examination) -> str | None:
     for step, frame in enumerate(of.play(scenario, of.seeds[0], of.episodes[0])):
         if np.shape(frame["states"]) != (n, d):
             return f"states of shape {np.shape(frame['states'])} {at(step)}, must be {(n, d)}"
-        if step and np.shape(frame["reward"]) != ():
-            return f"reward of shape {np.shape(frame['reward'])} {at(step)}, must be one number"
+        if step and np.shape(frame["reward"]) not in ((), (n,)):
+            return f"reward of shape {np.shape(frame['reward'])} {at(step)}, must be () or {(n,)}"
         if step and not all(isinstance(frame[e], bool) for e in ("terminated", "truncated")):
             return f"terminated and truncated must be bool, {at(step)} they are not"
         motions = frame.get("motions")
-        if motions is not None and np.shape(motions) != (len(scenario.groups), 3):
-            return f"motions of shape {np.shape(motions)}, must be {(len(scenario.groups), 3)}"
+        if motions is not None and np.shape(motions) != (len(groups), 3):
+            return f"motions of shape {np.shape(motions)}, must be {(len(groups), 3)}"
         pushed = frame.get("pushed")
         if pushed is not None and np.shape(pushed) != (3,):
             return f"pushed of shape {np.shape(pushed)}, must be (3,)"
+    return None
+
+
+def _measures(of: Examination) -> str | None:
+    """Check that what a scenario declares to be measured and recorded is there, and is so shaped."""
+    scenario: Any = of.factory()
+    measures = tuple(getattr(scenario, "measures", ()))
+    names = [measure.name for measure in measures]
+    if len(set(names)) != len(names):
+        return f"names {names} must be distinct"
+    opening(scenario, of.seeds[0], of.episodes[0])
+    info = scenario.step(of.actions(scenario, of.seeds[0])[0]).info
+    for measure in measures:
+        source = measure.source or measure.name
+        if source != "terminated" and source not in info:
+            return f"{measure.name}: info has no {source!r}, it has: {', '.join(info)}"
+        if source != "terminated" and np.ndim(info[source]):
+            return f"{measure.name}: info[{source!r}] must be one number"
+    kept = scenario.recorded if isinstance(scenario, RecordedScenario) else ()
+    for place, found in (("info", info), ("measure", measured(scenario))):
+        missing = [name for name in kept if name not in found]
+        if missing:
+            return f"recorded is {missing[0]!r}, which {place} has not"
     return None
 
 
@@ -261,6 +294,21 @@ def _predicts(of: Examination) -> str | None:
     return None
 
 
+def _senses(of: Examination) -> str | None:
+    """Check that variables mean the same in sensing and prediction, where that can be told."""
+    for seed, episode in _all(of):
+        scenario: Any = of.factory()
+        if not isinstance(scenario, ExactlyPredictedScenario):
+            return None
+        exact = scenario.with_exact_prediction()
+        fault = fault_of_exact(exact, seed, episode, of.actions(exact, seed)) or fault_at_rest(
+            scenario, seed, episode
+        )
+        if fault is not None:
+            return fault
+    return None
+
+
 def _leaves_alone(of: Examination) -> str | None:
     """Check that returned arrays stay as they are, and seeds and actions, too."""
     scenario = of.factory()
@@ -330,6 +378,7 @@ def _restores(of: Examination) -> str | None:
 
 CHECKS: dict[str, Callable[[Examination], str | None]] = {
     "form": _form,
+    "measures": _measures,
     "finite numbers": _finite,
     "bounds": _bounds,
     "equal seeds": _repeats,
@@ -337,6 +386,7 @@ CHECKS: dict[str, Callable[[Examination], str | None]] = {
     "two instances": _keeps_apart,
     "predicting": _only_looks,
     "predictions": _predicts,
+    "sensed and predicted": _senses,
     "returned arrays": _leaves_alone,
     "global random numbers": _keeps_off_globals,
     "save and restore": _restores,

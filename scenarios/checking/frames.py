@@ -10,7 +10,7 @@ import numpy as np
 
 from ...core.arrays import IntArray
 from ...core.loop import world_seed
-from ...core.protocols import Scenario, Transition
+from ...core.protocols import MeasuredScenario, RewardPrediction, Scenario, Transition
 
 Frame = dict[str, Any]
 """What one step gave, by dotted name; without the measured times."""
@@ -58,7 +58,12 @@ def play(
 def opening(scenario: Scenario, seed: int, episode: int) -> Frame:
     """Reset a scenario and return the frame of the start."""
     states = scenario.reset(world_seed(seed, episode), episode)
-    return _copied({"states": states, "info": scenario.measure()})
+    return _copied({"states": states, "info": measured(scenario)})
+
+
+def measured(scenario: Scenario) -> Mapping[str, Any]:
+    """Return the measurements of the present state, of a scenario that has them between steps."""
+    return scenario.measure() if isinstance(scenario, MeasuredScenario) else {}
 
 
 def stepped(scenario: Scenario, action: IntArray) -> Frame:
@@ -125,8 +130,9 @@ def _look_ahead(scenario: Scenario) -> None:
     some[1] = len(scenario.action_set) - 1
     for agent in range(len(scenario.agents)):
         prediction.states(agent, some)
-    prediction.rewards(some)
-    scenario.measure()
+    if isinstance(prediction, RewardPrediction):
+        prediction.rewards(some)
+    measured(scenario)
 
 
 def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:

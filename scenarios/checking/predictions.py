@@ -12,12 +12,19 @@ from typing import Any
 import numpy as np
 
 from ...core.arrays import FloatArray, IntArray
-from ...core.protocols import Blocks, Prediction, Scenario
+from ...core.protocols import (
+    Blocks,
+    RewardPrediction,
+    Scenario,
+    TabulatedPrediction,
+    TeamPrediction,
+    groups_of,
+)
 
-MOST_CODES = 4**8
+MOST_JOINT_ACTIONS = 4**8
 """Joint actions beyond which no tables are asked for: they might not fit into memory."""
 SAMPLED = 1024
-"""Codes that are compared, at most; if there are more they are drawn."""
+"""Joint actions that are compared, at most; if there are more they are drawn."""
 CLOSE = 1e-9
 """Difference of predicted numbers, relative to 1 or to their size, that rounding may make."""
 
@@ -42,52 +49,77 @@ def fault_of_prediction(
         f"states of agent {i}": (prediction.states(i, joint_actions), (m, d))
         for i in range(len(scenario.agents))
     }
-    wanted["rewards"] = prediction.rewards(joint_actions), (m,)
+    if isinstance(prediction, RewardPrediction):
+        wanted["rewards"] = prediction.rewards(joint_actions), (m,)
+    if isinstance(prediction, TeamPrediction):
+        together = prediction.states_of_all(joint_actions)
+        wanted["states of all agents"] = together, (len(scenario.agents), m, d)
     for name, (value, shape) in wanted.items():
         if np.shape(value) != shape:
             return f"predicted {name} of shape {np.shape(value)}, must be {shape}"
         if not np.isfinite(value).all():
             return f"predicted {name} are not finite"
-    return _wrong_tables(scenario, prediction, rng)
+    if isinstance(prediction, TeamPrediction):
+        alone = np.array([prediction.states(i, joint_actions) for i in range(len(together))])
+        wrong = ~_close(apart(scenario, np.asarray(together), alone), alone)
+        if wrong.any():
+            agent, _, j = np.argwhere(wrong)[0]
+            name = scenario.state_space.variables[j].name
+            return f"states_of_all and states differ in {name} of agent {agent}"
+    if isinstance(prediction, TabulatedPrediction):
+        return _wrong_tables(scenario, prediction, rng)
+    return None
+
+
+def apart(scenario: Scenario, states: FloatArray, others: FloatArray) -> FloatArray:
+    """Return the difference of states ``(..., d)``, of periodic variables the shorter way round."""
+    found = states - others
+    for j, variable in enumerate(scenario.state_space.variables):
+        if variable.periodic:
+            period = variable.high - variable.low
+            found[..., j] -= period * np.round(found[..., j] / period)
+    return found
 
 
 def _wrong_tables(
-    scenario: Scenario, prediction: Prediction, rng: np.random.Generator
+    scenario: Scenario, prediction: TabulatedPrediction, rng: np.random.Generator
 ) -> str | None:
     """Return where the tables differ from the prediction, whose states are taken to be right."""
     n, n_actions = len(scenario.agents), len(scenario.action_set)
-    n_codes = n_actions**n
-    if n_codes > MOST_CODES:
+    count = n_actions**n
+    if count > MOST_JOINT_ACTIONS:
         return None
-    codes: IntArray = np.arange(n_codes)
-    if n_codes > SAMPLED:
-        codes = np.sort(rng.choice(n_codes, SAMPLED, replace=False))
-    joint_actions = np.stack(np.unravel_index(codes, (n_actions,) * n), axis=-1)
+    indices: IntArray = np.arange(count)
+    if count > SAMPLED:
+        indices = np.sort(rng.choice(count, SAMPLED, replace=False))
+    joint_actions = np.stack(np.unravel_index(indices, (n_actions,) * n), axis=-1)
     behind = n
-    for group in scenario.groups:
+    for group in groups_of(scenario):
         behind -= len(group)
         for agent in group:
             blocks = prediction.blocks(agent)
             fault = _misshapen(
-                blocks, n_actions ** len(group), n_codes, n_actions**behind, scenario
+                blocks, n_actions ** len(group), count, n_actions**behind, scenario
             ) or _contradicted(
-                blocks, codes, joint_actions, prediction.states(agent, joint_actions), scenario
+                blocks, indices, joint_actions, prediction.states(agent, joint_actions), scenario
             )
             if fault is not None:
                 return f"blocks of agent {agent}: {fault}"
-    return _wrong_rewards(prediction, n_codes, codes, joint_actions)
+    if isinstance(prediction, RewardPrediction):
+        return _wrong_rewards(prediction, count, indices, joint_actions)
+    return None
 
 
 def _misshapen(
-    blocks: Blocks, n_local: int, n_codes: int, divisor: int, scenario: Scenario
+    blocks: Blocks, n_own_rows: int, n_shared_rows: int, divisor: int, scenario: Scenario
 ) -> str | None:
     """Return what would have a kernel read the wrong row, or none."""
     n_own, d = scenario.state_space.n_own, scenario.state_space.n_variables
     if blocks.divisor != divisor:
         return f"divisor = {blocks.divisor}, must be {divisor}"
     for name, table, rows, width, count in (
-        ("own", blocks.own, blocks.own_rows, n_own, n_local),
-        ("shared", blocks.shared, blocks.shared_rows, d - n_own, n_codes),
+        ("own", blocks.own, blocks.own_rows, n_own, n_own_rows),
+        ("shared", blocks.shared, blocks.shared_rows, d - n_own, n_shared_rows),
     ):
         for part, array, kinds, axes in (
             (name, table, "f", 2), (f"{name}_rows", rows, "iu", 1),
@@ -115,20 +147,15 @@ def _misshapen(
 
 def _contradicted(
     blocks: Blocks,
-    codes: IntArray,
+    indices: IntArray,
     joint_actions: IntArray,
     expected: FloatArray,
     scenario: Scenario,
 ) -> str | None:
     """Return where blocks and states differ, or none; own variables as if alone may."""
     space = scenario.state_space
-    expected, found = np.asarray(expected), blocks.states(codes)
-    apart = found - expected
-    for j, variable in enumerate(space.variables):
-        if variable.periodic:
-            period = variable.high - variable.low
-            apart[:, j] -= period * np.round(apart[:, j] / period)
-    wrong = ~_close(apart, expected)
+    expected, found = np.asarray(expected), blocks.states(indices)
+    wrong = ~_close(apart(scenario, found, expected), expected)
     if blocks.alone:
         wrong[:, : space.n_own] = False
     if not wrong.any():
@@ -141,12 +168,12 @@ def _contradicted(
 
 
 def _wrong_rewards(
-    prediction: Prediction, n_codes: int, codes: IntArray, joint_actions: IntArray
+    prediction: Any, count: int, indices: IntArray, joint_actions: IntArray
 ) -> str | None:
     table = prediction.reward_table()
-    if np.shape(table) != (n_codes,):
-        return f"reward_table of shape {np.shape(table)}, must be {(n_codes,)}"
-    expected, found = np.asarray(prediction.rewards(joint_actions)), np.asarray(table)[codes]
+    if np.shape(table) != (count,):
+        return f"reward_table of shape {np.shape(table)}, must be {(count,)}"
+    expected, found = np.asarray(prediction.rewards(joint_actions)), np.asarray(table)[indices]
     wrong = np.flatnonzero(~_close(found - expected, expected))
     if not len(wrong):
         return None
@@ -157,8 +184,8 @@ def _wrong_rewards(
     )
 
 
-def _close(apart: FloatArray, expected: FloatArray) -> Any:
-    return np.abs(apart) <= CLOSE * np.maximum(1.0, np.abs(expected))
+def _close(differences: FloatArray, expected: FloatArray) -> Any:
+    return np.abs(differences) <= CLOSE * np.maximum(1.0, np.abs(expected))
 
 
 def _type(array: Any) -> str:

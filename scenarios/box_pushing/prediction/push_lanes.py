@@ -4,8 +4,8 @@ Every quantity of a joint action is one row of a scratch array, the joint action
 next to each other in it, and every loop runs over them without a branch: so that the compiler can
 use the vector instructions of the processor. Rows of `body` belong to one robot, rows of `box` to
 the box and to what is passed between functions. All scratch is flat, as a loop over a row at a
-constant offset is what compilers see through. `box_pushing.prediction.push_reference` is the readable
-definition.
+constant offset is what compilers see through. `box_pushing.prediction.push_reference` is the
+readable definition.
 """
 
 from __future__ import annotations

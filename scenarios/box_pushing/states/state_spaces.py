@@ -207,10 +207,7 @@ def state_space_for(chosen: str | tuple[str, ...], max_speed: float) -> BoxState
     >>> state_space_for("paper", 0.26).space.variables[3].centres
     (-0.26, -0.13, 0.0, 0.13, 0.26)
     """
-    if isinstance(chosen, str):
-        space = STATE_SPACES[chosen]
-    else:
-        space = listed("+".join(chosen), *chosen)
+    space = STATE_SPACES[chosen] if isinstance(chosen, str) else listed("+".join(chosen), *chosen)
     factor = max_speed / _MAX_SPEED
     if factor == 1.0:
         return space

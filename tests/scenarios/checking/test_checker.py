@@ -22,7 +22,7 @@ from nested_agents.scenarios.box_pushing.config import (
 )
 from nested_agents.scenarios.checking.checker import CHECKS, ScenarioError, check_scenario
 from nested_agents.scenarios.checking.predictions import fault_of_prediction
-from nested_agents.scenarios.line_up import LEAD, LineUp, LineUpPrediction
+from nested_agents.scenarios.line_up import LEAD, LineUp, LineUpPrediction, LineUpSettings
 from nested_agents.studies.cli.main import main
 
 FAILURES = (
@@ -34,14 +34,14 @@ FAILURES = (
 
 def line(**changes: Callable[..., Any]) -> Callable[[], Scenario]:
     """Return a factory of line-ups with methods changed."""
-    return lambda: type("Changed", (LineUp,), changes)(2)
+    return lambda: type("Changed", (LineUp,), changes)(LineUpSettings())
 
 
 @pytest.mark.parametrize(
     "factory",
     [
-        lambda: LineUp(3),
-        lambda: SingleAgent(LineUp(2)),
+        lambda: LineUp(LineUpSettings(carts=3)),
+        lambda: SingleAgent(LineUp(LineUpSettings())),
         lambda: BoxPushing(BoxPushingSettings()),
         lambda: BoxPushing(BoxPushingSettings(state_space="paper", start="hard", box="bar")),
         lambda: BoxPushing(BoxPushingSettings(failures=FAILURES)),
@@ -150,7 +150,7 @@ def half_restored(self: Any, saved: Any) -> None:
 
 
 def angle_out_of_range(self: Any, *args: Any) -> None:
-    LineUp.__init__(self, 2)
+    LineUp.__init__(self, LineUpSettings())
     angle = replace(LEAD, low=-0.01, high=0.01, centres=(), periodic=True)
     self.state_space = StateSpace("line-up", (self.state_space.variables[0], angle), n_own=1)
 
@@ -160,7 +160,7 @@ def short_states(self: Any) -> Any:
 
 
 def lengthy_reward(self: Any, joint_action: Any) -> Any:
-    return replace(LineUp.step(self, joint_action), reward=np.zeros(2))
+    return replace(LineUp.step(self, joint_action), reward=np.zeros(3))
 
 
 def uncertain_end(self: Any, joint_action: Any) -> Any:
@@ -168,12 +168,12 @@ def uncertain_end(self: Any, joint_action: Any) -> Any:
 
 
 def twins(self: Any, *args: Any) -> None:
-    LineUp.__init__(self, 2)
+    LineUp.__init__(self, LineUpSettings())
     self.agents = ("cart", "cart")
 
 
 def crossed(self: Any, *args: Any) -> None:
-    LineUp.__init__(self, 2)
+    LineUp.__init__(self, LineUpSettings())
     self.groups = ((1,), (0,))
 
 
@@ -242,7 +242,7 @@ FAULTS: dict[str, tuple[Callable[[], Scenario], str]] = {
     ),
     "period": (line(__init__=angle_out_of_range), "bounds: lead leaves .* at the start"),
     "shape": (line(_states=short_states), r"form: states of shape \(2, 1\) at the start"),
-    "two rewards": (line(step=lengthy_reward), r"form: reward of shape \(2,\)"),
+    "three rewards": (line(step=lengthy_reward), r"form: reward of shape \(3,\)"),
     "end": (line(step=uncertain_end), "form: terminated and truncated must be bool"),
     "twins": (line(__init__=twins), "form: agents .*, of different names"),
     "groups": (line(__init__=crossed), "form: groups .* must hold the 2 agents once each"),
@@ -294,7 +294,7 @@ FAULTS: dict[str, tuple[Callable[[], Scenario], str]] = {
     "listed own": (rowed(own=[[0.0]]), BLOCKS + "own is list, must be an array of floats"),
     "flat own": (rowed(own=np.zeros(4)), BLOCKS + r"own of shape \(4,\), must have 2 axes"),
     "NaN own": (rowed(own=np.full((4, 1), np.nan)), BLOCKS + "own is not finite"),
-    "no scenario": (lambda: object(), "form: object lacks agents, groups, .*measure"),  # type: ignore[dict-item,return-value]
+    "no scenario": (lambda: object(), "form: object lacks agents, .*predict"),  # type: ignore[dict-item,return-value]
 }
 
 
@@ -360,11 +360,11 @@ def test_many_joint_actions_are_drawn_and_too_many_left_out() -> None:
             return Reversed(super().predict()._places)
 
     for n, said in ((6, "reward_table: .* after joint action"), (8, "reward_table: ")):
-        scenario = Many(n)
+        scenario = Many(LineUpSettings(carts=n))
         scenario.reset(0)
         fault = fault_of_prediction(scenario, np.zeros((1, n), int), np.random.default_rng(0))
         assert re.match(said, fault or "")
-    scenario = Many(9)
+    scenario = Many(LineUpSettings(carts=9))
     scenario.reset(0)
     none = fault_of_prediction(scenario, np.zeros((1, 9), int), np.random.default_rng(0))
     assert none is None
@@ -372,8 +372,8 @@ def test_many_joint_actions_are_drawn_and_too_many_left_out() -> None:
 
 def test_too_little_to_check_is_refused() -> None:
     with pytest.raises(ValueError, match=r"^seeds = \[0\]: must hold at least 2$"):
-        check_scenario(lambda: LineUp(2), seeds=(0,))
+        check_scenario(lambda: LineUp(LineUpSettings()), seeds=(0,))
     with pytest.raises(ValueError, match=r"^episodes = \[\]: must hold at least 1$"):
-        check_scenario(lambda: LineUp(2), episodes=())
+        check_scenario(lambda: LineUp(LineUpSettings()), episodes=())
     with pytest.raises(ValueError, match=r"^steps = 1: must be at least 2$"):
-        check_scenario(lambda: LineUp(2), steps=1)
+        check_scenario(lambda: LineUp(LineUpSettings()), steps=1)

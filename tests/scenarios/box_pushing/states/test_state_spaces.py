@@ -86,8 +86,8 @@ def test_mirrored_worlds_have_mirrored_angles() -> None:
         seen = EVERY.shared(view(robots, box, [0.1, 0.2]), robot)[0]
         mirrored = EVERY.shared(view(robots * flip, box * flip, [0.1, 0.2]), robot)[0]
         signs = [
-            -1 if described.low < 0 and name != "approach" else 1
-            for name, (described, _) in VARIABLES.items()
+            -1 if described.low < 0 and described.name != "approach" else 1
+            for described in EVERY.space.shared
         ]
         np.testing.assert_allclose(mirrored, seen * signs, atol=1e-12)
 

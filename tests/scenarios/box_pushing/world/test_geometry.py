@@ -1,4 +1,4 @@
-"""Signed distance and rays: known answers, and the compiled kernels against their NumPy references."""
+"""Signed distance and rays: known answers, and the kernels against their NumPy references."""
 
 import numpy as np
 import pytest

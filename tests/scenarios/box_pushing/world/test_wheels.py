@@ -1,4 +1,4 @@
-"""Wheel forces: the kernel against its reference, the friction circle, exactness under steady load."""
+"""Wheel forces: the kernel against its reference, the friction circle, exactness under load."""
 
 import numpy as np
 import pytest
