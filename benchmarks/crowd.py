@@ -34,12 +34,12 @@ def main() -> None:
     team = Team.build(learner, scenario, hierarchy, policy_seed(options.seed))
     watch, steps = Stopwatch(), 0
     scenario.reset(world_seed(options.seed, 0), 0)
-    recorder = EpisodeRecorder(scenario.measure())
+    recorder = EpisodeRecorder(scenario)
     for record in control_loop(scenario, team, episodes=1, steps=options.steps, seed=options.seed):
         recorder.add(record.transition)
         watch.add(record)
         steps += 1
-    snapshot(recorder.recording(**settings.drawn), steps, options.file)
+    snapshot(recorder.recording(), steps, options.file)
     spent = ", ".join(f"{name} {1e3 * s / steps:.1f} ms" for name, s in watch.seconds.items())
     period = f"{1e3 * settings.period:.0f} ms"
     print(f"{len(scenario.agents)} agents, {steps} decisions of {period} each: {spent}")

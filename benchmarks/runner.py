@@ -26,7 +26,13 @@ from joblib.externals.loky import get_reusable_executor
 
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.store import Store
-from nested_agents.studies.trials.trial import Trial, TrialResult, run_trial, trials_of
+from nested_agents.studies.trials.trial import (
+    Trial,
+    TrialResult,
+    measures_of_spec,
+    run_trial,
+    trials_of,
+)
 from nested_agents.studies.workers.loky import LokyWorkers
 from nested_agents.studies.workers.runner import run_trials
 
@@ -62,14 +68,15 @@ def measure(spec: Spec, jobs: int) -> Round:
     """Run the trials of a spec with warm workers."""
     trials = trials_of(spec)
     warm = [replace(trial, seed=10**6 + i) for i, trial in enumerate(trials[: 2 * jobs])]
+    measures = measures_of_spec(spec)
     with tempfile.TemporaryDirectory() as folder:
         workers = LokyWorkers(jobs)
-        with Store.create(Path(folder) / "warm", spec) as store:
+        with Store.create(Path(folder) / "warm", spec, measures) as store:
             for _ in run_trials(warm, store, timed, workers):
                 pass
             pids = _pids(store)
         before, own = sum(map(_cpu, pids)), time.process_time()
-        with Store.create(Path(folder) / "study", spec) as store:
+        with Store.create(Path(folder) / "study", spec, measures) as store:
             for outcome in run_trials(trials, store, timed, workers):
                 assert outcome.error is None, outcome.error
             own = time.process_time() - own

@@ -21,7 +21,23 @@ from collections.abc import Mapping
 import numpy as np
 
 from .arrays import FloatArray
-from .settings import CalibrationSettings
+from .settings import NonNegative, Positive, Settings
+
+
+class CalibrationSettings(Settings):
+    """Whether and how fast a team revises the constants of its predictor."""
+
+    enabled: bool = False
+    """Otherwise they stay as the scenario believes them to be."""
+    prior: Positive = 0.7
+    """Standard deviation of the logarithm of a constant at first: 0.7 is a factor of 2."""
+    noise: Positive = 0.008
+    """Standard deviation of a measured speed around the predicted one [m/s]."""
+    surprise: Positive = 4.0
+    """Mean squared innovation of a body, in units of the expected square, above which it counts
+    less."""
+    drift: NonNegative = 0.003
+    """What is added to the standard deviation (as squares) by every decision that pushes."""
 
 
 class Calibration:
@@ -43,9 +59,9 @@ class Calibration:
 
     >>> calibration = Calibration(CalibrationSettings(enabled=True), 1, np.array([0.1]))
     >>> for _ in range(20):
-    ...     foreseen = np.zeros((2, 1, 3))
-    ...     foreseen[:, 0, 0] = 0.05 * np.exp(calibration.points[:, 0])
-    ...     calibration.observe(np.array([[0.075, 0.0, 0.0]]), foreseen)
+    ...     predicted = np.zeros((2, 1, 3))
+    ...     predicted[:, 0, 0] = 0.05 * np.exp(calibration.points[:, 0])
+    ...     calibration.observe(np.array([[0.075, 0.0, 0.0]]), predicted)
     >>> round(float(np.exp(calibration.constants[0])), 1)
     1.5
     """
@@ -64,14 +80,14 @@ class Calibration:
 
     @property
     def points(self) -> FloatArray:
-        """Constants ``(2 n, n)`` whose outcomes are to be foreseen: m + L u, then m - L u."""
+        """Constants ``(2 n, n)`` whose outcomes are to be predicted: m + L u, then m - L u."""
         spread = np.sqrt(len(self.constants)) * self._root.T
         return self.constants + np.concatenate([spread, -spread])
 
-    def observe(self, measured: FloatArray, foreseen: FloatArray) -> None:
-        """Take in the twists ``(B, 3)`` of all bodies against those ``(2 n, B, 3)`` foreseen."""
+    def observe(self, measured: FloatArray, predicted: FloatArray) -> None:
+        """Take in the twists ``(B, 3)`` of all bodies against those ``(2 n, B, 3)`` predicted."""
         n, settings = len(self.constants), self.settings
-        plus, minus = self._units * foreseen[:n], self._units * foreseen[n:]
+        plus, minus = self._units * predicted[:n], self._units * predicted[n:]
         slope = (plus - minus) / (2.0 * np.sqrt(n))
         if not slope.any():
             return

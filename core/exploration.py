@@ -8,12 +8,14 @@ resting wheel lead to the same state).
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Annotated, Literal, Protocol
 
 import numpy as np
+from pydantic import Field
 
 from .arrays import FloatArray
-from .settings import BurstExploration, PaperExploration
+from .registry import SettingsRegistry
+from .settings import Fraction, NonNegative, Settings
 
 
 def boltzmann(values: FloatArray, temperature: float) -> FloatArray:
@@ -50,6 +52,16 @@ class Explorer(Protocol):
         """Note that all agents have decided this step."""
 
 
+class ExplorationSettings(Settings):
+    """What the settings of all kinds of exploration inherit."""
+
+    kind: str = ""
+
+    def build(self, n_agents: int) -> Explorer:
+        """Return the explorer of a team of `n_agents`."""
+        raise TypeError(f"exploration {self.kind!r} says not how it is built")
+
+
 class Greedy:
     """Always the action of greatest value."""
 
@@ -65,6 +77,32 @@ class Greedy:
     def choose(self, agent: int, values: FloatArray, rng: np.random.Generator) -> int:
         """Return the greatest action."""
         return greatest(values, rng)
+
+
+class PaperExploration(ExplorationSettings):
+    """Epsilon-decreasing with a diminishing temperature (Section V).
+
+    The temperature is ``T(t) = 1 + T_max exp(-s t)``; with probability
+    ``epsilon (T(t) - 1) / (T_max - 1)``, cut off at 1, an agent explores.
+    """
+
+    kind: Literal["paper"] = "paper"
+    epsilon: Fraction = 1.0
+    """Exploration rate at the start; not printed in the paper."""
+    max_temperature: Annotated[float, Field(gt=1)] = 100.0
+    """T_max; not printed in the paper."""
+    decay: NonNegative = 0.005
+    """s per step, printed in Section IX."""
+    clock: Literal["episode", "run"] = "run"
+    """Whether t counts the steps of the episode or of the whole run; not stated in the paper."""
+    exploit: Literal["greatest", "sample"] = "greatest"
+    """Take the action of greatest probability (Section V), or sample Eq. 14."""
+    explore: Literal["uniform", "boltzmann"] = "uniform"
+    """How the "random action" of the other case is drawn; not stated in the paper."""
+
+    def build(self, n_agents: int) -> Explorer:
+        """Return the explorer of a team."""
+        return EpsilonDecreasingBoltzmann(self)
 
 
 class EpsilonDecreasingBoltzmann:
@@ -104,6 +142,24 @@ class EpsilonDecreasingBoltzmann:
             # Eq. 14 is increasing in the value: the greatest probability is the greatest value.
             return greatest(values, rng)
         return int(rng.choice(len(values), p=boltzmann(values, self.temperature)))
+
+
+class BurstExploration(ExplorationSettings):
+    """Random actions that are held for a while, at a rate that falls from episode to episode.
+
+    The fraction of explorative decisions in episode ``k`` is ``max(floor, rate * decay ** k)``.
+    """
+
+    kind: Literal["burst"] = "burst"
+    rate: Fraction = 0.3
+    decay: Fraction = 0.75
+    floor: Fraction = 0.02
+    length: Annotated[float, Field(ge=1)] = 4.0
+    """Mean number of decisions for which a random action is repeated."""
+
+    def build(self, n_agents: int) -> Explorer:
+        """Return the explorer of a team of `n_agents`."""
+        return Bursts(self, n_agents)
 
 
 class Bursts:
@@ -146,8 +202,12 @@ class Bursts:
         return greatest(values, rng)
 
 
-def build_explorer(settings: PaperExploration | BurstExploration, n_agents: int) -> Explorer:
-    """Build the explorer that `settings` describe."""
-    if isinstance(settings, PaperExploration):
-        return EpsilonDecreasingBoltzmann(settings)
-    return Bursts(settings, n_agents)
+EXPLORATIONS = SettingsRegistry(
+    "exploration",
+    {
+        "burst": f"{__name__}:BurstExploration",
+        "paper": f"{__name__}:PaperExploration",
+    },
+    ExplorationSettings,
+)
+"""Kinds of exploration by name."""

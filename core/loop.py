@@ -101,7 +101,7 @@ def control_loop(
                 team.adapt(prediction, joint_action, transition)
             prediction = team.predict(scenario)
             if learn:
-                team.learn(transition, prediction)
+                team.learn(transition)
                 if last:
                     team.end_episode()
             yield StepRecord(

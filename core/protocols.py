@@ -113,21 +113,6 @@ class TabulatedPrediction(Prediction, Protocol):
         ...
 
 
-@runtime_checkable
-class MergingPrediction(Prediction, Protocol):
-    """A prediction that knows which local codes come to the same; ``L`` of the largest group."""
-
-    @property
-    def alike(self) -> IntArray:
-        """``(G, L)`` the first local code of the group that leads its own agents to the same."""
-        ...
-
-    @property
-    def alike_elsewhere(self) -> IntArray:
-        """``(G, L)`` the first that leads all other agents to the same."""
-        ...
-
-
 @dataclass(frozen=True)
 class Transition:
     """What one step of a scenario returns.

@@ -14,11 +14,9 @@ thing. A class with a nested ``Settings`` stands for the model that builds it.
 from __future__ import annotations
 
 import difflib
-import inspect
 import os
 import sys
 from collections.abc import Callable, Iterable, Mapping
-from importlib import import_module
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, Literal, cast
@@ -27,6 +25,7 @@ from pydantic import create_model
 from pydantic_core import PydanticCustomError, core_schema
 
 from . import sources
+from .places import located
 from .settings import Settings
 
 
@@ -112,16 +111,12 @@ class Registry:
             place = name
         if place is None:
             raise ValueError(f"{closest(name, self.names())}, or one of your own as file.py:NAME")
-        module, _, attribute = place.partition(":")
         try:
-            found: Any = import_module(module)
-            for part in filter(None, attribute.split(".")):
-                found = getattr(found, part)
+            return located(place)
         except Exception as error:
             if name in self.built_in:
                 raise
             raise ValueError(f"cannot be loaded: {type(error).__name__}: {error}") from None
-        return found
 
     def reference_to(self, thing: Any) -> str:
         """Return the name of an object: the registered one, or where it is defined.
@@ -289,11 +284,6 @@ class Plugged:
 
 
 def _relative(path: str) -> str:
-    """Return a path as it is written from the working directory."""
-    here = os.path.realpath(os.getcwd())
-    there = (
-        os.path.realpath(inspect.getsourcefile(sys.modules["__main__"]) or path)
-        if not path
-        else os.path.realpath(path)
-    )
+    """Return a path as it is written from the working directory, if it is below."""
+    here, there = os.path.realpath(os.getcwd()), os.path.realpath(path)
     return os.path.relpath(there, here) if there.startswith(here + os.sep) else there

@@ -3,19 +3,20 @@
 `RobotAgents` shows a scenario as one whose agents drive whole robots. An agent's action is a local
 code: the actions of all its wheels at once. Its state is the own variables of all its wheels and
 the variables that they share; everything else of this package works on it unchanged. Joint actions
-keep their codes, as the digits of a robot's wheels read as one.
+keep their indices, as the digits of a robot's wheels read as one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 
 from .arrays import FloatArray, IntArray
+from .forwarding import view_of
 from .protocols import (
     Blocks,
     CalibratedPrediction,
@@ -23,8 +24,12 @@ from .protocols import (
     EmbodiedPrediction,
     EmbodiedScenario,
     Prediction,
+    RewardPrediction,
     Scenario,
+    TabulatedPrediction,
     Transition,
+    groups_of,
+    measures_of,
 )
 from .spaces import ActionSet, StateSpace
 
@@ -48,7 +53,9 @@ class RobotAgents:
 
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario
-        sizes = {len(group) for group in scenario.groups}
+        self.wheel_groups = groups_of(scenario)
+        self.measures = measures_of(scenario)
+        sizes = {len(group) for group in groups_of(scenario)}
         single, w = scenario.action_set, max(sizes)
         if len(sizes) > 1:
             raise ValueError(f"robots: of {sorted(sizes)} wheels, allowed: equally many")
@@ -56,18 +63,18 @@ class RobotAgents:
             raise ValueError(
                 f"robots: {len(single)} ** {w} actions each, allowed: {MOST_ACTIONS} or fewer"
             )
-        # Row c holds the actions of a robot's wheels of local code c.
+        # Row c holds the actions of a robot's wheels of robot-action index c.
         self._local = np.array(list(product(range(len(single)), repeat=w)), dtype=np.int64)
         names = tuple("+".join(single.names[a] for a in row) for row in self._local)
         neutral = int(np.flatnonzero((self._local == single.neutral).all(axis=1))[0])
         zeros = (0.0,) * len(names)
         self.action_set = ActionSet(names, zeros, zeros, neutral)
-        self.agents = tuple(robot_of(scenario.agents[group[0]]) for group in scenario.groups)
+        self.agents = tuple(robot_of(scenario.agents[group[0]]) for group in self.wheel_groups)
         self.groups = tuple((r,) for r in range(len(self.agents)))
         space = scenario.state_space
         own = tuple(
             replace(v, name=f"{scenario.agents[wheel].rpartition('.')[2]}.{v.name}")
-            for wheel in scenario.groups[0]
+            for wheel in self.wheel_groups[0]
             for v in space.own
         )
         self.state_space = StateSpace(f"robots' {space.name}", (*own, *space.shared), len(own))
@@ -77,7 +84,7 @@ class RobotAgents:
         return self._joined(self.scenario.reset(seed, episode))
 
     def step(self, joint_action: IntArray) -> Transition:
-        """Carry out a local code per robot."""
+        """Carry out a robot-action index per robot."""
         transition = self.scenario.step(self._local[joint_action].ravel())
         return replace(transition, states=self._joined(transition.states))
 
@@ -85,19 +92,15 @@ class RobotAgents:
         """Predict from the present state."""
         return RobotPrediction(self.scenario.predict(), self)
 
-    def measure(self) -> Mapping[str, Any]:
-        """Return the measurements of the present state."""
-        return self.scenario.measure()
-
     def wheels(self, joint_actions: IntArray) -> IntArray:
-        """Return the actions of all wheels ``(m, n)`` for local codes ``(m, M)``."""
+        """Return the actions of all wheels ``(m, n)`` for robot-action indexs ``(m, M)``."""
         return self._local[joint_actions].reshape(len(joint_actions), -1)
 
     def _joined(self, states: FloatArray) -> FloatArray:
         n_own = self.scenario.state_space.n_own
         rows = [
             np.concatenate([*(states[wheel, :n_own] for wheel in group), states[group[0], n_own:]])
-            for group in self.scenario.groups
+            for group in self.wheel_groups
         ]
         return np.array(rows)
 
@@ -134,7 +137,9 @@ class EmbodiedRobotAgents(RobotAgents):
 def per_robot(scenario: Scenario) -> RobotAgents:
     """Return a scenario as one of one agent per robot."""
     embodied = isinstance(scenario, EmbodiedScenario)
-    return (EmbodiedRobotAgents if embodied else RobotAgents)(scenario)
+    kind = EmbodiedRobotAgents if embodied else RobotAgents
+    found: RobotAgents = view_of(kind, scenario)(scenario)
+    return found
 
 
 class RobotPrediction:
@@ -150,23 +155,24 @@ class RobotPrediction:
 
     def __init__(self, prediction: Prediction, robots: RobotAgents) -> None:
         self._prediction, self._robots = prediction, robots
-        self._groups = robots.scenario.groups
+        self._groups = robots.wheel_groups
         self._n_own = robots.scenario.state_space.n_own
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
-        """Return the next states of a robot for local codes ``(m, M)``."""
+        """Return the next states of a robot for robot-action indexs ``(m, M)``."""
         wheels = self._robots.wheels(joint_actions)
         parts = [self._prediction.states(wheel, wheels) for wheel in self._groups[agent]]
         own = [part[:, : self._n_own] for part in parts]
         return np.concatenate([*own, parts[0][:, self._n_own :]], axis=1)
 
     def rewards(self, joint_actions: IntArray) -> FloatArray:
-        """Return the predicted rewards of local codes ``(m, M)``."""
-        return self._prediction.rewards(self._robots.wheels(joint_actions))
+        """Return the predicted rewards of robot-action indexs ``(m, M)``."""
+        return cast(RewardPrediction, self._prediction).rewards(self._robots.wheels(joint_actions))
 
     def blocks(self, agent: int) -> Blocks:
         """Return the next states of a robot for all joint actions."""
-        blocks = [self._prediction.blocks(wheel) for wheel in self._groups[agent]]
+        tables = cast(TabulatedPrediction, self._prediction)
+        blocks = [tables.blocks(wheel) for wheel in self._groups[agent]]
         own = [b.own[b.own_rows] if len(b.own_rows) else b.own for b in blocks]
         return replace(
             blocks[0], own=np.concatenate(own, axis=1), own_rows=np.zeros(0, dtype=np.int64)
@@ -174,7 +180,7 @@ class RobotPrediction:
 
     def reward_table(self) -> FloatArray:
         """Return the predicted rewards of all joint actions by code."""
-        return self._prediction.reward_table()
+        return cast(TabulatedPrediction, self._prediction).reward_table()
 
     @property
     def groups(self) -> tuple[tuple[int, ...], ...]:
@@ -182,7 +188,7 @@ class RobotPrediction:
         return cast(EmbodiedPrediction, self._prediction).groups
 
     def commands(self, joint_action: IntArray) -> FloatArray:
-        """Return the wheel speeds that local codes ``(M,)`` would command."""
+        """Return the wheel speeds that robot-action indexs ``(M,)`` would command."""
         wheels = self._robots.wheels(joint_action[None])[0]
         return cast(EmbodiedPrediction, self._prediction).commands(wheels)
 
@@ -192,7 +198,7 @@ class RobotPrediction:
         return cast(EmbodiedPrediction, self._prediction).slips(wheels)
 
     def outcomes(self, joint_action: IntArray, constants: FloatArray) -> FloatArray:
-        """Return what local codes ``(M,)`` would lead to under constants ``(k, n)``."""
+        """Return what robot-action indexs ``(M,)`` would lead to under constants ``(k, n)``."""
         wheels = self._robots.wheels(joint_action[None])[0]
         return cast(CalibratedPrediction, self._prediction).outcomes(wheels, constants)
 

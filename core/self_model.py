@@ -23,10 +23,27 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from .arrays import FloatArray
-from .settings import SelfModelSettings
+from .settings import Positive, Settings
 
 MEMORY = 100
 """Decisions over which the size of innovations is averaged."""
+
+
+class SelfModelSettings(Settings):
+    """Whether and how fast a robot revises what it believes its wheels to do."""
+
+    enabled: bool = False
+    """Otherwise prediction takes every robot as nominal."""
+    prior_effect: Positive = 0.3
+    """Standard deviation of a wheel's effect around the nominal one [m/s per m/s]."""
+    prior_constant: Positive = 0.003
+    """Standard deviation of the constant part of the motion [m/s]."""
+    noise: Positive = 0.004
+    """Standard deviation of a measured speed around the model's [m/s]."""
+    surprise: Positive = 9.0
+    """Squared innovation, in units of its expected square, from which on a change is assumed."""
+    inflation: Positive = 1.0
+    """Share of the prior covariance that is added then."""
 
 
 class SelfModel:

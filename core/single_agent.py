@@ -7,15 +7,23 @@ on it unchanged. It is practicable for few agents only.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
 from itertools import product
-from typing import Any
+from typing import cast
 
 import numpy as np
 
 from .arrays import FloatArray, IntArray
-from .protocols import Blocks, Prediction, Scenario, Transition
+from .forwarding import view_of
+from .protocols import (
+    Blocks,
+    Prediction,
+    RewardPrediction,
+    Scenario,
+    TabulatedPrediction,
+    Transition,
+    measures_of,
+)
 from .spaces import ActionSet, StateSpace
 
 MOST_ACTIONS = 4**6
@@ -38,6 +46,7 @@ class SingleAgent:
 
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario
+        self.measures = measures_of(scenario)
         n, single = len(scenario.agents), scenario.action_set
         if len(single) ** n > MOST_ACTIONS:
             raise ValueError(
@@ -72,9 +81,11 @@ class SingleAgent:
         """Predict from the present state."""
         return SingleAgentPrediction(self.scenario.predict(), self._joint)
 
-    def measure(self) -> Mapping[str, Any]:
-        """Return the measurements of the present state."""
-        return self.scenario.measure()
+
+def single_agent(scenario: Scenario) -> SingleAgent:
+    """Return a scenario as that of one agent."""
+    found: SingleAgent = view_of(SingleAgent, scenario)(scenario)
+    return found
 
 
 class SingleAgentPrediction:
@@ -99,7 +110,7 @@ class SingleAgentPrediction:
 
     def rewards(self, joint_actions: IntArray) -> FloatArray:
         """Return the predicted rewards ``(m,)`` of codes ``(m, 1)``."""
-        return self._prediction.rewards(self._joint[joint_actions[:, 0]])
+        return cast(RewardPrediction, self._prediction).rewards(self._joint[joint_actions[:, 0]])
 
     def blocks(self, agent: int) -> Blocks:
         """Return the next joint states of all codes; no variable is the agent's own alone."""
@@ -108,4 +119,4 @@ class SingleAgentPrediction:
 
     def reward_table(self) -> FloatArray:
         """Return the predicted rewards of all codes."""
-        return self._prediction.reward_table()
+        return cast(TabulatedPrediction, self._prediction).reward_table()

@@ -10,37 +10,30 @@ import numpy as np
 
 from .arrays import FloatArray, IntArray
 from .calibration import Calibration
-from .evaluators import (
-    MOST_JOINT_ACTIONS,
-    Evaluator,
-    ExactEnumeration,
-    Extremes,
-    LatinHypercube,
-    Moments,
-    Sampling,
-)
-from .exploration import Explorer, Greedy, build_explorer
+from .evaluators.evaluator import DecisionProblem, Deliberation, Evaluator
+from .exploration import Explorer, Greedy
 from .hierarchy import Hierarchy
-from .learners import Learner, build_learner
+from .learners.learner import Learner, LearnerSettings
 from .protocols import (
     CalibratedPrediction,
     CalibratedScenario,
     EmbodiedPrediction,
     EmbodiedScenario,
     Prediction,
+    RewardPrediction,
     Scenario,
     SummedScenario,
     Transition,
+    groups_of,
+    roles_of,
 )
 from .rules.rule_base import RuleBase
 from .self_model import SelfModel
-from .settings import Decision
-from .settings import Learner as LearnerSettings
 from .spaces import ActionSet
 
 
 class Team:
-    """Agents in a hierarchy, one rule base and one row of consequent weights each.
+    """Agents in a hierarchy, one rule base each; consequent weights are an agent's own or a role's.
 
     Use `Team.build` to make one from settings.
 
@@ -52,6 +45,8 @@ class Team:
         What each agent can do.
     learner
         Owns the consequent weights.
+    rows
+        ``(n,)`` which row of them each agent has.
     explorer
         Chooses actions by value.
     evaluator
@@ -69,6 +64,7 @@ class Team:
         hierarchy: Hierarchy,
         action_set: ActionSet,
         learner: Learner,
+        rows: IntArray,
         explorer: Explorer,
         evaluator: Evaluator | None,
         seed: np.random.SeedSequence,
@@ -77,6 +73,7 @@ class Team:
     ) -> None:
         self.hierarchy, self.action_set = hierarchy, action_set
         self.learner, self.explorer, self.evaluator = learner, explorer, evaluator
+        self.rows = rows
         self.self_model, self.calibration = self_model, calibration
         self.rng = np.random.Generator(np.random.PCG64(seed))
         # How often each agent was seen to take each action; one of each to begin with.
@@ -126,17 +123,47 @@ class Team:
                 settings.calibration, len(scenario.constants), scenario.levers
             )
         rules = RuleBase.build(scenario.state_space, settings.rule_base)
-        n = len(hierarchy)
+        rows = rows_of(scenario, shared=settings.weights == "role")
+        evaluator, decision = None, settings.decision
+        if decision.rule != "random":
+            problem = DecisionProblem(
+                rules,
+                hierarchy,
+                len(scenario.action_set),
+                groups_of(scenario),
+                isinstance(scenario, SummedScenario) and scenario.superposes,
+                decision.rule,
+                decision.teammates,
+                settings.discount,
+            )
+            evaluator = decision.evaluator.build(problem)
         return cls(
             hierarchy,
             scenario.action_set,
-            build_learner(settings, rules, n),
-            build_explorer(settings.exploration, n),
-            _build_evaluator(settings.decision, rules, hierarchy, scenario, settings.discount),
+            settings.build(rules, rows),
+            rows,
+            settings.exploration.build(len(hierarchy)),
+            evaluator,
             seed,
             self_model,
             calibration,
         )
+
+    def check(self, prediction: Prediction) -> None:
+        """Refuse a prediction without what the team decides by.
+
+        Raises
+        ------
+        ValueError
+            If it decides by rewards, and the prediction knows none; one line.
+        """
+        problem = getattr(self.evaluator, "problem", None)
+        by_reward = isinstance(problem, DecisionProblem) and problem.rule != "value"
+        if by_reward and not isinstance(prediction, RewardPrediction):
+            raise ValueError(
+                f"learner.decision.rule = {problem.rule!r}: the scenario predicts no rewards, "
+                "use value"
+            )
 
     def begin_episode(self) -> None:
         """Note that an episode begins."""
@@ -164,15 +191,16 @@ class Team:
             return self.rng.integers(n_actions, size=n)
         explorer = self.explorer if explore else self._greedy
         frequencies = self._seen / self._seen.sum(axis=1, keepdims=True)
+        theta = self.learner.theta
+        weights = [theta[row] for row in self.rows]
         joint = np.full(n, self.action_set.neutral)
         for i, unseen in self._order:
             known = joint
             if len(unseen):  # decided, but not above: taken to maintain
                 known = joint.copy()
                 known[unseen] = self.action_set.neutral
-            values = self.evaluator.values(
-                i, known, self.learner.theta[i], prediction, frequencies, self.rng
-            )
+            deliberation = Deliberation(i, known, prediction, weights, frequencies, self.rng)
+            values = self.evaluator.values(deliberation)
             joint[i] = explorer.choose(i, values, self.rng)
         if explore:
             explorer.advance()
@@ -201,20 +229,13 @@ class Team:
         moved, motions = transition.pushed, transition.motions
         if self.calibration is None or moved is None or motions is None or not moved.any():
             return
-        foreseen = prediction.outcomes(joint_action, self.calibration.points)
-        self.calibration.observe(np.vstack([moved, motions]), foreseen)
+        predicted = prediction.outcomes(joint_action, self.calibration.points)
+        self.calibration.observe(np.vstack([moved, motions]), predicted)
 
-    def learn(self, transition: Transition, prediction: Prediction) -> None:
-        """Take in what a step led to, and the prediction from there."""
-        candidates = None
-        if self.learner.candidates:
-            n, n_actions = len(self.hierarchy), len(self.action_set)
-            joint = self.rng.integers(n_actions, size=(self.learner.candidates, n))
-            candidates = np.array([prediction.states(i, joint) for i in range(n)])
+    def learn(self, transition: Transition) -> None:
+        """Take in what a step led to."""
         self._count(
-            self.learner.observe(
-                transition.states, transition.reward, transition.terminated, candidates
-            )
+            self.learner.observe(transition.states, transition.reward, transition.terminated)
         )
 
     def end_episode(self) -> None:
@@ -295,35 +316,18 @@ def _part(arrays: Mapping[str, FloatArray], prefix: str) -> dict[str, FloatArray
     return {k.removeprefix(prefix): v for k, v in arrays.items() if k.startswith(prefix)}
 
 
-def _build_evaluator(
-    decision: Decision, rules: RuleBase, hierarchy: Hierarchy, scenario: Scenario, discount: float
-) -> Evaluator | None:
-    if decision.rule == "random":
-        return None
-    common = (rules, hierarchy, len(scenario.action_set), decision.rule, decision.others, discount)
-    kind = decision.evaluator
-    superposes = isinstance(scenario, SummedScenario) and scenario.superposes
-    if kind == "auto":
-        free = max(1 + len(hierarchy.below(i)) for i in range(len(hierarchy)))
-        summed = superposes and decision.rule == "value"
-        kind = "moments" if decision.others != "max" else "extremes"
-        countable = len(scenario.action_set) ** free <= MOST_JOINT_ACTIONS
-        if free <= decision.exact_up_to and countable:
-            kind = "exact"
-        elif free <= decision.sampling_up_to or not summed:
-            kind = "sampling"
-    if kind == "exact":
-        return ExactEnumeration(*common)
-    if kind == "sampling":
-        return Sampling(decision.samples, *common)
-    if kind == "latin-hypercube":
-        return LatinHypercube(scenario.groups, decision.budget, *common)
-    if not superposes:
-        raise ValueError(
-            f"learner.decision.evaluator = {kind!r}: the scenario predicts no sums, "
-            "use exact or sampling"
-        )
-    return (Moments if kind == "moments" else Extremes)(scenario.groups, *common)
+def rows_of(scenario: Scenario, *, shared: bool) -> IntArray:
+    """Return the row of weights of every agent ``(n,)``: its own, or that of its role.
 
-
-__all__ = ["Evaluator", "Team"]
+    Examples
+    --------
+    >>> from types import SimpleNamespace
+    >>> pair = SimpleNamespace(agents=("a.left", "a.right", "b.left"), roles=("left", "right", "left"))
+    >>> rows_of(pair, shared=True).tolist(), rows_of(pair, shared=False).tolist()
+    ([0, 1, 0], [0, 1, 2])
+    """
+    if not shared:
+        return np.arange(len(scenario.agents))
+    roles = roles_of(scenario)
+    names = list(dict.fromkeys(roles))
+    return np.array([names.index(role) for role in roles])

@@ -15,7 +15,7 @@ u, ``m dv/dt = k (u - v)``. With ``tau = m / k`` and u held for a period T this 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -54,9 +54,7 @@ class LineUpSettings(ScenarioSettings):
     carts: Annotated[int, Field(ge=1, le=10_000)] = 2
     """Number of carts, one agent each."""
 
-    def build(self) -> LineUp:
-        """Build the scenario."""
-        return LineUp(self)
+    factory: ClassVar[str] = f"{__name__}:LineUp"
 
 
 class LineUp:

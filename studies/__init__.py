@@ -1,11 +1,16 @@
 """What is measured: specs, trials, store, statistics and reports."""
 
-STUDIES: dict[str, str] = {
-    "learning-curve": ".catalogue.learning_curve",
-    "chain-order": ".catalogue.chain_order",
-    "ablation": ".catalogue.ablation",
-    "shapes": ".catalogue.shapes",
-    "wheel-failure": ".catalogue.wheel_failure",
-    "scaling": ".catalogue.scaling",
-}
-"""The module of every study by name; see `nested_agents.studies.catalogue.study`."""
+from ..core.registry import Registry
+
+STUDIES = Registry(
+    "study",
+    {
+        "learning-curve": f"{__name__}.catalogue.learning_curve",
+        "chain-order": f"{__name__}.catalogue.chain_order",
+        "ablation": f"{__name__}.catalogue.ablation",
+        "shapes": f"{__name__}.catalogue.shapes",
+        "wheel-failure": f"{__name__}.catalogue.wheel_failure",
+        "scaling": f"{__name__}.catalogue.scaling",
+    },
+)
+"""Studies by name; what they offer is in `nested_agents.studies.catalogue.study`."""

@@ -1,28 +1,41 @@
 """The settings of a topology, as they stand in the ``[topology]`` table of a spec, or as a string.
 
 A string is ``"kind"`` or ``"kind:argument"``, see `parse`; each settings class says what its
-argument may be.
+argument may be. A further topology is one settings class and one line in `TOPOLOGIES`.
 """
 
 from __future__ import annotations
 
-from difflib import get_close_matches
-from typing import Annotated, Any, ClassVar, Literal, Self, get_args
+from collections.abc import Iterable, Sequence
+from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import BeforeValidator, Field, ValidationError, model_validator
+import networkx as nx
+import numpy as np
+from pydantic import Field, ValidationError
 from typing_extensions import TypeAliasType
 
+from ..core import sources
+from ..core.hierarchy import Hierarchy
+from ..core.protocols import Scenario, groups_of
 from ..core.refusals import rule
+from ..core.registry import Plugged, SettingsRegistry, closest
+from ..core.robot_agents import per_robot
 from ..core.settings import Fraction, Settings
-from . import files
+from ..core.single_agent import single_agent
+from . import builders, files
+from .builders import from_networkx
+from .checks import check_names
 
 Count = Annotated[int, Field(ge=1)]
+Groups = Sequence[Sequence[str]]
 Names = tuple[str, ...]
 Members = TypeAliasType("Members", "tuple[str | Members, ...]")
 
 
 class TopologySettings(Settings):
-    """What the settings of all topologies share: how a string is read."""
+    """What the settings of all topologies share."""
+
+    kind: str = ""
 
     argument: ClassVar[str] = ""
     """What may follow ``kind:`` in a string, for help texts; empty: nothing."""
@@ -35,10 +48,23 @@ class TopologySettings(Settings):
     @property
     def title(self) -> str:
         """What it is called in complaints."""
-        return str(getattr(self, "kind", None))
+        return self.kind
 
-    def check_unchanged(self) -> None:
-        """Refuse if a file that the topology is made from is not what it was: one line."""
+    def build(self, agents: Sequence[str], groups: Groups) -> Any:
+        """Return the graph over named agents, given by group too."""
+        raise ValueError(f"topology {self.kind!r} is no hierarchy of {len(agents)} agents")
+
+    def arrange(self, scenario: Scenario) -> tuple[Scenario, Hierarchy]:
+        """Return a scenario and the hierarchy of its agents.
+
+        The scenario is the given one, except where the agents are others than its own.
+
+        Raises
+        ------
+        ValueError
+            If the settings do not fit the agents; one line that names the culprit.
+        """
+        return scenario, hierarchy_of(self, scenario.agents, groups_of(scenario))
 
 
 class ChainSettings(TopologySettings):
@@ -60,6 +86,17 @@ class ChainSettings(TopologySettings):
             raise ValueError(f"order must be written a,b,c, received {argument!r}")
         return cls(order=names)
 
+    def build(self, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
+        """Return the graph."""
+        orders = {
+            "listed": tuple(agents),
+            "reversed": tuple(reversed(agents)),
+            "interleaved": builders.interleaved(groups),
+        }
+        order = orders[self.order] if isinstance(self.order, str) else self.order
+        check_names(order, agents, "order")
+        return builders.chain(order)
+
 
 class TreeSettings(TopologySettings):
     """A tree in which every agent but the last ones has `branching` subordinates."""
@@ -73,6 +110,10 @@ class TreeSettings(TopologySettings):
     def parsed(cls, argument: str) -> Self:
         """Read the branching."""
         return cls(branching=_integer(argument, "branching"))
+
+    def build(self, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
+        """Return the graph."""
+        return builders.tree(agents, self.branching)
 
 
 class StarSettings(TopologySettings):
@@ -88,6 +129,10 @@ class StarSettings(TopologySettings):
     def parsed(cls, argument: str) -> Self:
         """Read the leader's name."""
         return cls(leader=argument)
+
+    def build(self, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
+        """Return the graph."""
+        return builders.star(agents, self.leader)
 
 
 class TeamsSettings(TopologySettings):
@@ -109,11 +154,21 @@ class TeamsSettings(TopologySettings):
         """Read the link."""
         return cls.model_validate({"link": argument})
 
+    def build(self, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
+        """Return the graph."""
+        members = groups if self.members is None else self.members
+        check_names(builders.names_of(members), agents, "members")
+        return builders.teams(members, self.link)
+
 
 class IndependentSettings(TopologySettings):
     """Agents that do not see one another."""
 
     kind: Literal["independent"] = "independent"
+
+    def build(self, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
+        """Return the graph."""
+        return builders.independent(agents)
 
 
 class EdgesSettings(TopologySettings):
@@ -137,6 +192,10 @@ class EdgesSettings(TopologySettings):
         edges = tuple(part for part in parts if len(part) == 2)
         return cls.model_validate({"edges": edges, "alone": [p[0] for p in parts if len(p) == 1]})
 
+    def build(self, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
+        """Return the graph."""
+        return builders.from_edges(agents, self.edges, self.alone)
+
 
 class RandomSettings(TopologySettings):
     """A random hierarchy: each agent above each lower-ranked one with a chance."""
@@ -153,84 +212,33 @@ class RandomSettings(TopologySettings):
         """Read the seed."""
         return cls(seed=_integer(argument, "seed"))
 
-
-class _OfAFile(TopologySettings):
-    """What a file defines: results belong to the content that it has."""
-
-    digest: str = ""
-    """Hash of the file's content, filled in when missing."""
-
-    key: ClassVar[str]
-    """The setting that names the file."""
-
-    @classmethod
-    def digest_of(cls, named: str) -> str:
-        """Return the hash of the present content of what is named."""
-        return files.digest(named)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _fill_digest(cls, table: Any) -> Any:
-        named = table.get(cls.key) if isinstance(table, dict) else None
-        if isinstance(named, str) and not table.get("digest"):
-            return {**table, "digest": cls.digest_of(named)}
-        return table
-
-    @classmethod
-    def parsed(cls, argument: str) -> Self:
-        """Read what is named."""
-        return cls.model_validate({cls.key: argument})
-
-    @property
-    def title(self) -> str:
-        """What is named."""
-        return str(getattr(self, self.key))
-
-    def check_unchanged(self) -> None:
-        """Refuse another content than the digest's."""
-        if (found := self.digest_of(self.title)) != self.digest:
-            raise ValueError(f"has changed: its digest is {found}, the settings say {self.digest}")
+    def build(self, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
+        """Return the graph."""
+        return builders.random_hierarchy(agents, self.seed, self.density)
 
 
-class FileSettings(_OfAFile):
+class FileSettings(TopologySettings):
     """A graph from a GraphML or JSON file."""
 
     kind: Literal["file"] = "file"
     path: str
+    """Of the file, relative to the spec."""
 
     argument: ClassVar[str] = "PATH.graphml|PATH.json"
-    key: ClassVar[str] = "path"
-
-
-class PythonSettings(_OfAFile):
-    """A user's function in a Python file."""
-
-    kind: Literal["python"] = "python"
-    source: str
-    """``path/to/file.py:function``, see `nested_agents.topologies.files`."""
-
-    argument: ClassVar[str] = "PATH.py:FUNCTION"
-    key: ClassVar[str] = "source"
 
     @classmethod
-    def digest_of(cls, named: str) -> str:
-        """Return the hash of the file that holds the function."""
-        return files.digest(files.split_source(named)[0])
+    def parsed(cls, argument: str) -> Self:
+        """Read the path."""
+        return cls(path=argument)
 
+    @property
+    def title(self) -> str:
+        """The path."""
+        return self.path
 
-class PackageSettings(_OfAFile):
-    """A user's function in an installed package, by entry point."""
-
-    kind: Literal["package"] = "package"
-    name: str
-
-    argument: ClassVar[str] = "NAME"
-    key: ClassVar[str] = "name"
-
-    @classmethod
-    def digest_of(cls, named: str) -> str:
-        """Return the hash of the file in which the package defines it."""
-        return files.package_digest(named)
+    def build(self, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
+        """Return the graph."""
+        return from_networkx(files.read_graph(self.path), agents)
 
 
 class SingleAgentSettings(TopologySettings):
@@ -238,28 +246,40 @@ class SingleAgentSettings(TopologySettings):
 
     kind: Literal["single-agent"] = "single-agent"
 
+    def arrange(self, scenario: Scenario) -> tuple[Scenario, Hierarchy]:
+        """Return the scenario as that of one agent."""
+        one = single_agent(scenario)
+        return one, Hierarchy(one.agents, [])
+
 
 class PerRobotSettings(TopologySettings):
     """One agent per robot, driving all its wheels; these agents form a chain."""
 
     kind: Literal["per-robot"] = "per-robot"
 
+    def arrange(self, scenario: Scenario) -> tuple[Scenario, Hierarchy]:
+        """Return the scenario as that of one agent per robot, and their chain."""
+        robots = per_robot(scenario)
+        return robots, Hierarchy(robots.agents, builders.chain(robots.agents).edges)
 
-AnyTopology = Annotated[
-    ChainSettings
-    | TreeSettings
-    | StarSettings
-    | TeamsSettings
-    | IndependentSettings
-    | EdgesSettings
-    | RandomSettings
-    | FileSettings
-    | PythonSettings
-    | PackageSettings
-    | SingleAgentSettings
-    | PerRobotSettings,
-    Field(discriminator="kind"),
-]
+
+TOPOLOGIES = SettingsRegistry(
+    "topology",
+    {
+        "chain": f"{__name__}:ChainSettings",
+        "tree": f"{__name__}:TreeSettings",
+        "star": f"{__name__}:StarSettings",
+        "teams": f"{__name__}:TeamsSettings",
+        "independent": f"{__name__}:IndependentSettings",
+        "edges": f"{__name__}:EdgesSettings",
+        "random": f"{__name__}:RandomSettings",
+        "file": f"{__name__}:FileSettings",
+        "single-agent": f"{__name__}:SingleAgentSettings",
+        "per-robot": f"{__name__}:PerRobotSettings",
+    },
+    TopologySettings,
+)
+"""Topologies by name."""
 
 
 def parse(text: str) -> TopologySettings:
@@ -280,36 +300,48 @@ def parse(text: str) -> TopologySettings:
     """
     kind, colon, argument = text.partition(":")
     try:
-        if kind in KINDS:
-            model = KINDS[kind]
+        if kind in TOPOLOGIES.built_in:
+            model = TOPOLOGIES.model(kind)
+            assert issubclass(model, TopologySettings)
             return model.parsed(argument) if colon else model()
-        if text.endswith((".graphml", ".json")):
+        if sources.is_file(text):
             return FileSettings(path=text)
-        if ".py:" in text:
-            return PythonSettings(source=text)
-        if text in files.installed():
-            return PackageSettings(name=text)
+        if sources.is_reference(text) or text in TOPOLOGIES.installed():
+            found = TOPOLOGIES.parsed(text)
+            assert isinstance(found, TopologySettings)
+            return found
     except ValidationError as error:
         raise ValueError(f"topology {text!r}: {_one_line(error)}") from None
     except ValueError as error:
         raise ValueError(f"topology {text!r}: {error}") from None
-    known = [*KINDS, *files.installed()]
-    near = get_close_matches(kind, known, n=1)
-    hint = f"did you mean {near[0]!r}? " if near else ""
-    raise ValueError(f"topology {text!r}: {hint}known: {', '.join(known)}, or a file")
+    known = closest(kind, TOPOLOGIES.names())
+    raise ValueError(f"topology {text!r}: {known}, or a file")
 
 
-def _from_text(value: object) -> object:
-    return parse(value) if isinstance(value, str) else value
-
-
-Topology = Annotated[AnyTopology, BeforeValidator(_from_text)]
+Topology = Annotated[TopologySettings, Plugged(TOPOLOGIES, parse)]
 """Any topology's settings: a table told apart by `kind`, or a string for `parse`."""
 
-KINDS: dict[str, type[TopologySettings]] = {
-    model.model_fields["kind"].default: model for model in get_args(get_args(AnyTopology)[0])
-}
-"""The settings classes by kind."""
+
+def hierarchy_of(
+    settings: TopologySettings,
+    agents: Sequence[str],
+    groups: Sequence[Sequence[int]] | None = None,
+) -> Hierarchy:
+    """Build the hierarchy of `settings` over named agents; see `topologies.build`."""
+    try:
+        if not agents:
+            raise ValueError("no agents")
+        named = [(a,) for a in agents] if groups is None else _named(agents, groups)
+        if settings.kind in TOPOLOGIES.built_in:
+            graph = settings.build(agents, named)
+        else:
+            graph = from_networkx(files.called(settings, agents, named), agents)
+        return Hierarchy(agents, graph.edges)
+    except ValueError as error:
+        said = str(error)
+        for start in ("hierarchy: ", f"{settings.title}: ", f"topology {settings.title!r}: "):
+            said = said.removeprefix(start)
+        raise ValueError(f"topology {settings.title!r}: {said}") from None
 
 
 def _names(text: str) -> Names:
@@ -333,3 +365,18 @@ def _one_line(error: ValidationError) -> str:
             said = rule(problem["msg"])
             problems.append(f"{where} = {value!r}: {said}" if where else said)
     return "; ".join(problems)
+
+
+def _named(agents: Sequence[str], groups: Sequence[Any]) -> Groups:
+    """Return the names of agents given by index, by group; refuse what is no index."""
+    named = []
+    for group in groups:
+        if isinstance(group, str) or not isinstance(group, Iterable):
+            raise ValueError(f"groups: {group!r} is no group, allowed: a sequence of agent indices")
+        for i in group:
+            if not isinstance(i, int | np.integer) or not 0 <= i < len(agents):
+                last = len(agents) - 1
+                raise ValueError(f"groups: {i!r} is no agent index, allowed: 0 to {last}")
+        named.append([agents[i] for i in group])
+    check_names(builders.names_of(named), agents, "groups")
+    return named

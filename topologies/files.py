@@ -7,42 +7,15 @@ and the same names by group (robot), and returns a networkx DiGraph over all age
 
 from __future__ import annotations
 
-import hashlib
-import importlib.util
-import inspect
 import json
-import sys
-from collections.abc import Callable, Sequence
-from importlib.metadata import entry_points
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import networkx as nx
 
+from ..core import sources
 from .checks import with_edges
-
-ENTRY_POINTS = "nested_agents.topologies"
-"""The entry-point group under which installed packages offer topologies."""
-
-UserTopology = Callable[..., Any]
-
-
-def digest(path: str) -> str:
-    """Return a short hash of a file's content, so that a study notices when it changes."""
-    return hashlib.sha256(_read(path)).hexdigest()[:16]
-
-
-def package_digest(name: str) -> str:
-    """Return the `digest` of the file in which an installed package defines its topology.
-
-    Empty for compiled functions, which have no such file.
-    """
-    function = inspect.unwrap(from_package(name))
-    try:
-        path = inspect.getsourcefile(function if inspect.isroutine(function) else type(function))
-    except TypeError:
-        path = None
-    return digest(path) if path else ""
 
 
 def read_graph(path: str) -> nx.DiGraph:
@@ -56,13 +29,13 @@ def read_graph(path: str) -> nx.DiGraph:
     ValueError
         If the file cannot be read or holds no graph.
     """
-    text = _read(path)
     suffix = Path(path).suffix
-    if suffix not in (".graphml", ".json"):
+    if suffix not in sources.GRAPHS:
         raise ValueError(f"{path}: suffix must be .graphml or .json")
+    text = sources.active().text(path)
     try:
         if suffix == ".graphml":
-            graph = nx.parse_graphml(text.decode())
+            graph = nx.parse_graphml(text)
         else:
             graph = _graph_of(json.loads(text))
     except (ValueError, KeyError, TypeError, SyntaxError, nx.NetworkXException) as error:
@@ -71,92 +44,20 @@ def read_graph(path: str) -> nx.DiGraph:
     return graph
 
 
-def from_python(source: str) -> UserTopology:
-    """Return the function named by ``"path/to/file.py:function"``.
+class Builder(Protocol):
+    """What makes a user's hierarchy: settings that build it."""
 
-    Raises
-    ------
-    ValueError
-        If there is no such file or function, or the file raises when it is read.
-    """
-    path, name = split_source(source)
-    _read(path)
-    spec = importlib.util.spec_from_file_location(f"_topology_{digest(path)}", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module  # dataclasses look their own module up
-    try:
-        spec.loader.exec_module(module)
-    except (Exception, SystemExit) as error:
-        del sys.modules[spec.name]
-        raise ValueError(f"{path} cannot be run: {type(error).__name__}: {error}") from None
-    function = getattr(module, name, None)
-    if not callable(function):
-        own = [n for n, f in vars(module).items() if getattr(f, "__module__", "") == spec.name]
-        raise ValueError(f"{path} has no function {name!r}, it has: {', '.join(own) or 'none'}")
-    return function
+    @property
+    def title(self) -> str:
+        """What it is called."""
+        ...
+
+    def build(self, agents: Sequence[str], groups: Sequence[Sequence[str]]) -> Any:
+        """Return a graph, or pairs (superior, subordinate)."""
+        ...
 
 
-def split_source(source: str) -> tuple[str, str]:
-    """Split ``"path/to/file.py:function"``.
-
-    Examples
-    --------
-    >>> split_source("ring.py:ring")
-    ('ring.py', 'ring')
-    """
-    path, colon, name = source.rpartition(":")
-    if not (colon and path.endswith(".py") and name.isidentifier()):
-        raise ValueError(f"{source!r} must be written path/to/file.py:function")
-    return path, name
-
-
-def installed() -> dict[str, str]:
-    """Return the topologies that installed packages offer: their values by name.
-
-    Raises
-    ------
-    ValueError
-        If two packages offer one name.
-    """
-    found: dict[str, str] = {}
-    for point in entry_points(group=ENTRY_POINTS):
-        if found.setdefault(point.name, point.value) != point.value:
-            raise ValueError(
-                f"entry point {point.name!r} is offered twice: {found[point.name]}, {point.value}"
-            )
-    return found
-
-
-def from_package(name: str) -> UserTopology:
-    """Return the function that an installed package offers under `name`.
-
-    Raises
-    ------
-    ValueError
-        If none does, or importing it fails.
-    """
-    known = installed()
-    if name not in known:
-        raise ValueError(
-            f"no installed package offers {name!r}, they offer: {', '.join(known) or 'none'}"
-        )
-    (point, *_) = entry_points(group=ENTRY_POINTS, name=name)
-    try:
-        function = point.load()
-    except Exception as error:
-        raise ValueError(
-            f"entry point {name!r} cannot be loaded: {type(error).__name__}: {error}"
-        ) from None
-    if not callable(function):
-        raise ValueError(f"entry point {name!r} ({point.value}) is no function")
-    return function
-
-
-def called(
-    function: UserTopology, agents: Sequence[str], groups: Sequence[Sequence[str]]
-) -> nx.DiGraph:
+def called(builder: Builder, agents: Sequence[str], groups: Sequence[Sequence[str]]) -> nx.DiGraph:
     """Return the graph that a user's function makes.
 
     Raises
@@ -164,22 +65,21 @@ def called(
     ValueError
         If it raises, returns neither a graph nor pairs, or not the same ones twice.
     """
-    graph, again = (_returned(function, agents, groups) for _ in range(2))
+    graph, again = (_returned(builder, agents, groups) for _ in range(2))
     if set(graph.edges) != set(again.edges):
-        name = getattr(function, "__name__", "the function")
         raise ValueError(
-            f"{name} returned another hierarchy when called again; random numbers must be drawn "
-            "from a seed of its own"
+            f"{_name(builder)} returned another hierarchy when called again; random numbers must "
+            "be drawn from a seed of its own"
         )
     return graph
 
 
 def _returned(
-    function: UserTopology, agents: Sequence[str], groups: Sequence[Sequence[str]]
+    builder: Builder, agents: Sequence[str], groups: Sequence[Sequence[str]]
 ) -> nx.DiGraph:
-    name = getattr(function, "__name__", "the function")
+    name = _name(builder)
     try:
-        result = function(tuple(agents), tuple(tuple(group) for group in groups))
+        result = builder.build(tuple(agents), tuple(tuple(group) for group in groups))
     except Exception as error:
         raise ValueError(f"{name} raised {type(error).__name__}: {error}") from None
     if isinstance(result, nx.Graph):
@@ -196,6 +96,10 @@ def _returned(
     return with_edges(graph, edges)
 
 
+def _name(builder: Builder) -> str:
+    return builder.title.rpartition(":")[2]
+
+
 def _graph_of(content: Any) -> nx.DiGraph:
     if not isinstance(content, dict):
         raise ValueError("it must be an object with the key edges")
@@ -208,10 +112,3 @@ def _graph_of(content: Any) -> nx.DiGraph:
     graph = nx.DiGraph()
     graph.add_nodes_from(content.get("alone", []))
     return with_edges(graph, content["edges"])
-
-
-def _read(path: str) -> bytes:
-    try:
-        return Path(path).read_bytes()
-    except OSError as error:
-        raise ValueError(f"{path}: {error.strerror or error}") from None

@@ -14,7 +14,7 @@ from typing import Any, Literal
 from ..core.cost import below_counts
 from ..core.hierarchy import Hierarchy
 from ..core.robot_agents import MOST_ACTIONS, robot_of
-from . import KINDS, TopologySettings, build, builders, files, parse
+from . import TOPOLOGIES, TopologySettings, build, builders, files, parse
 from .config import (
     ChainSettings,
     EdgesSettings,
@@ -171,13 +171,15 @@ def team_of(
 def kinds(form: Form) -> str:
     """Return all topologies, built-in and installed, for printing."""
     rows: list[dict[str, Any]] = []
-    for kind, model in KINDS.items():
+    for kind in TOPOLOGIES.built_in:
+        model = TOPOLOGIES.model(kind)
+        assert issubclass(model, TopologySettings)
         summary = (model.__doc__ or "").splitlines()[0]
         optional = not any(field.is_required() for field in model.model_fields.values())
         rows.append(
             {"kind": kind, "argument": model.argument, "optional": optional, "summary": summary}
         )
-    for name, value in files.installed().items():
+    for name, value in TOPOLOGIES.installed().items():
         summary = f"Installed: {value}"
         rows.append({"kind": name, "argument": "", "optional": True, "summary": summary})
     if form == "json":

@@ -2,24 +2,25 @@
 
 Agent i proposes each of its actions; the actions above are fixed, the unseen maintain, and the
 joint actions of the agents below are tried. Their next states are predicted and valued, and the
-values are gathered per own action: by their maximum, their mean, or their mean weighted with how
-often the agents below were seen to act so. Evaluators differ in which joint actions they try.
+values are aggregated per own action, by the teammate model: their maximum (best response), their
+mean (uniform), or their mean weighted with how often the agents below were seen to act so
+(empirical frequencies). Evaluators differ in which joint actions they try.
 """
 
-from .evaluator import Counts, Evaluator, Rule
-from .exact import MOST_JOINT_ACTIONS, ExactEnumeration
-from .latin_hypercube import LatinHypercube
-from .sampling import Sampling
-from .summed import Extremes, Moments
+from ..registry import SettingsRegistry
+from .evaluator import EvaluatorSettings
 
-__all__ = [
-    "MOST_JOINT_ACTIONS",
-    "Counts",
-    "Evaluator",
-    "ExactEnumeration",
-    "Extremes",
-    "LatinHypercube",
-    "Moments",
-    "Rule",
-    "Sampling",
-]
+EVALUATORS = SettingsRegistry(
+    "evaluator",
+    {
+        "auto": f"{__name__}.auto:AutoSettings",
+        "exact": f"{__name__}.exact:ExactSettings",
+        "sampling": f"{__name__}.sampling:SamplingSettings",
+        "moments": f"{__name__}.additive:MomentsSettings",
+        "extremes": f"{__name__}.additive:ExtremesSettings",
+    },
+    EvaluatorSettings,
+)
+"""Evaluators by name."""
+
+__all__ = ["EVALUATORS", "EvaluatorSettings"]

@@ -1,19 +1,57 @@
-"""What an evaluator is, and what those that try joint actions share."""
+"""What an evaluator is and what it is asked, and what those share that try joint actions."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol, cast
 
 import numpy as np
 
 from ..arrays import FloatArray, IntArray
 from ..hierarchy import Hierarchy
-from ..protocols import Prediction
-from ..rules.rule_base import RuleBase
+from ..protocols import Prediction, RewardPrediction
+from ..settings import Settings
+
+if TYPE_CHECKING:
+    from ..rules.rule_base import RuleBase
 
 Rule = Literal["value", "reward", "reward-and-value"]
-Others = Literal["max", "mean", "observed"]
+"""By what a joint action is valued."""
+Teammates = Literal["best-response", "uniform", "empirical"]
+"""The teammate model: what the agents below are expected to do."""
+
+
+class Deliberation(NamedTuple):
+    """What an agent knows when it decides.
+
+    Attributes
+    ----------
+    agent
+        The deciding agent.
+    joint_action
+        ``(n,)`` the actions decided above; neutral elsewhere.
+    prediction
+        Predicts what joint actions would lead to.
+    weights
+        The consequent weights ``(n_rules,)`` of every agent, in agent order.
+    frequencies
+        ``(n, A)`` how often each agent was seen to take each action, rows summing to one.
+    rng
+        Source of randomness.
+    """
+
+    agent: int
+    joint_action: IntArray
+    prediction: Prediction
+    weights: Sequence[FloatArray]
+    frequencies: FloatArray
+    rng: np.random.Generator
+
+    @property
+    def own_weights(self) -> FloatArray:
+        """The consequent weights of the deciding agent."""
+        return self.weights[self.agent]
 
 
 @dataclass
@@ -34,33 +72,51 @@ class Evaluator(Protocol):
     counts: Counts
     """What has been evaluated so far; the team adds what it learns."""
 
-    def values(
-        self,
-        agent: int,
-        joint_action: IntArray,
-        theta: FloatArray,
-        prediction: Prediction,
-        frequencies: FloatArray,
-        rng: np.random.Generator,
-    ) -> FloatArray:
-        """Return the value ``(A,)`` of each action of `agent`.
-
-        Parameters
-        ----------
-        agent
-            The deciding agent.
-        joint_action
-            ``(n,)`` decided actions above, neutral elsewhere.
-        theta
-            ``(n_rules,)`` the agent's consequent weights.
-        prediction
-            Predicts next states and rewards.
-        frequencies
-            ``(n, A)`` how often each agent was seen to take each action, rows summing to one.
-        rng
-            Source of randomness.
-        """
+    def values(self, deliberation: Deliberation) -> FloatArray:
+        """Return the value ``(A,)`` of each action of the deciding agent."""
         ...
+
+
+@dataclass(frozen=True)
+class DecisionProblem:
+    """What all decisions of a team have in common.
+
+    Attributes
+    ----------
+    rules
+        The agents' rule base.
+    hierarchy
+        Who is below whom.
+    n_actions
+        Actions A of every agent.
+    groups
+        Agents by body.
+    additive
+        Whether predictions can be had to first order, as sums over groups.
+    rule, teammates
+        By what a joint action is valued, and what the agents below are expected to do.
+    discount
+        Weight of the value, where it is added to the reward.
+    """
+
+    rules: RuleBase
+    hierarchy: Hierarchy
+    n_actions: int
+    groups: tuple[tuple[int, ...], ...]
+    additive: bool
+    rule: Rule
+    teammates: Teammates
+    discount: float
+
+
+class EvaluatorSettings(Settings):
+    """What the settings of all evaluators inherit."""
+
+    kind: str = ""
+
+    def build(self, problem: DecisionProblem) -> Evaluator:
+        """Return the evaluator of a team."""
+        raise TypeError(f"evaluator {self.kind!r} says not how it is built")
 
 
 def combinations(agents: tuple[int, ...], n_actions: int) -> IntArray:
@@ -71,71 +127,58 @@ def combinations(agents: tuple[int, ...], n_actions: int) -> IntArray:
     return np.ascontiguousarray(grid.T, dtype=np.int64)
 
 
-def weights_of(frequencies: FloatArray, below: tuple[int, ...]) -> FloatArray:
+def probabilities_of(frequencies: FloatArray, below: tuple[int, ...]) -> FloatArray:
     """Return the probability ``(A ** k,)`` of each joint action of the k agents below."""
-    weights = np.ones(1)
+    probabilities = np.ones(1)
     for agent in below:
-        weights = np.multiply.outer(weights, frequencies[agent]).ravel()
-    return weights / weights.sum()
+        probabilities = np.multiply.outer(probabilities, frequencies[agent]).ravel()
+    return probabilities / probabilities.sum()
 
 
-class Gathering:
-    """What the evaluators share: the rule of decision and the gathering over the agents below."""
+class Aggregation:
+    """What evaluators share: the decision rule, and the aggregation over teammates."""
 
-    def __init__(
-        self,
-        rules: RuleBase,
-        hierarchy: Hierarchy,
-        n_actions: int,
-        rule: Rule,
-        others: Others,
-        discount: float,
-    ) -> None:
-        self.rules, self.hierarchy, self.n_actions = rules, hierarchy, n_actions
-        self.rule, self.others, self.discount = rule, others, discount
+    def __init__(self, problem: DecisionProblem) -> None:
+        self.problem = problem
+        self.rules, self.hierarchy = problem.rules, problem.hierarchy
+        self.n_actions = problem.n_actions
         self.counts = Counts()
 
     def count(self, joint_actions: int) -> None:
         """Note that joint actions have been valued."""
         self.counts.joint_actions += joint_actions
-        if self.rule != "reward":
+        if self.problem.rule != "reward":
             self.counts.rule_evaluations += joint_actions * self.rules.n_rules
 
-    def indifferent(self, theta: FloatArray) -> bool:
+    def indifferent(self, weights: FloatArray) -> bool:
         """Return whether every action must come to zero: nothing is learned yet, or ever."""
-        return self.rule == "value" and not theta[:64].any() and not theta.any()
+        return self.problem.rule == "value" and not weights[:64].any() and not weights.any()
 
-    def by_states(
-        self,
-        agent: int,
-        joint_action: IntArray,
-        tried: IntArray,
-        theta: FloatArray,
-        prediction: Prediction,
-    ) -> FloatArray:
+    def by_states(self, deliberation: Deliberation, tried: IntArray) -> FloatArray:
         """Value ``(A, m)`` each own action with each of the joint actions `tried` ``(m, k)``."""
-        a = self.n_actions
-        joint = np.tile(joint_action, (a * len(tried), 1))
+        agent, prediction, a = deliberation.agent, deliberation.prediction, self.n_actions
+        joint = np.tile(deliberation.joint_action, (a * len(tried), 1))
         joint[:, agent] = np.repeat(np.arange(a), len(tried))
         joint[:, list(self.hierarchy.below(agent))] = np.tile(tried, (a, 1))
         self.count(len(joint))
         rewards = values = None
-        if self.rule != "value":
-            rewards = prediction.rewards(joint)
-        if self.rule != "reward":
-            values = self.rules.values(theta, prediction.states(agent, joint))
+        if self.problem.rule != "value":
+            rewards = cast(RewardPrediction, prediction).rewards(joint)
+        if self.problem.rule != "reward":
+            states = prediction.states(agent, joint)
+            values = self.rules.values(deliberation.own_weights, states)
         return self.combine(rewards, values).reshape(a, -1)
 
     def combine(self, rewards: FloatArray | None, values: FloatArray | None) -> FloatArray:
-        """Return what the rule of decision makes of predicted rewards and values."""
+        """Return what the decision rule makes of predicted rewards and values."""
         if rewards is None or values is None:
             combined = values if rewards is None else rewards
             assert combined is not None
             return combined
-        return rewards + self.discount * values
+        return rewards + self.problem.discount * values
 
-    def gather(self, values: FloatArray, weights: FloatArray | None) -> FloatArray:
-        """Return per row ``(A, m)`` the maximum, mean or weighted mean."""
-        if self.others == "max":
+    def aggregate(self, values: FloatArray, probabilities: FloatArray | None) -> FloatArray:
+        """Return per row ``(A, m)`` the maximum, mean or weighted mean, by the teammate model."""
+        if self.problem.teammates == "best-response":
             return values.max(axis=1)
-        return values.mean(axis=1) if weights is None else values @ weights
+        return values.mean(axis=1) if probabilities is None else values @ probabilities

@@ -2,22 +2,44 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Literal, cast
+
 import numpy as np
 
 from ..arrays import FloatArray, IntArray
-from ..protocols import Prediction
-from ..rules.kernels import Tried
-from .evaluator import Gathering, combinations, weights_of
+from ..protocols import TabulatedPrediction
+from .evaluator import (
+    Aggregation,
+    DecisionProblem,
+    Deliberation,
+    EvaluatorSettings,
+    combinations,
+    probabilities_of,
+)
+
+if TYPE_CHECKING:
+    from ..rules.kernels import Tried
 
 MOST_JOINT_ACTIONS = 4**12
 """The most that one agent enumerates: beyond, the tables do not fit into memory."""
 
 
-class ExactEnumeration(Gathering):
+class ExactSettings(EvaluatorSettings):
+    """Enumerate all joint actions of the agents below, as the paper does."""
+
+    kind: Literal["exact"] = "exact"
+
+    def build(self, problem: DecisionProblem) -> ExactEnumeration:
+        """Return the evaluator of a team."""
+        return ExactEnumeration(problem)
+
+
+class ExactEnumeration(Aggregation):
     """Tries every joint action of the agents below: ``A ** (1 + len(below))`` per agent.
 
-    If all agents together try at least as many joint actions as there are, next states are taken
-    from a table of all, else they are predicted for the joint actions that are tried.
+    If all agents together try at least as many joint actions as there are, and the prediction has
+    tables of all, next states are taken from there; else they are predicted for the joint actions
+    that are tried.
 
     Raises
     ------
@@ -25,8 +47,8 @@ class ExactEnumeration(Gathering):
         If an agent would have to try more than `MOST_JOINT_ACTIONS`.
     """
 
-    def __init__(self, *args: object) -> None:
-        super().__init__(*args)  # type: ignore[arg-type]
+    def __init__(self, problem: DecisionProblem) -> None:
+        super().__init__(problem)
         n, a = len(self.hierarchy), self.n_actions
         for i, name in enumerate(self.hierarchy.agents):
             free = 1 + len(self.hierarchy.below(i))
@@ -36,55 +58,59 @@ class ExactEnumeration(Gathering):
                     f"actions, exact enumeration allows {MOST_JOINT_ACTIONS}; use sampling"
                 )
         self._below = [combinations(self.hierarchy.below(i), a) for i in range(n)]
-        self._tabulated = self.hierarchy.joint_actions(a) >= a**n
-        self._chances = np.full((n, a), 1.0 / a) if self.others == "mean" else np.zeros((0, 0))
-        if self._tabulated:
+        uniform = problem.teammates == "uniform"
+        self._expected = np.full((n, a), 1.0 / a) if uniform else np.zeros((0, 0))
+        self._tried: list[Tried] = []
+        if self.hierarchy.joint_actions(a) >= a**n:
             places = a ** np.arange(n - 1, -1, -1, dtype=np.int64)
             self._tried = [self._tried_by(i, places) for i in range(n)]
 
     def _tried_by(self, agent: int, places: IntArray) -> Tried:
+        from ..rules.kernels import Tried
+
         below = np.array(self.hierarchy.below(agent), dtype=np.int64)
-        codes = np.arange(self.n_actions)[:, None] * places[agent]
-        codes = codes + (self._below[agent] @ places[below])[None, :]
+        indices = np.arange(self.n_actions)[:, None] * places[agent]
+        indices = indices + (self._below[agent] @ places[below])[None, :]
         given = places.copy()
         given[agent] = given[below] = 0
-        return Tried(codes, given, below)
+        return Tried(indices, given, below)
 
-    def values(
-        self,
-        agent: int,
-        joint_action: IntArray,
-        theta: FloatArray,
-        prediction: Prediction,
-        frequencies: FloatArray,
-        rng: np.random.Generator,
-    ) -> FloatArray:
-        """Return the value ``(A,)`` of each action of `agent`, see `Evaluator.values`."""
-        if self._tabulated and self.rule == "value":
+    def values(self, deliberation: Deliberation) -> FloatArray:
+        """Return the value ``(A,)`` of each action of the deciding agent."""
+        agent, problem = deliberation.agent, self.problem
+        tabulated = bool(self._tried) and hasattr(deliberation.prediction, "blocks")
+        if tabulated and problem.rule == "value":
             tried = self._tried[agent]
             self.count(tried.codes.size)
+            empirical = problem.teammates == "empirical"
             return self.rules.enumerate(
-                theta, prediction.blocks(agent), tried, joint_action,
-                frequencies if self.others == "observed" else self._chances,
-            )  # fmt: skip
+                deliberation.own_weights,
+                cast(TabulatedPrediction, deliberation.prediction).blocks(agent),
+                tried,
+                deliberation.joint_action,
+                deliberation.frequencies if empirical else self._expected,
+            )
         below, combined = self.hierarchy.below(agent), self._below[agent]
-        if self.indifferent(theta):
+        if self.indifferent(deliberation.own_weights):
             self.count(self.n_actions * len(combined))
             return np.zeros(self.n_actions)
-        weights = weights_of(frequencies, below) if self.others == "observed" else None
-        if self._tabulated:
-            table = self._by_codes(agent, joint_action, theta, prediction)
+        probabilities = None
+        if problem.teammates == "empirical":
+            probabilities = probabilities_of(deliberation.frequencies, below)
+        if tabulated:
+            table = self._by_tables(deliberation)
         else:
-            table = self.by_states(agent, joint_action, combined, theta, prediction)
-        return self.gather(table, weights)
+            table = self.by_states(deliberation, combined)
+        return self.aggregate(table, probabilities)
 
-    def _by_codes(
-        self, agent: int, joint_action: IntArray, theta: FloatArray, prediction: Prediction
-    ) -> FloatArray:
-        tried = self._tried[agent]
-        codes = (tried.codes + int(joint_action @ tried.places)).ravel()
-        self.count(len(codes))
-        rewards, values = prediction.reward_table()[codes], None
-        if self.rule != "reward":
-            values = self.rules.block_values(theta, prediction.blocks(agent), codes)
+    def _by_tables(self, deliberation: Deliberation) -> FloatArray:
+        """Value ``(A, m)`` each own action with each joint action below, by rewards too."""
+        prediction = cast(TabulatedPrediction, deliberation.prediction)
+        tried = self._tried[deliberation.agent]
+        indices = (tried.codes + int(deliberation.joint_action @ tried.places)).ravel()
+        self.count(len(indices))
+        rewards, values = prediction.reward_table()[indices], None
+        if self.problem.rule != "reward":
+            blocks = prediction.blocks(deliberation.agent)
+            values = self.rules.block_values(deliberation.own_weights, blocks, indices)
         return self.combine(rewards, values).reshape(self.n_actions, -1)

@@ -2,48 +2,65 @@
 
 from __future__ import annotations
 
+from typing import Annotated, Literal
+
 import numpy as np
+from pydantic import Field
 
-from ..arrays import FloatArray, IntArray
-from ..protocols import Prediction
-from .evaluator import Gathering, combinations, weights_of
+from ..arrays import FloatArray
+from .evaluator import (
+    Aggregation,
+    DecisionProblem,
+    Deliberation,
+    EvaluatorSettings,
+    combinations,
+    probabilities_of,
+)
+
+Samples = Annotated[int, Field(ge=1, le=1_000_000)]
 
 
-class Sampling(Gathering):
+class SamplingSettings(EvaluatorSettings):
+    """Try a random sample of the joint actions of the agents below."""
+
+    kind: Literal["sampling"] = "sampling"
+    samples: Samples = 64
+    """Joint actions of the agents below that are tried with each own action."""
+
+    def build(self, problem: DecisionProblem) -> Sampling:
+        """Return the evaluator of a team."""
+        return Sampling(self.samples, problem)
+
+
+class Sampling(Aggregation):
     """Tries a random sample of the joint actions below, the same ones for every own action.
 
-    Drawn with equal chance, or from the observed frequencies if others are "observed" (then the
-    plain mean estimates the weighted one). With no more joint actions than samples, all are tried.
+    Drawn with equal probability, or from the empirical frequencies if these are the teammate model
+    (then the plain mean estimates the weighted one). With no more joint actions than samples, all
+    are tried.
     """
 
-    def __init__(self, samples: int, *args: object) -> None:
-        super().__init__(*args)  # type: ignore[arg-type]
+    def __init__(self, samples: int, problem: DecisionProblem) -> None:
+        super().__init__(problem)
         self.samples = samples
 
-    def values(
-        self,
-        agent: int,
-        joint_action: IntArray,
-        theta: FloatArray,
-        prediction: Prediction,
-        frequencies: FloatArray,
-        rng: np.random.Generator,
-    ) -> FloatArray:
-        """Return the value ``(A,)`` of each action of `agent`, see `Evaluator.values`."""
-        below, a = self.hierarchy.below(agent), self.n_actions
-        weights = None
+    def values(self, deliberation: Deliberation) -> FloatArray:
+        """Return the value ``(A,)`` of each action of the deciding agent."""
+        below, a = self.hierarchy.below(deliberation.agent), self.n_actions
+        frequencies, rng = deliberation.frequencies, deliberation.rng
+        empirical = self.problem.teammates == "empirical"
+        probabilities = None
         if a ** len(below) <= self.samples:
             tried = combinations(below, a)
-            if self.others == "observed":
-                weights = weights_of(frequencies, below)
-        elif self.others == "observed":
+            if empirical:
+                probabilities = probabilities_of(frequencies, below)
+        elif empirical:
             ladder = frequencies[list(below)].cumsum(axis=1)[:, :-1]
             draws = rng.random((self.samples, len(below), 1))
             tried = (draws >= ladder).sum(axis=2)
         else:
             tried = rng.integers(a, size=(self.samples, len(below)))
-        if self.indifferent(theta):
+        if self.indifferent(deliberation.own_weights):
             self.count(a * len(tried))
             return np.zeros(a)
-        table = self.by_states(agent, joint_action, tried, theta, prediction)
-        return self.gather(table, weights)
+        return self.aggregate(self.by_states(deliberation, tried), probabilities)

@@ -6,47 +6,20 @@ and is not learned from. A terminal state counts as entered again for ever: its 
 R(s) / (1 - discount). Siblings differ where their mathematics differs.
 """
 
-from __future__ import annotations
+from ..registry import SettingsRegistry
+from .learner import LearnerSettings
 
-from ..rules.rule_base import RuleBase
-from ..settings import (
-    AnovaTDSettings,
-    BatchTDSettings,
-    FittedValueSettings,
-    FrozenSettings,
-    GradientTDSettings,
-    TDLambdaSettings,
+LEARNERS = SettingsRegistry(
+    "learner",
+    {
+        "batch-td": f"{__name__}.batch:BatchTDSettings",
+        "td-lambda": f"{__name__}.td:TDLambdaSettings",
+        "gradient-td": f"{__name__}.gradient:GradientTDSettings",
+        "anova-td": f"{__name__}.anova:AnovaTDSettings",
+        "frozen": f"{__name__}.frozen:FrozenSettings",
+    },
+    LearnerSettings,
 )
-from ..settings import Learner as LearnerSettings
-from .anova import AnovaTD
-from .batch import BatchTD, FittedValue
-from .gradient import GradientTD
-from .learner import Frozen, Learner
-from .td import TDLambda
+"""Learners by name."""
 
-__all__ = [
-    "AnovaTD",
-    "BatchTD",
-    "FittedValue",
-    "Frozen",
-    "GradientTD",
-    "Learner",
-    "TDLambda",
-    "build_learner",
-]
-
-
-def build_learner(settings: LearnerSettings, rules: RuleBase, n_agents: int) -> Learner:
-    """Build the learner that `settings` describe, with all consequent weights zero."""
-    if isinstance(settings, TDLambdaSettings):
-        return TDLambda(settings, rules, n_agents)
-    if isinstance(settings, GradientTDSettings):
-        return GradientTD(settings, rules, n_agents)
-    if isinstance(settings, AnovaTDSettings):
-        return AnovaTD(settings, rules, n_agents)
-    if isinstance(settings, BatchTDSettings):
-        return BatchTD(settings, rules, n_agents)
-    if isinstance(settings, FittedValueSettings):
-        return FittedValue(settings, rules, n_agents)
-    assert isinstance(settings, FrozenSettings)
-    return Frozen(rules, n_agents)
+__all__ = ["LEARNERS", "LearnerSettings"]

@@ -29,18 +29,39 @@ They are consequent weights like any others: the agent decides by its rules, not
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from pydantic import Field
 
 from ..arrays import FloatArray, IntArray
-from ..rules.rule_base import RuleBase
-from ..settings import AnovaTDSettings
-from .batch import REWARD_SCALE, Replay, _lambda_returns, _moment
-from .dictionary import Dictionary
+from ..settings import Fraction
+from .batch import REWARD_SCALE, Replay, ReplaySettings
+
+if TYPE_CHECKING:
+    from ..rules.rule_base import RuleBase
+    from .dictionary import Dictionary
 
 MOST_RULES = 5**9
 """Of one agent; beyond, the weights alone take more memory than a workstation has to spare."""
+
+
+class AnovaTDSettings(ReplaySettings):
+    """Batch TD(lambda) of the full product, with a prior that prefers few variables at a time."""
+
+    kind: Literal["anova-td"] = "anova-td"
+    trace_decay: Fraction = 0.0
+    """lambda, as of batch TD."""
+    interaction: Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)] = 0.1
+    """rho: prior variance of a function of k + 1 variables over that of one of k."""
+    tolerance: Annotated[float, Field(gt=0, le=1)] = 0.01
+    """Share of its prior variance that may be left out of an after-state."""
+    dictionary: Annotated[int, Field(ge=1, le=4096)] = 800
+    """After-states that all others are described by, at most."""
+
+    def build(self, rules: RuleBase, rows: IntArray) -> AnovaTD:
+        """Return the learner of a team."""
+        return AnovaTD(self, rules, rows)
 
 
 class AnovaTD(Replay):
@@ -55,68 +76,76 @@ class AnovaTD(Replay):
     largest = MOST_RULES
     remedy = "use fewer variables or memberships"
 
-    def __init__(self, settings: AnovaTDSettings, rules: RuleBase, n_agents: int) -> None:
+    def __init__(self, settings: AnovaTDSettings, rules: RuleBase, rows: IntArray) -> None:
         d = len(rules.partitions)
         if rules.terms != (tuple(range(d)),):
             raise ValueError(
                 f"learner.rule_base: anova-td learns one product of all {d} variables; "
                 f"set learner.rule_base.order = {d} and no products"
             )
-        super().__init__(settings, rules, n_agents)
+        super().__init__(settings, rules, rows)
         self._anova = settings
         self._sizes = [p.size for p in rules.partitions]
         self._dictionaries = self._empty()
-        # u of all agents, padded with zeros.
-        self._coefficients: FloatArray = np.zeros((n_agents, settings.dictionary))
+        self._described = 0  # steps whose after-states have coordinates
+        # u of all rows, padded with zeros.
+        self._coefficients: FloatArray = np.zeros((len(self.theta), settings.dictionary))
 
     def _empty(self) -> list[Dictionary]:
+        from .dictionary import Dictionary
+
         s = self._anova
         return [
             Dictionary(self._sizes, s.interaction, s.tolerance, s.dictionary) for _ in self.theta
         ]
 
     def _regress(self) -> int:
+        from scipy.linalg import cho_factor, cho_solve
+
+        from ..rules.kernels import regression
+
         self._extend()
         s = self._anova
-        rewards, follower, known, low, high = self._experience()
-        for i, held in enumerate(self._dictionaries):
+        for row, held in enumerate(self._dictionaries):
+            rewards, follower, known, low, high = self.experience(row)
             z = held.coordinates
             gram = (known[:, None] * z).T @ z + s.ridge * np.eye(z.shape[1])
             factor = cho_factor(gram, check_finite=False)
-            before = self._coefficients[i, : z.shape[1]]
+            before = self._coefficients[row, : z.shape[1]]
             u = before
-            for _ in range(s.sweeps):
-                targets = known * np.clip(self._targets(i, u, rewards, follower), low, high)
+            for _ in range(s.regression_iterations):
+                returns = regression.lambda_returns(
+                    z @ u, rewards, follower, s.discount, s.trace_decay
+                )
+                targets = known * np.clip(returns, low, high)
                 u = cho_solve(factor, targets @ z, check_finite=False)
-            self._coefficients[i, : z.shape[1]] += s.mixing * (u - before)
-            self.theta[i] = self._consequents(i) / REWARD_SCALE
+            change = s.target_averaging_rate * (u - before)
+            self._coefficients[row, : z.shape[1]] += change
+            self.theta[row] = self._consequents(row) / REWARD_SCALE
         return self.theta.size
 
-    def _targets(
-        self, agent: int, theta: FloatArray, rewards: FloatArray, follower: IntArray
-    ) -> FloatArray:
-        """Return the lambda-returns ``(N,)`` by coefficients; arbitrary where cut off."""
-        values = self._dictionaries[agent].coordinates @ theta
-        return _lambda_returns(
-            values, rewards, follower, self._anova.discount, self._anova.trace_decay
-        )
+    def _consequents(self, row: int) -> FloatArray:
+        """Return theta of the coefficients of a row."""
+        from scipy.linalg import solve_triangular
 
-    def _consequents(self, agent: int) -> FloatArray:
-        """Return theta of the coefficients of an agent."""
-        held = self._dictionaries[agent]
-        u = self._coefficients[agent, : len(held.members)]
+        from ..rules.kernels import regression
+
+        held = self._dictionaries[row]
+        u = self._coefficients[row, : len(held.members)]
         alpha = solve_triangular(held.factor, u, lower=True, trans="T", check_finite=False)
-        states = np.array([self._states[s][agent] for s in held.members])
-        active, strengths = self.rules.active(states)
-        moment = _moment(active, strengths, alpha, self.rules.n_rules)
+        active, strengths = self.rules.active(self.states_of(row)[held.members])
+        moment = regression.moment(active, strengths, alpha, self.rules.n_rules)
         return spread(moment, self._sizes, self._anova.interaction)
 
     def _extend(self) -> None:
         """Find the coordinates of the after-states that are new since the last regression."""
-        new = np.array(self._states[self._dictionaries[0].n_states :])
-        for i, held in enumerate(self._dictionaries if len(new) else ()):
-            degrees = [p.strengths(new[:, i, j]) for j, p in enumerate(self.rules.partitions)]
+        if self._described == len(self._states):
+            return
+        for row, held in enumerate(self._dictionaries):
+            new = self.states_of(row, self._described)
+            degrees = [p.strengths(new[:, j]) for j, p in enumerate(self.rules.partitions)]
             held.add(np.concatenate(degrees, axis=1))
+        self._described = len(self._states)
 
     def arrays(self) -> dict[str, FloatArray]:
         """Return weights, coefficients and all experience."""
@@ -126,7 +155,7 @@ class AnovaTD(Replay):
         """Continue from `arrays`."""
         super().restore(arrays)
         self._coefficients = arrays["coefficients"].copy()
-        self._dictionaries = self._empty()
+        self._dictionaries, self._described = self._empty(), 0
 
 
 def spread(moment: FloatArray, sizes: Sequence[int], rho: float) -> FloatArray:

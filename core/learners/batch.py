@@ -2,25 +2,26 @@
 
 After every episode, and during long ones, several times over: give every after-state s in memory a
 target, and find the weights that minimise the squared errors of f plus ``ridge`` times the squared
-weights. Batch TD(lambda) aims at the lambda-return of what followed; fitted value iteration (the
-value iteration of Section VII) at ``R(s) + gamma max_a f(s_a)`` over predicted next states s_a, so
-that experience under exploration teaches the value of acting well. Targets are clipped to the range
-that discounted sums of the rewards seen so far can reach: no extrapolation can run away.
+weights. Batch TD(lambda) aims at the lambda-return of what followed. Targets are clipped to the range
+that discounted sums of the rewards seen so far can reach: no extrapolation can run away. Agents that
+share weights share the regression: the experience of all of them is pooled.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import numpy as np
-from numba import njit
-from scipy.linalg import cho_factor, cho_solve
+from pydantic import Field
 
 from ..arrays import FloatArray, IntArray
-from ..rules.rule_base import RuleBase
-from ..settings import BatchTDSettings, FittedValueSettings, ReplaySettings
+from ..settings import Fraction, Positive
+from .learner import LearnerSettings
+
+if TYPE_CHECKING:
+    from ..rules.rule_base import RuleBase
 
 REWARD_SCALE = 100.0
 """Rewards are of the order of 0.01; the ridge weighs against rewards times this."""
@@ -29,8 +30,37 @@ TERMINAL, CUT_OFF = -1, -2
 """In place of the index of the next after-state: it is entered for ever; it is not known."""
 
 
+class ReplaySettings(LearnerSettings):
+    """What learners share that regress on all experience, after every episode and during it."""
+
+    ridge: Positive = 10.0
+    """Weight of the squared consequents against squared errors of rewards scaled by 100."""
+    regression_iterations: Annotated[int, Field(ge=1, le=10_000)] = 30
+    """Regressions on freshly discounted targets each time."""
+    target_averaging_rate: Annotated[float, Field(gt=0, le=1)] = 0.5
+    """Share of the way that the weights go towards the last regression's: below 1 the policy does
+    not jump from episode to episode."""
+    interval: Annotated[int, Field(ge=1)] = 100
+    """Decisions of an episode after which is regressed without waiting for its end."""
+
+
+class BatchTDSettings(ReplaySettings):
+    """Batch TD(lambda): towards what followed."""
+
+    kind: Literal["batch-td"] = "batch-td"
+    trace_decay: Fraction = 0.0
+    """lambda: 0 bootstraps from the next state, 1 sums the rewards of the whole episode."""
+
+    def build(self, rules: RuleBase, rows: IntArray) -> BatchTD:
+        """Return the learner of a team."""
+        return BatchTD(self, rules, rows)
+
+
 class Experience(NamedTuple):
-    """All after-states in memory, as a regression needs them; rewards are scaled."""
+    """All after-states in memory of the agents of one row; rewards are scaled.
+
+    Of k agents and N steps, after-state ``s * k + j`` is that of agent j after step s.
+    """
 
     rewards: FloatArray
     follower: IntArray
@@ -52,40 +82,33 @@ class Replay(ABC):
         If the rule base is too large for its normal equations to be solved densely.
     """
 
-    candidates = 0
     largest = 4096
     remedy = "lower learner.rule_base.order"
 
-    def __init__(self, settings: ReplaySettings, rules: RuleBase, n_agents: int) -> None:
+    def __init__(self, settings: ReplaySettings, rules: RuleBase, rows: IntArray) -> None:
         if rules.n_rules > self.largest:
             raise ValueError(
                 f"learner.kind: batch learners solve for all rules at once: {rules.n_rules} rules, "
                 f"allowed up to {self.largest}; {self.remedy}"
             )
         self.settings, self.rules = settings, rules
-        self.theta: FloatArray = np.zeros((n_agents, rules.n_rules), rules.dtype)
+        self.members = [np.flatnonzero(rows == row) for row in range(int(rows.max()) + 1)]
+        """The agents ``(k,)`` of every row."""
+        self.theta: FloatArray = np.zeros((len(self.members), rules.n_rules), rules.dtype)
         self._states: list[FloatArray] = []
-        self._rewards: list[float] = []
+        self._rewards: list[FloatArray] = []
         self._follower: list[int] = []
         self._begun = 0  # the first after-state of the running episode
-        # Active rules and strengths of the after-states so far regressed on, per agent.
-        self._rows: list[tuple[IntArray, FloatArray]] = []
 
     def begin_episode(self) -> None:
         """Note that the first after-state follows none, even if the last episode was given up."""
         self._cut_off()
         self._begun = len(self._states)
 
-    def observe(
-        self,
-        states: FloatArray,
-        reward: float,
-        terminated: bool,
-        candidates: FloatArray | None = None,
-    ) -> int:
+    def observe(self, states: FloatArray, reward: float | FloatArray, terminated: bool) -> int:
         """Remember an after-state; regress if the episode has gone on for long enough."""
         self._states.append(states.copy())
-        self._rewards.append(reward)
+        self._rewards.append(np.broadcast_to(np.asarray(reward, dtype=float), (len(states),)))
         self._follower.append(TERMINAL if terminated else len(self._states))
         lasted = len(self._states) - self._begun
         return 0 if terminated or lasted % self.settings.interval else self._regress()
@@ -99,57 +122,42 @@ class Replay(ABC):
         if self._follower and self._follower[-1] == len(self._states):
             self._follower[-1] = CUT_OFF
 
+    @abstractmethod
     def _regress(self) -> int:
-        self._extend()
-        rewards, follower, known, low, high = self._experience()
-        for i, (active, strengths) in enumerate(self._rows):
-            gram = self.settings.ridge * np.eye(self.rules.n_rules)
-            _add_gram(gram, active, strengths, known)
-            factor = cho_factor(gram, check_finite=False)
-            theta = self.theta[i].astype(float) * REWARD_SCALE
-            for _ in range(self.settings.sweeps):
-                targets = known * np.clip(self._targets(i, theta, rewards, follower), low, high)
-                moment = _moment(active, strengths, targets, self.rules.n_rules)
-                theta = cho_solve(factor, moment, check_finite=False)
-            self.theta[i] += self.settings.mixing * (theta / REWARD_SCALE - self.theta[i])
-        return self.theta.size
+        """Find the weights of all rows anew; return how many there are."""
 
-    def _experience(self) -> Experience:
-        rewards = REWARD_SCALE * np.array(self._rewards)
-        follower = np.array(self._follower)
-        follower[follower == len(follower)] = CUT_OFF  # of a running episode: not known yet
+    def experience(self, row: int) -> Experience:
+        """Return what the agents of a row have met."""
+        members = self.members[row]
+        rewards = (REWARD_SCALE * np.array(self._rewards)[:, members]).ravel()
+        steps = np.array(self._follower)
+        steps[steps == len(steps)] = CUT_OFF  # of a running episode: not known yet
+        k = len(members)
+        follower = np.where(
+            steps[:, None] < 0, steps[:, None], steps[:, None] * k + np.arange(k)
+        ).ravel()
         known = (follower != CUT_OFF).astype(float)
         gamma = self.settings.discount
         low, high = rewards.min() / (1.0 - gamma), rewards.max() / (1.0 - gamma)
         return Experience(rewards, follower, known, low, high)
 
-    @abstractmethod
-    def _targets(
-        self, agent: int, theta: FloatArray, rewards: FloatArray, follower: IntArray
-    ) -> FloatArray:
-        """Return the targets ``(N,)`` of all after-states; arbitrary where cut off."""
+    def states_of(self, row: int, since: int = 0) -> FloatArray:
+        """Return the after-states ``(m, d)`` of a row, those since a step alone."""
+        d = len(self.rules.partitions)
+        new = np.array(self._states[since:]).reshape(-1, self._n_agents, d)
+        return new[:, self.members[row]].reshape(-1, d)
 
-    def _extend(self) -> None:
-        """Find the active rules of the after-states that are new since the last regression."""
-        done = len(self._rows[0][0]) if self._rows else 0
-        new = np.array(self._states[done:])
-        if not len(new):
-            return
-        rows = [self.rules.active(new[:, i]) for i in range(len(self.theta))]
-        if self._rows:
-            rows = [
-                (np.concatenate([old[0], row[0]]), np.concatenate([old[1], row[1]]))
-                for old, row in zip(self._rows, rows, strict=True)
-            ]
-        self._rows = rows
+    @property
+    def _n_agents(self) -> int:
+        return sum(map(len, self.members))
 
     def arrays(self) -> dict[str, FloatArray]:
         """Return weights and all experience."""
-        n, d = len(self.theta), len(self.rules.partitions)
+        n, d = self._n_agents, len(self.rules.partitions)
         return {
             "theta": self.theta,
             "states": np.array(self._states).reshape(-1, n, d),
-            "rewards": np.array(self._rewards),
+            "rewards": np.array(self._rewards).reshape(-1, n),
             "follower": np.array(self._follower, dtype=np.int64),
         }
 
@@ -157,125 +165,61 @@ class Replay(ABC):
         """Continue from `arrays`."""
         self.theta = arrays["theta"].copy()
         self._states = list(arrays["states"])
-        self._rewards = [float(r) for r in arrays["rewards"]]
+        self._rewards = list(arrays["rewards"])
         self._follower = [int(f) for f in arrays["follower"]]
         ended = [s for s, f in enumerate(self._follower) if f in (TERMINAL, CUT_OFF)]
         self._begun = ended[-1] + 1 if ended else 0
-        self._rows = []
 
 
 class BatchTD(Replay):
     """Batch TD(lambda)."""
 
-    def __init__(self, settings: BatchTDSettings, rules: RuleBase, n_agents: int) -> None:
-        super().__init__(settings, rules, n_agents)
+    def __init__(self, settings: BatchTDSettings, rules: RuleBase, rows: IntArray) -> None:
+        super().__init__(settings, rules, rows)
         self._decay = settings.trace_decay
-
-    def _targets(
-        self, agent: int, theta: FloatArray, rewards: FloatArray, follower: IntArray
-    ) -> FloatArray:
-        """Return the lambda-returns ``(N,)`` of all after-states; arbitrary where cut off."""
-        values = _row_values(theta, *self._rows[agent])
-        return _lambda_returns(values, rewards, follower, self.settings.discount, self._decay)
-
-
-class FittedValue(Replay):
-    """Fitted value iteration over predicted next states."""
-
-    def __init__(self, settings: FittedValueSettings, rules: RuleBase, n_agents: int) -> None:
-        super().__init__(settings, rules, n_agents)
-        self.candidates = settings.candidates
-        self._candidates: list[FloatArray] = []
-        self._nexts: FloatArray = np.zeros((n_agents, 0, self.candidates, 0))
+        # By row, active rules and strengths of the after-states so far regressed on.
+        self._active: list[tuple[IntArray, FloatArray]] = []
+        self._regressed = 0
 
     def _regress(self) -> int:
-        self._nexts = np.stack(self._candidates, axis=1).astype(float)
-        return super()._regress()
+        from scipy.linalg import cho_factor, cho_solve
 
-    def observe(
-        self,
-        states: FloatArray,
-        reward: float,
-        terminated: bool,
-        candidates: FloatArray | None = None,
-    ) -> int:
-        """Remember an after-state and the predicted next states ``(n, m, d)``."""
-        if candidates is None:
-            raise ValueError("fitted value iteration needs predicted next states")
-        self._candidates.append(candidates.astype(np.float32))
-        return super().observe(states, reward, terminated)
+        from ..rules.kernels import regression
 
-    def _targets(
-        self, agent: int, theta: FloatArray, rewards: FloatArray, follower: IntArray
-    ) -> FloatArray:
-        """Return R plus the discounted best predicted value ``(N,)``."""
-        nexts = self._nexts[agent]
-        values = self.rules.values(theta, nexts.reshape(-1, nexts.shape[2]))
-        best = values.reshape(nexts.shape[:2]).max(axis=1)
-        gamma = self.settings.discount
-        return np.where(follower == TERMINAL, rewards / (1.0 - gamma), rewards + gamma * best)
+        self._extend()
+        s = self.settings
+        for row, (active, strengths) in enumerate(self._active):
+            rewards, follower, known, low, high = self.experience(row)
+            gram = s.ridge * np.eye(self.rules.n_rules)
+            regression.add_gram(gram, active, strengths, known)
+            factor = cho_factor(gram, check_finite=False)
+            theta = self.theta[row].astype(float) * REWARD_SCALE
+            for _ in range(s.regression_iterations):
+                values = regression.row_values(theta, active, strengths)
+                returns = regression.lambda_returns(
+                    values, rewards, follower, s.discount, self._decay
+                )
+                targets = known * np.clip(returns, low, high)
+                moment = regression.moment(active, strengths, targets, self.rules.n_rules)
+                theta = cho_solve(factor, moment, check_finite=False)
+            change = theta / REWARD_SCALE - self.theta[row]
+            self.theta[row] += s.target_averaging_rate * change
+        return self.theta.size
 
-    def arrays(self) -> dict[str, FloatArray]:
-        """Return what batch TD returns, and the predicted next states."""
-        return {**super().arrays(), "candidates": np.array(self._candidates)}
+    def _extend(self) -> None:
+        """Find the active rules of the after-states that are new since the last regression."""
+        if self._regressed == len(self._states):
+            return
+        rows = range(len(self.theta))
+        found = [self.rules.active(self.states_of(row, self._regressed)) for row in rows]
+        if self._active:
+            found = [
+                (np.concatenate([old[0], new[0]]), np.concatenate([old[1], new[1]]))
+                for old, new in zip(self._active, found, strict=True)
+            ]
+        self._active, self._regressed = found, len(self._states)
 
     def restore(self, arrays: Mapping[str, FloatArray]) -> None:
         """Continue from `arrays`."""
         super().restore(arrays)
-        self._candidates = list(arrays["candidates"])
-
-
-@njit(cache=True)
-def _add_gram(
-    gram: FloatArray, active: IntArray, strengths: FloatArray, weights: FloatArray
-) -> None:
-    """Add the weighted phi phi' of every row to `gram`."""
-    for s in range(len(active)):
-        for a in range(active.shape[1]):
-            weighted = weights[s] * strengths[s, a]
-            if weighted > 0.0:
-                for b in range(active.shape[1]):
-                    gram[active[s, a], active[s, b]] += weighted * strengths[s, b]
-
-
-@njit(cache=True)
-def _row_values(theta: FloatArray, active: IntArray, strengths: FloatArray) -> FloatArray:
-    """Return f ``(N,)`` of all rows."""
-    values = np.zeros(len(active))
-    for s in range(len(active)):
-        for a in range(active.shape[1]):
-            values[s] += strengths[s, a] * theta[active[s, a]]
-    return values
-
-
-@njit(cache=True)
-def _moment(
-    active: IntArray, strengths: FloatArray, targets: FloatArray, n_rules: int
-) -> FloatArray:
-    """Return the sum of phi times target over all rows."""
-    moment = np.zeros(n_rules)
-    for s in range(len(active)):
-        for a in range(active.shape[1]):
-            moment[active[s, a]] += strengths[s, a] * targets[s]
-    return moment
-
-
-@njit(cache=True)
-def _lambda_returns(
-    values: FloatArray, rewards: FloatArray, follower: IntArray, discount: float, decay: float
-) -> FloatArray:
-    """Return the lambda-return of every row, by recursion from the end of each episode.
-
-    ``G(s) = R(s) + gamma ((1 - lambda) f(s') + lambda G(s'))``
-    """
-    returns = np.empty(len(values))
-    for s in range(len(values) - 1, -1, -1):
-        if follower[s] == -1:  # TERMINAL
-            returns[s] = rewards[s] / (1.0 - discount)
-        elif follower[s] == -2:  # CUT_OFF
-            returns[s] = values[s]
-        else:
-            after = follower[s]
-            ahead = (1.0 - decay) * values[after] + decay * returns[after]
-            returns[s] = rewards[s] + discount * ahead
-    return returns
+        self._active, self._regressed = [], 0

@@ -6,13 +6,35 @@ of the expected TD error given the features, learned with its own step size beta
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Literal
+
 import numpy as np
 
-from ..arrays import FloatArray
-from ..rules import kernels
-from ..rules.rule_base import RuleBase
-from ..settings import GradientTDSettings
+from ..arrays import FloatArray, IntArray
+from ..settings import Fraction, Positive
+from .learner import LearnerSettings
 from .online import Online
+
+if TYPE_CHECKING:
+    from ..rules.rule_base import RuleBase
+
+
+class GradientTDSettings(LearnerSettings):
+    """Gradient TD(lambda), the convergent method cited as [26]."""
+
+    kind: Literal["gradient-td"] = "gradient-td"
+    correction: Literal["tdc", "gtd2"] = "tdc"
+    """TD with gradient correction, or GTD2."""
+    step_size: Positive = 0.01
+    """alpha, of the consequent weights."""
+    second_step_size: Positive = 0.005
+    """beta, of the second weights."""
+    trace_decay: Fraction = 0.4
+    """lambda."""
+
+    def build(self, rules: RuleBase, rows: IntArray) -> GradientTD:
+        """Return the learner of a team."""
+        return GradientTD(self, rules, rows)
 
 
 class GradientTD(Online):
@@ -31,37 +53,42 @@ class GradientTD(Online):
 
     kept = ("theta", "second", "trace", "reach")
 
-    def __init__(self, settings: GradientTDSettings, rules: RuleBase, n_agents: int) -> None:
-        super().__init__(settings.discount, rules, n_agents)
+    def __init__(self, settings: GradientTDSettings, rules: RuleBase, rows: IntArray) -> None:
+        super().__init__(settings.discount, rules, rows)
         self.settings = settings
         self.second: FloatArray = np.zeros_like(self.theta)
 
-    def _update(self, states: FloatArray, reward: float, entered: FloatArray | None) -> int:
-        s, rules = self.settings, self.rules
-        delta = self._errors(states, reward, entered)
-        expected = rules.each(self.second, states[:, None])[:, 0]
+    def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
+        from ..rules import kernels
+
+        s, rules, rows = self.settings, self.rules, self.rows
+        delta = self._errors(states, rewards, entered)
+        expected = rules.each(self.of_agents(self.second), states[:, None])[:, 0]
         along = s.step_size * delta if s.correction == "tdc" else np.zeros_like(delta)
         kernels.td_update(
-            self.theta, self.trace, self.reach, states, along, s.discount * s.trace_decay,
+            self.theta, rows, self.trace, self.reach, states, along, s.discount * s.trace_decay,
             rules.layout,
         )  # fmt: skip
         if s.correction == "gtd2":
-            kernels.add_features(self.theta, states, s.step_size * expected, rules.layout)
+            kernels.add_features(self.theta, rows, states, s.step_size * expected, rules.layout)
         if entered is not None:
-            carried = np.einsum("ij,ij->i", self.trace, self.second)
+            carried = np.einsum("ij,ij->i", self.trace, self.of_agents(self.second))
             weight = -s.step_size * s.discount * (1.0 - s.trace_decay) * carried
-            kernels.add_features(self.theta, entered, weight, rules.layout)
-        self.second += (s.second_step_size * delta)[:, None] * self.trace
-        kernels.add_features(self.second, states, -s.second_step_size * expected, rules.layout)
+            kernels.add_features(self.theta, rows, entered, weight, rules.layout)
+        np.add.at(self.second, rows, (s.second_step_size * delta)[:, None] * self.trace)
+        change = -s.second_step_size * expected
+        kernels.add_features(self.second, rows, states, change, rules.layout)
         return 2 * self.theta.size
 
-    def _errors(self, states: FloatArray, reward: float, entered: FloatArray | None) -> FloatArray:
+    def _errors(
+        self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None
+    ) -> FloatArray:
         """Return the TD errors ``(n,)`` (Eq. 7)."""
         met = states[:, None]
         if entered is not None:
             met = np.empty((len(states), 2, states.shape[1]))
             met[:, 0], met[:, 1] = states, entered
-        values = self.rules.each(self.theta, met)
+        values = self.rules.each(self.of_agents(self.theta), met)
         ahead = 0.0 if entered is None else self.discount * values[:, 1]
-        errors: FloatArray = reward + ahead - values[:, 0]
+        errors: FloatArray = rewards + ahead - values[:, 0]
         return errors

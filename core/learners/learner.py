@@ -1,36 +1,40 @@
-"""What every learner is to a team, and the one that never learns."""
+"""What every learner is to a team, and what the settings of all learners share."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Protocol
+from typing import TYPE_CHECKING, Annotated, Literal, Protocol
 
-import numpy as np
+from pydantic import Field
 
-from ..arrays import FloatArray
-from ..rules.rule_base import RuleBase
+from ..arrays import FloatArray, IntArray
+from ..calibration import CalibrationSettings
+from ..decision import Decision
+from ..exploration import EXPLORATIONS, BurstExploration, ExplorationSettings
+from ..registry import Plugged
+from ..rules.settings import RuleBaseSettings
+from ..self_model import SelfModelSettings
+from ..settings import Settings
+
+if TYPE_CHECKING:
+    from ..rules.rule_base import RuleBase
 
 
 class Learner(Protocol):
-    """Turns experience into consequent weights."""
+    """Turns experience into consequent weights.
+
+    Agents that share weights have one row of them in common; `rows`, which a learner is built with,
+    says which row is whose.
+    """
 
     theta: FloatArray
-    """``(n_agents, n_rules)`` consequent weights, one row per agent."""
-
-    candidates: int
-    """How many predicted next states per agent `observe` is to be given; 0: none."""
+    """``(n_rows, n_rules)`` consequent weights."""
 
     def begin_episode(self) -> None:
         """Forget what reached into the past: an episode begins."""
         ...
 
-    def observe(
-        self,
-        states: FloatArray,
-        reward: float,
-        terminated: bool,
-        candidates: FloatArray | None = None,
-    ) -> int:
+    def observe(self, states: FloatArray, reward: float | FloatArray, terminated: bool) -> int:
         """Take in the states entered; return the number of consequent weights changed.
 
         Parameters
@@ -38,11 +42,9 @@ class Learner(Protocol):
         states
             ``(n, d)`` states that the agents entered.
         reward
-            Received on entering them.
+            Received on entering them: one number, or ``(n,)``.
         terminated
             Whether they are terminal.
-        candidates
-            ``(n, candidates, d)`` predicted next states of each agent under random joint actions.
         """
         ...
 
@@ -59,35 +61,29 @@ class Learner(Protocol):
         ...
 
 
-class Frozen:
-    """Never learns: the consequent weights stay as they are, zero from the start."""
+class LearnerSettings(Settings):
+    """What the settings of all learners share."""
 
-    candidates = 0
+    kind: str = ""
+    rule_base: RuleBaseSettings = RuleBaseSettings()
+    discount: Annotated[float, Field(ge=0, lt=1)] = 0.95
+    """gamma of Eq. 7."""
+    weights: Literal["own", "role"] = "own"
+    """Whether every agent has consequent weights of its own, or all agents of one role (the left
+    wheels, say) share them and pool their experience."""
+    exploration: Annotated[ExplorationSettings, Plugged(EXPLORATIONS)] = BurstExploration()
+    decision: Decision = Decision()
+    self_model: SelfModelSettings = SelfModelSettings()
+    calibration: CalibrationSettings = CalibrationSettings()
 
-    def __init__(self, rules: RuleBase, n_agents: int) -> None:
-        self.theta: FloatArray = np.zeros((n_agents, rules.n_rules), rules.dtype)
+    def build(self, rules: RuleBase, rows: IntArray) -> Learner:
+        """Return the learner of a team, all consequent weights zero.
 
-    def begin_episode(self) -> None:
-        """Nothing to forget."""
-
-    def observe(
-        self,
-        states: FloatArray,
-        reward: float,
-        terminated: bool,
-        candidates: FloatArray | None = None,
-    ) -> int:
-        """Change nothing."""
-        return 0
-
-    def end_episode(self) -> int:
-        """Change nothing."""
-        return 0
-
-    def arrays(self) -> dict[str, FloatArray]:
-        """Return the consequent weights."""
-        return {"theta": self.theta}
-
-    def restore(self, arrays: Mapping[str, FloatArray]) -> None:
-        """Take over the consequent weights."""
-        self.theta = arrays["theta"].copy()
+        Parameters
+        ----------
+        rules
+            The agents' rule base.
+        rows
+            ``(n,)`` the row of weights of every agent; all rows are somebody's.
+        """
+        raise TypeError(f"learner {self.kind!r} says not how it is built")

@@ -4,33 +4,40 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..arrays import FloatArray
-from ..rules.rule_base import RuleBase
+from ..arrays import FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from ..rules.rule_base import RuleBase
 
 
 class Online(ABC):
-    """Learns from one state to the next, all agents at once.
+    """Learns from one state to the next, agent by agent; those of one row change it in turn.
 
     A terminal state is followed by itself for ever, which adds one update with the reward
     R / (1 - discount) and no next state.
     """
 
-    candidates = 0
     kept: tuple[str, ...] = ("theta", "trace", "reach")
     """Names of the arrays that are saved."""
 
-    def __init__(self, discount: float, rules: RuleBase, n_agents: int) -> None:
-        self.discount, self.rules = discount, rules
-        self.theta: FloatArray = np.zeros((n_agents, rules.n_rules), rules.dtype)
+    def __init__(self, discount: float, rules: RuleBase, rows: IntArray) -> None:
+        self.discount, self.rules, self.rows = discount, rules, rows
+        n_rows = int(rows.max()) + 1
+        self.theta: FloatArray = np.zeros((n_rows, rules.n_rules), rules.dtype)
         self.weights = self.theta
         """The consequent weights that learn; those that decide, theta, may be an average."""
-        self.trace: FloatArray = np.zeros_like(self.theta)
-        self.reach: FloatArray = np.zeros((n_agents, rules.n_parts))
+        self.trace: FloatArray = np.zeros((len(rows), rules.n_rules), rules.dtype)
+        self.reach: FloatArray = np.zeros((len(rows), rules.n_parts))
         self._previous: FloatArray | None = None
-        self._reward = 0.0
+        self._rewards: FloatArray = np.zeros(len(rows))
+
+    def of_agents(self, weights: FloatArray) -> FloatArray:
+        """Return the row of every agent ``(n, n_rules)``: the weights themselves if each has one."""
+        return weights if len(weights) == len(self.rows) else weights[self.rows]
 
     def begin_episode(self) -> None:
         """Clear the traces."""
@@ -38,20 +45,15 @@ class Online(ABC):
             self.trace[:], self.reach[:] = 0.0, 0.0
         self._previous = None
 
-    def observe(
-        self,
-        states: FloatArray,
-        reward: float,
-        terminated: bool,
-        candidates: FloatArray | None = None,
-    ) -> int:
+    def observe(self, states: FloatArray, reward: float | FloatArray, terminated: bool) -> int:
         """Update for the step from the previous states to these."""
         changed = 0
         if self._previous is not None:
-            changed += self._update(self._previous, self._reward, states)
-        self._previous, self._reward = states.copy(), reward
+            changed += self._update(self._previous, self._rewards, states)
+        self._previous = states.copy()
+        self._rewards = np.broadcast_to(np.asarray(reward, dtype=float), (len(states),)).copy()
         if terminated:
-            changed += self._update(states, reward / (1.0 - self.discount), None)
+            changed += self._update(states, self._rewards / (1.0 - self.discount), None)
         return changed
 
     def end_episode(self) -> int:
@@ -59,17 +61,17 @@ class Online(ABC):
         return 0
 
     @abstractmethod
-    def _update(self, states: FloatArray, reward: float, entered: FloatArray | None) -> int:
+    def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
         """Learn from R(s) of `states` and the states entered after them, none if terminal.
 
         Returns the number of weights changed.
         """
 
     def arrays(self) -> dict[str, FloatArray]:
-        """Return weights, traces and the previous states with their reward."""
+        """Return weights, traces and the previous states with their rewards."""
         previous = self._previous if self._previous is not None else np.zeros((0, 0))
         named: dict[str, FloatArray] = {name: getattr(self, name) for name in self.kept}
-        return named | {"previous": previous, "reward": np.array(self._reward)}
+        return named | {"previous": previous, "rewards": self._rewards}
 
     def restore(self, arrays: Mapping[str, FloatArray]) -> None:
         """Continue from `arrays`."""
@@ -78,4 +80,4 @@ class Online(ABC):
         if "weights" not in self.kept:
             self.weights = self.theta
         self._previous = arrays["previous"].copy() if arrays["previous"].size else None
-        self._reward = float(arrays["reward"])
+        self._rewards = arrays["rewards"].copy()

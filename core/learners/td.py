@@ -2,12 +2,36 @@
 
 from __future__ import annotations
 
-import numpy as np
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from ..arrays import FloatArray
-from ..rules.rule_base import RuleBase
-from ..settings import TDLambdaSettings
+import numpy as np
+from pydantic import Field
+
+from ..arrays import FloatArray, IntArray
+from ..settings import Fraction, Positive
+from .learner import LearnerSettings
 from .online import Online
+
+if TYPE_CHECKING:
+    from ..rules.rule_base import RuleBase
+
+
+class TDLambdaSettings(LearnerSettings):
+    """Online TD(lambda), Eq. 7-13."""
+
+    kind: Literal["td-lambda"] = "td-lambda"
+    step_size: Positive = 0.00012
+    """alpha of Eq. 13."""
+    trace_decay: Fraction = 0.4
+    """lambda of Eq. 8."""
+    normalised: bool = False
+    """Divide the step size by the squared length of the feature vector."""
+    averaging: Annotated[float, Field(ge=1, allow_inf_nan=False)] = 1.0
+    """Steps over which the weights that decide average those that learn; 1: they are the same."""
+
+    def build(self, rules: RuleBase, rows: IntArray) -> TDLambda:
+        """Return the learner of a team."""
+        return TDLambda(self, rules, rows)
 
 
 class TDLambda(Online):
@@ -30,21 +54,21 @@ class TDLambda(Online):
     size then keeps learning without its noise deciding.
     """
 
-    def __init__(self, settings: TDLambdaSettings, rules: RuleBase, n_agents: int) -> None:
-        super().__init__(settings.discount, rules, n_agents)
+    def __init__(self, settings: TDLambdaSettings, rules: RuleBase, rows: IntArray) -> None:
+        super().__init__(settings.discount, rules, rows)
         self.settings = settings
         self.updates: FloatArray = np.zeros(())
         if settings.averaging > 1:
             self.weights = np.zeros_like(self.theta)
             self.kept = (*self.kept, "weights", "updates")
 
-    def _update(self, states: FloatArray, reward: float, entered: FloatArray | None) -> int:
+    def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
         lengths: FloatArray = np.ones(len(states))
         if self.settings.normalised:
             lengths = self.rules.squared_lengths(states)
         self.rules.td_update(
-            self.weights, self.trace, self.reach, states, states if entered is None else entered,
-            reward, 0.0 if entered is None else self.discount, self.settings.step_size, lengths,
+            self.weights, self.rows, self.trace, self.reach, states,
+            states if entered is None else entered, rewards, 0.0 if entered is None else self.discount, self.settings.step_size, lengths,
             self.discount * self.settings.trace_decay,
         )  # fmt: skip
         if self.settings.averaging > 1:

@@ -20,10 +20,10 @@ import numpy as np
 
 from ..arrays import FloatArray, IntArray
 from ..protocols import Blocks
-from ..settings import RuleBaseSettings
 from ..spaces import StateSpace
 from . import kernels
 from .fuzzy import Partition
+from .settings import RuleBaseSettings
 
 
 class RuleBase:
@@ -184,11 +184,12 @@ class RuleBase:
     def td_update(
         self,
         theta: FloatArray,
+        rows: IntArray,
         trace: FloatArray,
         reach: FloatArray,
         states: FloatArray,
         entered: FloatArray,
-        reward: float,
+        rewards: FloatArray,
         discount: float,
         step_size: float,
         lengths: FloatArray,
@@ -199,8 +200,8 @@ class RuleBase:
         Shapes are trusted: a learner calls this at every step.
         """
         self._td_update(
-            theta, trace, reach, states, entered, reward, discount, step_size, lengths, decay,
-            self.layout,
+            theta, rows, trace, reach, states, entered, rewards, discount, step_size, lengths,
+            decay, self.layout,
         )  # fmt: skip
 
     def squared_lengths(self, states: FloatArray) -> FloatArray:

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
 from ...core.settings import NonNegative, Positive, ScenarioSettings, Settings
-
-if TYPE_CHECKING:
-    from .scenario import BoxPushing
 
 CONTROL_PERIOD = 0.064
 """Time between commands to the wheels [s]; the basic time step of the e-puck in Webots."""
@@ -237,6 +234,7 @@ class BoxPushingSettings(ScenarioSettings):
     """The box-pushing scenario (Section IX)."""
 
     kind: Literal["box-pushing"] = "box-pushing"
+    factory: ClassVar[str] = f"{__package__}.scenario:BoxPushing"
     robots: Annotated[int, Field(ge=1, le=64)] = 2
     """Number of robots."""
     robot: str | RobotSettings = "e-puck"
@@ -285,18 +283,6 @@ class BoxPushingSettings(ScenarioSettings):
         if self.predictor != "push" and self.belief != BeliefSettings():
             raise ValueError(f"belief is for predictor = 'push', received {self.predictor!r}")
         return self
-
-    def build(self) -> BoxPushing:
-        """Build the scenario.
-
-        Raises
-        ------
-        ValueError
-            If there is none of these settings, see `BoxPushing`.
-        """
-        from .scenario import BoxPushing
-
-        return BoxPushing(self)
 
     @property
     def onset(self) -> int | None:

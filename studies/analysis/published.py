@@ -1,7 +1,7 @@
 """Results of a study as one small JSON file, with spec and seeds, fit to be committed or published.
 
-Outcomes are kept as one character an episode, other measures in three decimals; distances and
-returns are left out. Claims are always decided by results in this form, so the committed files give
+Rates are kept as one character an episode, steps and other measures in three decimals; returns are
+left out. Claims are always decided by results in this form, so the committed files give
 the table that the run gave.
 """
 
@@ -14,35 +14,36 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...core.protocols import SUCCESS, Measure
 from ..spec.errors import SpecError
-from ..spec.spec import Spec
+from ..spec.outline import Outline
 from ..store import durable
+from ..trials.measures import measures_from, tables
 from ..trials.trial import RESULTS_VERSION
 from .results import Arrays, Results
 
-MEASURES: dict[str, tuple[str, ...]] = {
-    "learning-curve": (
-        "success", "stopped_at_goal", "steps", "final_orientation_rad", "contact_fraction",
-    ),
-    "shapes": ("success", "stopped_at_goal", "contact_fraction"),
-    "wheel-failure": ("success", "steps"),
-    "scaling": ("success", "steps"),
-}  # fmt: skip
-"""What is kept of each study; of others it is success alone."""
-OUTCOMES = ("success", "stopped_at_goal")
+SUCCESS_ALONE = ("ablation", "chain-order", "scaling", "wheel-failure")
+"""Studies whose analysis asks for no other measure of an episode: of them no other is kept."""
 DECIMALS = 3
 
 
-def dumps(spec: Spec, results: Results, version: int = RESULTS_VERSION) -> str:
+def dumps(outline: Outline, results: Results, version: int = RESULTS_VERSION) -> str:
     """Return results, their spec and the version that they are of as JSON text."""
-    names = MEASURES.get(spec.study, ("success",))
+    measures = _kept(outline.study, results)
+    rates = {measure.name: measure.is_rate for measure in measures} | {"steps": False}
     content = {
         "results_version": version,
-        "spec": spec.table(),
+        "spec": outline.table,
+        "columns": results.columns,
+        "measures": tables(measures),
         "seeds": results.seeds,
         "phases": {
             phase: {
-                condition: {name: _packed(name, arrays[name]) for name in names}
+                condition: {
+                    name: _packed(values, is_rate=rates[name])
+                    for name, values in arrays.items()
+                    if name in rates
+                }
                 for condition, arrays in by_condition.items()
             }
             for phase, by_condition in results.phases.items()
@@ -55,9 +56,9 @@ def dumps(spec: Spec, results: Results, version: int = RESULTS_VERSION) -> str:
 
 
 class Published(NamedTuple):
-    """Results with their spec, and the version of the code that they are of."""
+    """Results with their spec as a table, and the version of the code that they are of."""
 
-    spec: Spec
+    outline: Outline
     results: Results
     version: int
 
@@ -72,9 +73,13 @@ class Published(NamedTuple):
 def loads(text: str) -> Published:
     """Return what `dumps` has written."""
     content = json.loads(text)
+    measures = measures_from(content["measures"])
+    rates = {measure.name for measure in measures if measure.is_rate}
     phases = {
         phase: {
-            condition: {name: _unpacked(name, packed) for name, packed in arrays.items()}
+            condition: {
+                name: _unpacked(packed, is_rate=name in rates) for name, packed in arrays.items()
+            }
             for condition, arrays in by_condition.items()
         }
         for phase, by_condition in content["phases"].items()
@@ -85,15 +90,15 @@ def loads(text: str) -> Published:
         for key in ("numbers", "usage")
     )
     training, evaluation = phases.get("training", {}), phases.get("evaluation", {})
-    spec = Spec.of(content["spec"])
-    columns = {c.label: c.columns for c in spec.conditions()}
-    results = Results(training, evaluation, phases, seeds, numbers, usage, columns)
-    return Published(spec, results, int(content["results_version"]))
+    columns = content["columns"]
+    outline = Outline.noted(content["spec"], columns)
+    results = Results(training, evaluation, phases, seeds, numbers, usage, columns, measures)
+    return Published(outline, results, int(content["results_version"]))
 
 
-def write(path: Path, spec: Spec, results: Results, version: int = RESULTS_VERSION) -> None:
+def write(path: Path, outline: Outline, results: Results, version: int = RESULTS_VERSION) -> None:
     """Write the same to a file, which is there whole or not at all."""
-    durable.write(path, dumps(spec, results, version).encode())
+    durable.write(path, dumps(outline, results, version).encode())
 
 
 def read(folder: Path, studies: Iterable[str]) -> dict[str, Published]:
@@ -122,14 +127,26 @@ def load(path: Path) -> Published:
         raise SpecError(f"{path}: holds no published results: {error}") from None
 
 
-def _packed(name: str, values: np.ndarray) -> list[Any]:
-    if name in OUTCOMES:
+def _kept(study: str, results: Results) -> tuple[Measure, ...]:
+    """Return the measures of which there is anything to be kept."""
+    wanted = {SUCCESS.name} if study in SUCCESS_ALONE else {m.name for m in results.measures}
+    held = {
+        name
+        for by_condition in results.phases.values()
+        for arrays in by_condition.values()
+        for name in arrays
+    }
+    return tuple(m for m in results.measures if m.name in wanted & held)
+
+
+def _packed(values: np.ndarray, *, is_rate: bool) -> list[Any]:
+    if is_rate:
         return ["".join("1" if v else "0" for v in row) for row in values]
     return np.round(values, DECIMALS).tolist()
 
 
-def _unpacked(name: str, packed: list[Any]) -> np.ndarray:
-    if name in OUTCOMES:
+def _unpacked(packed: list[Any], *, is_rate: bool) -> np.ndarray:
+    if is_rate:
         return np.array([[int(character) for character in row] for row in packed])
     return np.array(packed)
 

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.protocols import SUCCESS, Measure
 from ..store.store import Store
-from ..trials.episodes import COLUMNS
-
-MEASURES = COLUMNS[2:]
-"""The columns that hold a measurement."""
+from ..trials.measures import AFTER
 
 Arrays = dict[str, NDArray[Any]]
 
@@ -25,8 +23,9 @@ class Results:
     Attributes
     ----------
     training, evaluation
-        By condition, in the order of the spec, then by measure: arrays ``(n_seeds, n_episodes)``.
-        Conditions without a finished trial are absent.
+        By condition, in the order of the spec, then by ``steps``, the name of a measure, or
+        ``return``: arrays ``(n_seeds, n_episodes)``. Conditions without a finished trial are
+        absent, and measures that a condition's scenario has not.
     phases
         The same of every phase by name, training and evaluation included.
     seeds
@@ -39,6 +38,8 @@ class Results:
     columns
         By condition, what tells it from the others, see
         `nested_agents.studies.spec.conditions.Condition`.
+    measures
+        What episodes are told by, of all conditions; success first.
     """
 
     training: dict[str, Arrays]
@@ -48,6 +49,7 @@ class Results:
     numbers: dict[str, Arrays] = field(default_factory=dict)
     usage: dict[str, Arrays] = field(default_factory=dict)
     columns: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    measures: tuple[Measure, ...] = (SUCCESS,)
 
 
 def read(store: Store) -> Results:
@@ -62,7 +64,9 @@ def read(store: Store) -> Results:
     for row in timed:
         seeds.setdefault(row[0], []).append(row[1])
     numbers = store.numbers()
-    phases = {phase: _arrays(store, phase) for phase in store.phases()}
+    measures = store.measures()
+    columns = ("steps", *(measure.name for measure in measures), *AFTER)
+    phases = {phase: _arrays(store, phase, columns) for phase in store.phases()}
     return Results(
         phases.get("training", {}),
         phases.get("evaluation", {}),
@@ -71,6 +75,7 @@ def read(store: Store) -> Results:
         _by_name(row[:4] for row in numbers if row[4]),
         _by_name([*seconds, *(row[:4] for row in numbers if not row[4])]),
         store.columns(),
+        measures,
     )
 
 
@@ -84,16 +89,18 @@ def _by_name(rows: Iterable[tuple[str, int, str, float]]) -> dict[str, Arrays]:
     }
 
 
-def _arrays(store: Store, phase: str) -> dict[str, Arrays]:
+def _arrays(store: Store, phase: str, columns: Sequence[str]) -> dict[str, Arrays]:
     names, rows = store.rows(phase)
-    at = {name: names.index(name) for name in ("condition", "seed", *MEASURES)}
+    condition, seed = names.index("condition"), names.index("seed")
     runs: dict[str, dict[int, list[tuple[Any, ...]]]] = {}
     for row in rows:
-        runs.setdefault(row[at["condition"]], {}).setdefault(row[at["seed"]], []).append(row)
+        runs.setdefault(row[condition], {}).setdefault(row[seed], []).append(row)
+    at = {name: names.index(name) for name in columns}
     return {
         condition: {
-            name: np.array([[row[at[name]] for row in run] for run in by_seed.values()])
-            for name in MEASURES
+            name: np.array([[row[i] for row in run] for run in by_seed.values()])
+            for name, i in at.items()
+            if all(row[i] is not None for run in by_seed.values() for row in run)
         }
         for condition, by_seed in runs.items()
     }

@@ -1,20 +1,25 @@
 """What a study is: a measure of one trial, an analysis of all, and figures of the analysis.
 
-A study is one module that offers these, and one line in `nested_agents.studies.STUDIES`. It may
-also offer ``check(spec)``, which raises `SpecError` if the spec has not what it needs.
+A study is a module, or a class, that offers these, and one line in `nested_agents.studies.STUDIES`
+or ``study = "mine.py:Mine"`` in a spec. It may also offer ``check(spec)``, which raises `SpecError`
+if the spec has not what it needs.
 """
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
 from .. import STUDIES
 from ..analysis.results import Results
+from ..spec.errors import SpecError
 from ..trials.trial import Trial, TrialResult
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+PARTS = ("measure", "analyse", "draw")
+"""What every study offers."""
 
 
 class Study(Protocol):
@@ -38,5 +43,21 @@ class Study(Protocol):
 
 
 def load_study(name: str) -> Study:
-    """Return the study of a name in `nested_agents.studies.STUDIES`."""
-    return cast(Study, import_module(STUDIES[name], "nested_agents.studies"))
+    """Return the study of a name in `nested_agents.studies.STUDIES`, or of a user's file.
+
+    Raises
+    ------
+    SpecError
+        If it lacks a function that studies have; one line.
+    """
+    found = STUDIES.find(name)
+    study = found() if isinstance(found, type) else found
+    missing = [part for part in PARTS if not callable(getattr(study, part, None))]
+    if missing:
+        raise SpecError(f"study = {name!r}: has no {missing[0]}, needs {', '.join(PARTS)}")
+    return cast(Study, study)
+
+
+def measured(trial: Trial) -> TrialResult:
+    """Run a trial by the study that it names; imported by name in worker processes."""
+    return load_study(trial.study).measure(trial)

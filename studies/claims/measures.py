@@ -110,7 +110,8 @@ def contact_gained(results: Results) -> Measured | None:
         contact = r.training[name]["contact_fraction"]
         return np.asarray(contact[:, LAST].mean(axis=1) - contact[:, FIRST].mean(axis=1))
 
-    if not {"default", TOLD} <= results.training.keys():
+    known = [c for c, arrays in results.training.items() if "contact_fraction" in arrays]
+    if not {"default", TOLD} <= set(known):
         return None
     base, own = paired(results, TOLD, "default", gained)
     return Measured(bootstrap(own - base), len(own)) if len(own) else None
@@ -156,7 +157,7 @@ def _sizes(results: Results) -> dict[int, list[str]]:
 def decision_share(results: Results) -> Measured | None:
     """Measure what share of its period a decision takes with most robots, fastest evaluator."""
     sizes = _sizes(results)
-    if not sizes:
+    if not sizes or any("period_s" not in numbers for numbers in results.numbers.values()):
         return None
     most = max(sizes)
     shares = [

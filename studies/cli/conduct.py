@@ -9,8 +9,10 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 
+from ...core.protocols import DrawnScenario
+from ...core.sources import is_reference
 from ..analysis.results import read
-from ..catalogue.study import load_study
+from ..catalogue.study import load_study, measured
 from ..presentation import figures
 from ..presentation.tables import tabulate
 from ..spec.spec import Spec
@@ -30,6 +32,7 @@ def conduct(
     address: str | None = None,
     replay: bool = False,
     retry_failed: bool = False,
+    accept_code: bool = False,
 ) -> int:
     """Run what is left of a study, print its table, draw its figures.
 
@@ -45,6 +48,8 @@ def conduct(
         Whether to draw a replay of the first condition's first seed.
     retry_failed
         Whether failed trials are run again.
+    accept_code
+        Whether to go on with a study although the installed code has changed.
 
     Returns
     -------
@@ -52,18 +57,25 @@ def conduct(
         1 if any trial failed, else 0.
     """
     with carried_out(
-        spec, directory, jobs, backend=backend, address=address, retry_failed=retry_failed
+        spec,
+        directory,
+        jobs,
+        backend=backend,
+        address=address,
+        retry_failed=retry_failed,
+        accept_code=accept_code,
     ) as store:
         failed, results = store.failed(), read(store)
         replays = _replay(store, trials_of(spec)[0]) if replay and not failed else []
-    study = load_study(spec.study)
-    analysis = study.analyse(results)
+    with spec.sources.active():
+        study = load_study(spec.study)
+        analysis = study.analyse(results)
+        drawn = study.draw(analysis) if analysis.table else {}
     display.print_table(tabulate(analysis.table))
     for note in getattr(analysis, "notes", ()):
         print(note)
     folder = directory / "figures"
     folder.mkdir(exist_ok=True)
-    drawn = study.draw(analysis) if analysis.table else {}
     pictures = figures.save(drawn, folder) if drawn else []
     display.print_places(directory, pictures, replays)
     if failed:
@@ -80,14 +92,18 @@ def carried_out(
     backend: Backend = "loky",
     address: str | None = None,
     retry_failed: bool = False,
+    accept_code: bool = False,
 ) -> Iterator[Store]:
     """Run what is left of a study, and open its store; parameters as those of `conduct`."""
-    study, trials = load_study(spec.study), trials_of(spec)
-    check(spec)
-    getattr(study, "check", lambda spec: None)(spec)
+    measures, trials = check(spec), trials_of(spec)
+    with spec.sources.active():
+        study = load_study(spec.study)
+        getattr(study, "check", lambda spec: None)(spec)
+    # A study of a user's file is made again in every worker, which knows the file.
+    measure = measured if is_reference(spec.study) else study.measure
     with (
         hire(backend, jobs, address, len(trials)) as workers,
-        Store.create(directory, spec) as store,
+        Store.create(directory, spec, measures, accept_code=accept_code) as store,
     ):
         if retry_failed:
             store.forget_failed()
@@ -97,7 +113,7 @@ def carried_out(
         if pending:
             display.announce(spec, directory, workers.processes)
         try:
-            with closing(run_trials(pending, store, study.measure, workers)) as outcomes:
+            with closing(run_trials(pending, store, measure, workers)) as outcomes:
                 display.follow(outcomes, len(trials), len(trials) - len(pending))
         except KeyboardInterrupt:
             display.say(
@@ -109,8 +125,12 @@ def carried_out(
 
 
 def _replay(store: Store, trial: Trial) -> list[Path]:
-    from ...scenarios.box_pushing.pictures.rendering import animate
-
+    """Draw what is recorded of a trial, if its scenario knows how."""
+    with trial.sources.active():
+        scenario = trial.settings.scenario.build()
+    if not isinstance(scenario, DrawnScenario):
+        display.say(f"no replay: {type(scenario).__name__} does not draw its episodes")
+        return []
     folder = store.directory / "replay"
     folder.mkdir(exist_ok=True)
     paths = []
@@ -119,6 +139,6 @@ def _replay(store: Store, trial: Trial) -> list[Path]:
             continue
         path = folder / f"{name}-episode.gif"
         if not path.exists():
-            animate(store.recording(trial, name), path)
+            scenario.animate(store.recording(trial, name), path)
         paths.append(path)
     return paths

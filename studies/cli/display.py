@@ -36,13 +36,18 @@ def announce(spec: Spec, directory: Path, jobs: int) -> None:
     """Say what is about to be run."""
     conditions, seeds = len(spec.conditions()), len(spec.seeds)
     say(
-        f"{spec.study}: {_count(conditions, 'condition')} x {_count(seeds, 'seed')}, "
-        f"{_count(spec.episodes, 'episode')} of up to {_count(spec.steps, 'step')}, "
-        f"{_count(jobs, 'process', 'es')}, kept in {directory}"
+        f"{spec.study}: {count(conditions, 'condition')} x {count(seeds, 'seed')}, "
+        f"{count(spec.episodes, 'episode')} of up to {count(spec.steps, 'step')}, "
+        f"{count(jobs, 'process', 'es')}, kept in {directory}"
     )
 
 
-def _count(number: int, what: str, plural: str = "s") -> str:
+def count(number: int, what: str, plural: str = "s") -> str:
+    """Return a number of things.
+
+    >>> count(1, "seed"), count(2, "process", "es")
+    ('1 seed', '2 processes')
+    """
     return f"{number} {what}{'' if number == 1 else plural}"
 
 
@@ -124,7 +129,7 @@ def print_table(found: SummaryTable) -> None:
         table.add_column(escape(title), justify="right", overflow="fold")
     for condition, seeds, cells in found.rows:
         table.add_row(
-            f"{escape(condition)}\n[dim]{_count(seeds, 'seed')}[/]",
+            f"{escape(condition)}\n[dim]{count(seeds, 'seed')}[/]",
             *(f"{c.value}\n[dim]{c.interval or '–'}[/]" if c else "" for c in cells),
         )
     Console().print(table)

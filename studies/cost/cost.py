@@ -23,12 +23,15 @@ import numpy as np
 from scipy import stats
 
 from ...core.cost import Problem, below_counts, is_chain
+from ...core.decision import Decision
+from ...core.evaluators.exact import ExactSettings
+from ...core.learners.td import TDLambdaSettings
 from ...core.loop import control_loop, policy_seed
 from ...core.protocols import Scenario
-from ...core.settings import Decision, RuleBaseSettings, TDLambdaSettings
+from ...core.rules.settings import RuleBaseSettings
 from ...core.team import Team
 from ...scenarios.line_up import LineUpSettings
-from ...topologies import arrange, build, parse
+from ...topologies import build, parse
 from ...topologies.config import (
     ChainSettings,
     IndependentSettings,
@@ -43,7 +46,7 @@ RULES = MEMBERSHIPS**2
 """|S| of an agent in what is counted and timed."""
 LEARNER = TDLambdaSettings(
     rule_base=RuleBaseSettings(membership="sigmoid", memberships=MEMBERSHIPS, order=2),
-    decision=Decision(rule="value", evaluator="exact"),
+    decision=Decision(rule="value", evaluator=ExactSettings()),
 )
 """The learner that is counted and timed: the paper's, over the two variables of line-up."""
 MOST_OPERATIONS = 4 * 10**8
@@ -185,7 +188,7 @@ def measure(text: str, n: int) -> Measured | None:
         return None
     scenario: Scenario = line_up
     if isinstance(settings, SingleAgentSettings):
-        scenario, hierarchy = arrange(settings, line_up)
+        scenario, hierarchy = settings.arrange(line_up)
         learner = _of_order(2 * n)
     else:
         learner = LEARNER

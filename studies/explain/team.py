@@ -23,7 +23,7 @@ from ...core.team import Team
 from ...scenarios.box_pushing.scenario import BoxPushing
 from ..spec.errors import SpecError, closest
 from ..store.store import Store
-from ..trials.episodes import COLUMNS
+from ..trials.measures import columns
 from ..trials.trial import RESULTS_VERSION, Session, Trial, trials_of
 from . import policy as explain_policy
 from . import rules as explain_rules
@@ -140,7 +140,9 @@ def _trained(store: Store, trial: Trial) -> tuple[Team, Scenario, Bodies | None]
         session.train(1, episode)
     if bodies and model:
         bodies.note("after", model)
-    kept, found = _kept(store, trial), [row[1:] for row in session.result().rows]
+    measured = [measure.name for measure in store.measures()]
+    kept = _kept(store, trial)
+    found = [row.flat(measured)[1:] for row in session.result().rows]
     if kept != found:
         same = [one == other for one, other in zip(kept, found, strict=False)]
         episode = same.index(False) if False in same else len(same)
@@ -155,7 +157,7 @@ def _trained(store: Store, trial: Trial) -> tuple[Team, Scenario, Bodies | None]
 def _kept(store: Store, trial: Trial) -> list[tuple[object, ...]]:
     """Return the training episodes of a trial as they are kept, none if it has not finished."""
     names, rows = store.rows("training")
-    at = [names.index(name) for name in COLUMNS[1:]]
+    at = [names.index(name) for name in columns(store.measures())[1:]]
     where = names.index("condition"), names.index("seed")
     own = (row for row in rows if tuple(row[i] for i in where) == (trial.condition, trial.seed))
     return [tuple(row[i] for i in at) for row in own]

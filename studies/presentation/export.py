@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Sequence, Set
 from pathlib import Path
 from typing import Any, Literal
 
@@ -13,7 +13,6 @@ from ..analysis.results import read
 from ..spec.errors import SpecError
 from ..store.durable import replacing
 from ..store.store import Store
-from .row_formats import TRUTHS
 
 Form = Literal["csv", "parquet", "json"]
 Table = tuple[list[str], list[tuple[Any, ...]]]
@@ -63,8 +62,11 @@ def _writers(store: Store, form: Form) -> dict[str, Callable[[Path], None]]:
     """Return what writes each file, by its name."""
     if form == "json":
         version = int(store.meta("results_version"))
-        return {"results": lambda path: published.write(path, store.spec(), read(store), version)}
-    write_table = _write_csv if form == "csv" else _parquet_writer()
+        return {
+            "results": lambda path: published.write(path, store.outline(), read(store), version)
+        }
+    rates = {measure.name for measure in store.measures() if measure.is_rate}
+    write_table = _write_csv if form == "csv" else _parquet_writer(rates)
     return {
         "episodes": lambda path: write_table(store.episodes(), path),
         "trials": lambda path: write_table(store.trials(), path),
@@ -81,7 +83,8 @@ def _write_csv(table: Table, path: Path) -> None:
         text.detach()
 
 
-def _parquet_writer() -> Any:
+def _parquet_writer(rates: Set[str]) -> Any:
+    """Return what writes a table as Parquet, columns named in `rates` as truth values."""
     try:
         import pyarrow
         import pyarrow.parquet
@@ -92,17 +95,19 @@ def _parquet_writer() -> Any:
 
     def write(table: Table, path: Path) -> None:
         names, rows = table
-        columns = {n: _column(n, [row[i] for row in rows]) for i, n in enumerate(names)}
+        columns = {
+            n: _column([row[i] for row in rows], is_rate=n in rates) for i, n in enumerate(names)
+        }
         with replacing(path) as file:
             pyarrow.parquet.write_table(pyarrow.table(columns), file)
 
     return write
 
 
-def _column(name: str, values: Sequence[Any]) -> list[Any]:
+def _column(values: Sequence[Any], *, is_rate: bool) -> list[Any]:
     """Return values of one type: numbers if all are, else text; what is missing stays missing."""
-    if name in TRUTHS:
-        return [bool(value) for value in values]
+    if is_rate:
+        return [None if value is None else bool(value) for value in values]
     types = {type(value) for value in values if value is not None}
     if len(types) <= 1:
         return list(values)

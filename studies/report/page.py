@@ -15,7 +15,7 @@ from ..claims.table import result
 from ..presentation.tables import tabulate
 from ..spec.toml import dumps
 from ..store.store import Store
-from ..trials.trial import RESULTS_VERSION, trials_of
+from ..trials.trial import RESULTS_VERSION
 from . import words
 from .pictures import pictures
 from .replays import replays
@@ -33,20 +33,23 @@ def page(directory: Path) -> str:
     """
     with Store.open(directory) as store:
         store.verify()
-        spec, results, counts = store.spec(), read(store), store.counts()
+        outline, results, counts = store.outline(), read(store), store.counts()
         failed = [
             (condition, seed, words.without_places(error.rstrip()))
             for condition, seed, error in store.failed()
         ]
-        trials = trials_of(spec)
+        trials = store.planned()
         packed = replays(store, trials)
         version = store.meta("results_version")
-    study = load_study(spec.study)
-    analysis = study.analyse(results)
+        sources = store.sources()
+    with sources.active():
+        study = load_study(outline.study)
+        analysis = study.analyse(results)
+        drawn = study.draw(analysis) if analysis.table else {}
     return _template().render(
-        study=spec.study,
-        extent=words.extent(spec),
-        compared=", ".join(spec.conditions()[0].columns),
+        study=outline.study,
+        extent=words.extent(outline),
+        compared=", ".join(next(iter(outline.columns.values()))),
         standing=words.standing(len(trials), counts["done"], counts["failed"]),
         complete=counts["done"] == len(trials),
         verdict=words.contest(analysis.table, getattr(analysis, "headline", None)),
@@ -54,14 +57,14 @@ def page(directory: Path) -> str:
         table=tabulate(analysis.table),
         claims=[
             (finding.claim, result(finding), finding.verdict)
-            for finding in judge({spec.study: results})
-            if finding.claim.study == spec.study and finding.measured is not None
+            for finding in judge({outline.study: results})
+            if finding.claim.study == outline.study and finding.measured is not None
         ],
-        pictures=pictures(study.draw(analysis)) if analysis.table else [],
+        pictures=pictures(drawn),
         replays=packed,
         failed=failed,
-        seeds=words.runs(spec.seeds),
-        spec=dumps(spec.table()),
+        seeds=words.runs(outline.seeds),
+        spec=dumps(outline.table),
         versions=words.versions(),
         results_version=version,
         outdated=version != str(RESULTS_VERSION),

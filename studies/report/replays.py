@@ -22,12 +22,16 @@ from ...core.arrays import FloatArray
 from ...scenarios.box_pushing.world.boxes import box_for
 from ...scenarios.box_pushing.world.robots import robot_for
 from ..spec.errors import SpecError
-from ..store.store import Store
-from ..trials.episodes import RECORDED, Recording
-from ..trials.trial import Trial
+from ..store.durable import NotRecordedError
+from ..store.store import Planned, Store
+from ..trials.episodes import Recording
 from .words import runs
 
-NEEDED = (*RECORDED, "goal_pose", "dt", "robot", "box")
+NEEDED = (
+    "robot_poses", "box_pose", "wheel_speeds", "contact", "failed", "goal_pose", "dt", "robot",
+    "box",
+)  # fmt: skip
+"""What the canvas draws."""
 LEAST_SCALE = 1e-4
 """Positions are kept to a tenth of a millimetre, or coarser where they reach beyond 3 m [m]."""
 MOST_BYTES = 1_500_000
@@ -65,7 +69,7 @@ class Replays:
         return said
 
 
-def replays(store: Store, trials: Iterable[Trial], most_bytes: int = MOST_BYTES) -> Replays:
+def replays(store: Store, trials: Iterable[Planned], most_bytes: int = MOST_BYTES) -> Replays:
     """Pack the recordings of finished trials, in their order, until there is no more room."""
     reached = _reached(store)
     done = {(condition, seed) for condition, seed, _ in reached}
@@ -73,7 +77,7 @@ def replays(store: Store, trials: Iterable[Trial], most_bytes: int = MOST_BYTES)
     found = Replays([], [], {})
     size = 0
 
-    def miss(trial: Trial, reason: str) -> None:
+    def miss(trial: Planned, reason: str) -> None:
         trials = found.missing.setdefault(reason, {})
         trials.setdefault(trial.condition, []).append(trial.seed)
 
@@ -97,6 +101,8 @@ def replays(store: Store, trials: Iterable[Trial], most_bytes: int = MOST_BYTES)
                 }
                 found.episodes.append(episode)
                 size += len(episode["data"])
+        except NotRecordedError:
+            miss(trial, "Not shown, as the scenario records no episodes")
         except SpecError:
             miss(trial, "Not shown, as the recording is missing or damaged")
         except ValueError:

@@ -10,7 +10,7 @@ from importlib.metadata import version
 import numpy as np
 
 from ..analysis.summary import Summary, interval, number
-from ..spec.spec import Spec
+from ..spec.outline import Outline
 
 PACKAGES = (
     "nested-agents",
@@ -57,12 +57,16 @@ def runs(values: Iterable[int]) -> str:
     return ", ".join(parts)
 
 
-def extent(spec: Spec) -> str:
+def extent(outline: Outline) -> str:
     """Return what a study consists of."""
-    after = f", {count(spec.evaluation, 'greedy episode')} after them" if spec.evaluation else ""
+    after = (
+        f", {count(outline.evaluation, 'evaluation episode')} after them"
+        if outline.evaluation
+        else ""
+    )
     return (
-        f"{count(len(spec.conditions()), 'condition')} × {count(len(spec.seeds), 'seed')}, each "
-        f"{count(spec.episodes, 'training episode')} of up to {count(spec.steps, 'step')}{after}"
+        f"{count(len(outline.columns), 'condition')} × {count(len(outline.seeds), 'seed')}, each "
+        f"{count(outline.episodes, 'training episode')} of up to {count(outline.steps, 'step')}{after}"
     )
 
 

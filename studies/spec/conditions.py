@@ -16,12 +16,17 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, Field, ValidationError
 
-from ...core.settings import BatchTDSettings, Learner, Settings
+from ...core.learners import LEARNERS, LearnerSettings
+from ...core.learners.batch import BatchTDSettings
+from ...core.registry import Plugged, closest
+from ...core.settings import ScenarioSettings, Settings
+from ...scenarios import SCENARIOS
 from ...scenarios.box_pushing.config import BoxPushingSettings
 from ...topologies.config import ChainSettings, Topology, parse
-from .errors import SpecError, closest, explain, show
+from .errors import SpecError, explain, show
 from .overlay import Table, nested, overlay
 from .presets import PRESETS
+from .renamed import now_called
 
 SECTIONS = ("scenario", "topology", "learner")
 
@@ -29,9 +34,9 @@ SECTIONS = ("scenario", "topology", "learner")
 class ConditionSettings(Settings):
     """All that a trial depends on besides its seed and its length."""
 
-    scenario: BoxPushingSettings = BoxPushingSettings()
+    scenario: Annotated[ScenarioSettings, Plugged(SCENARIOS)] = BoxPushingSettings()
     topology: Topology = ChainSettings()
-    learner: Learner = BatchTDSettings()
+    learner: Annotated[LearnerSettings, Plugged(LEARNERS)] = BatchTDSettings()
 
     def canonical(self) -> str:
         """Return the JSON text that equal settings share, whatever wrote them."""
@@ -89,7 +94,13 @@ class Condition:
     label: str
     columns: Mapping[str, Any]
     settings: ConditionSettings
-    evaluations: tuple[tuple[str, BoxPushingSettings], ...] = ()
+    evaluations: tuple[tuple[str, ScenarioSettings], ...] = ()
+
+    @property
+    def tables(self) -> list[Any]:
+        """Its settings and those of its evaluations, as tables."""
+        elsewhere = [scenario.model_dump(mode="json") for _, scenario in self.evaluations]
+        return [self.settings.model_dump(mode="json"), *elsewhere]
 
 
 def grid(
@@ -159,7 +170,8 @@ def resolve(
     own = override.preset if override else None
     name = point.get("preset", preset if own is None else own)
     if not isinstance(name, str) or name not in PRESETS:
-        raise SpecError(f"preset = {show(name)}: {closest(name, PRESETS)}{where}")
+        said = now_called("preset", name) or closest(name, PRESETS)
+        raise SpecError(f"preset = {show(name)}: {said}{where}")
     layers = [PRESETS[name].table, tables, override.tables if override else {}]
     layers += [nested(key, value) for key, value in point.items() if key != "preset"]
     table = ConditionSettings().model_dump()
@@ -171,7 +183,7 @@ def resolve(
 
 def _elsewhere(
     settings: ConditionSettings, evaluations: Mapping[str, Mapping[str, Any]], where: str
-) -> tuple[tuple[str, BoxPushingSettings], ...]:
+) -> tuple[tuple[str, ScenarioSettings], ...]:
     table = settings.model_dump()
     found = []
     for name, changes in evaluations.items():

@@ -44,6 +44,9 @@ def _differences(
         yield f"evaluations = {then} there, {now} here"
     if not set(old.seeds) <= set(new.seeds):
         yield f"seeds = {show(old.seeds)} there, {show(new.seeds)} here"
+    for name in sorted(old.sources.texts.keys() & new.sources.texts.keys()):
+        if old.sources.digest(name) != new.sources.digest(name):
+            yield f"{name} has changed since"
     settings = {c.label: c.settings.model_dump(mode="json") for c in new.conditions()}
     if list(settings) != list(old_settings):
         yield f"conditions = {show(list(old_settings))} there, {show(list(settings))} here"

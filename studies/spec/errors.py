@@ -6,14 +6,15 @@ value found there, what is allowed, and the closest known name.
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
 from ...core.refusals import rule
-from .overlay import kind_of, model_at, models_of
+from ...core.registry import closest
+from .overlay import Slot, field_of, kind_of, model_at, models_of
+from .renamed import now_called
 
 
 class SpecError(ValueError):
@@ -41,14 +42,6 @@ def show(value: object, width: int | None = 60) -> str:
     return text if width is None or len(text) <= width else text[: width - 3] + "..."
 
 
-def closest(name: object, known: Iterable[str]) -> str:
-    """Return "; did you mean ...?" if a known name is near, and the known names in any case."""
-    known = sorted(known)
-    near = difflib.get_close_matches(str(name), known, n=1)
-    hint = f"did you mean {near[0]!r}? " if near else ""
-    return f"{hint}known: {', '.join(known) or 'none'}"
-
-
 def explain(error: ValidationError, model: type[BaseModel], data: Mapping[str, Any]) -> str:
     """Return one line on the first thing that `error` found wrong with `data`.
 
@@ -70,19 +63,29 @@ def explain(error: ValidationError, model: type[BaseModel], data: Mapping[str, A
     if first["type"] == "extra_forbidden":
         owner = _owner(keys[:-1], model, data)
         kind = f" for kind {kind_of(owner)!r}" if owner is not None and kind_of(owner) else ""
+        renamed = now_called(path)
+        if renamed is not None:
+            return f"{path} = {show(first['input'])}: {renamed}"
         known = set() if owner is None else set(owner.model_fields)
         return f"{path} = {show(first['input'])}: unknown key{kind}; {closest(keys[-1], known)}"
     if first["type"] == "missing":
         name = str(first["loc"][-1])
         return f"{path}: missing" if keys == (name,) else f"{path}.{name}: missing"
     value = first["input"]
+    if first["type"] == "plugged_kind":
+        if isinstance(value, Mapping):
+            path, value = f"{path}.kind", value.get("kind")
+        renamed = now_called(path, value)
+        return f"{path} = {show(value)}: {renamed or first['msg']}"
     if first["type"].startswith("union_tag"):
         path, value = f"{path}.kind", value.get("kind") if isinstance(value, Mapping) else value
-        kinds = [kind_of(m) for m in models_of(_annotation(keys, model, data))]
+        slot = _slot(keys, model, data)
+        kinds = [kind_of(m) for m in models_of(getattr(slot, "annotation", slot))]
         return f"{path} = {show(value)}: {closest(value, [k for k in kinds if k])}"
     # The members of a union complain one by one about the same place: say what any would take.
     rules = dict.fromkeys(rule(e["msg"]) for place, e in found if place == keys)
-    return f"{path} = {show(value)}: {', or '.join(rules)}"
+    renamed = now_called(path, value)
+    return f"{path} = {show(value)}: {renamed or ', or '.join(rules)}"
 
 
 def _place(loc: Sequence[int | str], data: object) -> tuple[int | str, ...]:
@@ -106,18 +109,18 @@ def _dotted(keys: Sequence[int | str]) -> str:
     return path.lstrip(".").replace("\n", " ") or "spec"
 
 
-def _annotation(keys: Sequence[int | str], model: type[BaseModel], data: Any) -> Any:
-    annotation: Any = model
+def _slot(keys: Sequence[int | str], model: type[BaseModel], data: Any) -> Slot:
+    """Return what the value at `keys` is meant for."""
+    slot: Slot = model
     for key in keys:
         if isinstance(key, int):  # an item of a list is one of the models that the list may hold
             data = data[key]
             continue
-        owner = model_at(annotation, data)
-        field = owner.model_fields.get(str(key)) if owner is not None else None
-        if field is None:
+        slot = field_of(model_at(slot, data), str(key))
+        if slot is None:
             return None
-        annotation, data = field.annotation, data[key]
-    return annotation
+        data = data[key]
+    return slot
 
 
 def _owner(
@@ -127,4 +130,4 @@ def _owner(
     inner: Any = data
     for key in keys:
         inner = inner[key]
-    return model_at(_annotation(keys, model, data), inner)
+    return model_at(_slot(keys, model, data), inner)

@@ -13,8 +13,15 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from ...core.registry import Plugged, SettingsRegistry
 
 Table = dict[str, Any]
+
+
+Slot = type[BaseModel] | FieldInfo | None
+"""What a table is meant for: a model, or a field that holds one of several."""
 
 
 def models_of(annotation: Any) -> list[type[BaseModel]]:
@@ -27,28 +34,44 @@ def models_of(annotation: Any) -> list[type[BaseModel]]:
 def kind_of(model: type[BaseModel]) -> str | None:
     """Return the `kind` by which a table names this model, if it has one."""
     field = model.model_fields.get("kind")
-    return None if field is None else field.default
+    return None if field is None else field.default or None
 
 
-def model_at(annotation: Any, table: object) -> type[BaseModel] | None:
+def registry_of(slot: Slot) -> SettingsRegistry | None:
+    """Return the registry whose things a field holds, if it does."""
+    marks = slot.metadata if isinstance(slot, FieldInfo) else []
+    return next((mark.registry for mark in marks if isinstance(mark, Plugged)), None)
+
+
+def model_at(slot: Slot, table: object) -> type[BaseModel] | None:
     """Return the model that `table` is meant for; none if its kind is unknown or missing."""
-    models = models_of(annotation)
+    kind = table.get("kind") if isinstance(table, Mapping) else None
+    registry = registry_of(slot)
+    if registry is not None:
+        try:
+            return registry.model(str(kind))
+        except ValueError:
+            return None
+    models = models_of(slot.annotation if isinstance(slot, FieldInfo) else slot)
     if len(models) == 1:
         return models[0]
-    kind = table.get("kind") if isinstance(table, Mapping) else None
     return next((m for m in models if kind is not None and kind_of(m) == kind), None)
 
 
-def overlay(base: Mapping[str, Any], table: Mapping[str, Any], annotation: Any = None) -> Table:
+def field_of(model: type[BaseModel] | None, key: str) -> FieldInfo | None:
+    """Return the field that a key of a model's table names."""
+    return None if model is None else model.model_fields.get(key)
+
+
+def overlay(base: Mapping[str, Any], table: Mapping[str, Any], slot: Slot = None) -> Table:
     """Return `base` with `table` laid over it; neither is modified.
 
     Parameters
     ----------
     base, table
         The lower and the upper table.
-    annotation
-        Model, or union of models told apart by `kind`, that the result is meant for. None: plain
-        tables without kinds.
+    slot
+        What the result is meant for. None: plain tables without kinds.
 
     Examples
     --------
@@ -57,14 +80,16 @@ def overlay(base: Mapping[str, Any], table: Mapping[str, Any], annotation: Any =
     """
     result = dict(base)
     if "kind" in base and "kind" in table and base["kind"] != table["kind"]:
-        kept = _common_fields(model_at(annotation, base), model_at(annotation, table))
+        kept = _common_fields(model_at(slot, base), model_at(slot, table))
         result = {key: value for key, value in base.items() if key in kept}
-    model = model_at(annotation, {**result, **table})
+    model = model_at(slot, {**result, **table})
     for key, value in table.items():
         below = result.get(key)
         if isinstance(value, Mapping) and isinstance(below, Mapping):
-            field = model.model_fields.get(key) if model is not None else None
-            result[key] = overlay(below, value, None if field is None else field.annotation)
+            result[key] = overlay(below, value, field_of(model, key))
+        elif isinstance(value, str) and isinstance(below, Mapping) and "kind" in below:
+            # A name stands for a table that says its kind and no more.
+            result[key] = {"kind": value} if registry_of(field_of(model, key)) else value
         else:
             result[key] = value
     return result

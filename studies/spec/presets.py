@@ -1,7 +1,7 @@
 """Named starting points of a spec: a scenario, a topology and a learner.
 
 A preset states where it departs from the defaults of the settings models; a spec's own tables are
-laid over it. `frozen`, `random` and `greedy` are the controls of a learning curve.
+laid over it. `frozen`, `random` and `planner` are the controls of a learning curve.
 """
 
 from __future__ import annotations
@@ -27,7 +27,11 @@ PRESETS: dict[str, Preset] = {
     "pose": Preset(
         "as default, and the box must stand within 15 degrees of the goal pose to be there",
         {
-            "scenario": {"state_space": "pose", "orientation_tolerance": 0.2618},
+            "scenario": {
+                "kind": "box-pushing",
+                "state_space": "pose",
+                "orientation_tolerance": 0.2618,
+            },
             "learner": {"kind": "batch-td", "ridge": 3.0},
         },
     ),
@@ -35,11 +39,12 @@ PRESETS: dict[str, Preset] = {
         "constants as printed in the paper; what it does not print is in docs/fidelity.md",
         {
             "scenario": {
+                "kind": "box-pushing",
                 "state_space": "paper",
-                "hold": 1,
-                "lookahead": 1,
+                "action_repeat": 1,
+                "prediction_horizon": 1,
                 "speed_increment": 0.25,
-                "arena": 100.0,
+                "termination_radius": 100.0,
                 "reward": {
                     "least_approach": 0.0,
                     "pays_at_goal": False,
@@ -54,7 +59,7 @@ PRESETS: dict[str, Preset] = {
                 "trace_decay": 0.4,
                 "rule_base": {"membership": "sigmoid", "memberships": 5, "order": 7},
                 "exploration": {"kind": "paper", "decay": 0.005},
-                "decision": {"rule": "value", "others": "observed"},
+                "decision": {"rule": "value", "teammates": "empirical"},
             },
         },
     ),
@@ -66,12 +71,16 @@ PRESETS: dict[str, Preset] = {
         "control: every action is drawn at random",
         {"learner": {"kind": "frozen", "decision": {"rule": "random"}}},
     ),
-    "greedy": Preset(
-        "control: greedy on the predicted reward, which it is told; nothing is learned",
+    "planner": Preset(
+        "control: model-based lookahead planner, which has the reward function; learns nothing",
         {
             # With R_1 under Condition 3 as printed, and 3 s ahead: what did best on seeds 10000 to
-            # 10009. With the default's reward and 1.5 s it brings the box home in .6 of episodes.
-            "scenario": {"lookahead": 48, "reward": {"attraction_without_contact": True}},
+            # 10009. With the default's reward and 1.5 s its success rate is .6.
+            "scenario": {
+                "kind": "box-pushing",
+                "prediction_horizon": 48,
+                "reward": {"attraction_without_contact": True},
+            },
             "learner": {"kind": "frozen", "decision": {"rule": "reward"}},
         },
     ),

@@ -14,12 +14,15 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field, ValidationError, field_validator
+from pydantic import Field, PrivateAttr, ValidationError, field_validator
 
+from ...core.registry import closest
 from ...core.settings import Settings
+from ...core.sources import Sources, is_reference, named
 from .. import STUDIES
 from .conditions import SECTIONS, Condition, Name, Override, grid, section, tuples
-from .errors import SpecError, closest, explain, show
+from .errors import SpecError, explain, show
+from .objects import plain
 from .overlay import Table, assignment, flat, overlay
 from .presets import PRESETS
 
@@ -41,7 +44,7 @@ class Spec(Settings):
 
     Tables may be made by any Python, and hold settings models:
 
-    >>> from nested_agents.core.settings import TDLambdaSettings
+    >>> from nested_agents.core.learners.td import TDLambdaSettings
     >>> ridges = [{"name": f"ridge {r}", "learner": {"ridge": r}} for r in (1.0, 100.0)]
     >>> online = {"name": "online", "learner": TDLambdaSettings(step_size=0.1, normalised=True)}
     >>> [c.label for c in Spec.of({"overrides": [*ridges, online]}).conditions()]
@@ -73,12 +76,23 @@ class Spec(Settings):
     evaluations: Mapping[Name, Mapping[str, Any]] = Field(default_factory=dict)
     """By name, changes of the scenario in which the trained teams are evaluated too."""
 
-    @field_validator("study", "preset")
+    _conditions: tuple[Condition, ...] = PrivateAttr(default=())
+    _sources: Sources = PrivateAttr(default_factory=Sources)
+
+    @field_validator("study")
     @classmethod
-    def _known(cls, value: str, info: Any) -> str:
-        known: Iterable[str] = STUDIES if info.field_name == "study" else PRESETS
-        if value not in known:
-            raise ValueError(closest(value, known))
+    def _known(cls, value: str) -> str:
+        if is_reference(value):
+            STUDIES.find(value)
+        elif value not in STUDIES.names():
+            raise ValueError(closest(value, STUDIES.names()))
+        return value
+
+    @field_validator("preset")
+    @classmethod
+    def _preset(cls, value: str) -> str:
+        if value not in PRESETS:
+            raise ValueError(closest(value, PRESETS))
         return value
 
     @field_validator("seeds", mode="before")
@@ -97,22 +111,31 @@ class Spec(Settings):
         return tuple(value)
 
     @classmethod
-    def of(cls, table: Mapping[str, Any]) -> Spec:
-        """Build a spec from a table as TOML reads it.
+    def of(cls, table: Mapping[str, Any], sources: Sources | None = None) -> Spec:
+        """Build a spec from a table as TOML reads it, or with objects in it.
+
+        Parameters
+        ----------
+        table
+            The spec. In place of names it may hold settings, classes and functions.
+        sources
+            The files that it may name; those below the working directory unless given.
 
         Raises
         ------
         SpecError
             If anything in it, the conditions included, is wrong.
         """
+        sources = Sources(Path()) if sources is None else sources
         try:
-            return cls._of(table)
+            with sources.active():
+                return cls._of(table, sources)
         except RecursionError:
             raise SpecError("spec: is nested too deeply") from None
 
     @classmethod
-    def _of(cls, table: Mapping[str, Any]) -> Spec:
-        table = _read(table, "")
+    def _of(cls, table: Mapping[str, Any], sources: Sources) -> Spec:
+        table = _read(plain(table), "")
         if isinstance(table.get("overrides"), list | tuple):
             table["overrides"] = tuple(
                 _read(override, f"overrides[{i}].") if isinstance(override, Mapping) else override
@@ -126,7 +149,11 @@ class Spec(Settings):
         if points * len(spec.seeds) > MOST_TRIALS:
             grid_size = f"{points} conditions x {len(spec.seeds)} seeds"
             raise SpecError(f"sweep: {grid_size}, at most {MOST_TRIALS} trials")
-        spec.conditions()
+        tables = {name: getattr(spec, name) for name in SECTIONS}
+        spec._conditions = grid(spec.preset, tables, spec.sweep, spec.overrides, spec.evaluations)
+        spec._sources = sources.only(
+            named([spec.study, *(condition.tables for condition in spec._conditions)])
+        )
         return spec
 
     @classmethod
@@ -144,11 +171,20 @@ class Spec(Settings):
             raise SpecError(f"{path}: {error.strerror or error}") from None
         except UnicodeDecodeError:
             raise SpecError(f"{path}: is not UTF-8 text") from None
-        return cls.parse(text, changes, str(path))
+        return cls.parse(text, changes, str(path), path.parent)
 
     @classmethod
-    def parse(cls, text: str, changes: Iterable[str] = (), source: str = "spec") -> Spec:
-        """Read TOML text and lay ``key=value`` changes over it; see `load`."""
+    def parse(
+        cls,
+        text: str,
+        changes: Iterable[str] = (),
+        source: str = "spec",
+        folder: Path = Path(),
+    ) -> Spec:
+        """Read TOML text and lay ``key=value`` changes over it; see `load`.
+
+        Files that it names are below `folder`.
+        """
         try:
             table = tomllib.loads(text)
         except tomllib.TOMLDecodeError as error:
@@ -160,7 +196,7 @@ class Spec(Settings):
                 table = _changed(table, assignment(change))
             except ValueError as error:
                 raise SpecError(f"--set {change}: {error}") from None
-        return cls.of(table)
+        return cls.of(table, Sources(folder))
 
     @property
     def n_conditions(self) -> int:
@@ -171,8 +207,12 @@ class Spec(Settings):
 
     def conditions(self) -> tuple[Condition, ...]:
         """Return the conditions in the order of the overrides and sweeps."""
-        tables = {name: getattr(self, name) for name in SECTIONS}
-        return grid(self.preset, tables, self.sweep, self.overrides, self.evaluations)
+        return self._conditions
+
+    @property
+    def sources(self) -> Sources:
+        """The files of users that it names."""
+        return self._sources
 
     def table(self) -> Table:
         """Return the spec as a table that `of` reads back."""

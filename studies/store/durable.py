@@ -17,6 +17,10 @@ from ..spec.errors import SpecError
 from ..trials.episodes import Recording
 
 
+class NotRecordedError(SpecError):
+    """A file of recordings is sound, and holds none of this name."""
+
+
 def write(path: Path, content: bytes) -> None:
     """Replace a file so that, whenever power fails, it holds the old or the new content."""
     with replacing(path) as file:
@@ -67,7 +71,9 @@ def read_recording(path: Path, name: str) -> Recording:
     Raises
     ------
     SpecError
-        If the file is not there or damaged, or holds no such recording.
+        If the file is not there or damaged.
+    NotRecordedError
+        If it holds no such recording.
     """
     prefix = f"{name}/"
     try:
@@ -79,5 +85,5 @@ def read_recording(path: Path, name: str) -> Recording:
     except (OSError, ValueError, EOFError, zipfile.BadZipFile):
         raise SpecError(f"{path}: is damaged") from None
     if not found:
-        raise SpecError(f"{path}: holds no recording {name!r}")
+        raise NotRecordedError(f"{path}: holds no recording {name!r}")
     return found

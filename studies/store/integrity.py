@@ -67,22 +67,30 @@ def recover(damaged: Path, db: sqlite3.Connection) -> int:
     Returns
     -------
     int
-        How many trials were copied.
+        How many trials were copied; none if episodes are told by other measures now.
     """
     copied = 0
-    for tables in _sound(damaged):
+    for tables in _sound(damaged, _columns(db)):
         for table, rows in tables.items():
             database.insert(db, table, rows)
         copied += 1
     return copied
 
 
-def _sound(path: Path) -> Iterator[dict[str, list[tuple[object, ...]]]]:
-    """Yield the rows by table of every trial that can be read and has its checksum."""
+def _columns(db: sqlite3.Connection) -> list[str]:
+    return [name for _, name, *_ in db.execute("PRAGMA table_info(episodes)")]
+
+
+def _sound(path: Path, columns: list[str]) -> Iterator[dict[str, list[tuple[object, ...]]]]:
+    """Yield the rows by table of every trial that can be read and has its checksum.
+
+    None if episodes have other `columns`.
+    """
     identities: dict[str, str] = {}
     with suppress(sqlite3.DatabaseError), database.copied(path) as db:
         db.execute("PRAGMA writable_schema = ON")  # a table it cannot understand is passed over
-        for identity, noted in db.execute("SELECT identity, sha256 FROM checksums"):
+        noted_by = db.execute("SELECT identity, sha256 FROM checksums")
+        for identity, noted in noted_by if _columns(db) == columns else ():
             identities.setdefault(identity, noted)
     with database.copied(path) as db:
         db.execute("PRAGMA writable_schema = ON")

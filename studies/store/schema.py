@@ -9,13 +9,19 @@ from __future__ import annotations
 import hashlib
 import json
 import sqlite3
+from collections.abc import Sequence
 
+from ...core.protocols import Measure
 from ..spec.spec import Spec
-from ..trials.episodes import COLUMNS
-from ..trials.trial import RESULTS_VERSION
+from ..trials.code import Code
+from ..trials.measures import columns, tables
+from ..trials.trial import RESULTS_VERSION, trials_of
 from .database import insert, quoted
 
 SECONDS = ("decision", "physics", "sensors", "learning", "total")
+
+PLANNED = ("identity", "condition", "seed", "recorded")
+"""What is noted of every trial of a study before it is run."""
 
 OF_A_TRIAL = ("episodes", "seconds", "numbers", "checksums")
 """The tables that hold what a trial measured, by its identity."""
@@ -25,13 +31,10 @@ SCHEMA = (
     """CREATE TABLE IF NOT EXISTS trials (
         identity TEXT PRIMARY KEY, condition TEXT NOT NULL, seed INTEGER NOT NULL,
         state TEXT NOT NULL CHECK (state IN ('done', 'failed')), error TEXT,
-        recording_sha256 TEXT)""",
-    """CREATE TABLE IF NOT EXISTS episodes (
-        identity TEXT NOT NULL REFERENCES trials ON DELETE CASCADE, phase TEXT NOT NULL,
-        episode INTEGER NOT NULL, steps INTEGER NOT NULL, success INTEGER NOT NULL,
-        stopped_at_goal INTEGER NOT NULL, final_distance_m REAL NOT NULL,
-        final_orientation_rad REAL NOT NULL, contact_fraction REAL NOT NULL,
-        "return" REAL NOT NULL, PRIMARY KEY (identity, phase, episode)) WITHOUT ROWID""",
+        recording_sha256 TEXT, code TEXT)""",
+    """CREATE TABLE IF NOT EXISTS planned (
+        position INTEGER, identity TEXT PRIMARY KEY, condition TEXT NOT NULL,
+        seed INTEGER NOT NULL, recorded TEXT NOT NULL)""",
     f"""CREATE TABLE IF NOT EXISTS seconds (
         identity TEXT PRIMARY KEY REFERENCES trials ON DELETE CASCADE,
         {", ".join(f"{part} REAL NOT NULL" for part in SECONDS)})""",
@@ -42,30 +45,51 @@ SCHEMA = (
     """CREATE TABLE IF NOT EXISTS checksums (
         identity TEXT PRIMARY KEY REFERENCES trials ON DELETE CASCADE, sha256 TEXT NOT NULL)""",
 )
+"""Tables that all studies have alike; the columns of `conditions` and `episodes` differ."""
 
 
-def prepare(db: sqlite3.Connection, spec: Spec) -> None:
-    """Make the tables, and note what the study consists of; within a transaction."""
+def prepare(
+    db: sqlite3.Connection, spec: Spec, measures: Sequence[Measure], computed_by: Code
+) -> None:
+    """Make the tables, and note what the study is and what computes it; within a transaction."""
     conditions = spec.conditions()
     settings = {c.label: c.settings.model_dump(mode="json") for c in conditions}
     swept = [quoted(key) for key in conditions[0].columns]
-    columns = ", ".join(["position INTEGER", "condition TEXT PRIMARY KEY", *swept])
+    told = ", ".join(["position INTEGER", "condition TEXT PRIMARY KEY", *swept])
     for statement in SCHEMA:
         db.execute(statement)
-    db.execute(f"CREATE TABLE IF NOT EXISTS conditions ({columns})")
+    db.execute(_episodes(measures))
+    db.execute(f"CREATE TABLE IF NOT EXISTS conditions ({told})")
     db.execute("DELETE FROM conditions")
     insert(db, "conditions", [(i, c.label, *c.columns.values()) for i, c in enumerate(conditions)])
     db.execute(
         f"""CREATE VIEW IF NOT EXISTS results AS
         SELECT c.condition, {"".join(f"c.{key}, " for key in swept)}t.seed,
-            {", ".join(f"e.{quoted(name)}" for name in COLUMNS)}
+            {", ".join(f"e.{quoted(name)}" for name in columns(measures))}
         FROM episodes e JOIN trials t USING (identity) JOIN conditions c USING (condition)
         WHERE t.state = 'done' ORDER BY c.position, t.seed, e.phase DESC, e.episode"""
     )
+    db.execute("DELETE FROM planned")
+    planned = [
+        (i, t.identity, t.condition, t.seed, json.dumps(t.recorded))
+        for i, t in enumerate(trials_of(spec))
+    ]
+    insert(db, "planned", planned)
     db.execute("DELETE FROM meta")
     meta = {"results_version": str(RESULTS_VERSION), "spec": json.dumps(spec.table())}
-    insert(db, "meta", [*meta.items(), ("conditions", json.dumps(settings))])
+    meta |= {"conditions": json.dumps(settings), "measures": json.dumps(tables(measures))}
+    meta |= {"sources": json.dumps(spec.sources.texts), "code": json.dumps(computed_by)}
+    insert(db, "meta", list(meta.items()))
     insert(db, "meta", [("sha256", study_checksum(db))])
+
+
+def _episodes(measures: Sequence[Measure]) -> str:
+    """Return what makes the table of episodes: a measure is NULL where a scenario has it not."""
+    measured = "".join(f"{quoted(m.name)} {'INTEGER' if m.is_rate else 'REAL'}, " for m in measures)
+    return f"""CREATE TABLE IF NOT EXISTS episodes (
+        identity TEXT NOT NULL REFERENCES trials ON DELETE CASCADE, phase TEXT NOT NULL,
+        episode INTEGER NOT NULL, steps INTEGER NOT NULL, {measured}"return" REAL NOT NULL,
+        PRIMARY KEY (identity, phase, episode)) WITHOUT ROWID"""
 
 
 def study_checksum(db: sqlite3.Connection) -> str:
@@ -74,6 +98,7 @@ def study_checksum(db: sqlite3.Connection) -> str:
         "SELECT type, name, tbl_name, sql FROM sqlite_master ORDER BY name",
         "SELECT key, value FROM meta WHERE key <> 'sha256' ORDER BY key",
         "SELECT * FROM conditions ORDER BY condition",
+        "SELECT * FROM planned ORDER BY position",
     )
     return _sha256([db.execute(query).fetchall() for query in queries])
 
@@ -81,7 +106,7 @@ def study_checksum(db: sqlite3.Connection) -> str:
 def trial_checksum(db: sqlite3.Connection, identity: str) -> str:
     """Return the SHA-256 of all rows of a trial."""
     queries = (
-        "SELECT identity, condition, seed, state, recording_sha256 FROM trials WHERE identity = ?",
+        "SELECT identity, condition, seed, state, recording_sha256, code FROM trials WHERE identity = ?",
         "SELECT * FROM episodes WHERE identity = ? ORDER BY phase, episode",
         "SELECT * FROM seconds WHERE identity = ?",
         "SELECT * FROM numbers WHERE identity = ? ORDER BY name",

@@ -17,23 +17,67 @@ import fcntl
 import json
 import sqlite3
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any, NamedTuple, Protocol, TextIO, TypeVar
 
+from ...core.protocols import Measure
+from ...core.sources import FOLDER, Sources, kept_name
 from ..spec.difference import difference
 from ..spec.errors import SpecError
+from ..spec.outline import Outline
 from ..spec.spec import Spec
 from ..spec.toml import dumps
+from ..trials import code
 from ..trials.episodes import Recording
+from ..trials.measures import column_of, measures_from
 from ..trials.trial import RESULTS_VERSION, Trial, TrialResult
 from . import database, durable, integrity
 from .running import LOCK
-from .schema import SECONDS, prepare, trial_checksum
+from .schema import PLANNED, SECONDS, prepare, trial_checksum
 
 DATABASE = "results.sqlite"
 SPEC_FILE = "study.toml"
+
+
+class Identified(Protocol):
+    """A trial as far as the ledger needs it."""
+
+    @property
+    def identity(self) -> str: ...  # noqa: D102
+    @property
+    def condition(self) -> str: ...  # noqa: D102
+    @property
+    def seed(self) -> int: ...  # noqa: D102
+
+
+T = TypeVar("T", bound=Identified)
+
+
+class Planned(NamedTuple):
+    """A trial as it was noted before it was run: its members are those of a `Trial`."""
+
+    identity: str
+    condition: str
+    seed: int
+    recorded: dict[int, str]
+
+
+@dataclass(frozen=True)
+class _Given:
+    """What is to be run, and by what."""
+
+    spec: Spec
+    measures: Sequence[Measure]
+    accept_code: bool
+
+    @cached_property
+    def code(self) -> code.Code:
+        """The installed code."""
+        return code.present()
 
 
 class Store:
@@ -51,13 +95,32 @@ class Store:
         self.directory = directory
         self.notes: list[str] = []
         self._db = connection
+        self._code = ""  # what computes what is saved
 
     @classmethod
     @contextmanager
-    def create(cls, directory: Path, spec: Spec) -> Iterator[Store]:
+    def create(
+        cls,
+        directory: Path,
+        spec: Spec,
+        measures: Sequence[Measure],
+        *,
+        accept_code: bool = False,
+    ) -> Iterator[Store]:
         """Open a directory to run `spec` in; make it if it does not exist.
 
         A damaged database is set aside under another name, and what can be trusted of it copied.
+
+        Parameters
+        ----------
+        directory
+            The directory.
+        spec
+            The study.
+        measures
+            What it measures of its episodes, see `nested_agents.studies.trials.trial.check`.
+        accept_code
+            Whether to go on although the installed code has changed since.
 
         Raises
         ------
@@ -65,7 +128,8 @@ class Store:
             If it cannot be written, holds a study that differs by more than additional seeds, or
             another process is writing to it. Nothing has been changed then.
         """
-        _examined(directory, spec)  # what is refused leaves nothing behind
+        given = _Given(spec, measures, accept_code)
+        _examined(directory, given)  # what is refused leaves nothing behind
         path = directory / DATABASE
         try:
             (directory / "recordings").mkdir(parents=True, exist_ok=True)
@@ -74,12 +138,12 @@ class Store:
             raise SpecError(f"{directory}: {error.strerror or error}") from None
         with lock:
             _take(lock, directory)
-            damage = _examined(directory, spec)  # again: nobody else writes from here on
+            damage = _examined(directory, given)  # again: nobody else writes from here on
             aside = integrity.set_aside(path) if damage is not None else None
             with database.writing(path) as connection:
                 store = cls(directory, connection)
                 with database.transaction(connection):
-                    prepare(connection, spec)
+                    prepare(connection, spec, measures, given.code)
                     recovered = 0 if aside is None else integrity.recover(aside, connection)
                 if aside is not None:
                     store.notes.append(
@@ -89,6 +153,8 @@ class Store:
                 spec_file = directory / SPEC_FILE
                 if not (spec_file.exists() and Spec.load(spec_file) == spec):
                     durable.write(spec_file, dumps(spec.table()).encode())
+                store._keep_sources(spec)
+                store._code = code.digest(given.code)
                 yield store
 
     @classmethod
@@ -107,28 +173,89 @@ class Store:
             yield cls(directory, connection)
 
     def spec(self) -> Spec:
-        """Return the spec that the study runs."""
-        return Spec.of(self._table("spec"))
+        """Return the spec that the study runs; what it names of users' files is run."""
+        return Spec.of(self._table("spec"), self.sources())
 
-    def refusal(self, spec: Spec) -> str | None:
-        """Return why `spec` may not be run here by this version, in one line; None if it may."""
+    def sources(self) -> Sources:
+        """Return the files of users that the study names, as they were when it began."""
+        return Sources(None, self._table("sources"))
+
+    def outline(self) -> Outline:
+        """Return what the study consists of, as it was noted; nothing is run for it."""
+        try:
+            return Outline.noted(self._table("spec"), self.columns())
+        except (KeyError, TypeError, ValueError):
+            raise SpecError(
+                f"{self.directory / DATABASE}: is damaged: spec cannot be read"
+            ) from None
+
+    def planned(self) -> tuple[Planned, ...]:
+        """Return all trials of the study, as they were noted."""
+        rows = self._db.execute(f"SELECT {', '.join(PLANNED)} FROM planned ORDER BY position")
+        return tuple(
+            Planned(identity, condition, seed, {int(k): v for k, v in json.loads(kept).items()})
+            for identity, condition, seed, kept in rows
+        )
+
+    def versions_of_code(self) -> int:
+        """Return by how many versions of the installed code finished trials were computed."""
+        query = "SELECT count(DISTINCT code) FROM trials WHERE state = 'done'"
+        return int(self._db.execute(query).fetchone()[0])
+
+    def outdated(self) -> str | None:
+        """Return why this version would not go on with the study, in one line; None if it would."""
         if (version := self.meta("results_version")) != str(RESULTS_VERSION):
-            return (
-                f"{self.directory}: holds results of version {version}, this is version "
-                f"{RESULTS_VERSION}; use another directory"
-            )
-        if found := difference(self.spec(), self._table("conditions"), spec):
+            return f"{self._version(version)}; use another directory"
+        known = {name: (text, tree) for name, (text, tree) in self._table("code").items()}
+        modules = code.changed(known)
+        if not modules:
+            return None
+        more = f" and {len(modules) - 1} more" if len(modules) > 1 else ""
+        return (
+            f"{self.directory}: its results are of other code: {modules[0]}{more} has changed since; "
+            "--accept-code goes on with it"
+        )
+
+    def measures(self) -> tuple[Measure, ...]:
+        """Return what the study measures of its episodes, of any condition."""
+        if (version := self.meta("results_version")) != str(RESULTS_VERSION):
+            raise SpecError(f"{self._version(version)}; run it again to read it")
+        try:
+            return measures_from(json.loads(self.meta("measures")))
+        except (ValueError, TypeError):
+            raise SpecError(
+                f"{self.directory / DATABASE}: is damaged: measures cannot be read"
+            ) from None
+
+    def _version(self, version: str) -> str:
+        return (
+            f"{self.directory}: holds results of version {version}, this is version "
+            f"{RESULTS_VERSION}"
+        )
+
+    def refusal(self, given: _Given) -> str | None:
+        """Return why a spec may not be run here by this version, in one line; None if it may."""
+        outdated = self.outdated()
+        is_other = self.meta("results_version") != str(RESULTS_VERSION)
+        if is_other or (outdated is not None and not given.accept_code):
+            return outdated
+        if found := difference(self.spec(), self._table("conditions"), given.spec):
             return f"{self.directory}: holds another study: {found}"
-        for condition in spec.conditions():
-            try:
-                condition.settings.topology.check_unchanged()
-            except ValueError as error:
-                title = condition.settings.topology.title
-                return f"{self.directory}: topology {title!r}: {error}"
-        return None
+        return self._other_measures(given.measures)
+
+    def _other_measures(self, measures: Sequence[Measure]) -> str | None:
+        """Return in one line that episodes are measured otherwise here; None if they are not."""
+        kept = self.measures()
+        if list(map(column_of, kept)) == list(map(column_of, measures)):
+            return None
+        told, now = (", ".join(m.name for m in group) for group in (kept, measures))
+        return (
+            f"{self.directory}: holds episodes measured by {told}; its scenarios now declare "
+            f"{now}, or mean something else by it; use another directory"
+        )
 
     def meta(self, key: str) -> str:
-        """Return what is noted under `key`: ``spec``, ``conditions`` or ``results_version``."""
+        """Return what is noted under `key`, as ``spec``, ``conditions`` or ``results_version``."""
         found = self._db.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
         if found is None:
             raise SpecError(f"{self.directory / DATABASE}: is no study: it has no {key}")
@@ -143,7 +270,16 @@ class Store:
             raise SpecError(f"{self.directory / DATABASE}: is damaged: {key} cannot be read")
         return table
 
-    def pending(self, trials: Iterable[Trial]) -> list[Trial]:
+    def _keep_sources(self, spec: Spec) -> None:
+        """Keep copies of users' files to read, and to run ``study.toml`` again."""
+        folder = self.directory / FOLDER
+        for name, text in spec.sources.texts.items():
+            folder.mkdir(exist_ok=True)
+            path = folder / kept_name(name)
+            if not path.exists():
+                durable.write(path, text.encode())
+
+    def pending(self, trials: Iterable[T]) -> list[T]:
         """Return the trials that have neither failed nor finished with undamaged results.
 
         What is damaged is added to the `notes`.
@@ -155,7 +291,7 @@ class Store:
             self.notes.append(f"{line}; must run again")
         return [trial for trial in trials if trial.identity not in states]
 
-    def damage(self, trials: Iterable[Trial]) -> dict[str, str]:
+    def damage(self, trials: Iterable[Identified]) -> dict[str, str]:
         """Return by identity which finished trials are not as they were written, one line each."""
         found = {}
         for trial in trials:
@@ -191,15 +327,23 @@ class Store:
         return noted is None or noted[0] == trial_checksum(self._db, identity)
 
     def save(self, trial: Trial, result: TrialResult, total: float) -> None:
-        """Keep the result of a trial that took `total` seconds; durable on return."""
-        identity = trial.identity
+        """Keep the result of a trial that took `total` seconds; durable on return.
+
+        Raises
+        ------
+        ValueError
+            If it has a measure that the study has not.
+        """
+        identity, names = trial.identity, [m.name for m in self.measures()]
+        if unknown := {m.name for m in result.measures} - set(names):
+            raise ValueError(f"measures {sorted(unknown)}: the study has {names}")
         digest = durable.write_recordings(self._recordings(identity), result.recordings)
         seconds = {**result.seconds, "total": total}
         numbers = [(n, v, 1) for n, v in result.numbers.items()]
         numbers += [(n, v, 0) for n, v in result.usage.items()]
         with database.transaction(self._db):
             self._note(trial, "done", None, digest)
-            self._insert("episodes", [(identity, *row) for row in result.rows])
+            self._insert("episodes", [(identity, *row.flat(names)) for row in result.rows])
             self._insert("seconds", [(identity, *(seconds[part] for part in SECONDS))])
             self._insert("numbers", [(identity, *number) for number in numbers])
             self._insert("checksums", [(identity, trial_checksum(self._db, identity))])
@@ -296,7 +440,7 @@ class Store:
         )
         return [(*row[:4], bool(row[4])) for row in cursor]
 
-    def recording(self, trial: Trial, name: str) -> Recording:
+    def recording(self, trial: Identified, name: str) -> Recording:
         """Return a recorded episode of a trial, by its name in `Trial.recorded`."""
         return durable.read_recording(self._recordings(trial.identity), name)
 
@@ -308,32 +452,32 @@ class Store:
 
     def _note(self, trial: Trial, state: str, error: str | None, digest: str | None) -> None:
         self._db.execute("DELETE FROM trials WHERE identity = ?", (trial.identity,))
-        row = (trial.identity, trial.condition, trial.seed, state, error, digest)
+        row = (trial.identity, trial.condition, trial.seed, state, error, digest, self._code)
         self._insert("trials", [row])
 
 
-def _examined(directory: Path, spec: Spec) -> str | None:
+def _examined(directory: Path, given: _Given) -> str | None:
     """Return what is wrong with a directory's database, if anything is; refuse another study."""
     path = directory / DATABASE
     damage = integrity.damage(path) if path.exists() else None
-    refusal = _refusal(directory, spec, damaged=damage is not None)
+    refusal = _refusal(directory, given, damaged=damage is not None)
     if refusal is not None:
         raise SpecError(refusal)
     return damage
 
 
-def _refusal(directory: Path, spec: Spec, *, damaged: bool) -> str | None:
-    """Return why `spec` may not be added to what a directory holds, in one line."""
+def _refusal(directory: Path, given: _Given, *, damaged: bool) -> str | None:
+    """Return why a spec may not be added to what a directory holds, in one line."""
     if not damaged and _holds_tables(directory):
         with Store.open(directory) as store:
-            return store.refusal(spec)
+            return store.refusal(given)
     path = directory / SPEC_FILE
-    if not path.exists() or (old := Spec.load(path)) == spec:
+    if not path.exists() or (old := Spec.load(path)) == given.spec:
         return None
     if not damaged:
         return f"{path}: is in the way of this study's own copy"
     settings = {c.label: c.settings.model_dump(mode="json") for c in old.conditions()}
-    found = difference(old, settings, spec)
+    found = difference(old, settings, given.spec)
     return f"{directory}: holds another study: {found}" if found else None
 
 

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from math import isfinite
+from collections.abc import Iterable, Mapping, Sequence
+from math import inf, isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.loop import StepRecord
-from ...core.protocols import Transition
+from ...core.protocols import Measure, RecordedScenario, Transition
 
 Recording = dict[str, NDArray[Any]]
-"""Arrays of one episode by name; with T steps, M robots and n agents: `robot_poses` (T + 1, M, 3),
-`box_pose` (T + 1, 3), `goal_pose` (3,), `wheel_speeds` (T + 1, n), `contact` (T + 1, M),
-`failed` (T + 1, n) wheels, `reward` (T,), `dt` [s] () of one decision, `robot` and `box` () by
-name."""
-
-RECORDED = ("robot_poses", "box_pose", "wheel_speeds", "contact", "failed")
+"""Arrays of one episode of T steps by name: what the scenario's ``recorded`` names, each
+``(T + 1, ...)``; ``reward`` ``(T,)``, or ``(T, n)`` if agents are rewarded one by one; and what
+its ``constants_of_episode`` returns."""
 
 
 class EpisodeRow(NamedTuple):
@@ -29,67 +26,99 @@ class EpisodeRow(NamedTuple):
     episode: int
     """Counted from 0 within its phase."""
     steps: int
-    success: bool
-    """Whether the box came within the tolerance of the goal, at whatever speed."""
-    stopped_at_goal: bool
-    """Whether it was there, nearly at rest, once the robots had stopped."""
-    final_distance_m: float
-    """Distance of the box from the goal at the end [m]."""
-    final_orientation_rad: float
-    """Absolute orientation error of the box at the end [rad]."""
-    contact_fraction: float
-    """Fraction of the time that a robot touches the box, averaged over the robots."""
+    measures: Mapping[str, float]
+    """Values of the scenario's measures by name, in their order; of a rate, whether it is so."""
     return_: float
-    """Sum of the rewards, not discounted."""
+    """Sum of the rewards, not discounted; of rewards of each agent, of their mean."""
 
-
-COLUMNS = tuple(name.rstrip("_") for name in EpisodeRow._fields)
-"""The columns of an episode row as they are stored."""
+    def flat(self, names: Iterable[str]) -> tuple[Any, ...]:
+        """Return it with the measures of these names in place of all; None where it has not one."""
+        measured = (self.measures.get(name) for name in names)
+        return (self.phase, self.episode, self.steps, *measured, self.return_)
 
 
 class EpisodeMeter:
-    """Takes in the records of one episode and sums them up.
+    """Takes in the transitions of one episode and sums them up.
 
     Parameters
     ----------
     phase, episode
         Where the episode stands.
+    measures
+        What is measured of it.
+
+    Examples
+    --------
+    >>> meter = EpisodeMeter("training", 0, [Measure("energy_j", "energy", "J", "joules", "sum")])
+    >>> for joules in (1.0, 2.5):
+    ...     meter.add(Transition(np.zeros((1, 1)), 0.5, False, False, {"joules": joules}))
+    >>> meter.row()
+    EpisodeRow(phase='training', episode=0, steps=2, measures={'energy_j': 3.5}, return_=1.0)
     """
 
-    def __init__(self, phase: str, episode: int) -> None:
-        self._phase, self._episode = phase, episode
-        self._steps, self._contact, self._return = 0, 0.0, 0.0
+    def __init__(self, phase: str, episode: int, measures: Sequence[Measure]) -> None:
+        self._phase, self._episode, self._measures = phase, episode, measures
+        self._values = {m.name: -inf if m.gathering == "max" else 0.0 for m in measures}
+        self._steps, self._return = 0, 0.0
 
     def add(self, transition: Transition) -> None:
-        """Take in one step."""
-        self._steps += 1
-        self._contact += float(np.mean(transition.info["contact_time"]))
-        self._return += float(transition.reward)
+        """Take in one step.
 
-    def row(self, last: Transition) -> EpisodeRow:
-        """Return the measurements of an episode that ended with the transition `last`.
+        Raises
+        ------
+        ValueError
+            If the transition does not hold what a measure is taken from.
+        """
+        self._steps += 1
+        for measure in self._measures:
+            value, before = _taken(measure, transition), self._values[measure.name]
+            if measure.gathering == "last":
+                self._values[measure.name] = value
+            elif measure.gathering == "max":
+                self._values[measure.name] = max(before, value)
+            else:
+                self._values[measure.name] = before + value
+        self._return += float(np.mean(transition.reward))
+
+    def row(self) -> EpisodeRow:
+        """Return the measurements of the episode, which has ended.
 
         Raises
         ------
         FloatingPointError
             If one of them is not finite: the trial has come to nothing, and says so.
         """
-        row = EpisodeRow(
-            phase=self._phase,
-            episode=self._episode,
-            steps=self._steps,
-            success=bool(last.terminated),
-            stopped_at_goal=bool(last.info.get("stopped_at_goal", False)),
-            final_distance_m=float(last.info["distance_m"]),
-            final_orientation_rad=abs(float(last.info["orientation_rad"])),
-            contact_fraction=self._contact / self._steps,
-            return_=self._return,
-        )
-        for name, value in zip(COLUMNS[2:], row[2:], strict=True):
+        measured = {m.name: self._gathered(m) for m in self._measures}
+        for name, value in {**measured, "return": self._return}.items():
             if not isfinite(value):
                 where = f"{self._phase} episode {self._episode}"
                 raise FloatingPointError(f"{name} = {value} in {where}")
-        return row
+        return EpisodeRow(self._phase, self._episode, self._steps, measured, self._return)
+
+    def _gathered(self, measure: Measure) -> float:
+        value = self._values[measure.name]
+        if measure.gathering == "mean":
+            value /= self._steps
+        return bool(value) if measure.is_rate and isfinite(value) else value
+
+
+def _taken(measure: Measure, transition: Transition) -> float:
+    """Return the value of a measure at one step."""
+    if measure.source == "terminated":
+        return float(transition.terminated)
+    if measure.source not in transition.info:
+        known = ", ".join(sorted(transition.info)) or "nothing"
+        raise ValueError(
+            f"measure {measure.name!r}: its source {measure.source!r} is not in the info of a "
+            f"step, which holds {known}"
+        )
+    try:
+        return float(transition.info[measure.source])
+    except (TypeError, ValueError):
+        raise ValueError(
+            f"measure {measure.name!r}: its source {measure.source!r} must be one number at every "
+            f"step, received {type(transition.info[measure.source]).__name__}"
+        ) from None
 
 
 class Stopwatch:
@@ -112,23 +141,25 @@ class EpisodeRecorder:
 
     Parameters
     ----------
-    opening
-        Measurements before the first step.
+    scenario
+        As it is before the first step, which no transition tells; it may be a like of the one that
+        steps.
     """
 
-    def __init__(self, opening: Mapping[str, Any]) -> None:
-        self._goal = np.array(opening["goal_pose"], dtype=float)
-        self._frames = {name: [np.array(opening[name])] for name in RECORDED}
-        self._rewards: list[float] = []
+    def __init__(self, scenario: RecordedScenario) -> None:
+        opening = scenario.measure()
+        self._frames = {name: [np.array(opening[name])] for name in scenario.recorded}
+        constants = scenario.constants_of_episode()
+        self._constants = {name: np.array(value) for name, value in constants.items()}
+        self._rewards: list[NDArray[np.float64]] = []
 
     def add(self, transition: Transition) -> None:
         """Take in one step."""
         for name, frames in self._frames.items():
             frames.append(np.array(transition.info[name]))
-        self._rewards.append(float(transition.reward))
+        self._rewards.append(np.array(transition.reward, dtype=float))
 
-    def recording(self, **constants: float | str) -> Recording:
-        """Return what was recorded; `constants` are added as arrays of no dimension."""
+    def recording(self) -> Recording:
+        """Return what was recorded."""
         arrays = {name: np.stack(frames) for name, frames in self._frames.items()}
-        arrays |= {"goal_pose": self._goal, "reward": np.array(self._rewards)}
-        return arrays | {name: np.array(value) for name, value in constants.items()}
+        return arrays | {"reward": np.array(self._rewards)} | self._constants

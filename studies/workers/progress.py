@@ -8,7 +8,6 @@ from statistics import fmean
 
 from ..store.running import look
 from ..store.store import Store
-from ..trials.trial import trials_of
 from .worker import CORES
 
 
@@ -45,8 +44,7 @@ class Progress:
 
 def progress(store: Store) -> Progress:
     """Return how far the study of an open store is."""
-    spec = store.spec()
-    trials, refusal, counts = trials_of(spec), store.refusal(spec), store.counts()
+    trials, refusal, counts = store.planned(), store.outdated(), store.counts()
     if refusal is not None:
         # Trials of another version have other identities: what is there counts.
         return Progress(

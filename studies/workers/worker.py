@@ -11,10 +11,12 @@ from importlib.metadata import version
 from platform import python_version
 from typing import TYPE_CHECKING, NamedTuple
 
+from joblib import cpu_count
+
 if TYPE_CHECKING:
     from ..trials.trial import Trial, TrialResult
 
-CORES = len(os.sched_getaffinity(0))
+CORES = cpu_count()
 """Cores that this process may use."""
 
 POLL = 0.5
@@ -72,7 +74,8 @@ def attempt(measure: Measure, trial: Trial) -> Arrival:
     """Run one trial; what goes wrong is returned as text."""
     begin = time.perf_counter()
     try:
-        result = measure(trial)
+        with trial.sources.active():
+            result = measure(trial)
     except Exception:
         return Arrival(trial, None, traceback.format_exc(), time.perf_counter() - begin)
     return Arrival(trial, result, None, time.perf_counter() - begin)

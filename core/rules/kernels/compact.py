@@ -93,8 +93,9 @@ def each_compact(theta: FloatArray, states: FloatArray, packed: Packed) -> Float
 
 @njit(cache=True)
 def td_compact(  # type: ignore[no-untyped-def]
-    theta, trace, reach, states: FloatArray, entered: FloatArray, reward: float, discount: float,
-    step_size: float, lengths: FloatArray, decay: float, packed: Packed,
+    theta, rows: IntArray, trace, reach, states: FloatArray, entered: FloatArray,
+    rewards: FloatArray, discount: float, step_size: float, lengths: FloatArray, decay: float,
+    packed: Packed,
 ) -> None:  # fmt: skip
     """Do what `core.rules.kernels.td_dense` does, triangular partitions."""
     lay = unpack(packed)
@@ -102,12 +103,12 @@ def td_compact(  # type: ignore[no-untyped-def]
     functions, room = _room(lay)
     for i in range(len(states)):
         _pairs_of(entered[i], 0, lay, functions)
-        ahead = _compact_value(theta[i], lay, functions, room)
+        ahead = _compact_value(theta[rows[i]], lay, functions, room)
         _pairs_of(states[i], 0, lay, functions)
-        now = _compact_value(theta[i], lay, functions, room)
+        now = _compact_value(theta[rows[i]], lay, functions, room)
         all_strengths(states[i], lay, strengths, spare)
-        step = step_size * (reward + discount * ahead - now) / lengths[i]
-        advance(theta[i], trace[i], reach[i], strengths, decay, step, lay)
+        step = step_size * (rewards[i] + discount * ahead - now) / lengths[i]
+        advance(theta[rows[i]], trace[i], reach[i], strengths, decay, step, lay)
 
 
 @njit(cache=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from ...arrays import FloatArray
+from ...arrays import FloatArray, IntArray
 from .layout import Layout, Packed, unpack
 from .strengths import all_strengths, hull, negligible, product_of, strengths_room
 from .updates import advance
@@ -89,21 +89,26 @@ def each_dense(theta: FloatArray, states: FloatArray, packed: Packed) -> FloatAr
 
 @njit(cache=True)
 def td_dense(  # type: ignore[no-untyped-def]
-    theta, trace, reach, states: FloatArray, entered: FloatArray, reward: float, discount: float,
-    step_size: float, lengths: FloatArray, decay: float, packed: Packed,
+    theta, rows: IntArray, trace, reach, states: FloatArray, entered: FloatArray,
+    rewards: FloatArray, discount: float, step_size: float, lengths: FloatArray, decay: float,
+    packed: Packed,
 ) -> None:  # fmt: skip
     """Make one TD update of every agent (Eq. 7, 12, 13), any partitions.
 
     Parameters
     ----------
-    theta, trace
-        ``(n, n_rules)`` consequent weights and eligibility traces, both modified.
+    theta
+        ``(n_rows, n_rules)`` consequent weights, modified.
+    rows
+        ``(n,)`` the row of theta of every agent.
+    trace
+        ``(n, n_rules)`` eligibility traces, modified.
     reach
         ``(n, parts of all rows)``, see `core.rules.kernels.updates.advance`, modified.
     states, entered
         ``(n, d)`` the previous states of the agents and those that followed.
-    reward, discount
-        Received in the previous states; weight of what follows, 0 if they were terminal.
+    rewards, discount
+        ``(n,)`` received in the previous states; weight of what follows, 0 if they were terminal.
     step_size, lengths
         Step size, and ``(n,)`` what it is divided by for every agent.
     decay
@@ -117,6 +122,6 @@ def td_dense(  # type: ignore[no-untyped-def]
     for i in range(len(states)):
         all_strengths(states[i], lay, one, room)
         all_strengths(entered[i], lay, two, room)
-        now, ahead = _values_of_two(theta[i], one, two, lay)
-        step = step_size * (reward + discount * ahead - now) / lengths[i]
-        advance(theta[i], trace[i], reach[i], one, decay, step, lay)
+        now, ahead = _values_of_two(theta[rows[i]], one, two, lay)
+        step = step_size * (rewards[i] + discount * ahead - now) / lengths[i]
+        advance(theta[rows[i]], trace[i], reach[i], one, decay, step, lay)

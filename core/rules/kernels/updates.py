@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from ...arrays import FloatArray
+from ...arrays import FloatArray, IntArray
 from .layout import Layout, Packed, unpack
 from .strengths import all_strengths, hull, negligible, product_of, strengths_room
 
@@ -75,21 +75,22 @@ def advance(theta, trace, reach, strengths, decay: float, step: float, lay: Layo
 
 @njit(cache=True)
 def td_update(  # type: ignore[no-untyped-def]
-    theta, trace, reach, states: FloatArray, steps: FloatArray, decay: float, packed: Packed
-) -> None:
-    """Do `advance` for all agents: everything has an axis ``n`` before its own."""
+    theta, rows: IntArray, trace, reach, states: FloatArray, steps: FloatArray, decay: float,
+    packed: Packed,
+) -> None:  # fmt: skip
+    """Do `advance` for all agents, agent i with row ``rows[i]`` of theta."""
     lay = unpack(packed)
     strengths, room = strengths_room(lay)
     for i in range(len(states)):
         all_strengths(states[i], lay, strengths, room)
-        advance(theta[i], trace[i], reach[i], strengths, decay, steps[i], lay)
+        advance(theta[rows[i]], trace[i], reach[i], strengths, decay, steps[i], lay)
 
 
 @njit(cache=True)
 def add_features(  # type: ignore[no-untyped-def]
-    target, states: FloatArray, weights: FloatArray, packed: Packed
+    target, rows: IntArray, states: FloatArray, weights: FloatArray, packed: Packed
 ) -> None:
-    """Add ``weights[i] * phi(states[i])`` to row i of ``target (n, n_rules)``, in place."""
+    """Add ``weights[i] * phi(states[i])`` to row ``rows[i]`` of ``target``, in place."""
     lay = unpack(packed)
     strengths, room = strengths_room(lay)
     own, shared = np.empty(lay.own_sizes.max()), np.empty(lay.shared_sizes.max())
@@ -102,4 +103,4 @@ def add_features(  # type: ignore[no-untyped-def]
             for r in range(lay.own_sizes[t]):
                 at = lay.offsets[t] + r * columns
                 for c in range(columns):
-                    target[i, at + c] += weights[i] * own[r] * shared[c]
+                    target[rows[i], at + c] += weights[i] * own[r] * shared[c]

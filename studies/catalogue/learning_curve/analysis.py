@@ -6,17 +6,20 @@ from luck, one that is told the reward tells it from what the predictor alone ac
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
+from ....core.protocols import SUCCESS, Measure
 from ...analysis.results import Results
 from ...analysis.statistics import Estimate, bootstrap, rate, rates
 from ...analysis.summary import Summary
 
 BLOCK = 5
 """Episodes at each end of training that the table averages over."""
+EVALUATED = "evaluation success"
 
 
 @dataclass(frozen=True)
@@ -28,7 +31,7 @@ class Metric:
     title
         Its heading.
     measure
-        Which measurement, see `nested_agents.studies.analysis.results.MEASURES`.
+        Which measurement: a measure of `Results.measures`, or ``steps``.
     block
         Which episodes: the first or the last `BLOCK` of training, or those of the evaluation.
     is_rate
@@ -37,23 +40,26 @@ class Metric:
 
     title: str
     measure: str
-    block: Literal["first", "last", "greedy"]
+    block: Literal["first", "last", "evaluation"]
     is_rate: bool = False
 
 
-METRICS = (
-    Metric(f"success first {BLOCK}", "success", "first", is_rate=True),
-    Metric(f"success last {BLOCK}", "success", "last", is_rate=True),
-    Metric("success greedy", "success", "greedy", is_rate=True),
-    Metric("stopped greedy", "stopped_at_goal", "greedy", is_rate=True),
-    Metric("steps greedy", "steps", "greedy"),
-    Metric("distance [m]", "final_distance_m", "last"),
-    Metric("turned [rad]", "final_orientation_rad", "last"),
-    Metric("contact", "contact_fraction", "last"),
-)
+def metrics_of(measures: Sequence[Measure]) -> tuple[Metric, ...]:
+    """Return the columns of the table, given what is measured of an episode.
 
-CURVES = ("success", "final_distance_m", "final_orientation_rad", "contact_fraction")
-"""The measures that are followed from episode to episode."""
+    Success as it begins, as it ends and when evaluated; how the evaluation fares by other rates
+    and how many steps it takes; and every other measure at the end of training.
+    """
+    rates = [m for m in measures if m.is_rate and m.name != SUCCESS.name]
+    numbers = [m for m in measures if not m.is_rate and m.name != SUCCESS.name]
+    return (
+        Metric(f"success first {BLOCK}", SUCCESS.name, "first", is_rate=True),
+        Metric(f"success last {BLOCK}", SUCCESS.name, "last", is_rate=True),
+        Metric(EVALUATED, SUCCESS.name, "evaluation", is_rate=True),
+        *(Metric(f"{m.title}, evaluation", m.name, "evaluation", is_rate=True) for m in rates),
+        Metric("evaluation steps", "steps", "evaluation"),
+        *(Metric(m.heading, m.name, "last") for m in numbers),
+    )
 
 
 @dataclass(frozen=True)
@@ -65,17 +71,21 @@ class LearningCurves:
     table
         One line per condition.
     curves
-        By condition and measure, estimates ``(n_episodes,)`` over seeds.
+        By condition and measure, estimates ``(n_episodes,)`` over seeds; of a condition, those
+        that its scenario has.
+    followed
+        The measures that are followed from episode to episode: success and all that are no rates.
     """
 
     table: tuple[Summary, ...]
     curves: dict[str, dict[str, Estimate]]
+    followed: tuple[Measure, ...]
 
     @property
     def headline(self) -> str:
         """The estimate to begin with: success after training, or if not measured at its end."""
         titles = {title for line in self.table for title in line.estimates}
-        return "success greedy" if "success greedy" in titles else f"success last {BLOCK}"
+        return EVALUATED if EVALUATED in titles else f"success last {BLOCK}"
 
 
 def analyse(results: Results) -> LearningCurves:
@@ -84,24 +94,26 @@ def analyse(results: Results) -> LearningCurves:
     for condition, training in results.training.items():
         evaluation = results.evaluation.get(condition)
         estimates = {}
-        for metric in METRICS:
-            arrays = evaluation if metric.block == "greedy" else training
+        for metric in metrics_of(results.measures):
+            arrays = evaluation if metric.block == "evaluation" else training
             if arrays is None or metric.measure not in arrays:  # published results keep a part
                 continue
             block = slice(None, BLOCK) if metric.block == "first" else slice(-BLOCK, None)
             values = arrays[metric.measure]
-            values = values if metric.block == "greedy" else values[:, block]
+            values = values if metric.block == "evaluation" else values[:, block]
             estimates[metric.title] = rate(values) if metric.is_rate else bootstrap(_runs(values))
         table.append(Summary(condition, len(training["success"]), estimates))
+    followed = [m for m in results.measures if m.name == SUCCESS.name or not m.is_rate]
     curves = {
         condition: {
-            name: rates(training[name]) if name == "success" else bootstrap(training[name])
-            for name in CURVES
-            if name in training
+            m.name: (rates if m.is_rate else bootstrap)(training[m.name])
+            for m in followed
+            if m.name in training
         }
         for condition, training in results.training.items()
     }
-    return LearningCurves(tuple(table), curves)
+    known = {name for by_measure in curves.values() for name in by_measure}
+    return LearningCurves(tuple(table), curves, tuple(m for m in followed if m.name in known))
 
 
 def _runs(values: np.ndarray) -> np.ndarray:

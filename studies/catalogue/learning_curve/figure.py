@@ -1,4 +1,4 @@
-"""Figures of a learning curve: distance, orientation, contact and success by episode."""
+"""The figure of a learning curve: success and all measures that are no rates, by episode."""
 
 from __future__ import annotations
 
@@ -7,42 +7,49 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from ....core.protocols import Measure
 from ...analysis.statistics import Estimate
 from ...presentation.figures import COLOURS, SETTINGS, STYLES
 from .analysis import LearningCurves
 
-PANELS = (
-    ("success", "success rate", (-0.03, 1.03)),
-    ("final_distance_m", "final distance to goal [m]", None),
-    ("final_orientation_rad", "final orientation error [rad]", None),
-    ("contact_fraction", "time in contact, per robot", None),
-)
+COLUMNS = 2
 
 
 def figure_of(analysis: LearningCurves) -> Figure:
-    """Return the figure.
+    """Return the figure, a panel for every measure that is followed.
 
     Lines are means over seeds, bands their 95 % intervals. A condition has a colour and a style of
     line of its own, so that lines upon each other are told apart.
     """
+    count = len(analysis.followed)
+    columns = min(COLUMNS, count)
+    rows = -(-count // columns)
     with mpl.rc_context(SETTINGS):  # type: ignore[arg-type]
-        figure = Figure(figsize=(7.2, 5.4), layout="constrained")
-        panels = figure.subplots(2, 2, sharex=True)
-        for axes, (measure, title, limits) in zip(panels.flat, PANELS, strict=True):
-            for index, curves in enumerate(analysis.curves.values()):
-                _curve(axes, curves[measure], index)
-            axes.set_title(title, loc="left")
-            if limits is not None:
-                axes.set_ylim(*limits)
-            else:
-                axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
-            ticks = MaxNLocator(integer=True, min_n_ticks=1, steps=[1, 2, 5, 10])
-            axes.xaxis.set_major_locator(ticks)
-            axes.grid(axis="y", alpha=0.25)
-        for axes in panels[-1]:
+        figure = Figure(figsize=(3.6 * COLUMNS, 1.2 + 2.1 * rows), layout="constrained")
+        panels = figure.subplots(rows, columns, sharex=True, squeeze=False)
+        for axes, measure in zip(panels.flat, analysis.followed, strict=False):
+            _panel(axes, measure, analysis)
+        for axes in panels.flat[count:]:
+            axes.set_visible(False)
+        for axes in panels.flat[count - columns : count]:
             axes.set_xlabel("episode")
+            axes.tick_params(labelbottom=True)
         _legend(figure, panels[0][0], analysis)
         return figure
+
+
+def _panel(axes: Axes, measure: Measure, analysis: LearningCurves) -> None:
+    for index, curves in enumerate(analysis.curves.values()):
+        if measure.name in curves:
+            _curve(axes, curves[measure.name], index)
+    axes.set_title(measure.heading, loc="left")
+    if measure.is_rate:
+        axes.set_ylim(-0.03, 1.03)
+    else:
+        axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
+    ticks = MaxNLocator(integer=True, min_n_ticks=1, steps=[1, 2, 5, 10])
+    axes.xaxis.set_major_locator(ticks)
+    axes.grid(axis="y", alpha=0.25)
 
 
 def _curve(axes: Axes, estimate: Estimate, index: int) -> None:

@@ -19,9 +19,11 @@ from pathlib import Path
 
 import numpy as np
 
+from ....core.protocols import groups_of
 from ...analysis.results import Results
 from ...analysis.statistics import Estimate, bootstrap, rate
 from ...analysis.summary import Summary
+from ...trials.contact import ContactShares
 from ...trials.trial import Session, Trial, TrialResult
 
 COLUMNS = (
@@ -42,15 +44,19 @@ def measure(trial: Trial) -> TrialResult:
     hierarchy, team = session.team.hierarchy, session.team
     tried = team.evaluator.counts.joint_actions if team.evaluator is not None else 0
     numbers = {
-        "robots": float(trial.settings.scenario.robots),
-        "period_s": trial.settings.scenario.period,
+        "robots": float(len(groups_of(session.world))),
         "agents": float(len(hierarchy)),
         "messages": float(messages(hierarchy.below(i) for i in range(len(hierarchy)))),
         "joint_actions": tried / len(session.deciding),
         "team_bytes": float(sum(array.nbytes for array in team.arrays().values())),
         "weight_bytes": float(team.learner.theta.nbytes),
     }
-    shares = session.evaluate()
+    period = getattr(trial.settings.scenario, "period", None)
+    if period is not None:
+        numbers["period_s"] = period
+    contact = ContactShares()
+    session.evaluate(contact)
+    shares = contact.shares
     if len(shares):
         numbers["least_touching"] = float(shares.min(axis=1).mean())
         numbers["all_touching"] = float((shares.min(axis=1) >= 0.5).mean())
@@ -111,7 +117,7 @@ class Point:
     robots, agents, messages
         Sizes.
     period
-        What a decision may take to keep up with the robots [s].
+        What a decision may take to keep up with the robots [s]; none: the scenario has no hurry.
     values
         Estimates by name, see `analyse`.
     """
@@ -120,7 +126,7 @@ class Point:
     robots: int
     agents: int
     messages: int
-    period: float
+    period: float | None
     values: dict[str, Estimate]
 
 
@@ -167,10 +173,11 @@ def analyse(results: Results) -> Scaling:
         if condition in results.evaluation:
             greedy = rate(results.evaluation[condition]["success"])
             values = {"success": values.pop("success"), "greedy": greedy} | values
+        if "all_touching" in numbers:
             values["all touch"] = bootstrap(numbers["all_touching"])
         agents, passed = (int(numbers[n][0]) for n in ("agents", "messages"))
         evaluator = _without_robots(condition, sizes)
-        period = float(numbers["period_s"][0])
+        period = float(numbers["period_s"][0]) if "period_s" in numbers else None
         points.append(Point(evaluator, sizes[condition], agents, passed, period, values))
         shown = {name: values[name] for name in COLUMNS if name in values}
         table.append(Summary(condition, len(steps), shown))

@@ -20,6 +20,7 @@ from ...analysis.statistics import bootstrap, rate
 from ...analysis.summary import Summary
 from ...spec.errors import SpecError
 from ...spec.spec import Spec
+from ...trials.contact import ContactShares
 from ...trials.trial import Session, Trial, TrialResult
 
 TRAINED = "trained on"
@@ -37,13 +38,14 @@ def measure(trial: Trial) -> TrialResult:
     """Train a team with its own box, evaluate it with all; imported by name in workers."""
     session = Session(trial)
     session.train(trial.episodes)
-    shares = {TRAINED: session.evaluate()}
-    shares |= session.evaluate_elsewhere()
+    contacts = {name: ContactShares() for name in (TRAINED, *dict(trial.evaluations))}
+    session.evaluate(contacts[TRAINED])
+    session.evaluate_elsewhere(contacts)
     numbers = {
         f"touching.{name}.robot{r + 1}": float(share)
-        for name, by_episode in shares.items()
-        if len(by_episode)
-        for r, share in enumerate(by_episode.mean(axis=0))
+        for name, contact in contacts.items()
+        if len(contact.shares)
+        for r, share in enumerate(contact.shares.mean(axis=0))
     }
     return session.result(numbers)
 
@@ -117,11 +119,12 @@ def _further(arrays: Arrays, numbers: Arrays, box: str) -> dict:
     robots = {
         f"touches {n.removeprefix(start)}": v for n, v in numbers.items() if n.startswith(start)
     }
-    return {
-        "stopped": rate(arrays["stopped_at_goal"]),
-        "contact": bootstrap(arrays["contact_fraction"].mean(axis=1)),
-        **{title: bootstrap(values) for title, values in robots.items()},
-    }
+    found = {}
+    if "stopped_at_goal" in arrays:
+        found["stopped"] = rate(arrays["stopped_at_goal"])
+    if "contact_fraction" in arrays:
+        found["contact"] = bootstrap(arrays["contact_fraction"].mean(axis=1))
+    return found | {title: bootstrap(values) for title, values in robots.items()}
 
 
 def least_ratio(found: tuple[Difference, ...]) -> Difference:

@@ -20,7 +20,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ....core.settings import FrozenSettings, LearnerSettings
+from ....core.learners.frozen import FrozenSettings
+from ....core.learners.learner import LearnerSettings
 from ....core.team import Team
 from ...analysis.comparison import Array, Difference
 from ...analysis.paired_tests import holm, paired_permutation
@@ -87,7 +88,11 @@ def check(spec: Spec) -> None:
 def _keeping_weights(session: Session) -> Team:
     """Return a copy of the session's team that explores and models itself but keeps its weights."""
     settings = session.trial.settings
-    common = {name: getattr(settings.learner, name) for name in LearnerSettings.model_fields}
+    common = {
+        name: getattr(settings.learner, name)
+        for name in LearnerSettings.model_fields
+        if name != "kind"
+    }
     frozen = settings.model_copy(update={"learner": FrozenSettings(**common)})
     _, team = build(frozen, session.trial.seed)
     arrays = session.team.arrays()

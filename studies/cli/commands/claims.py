@@ -56,8 +56,8 @@ def command(
             say(f"{study}: {of_study.note}")
     if publish is not None:
         publish.mkdir(parents=True, exist_ok=True)
-        for study, (spec, results, _) in found.items():
-            published.write(publish / f"{study}.json", spec, results)
+        for study, (outline, results, _) in found.items():
+            published.write(publish / f"{study}.json", outline, results)
     print_claims(claims.judge({study: p.results for study, p in found.items()}), format)
     return 0
 
@@ -82,5 +82,5 @@ def _run(out: Path, *, quick: bool, jobs: int | None) -> dict[str, Published]:
                     f"{out / study}: {len(failed)} trials failed: nested-agents status "
                     f"{out / study}"
                 )
-            found[study] = published.loads(published.dumps(spec, read(store)))
+            found[study] = published.loads(published.dumps(store.outline(), read(store)))
     return found

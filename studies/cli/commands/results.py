@@ -30,6 +30,7 @@ def command(
 
     with Store.open(directory) as store:
         store.verify()
+        measures = store.measures()
         names, rows = store.rows(phase)
-    write_rows(names, rows, format, sys.stdout)
+    write_rows(names, rows, measures, format, sys.stdout)
     return 0

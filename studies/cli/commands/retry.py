@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
+import tyro
+
 from .options import Address, Backend, Directory, MostJobs
 
 
@@ -10,6 +14,7 @@ def command(
     jobs: MostJobs = None,
     backend: Backend = "loky",
     address: Address = None,
+    accept_code: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> int:
     """Run the failed trials of a study again, and whatever is left of it.
 
@@ -24,10 +29,20 @@ def command(
         nested-agents[dask]). The results are the same.
     address
         Of the scheduler of a running Dask cluster; if missing, one is started here.
+    accept_code
+        Go on with a study although the installed code that computes it has changed since.
     """
     from ...store.store import Store
     from ..conduct import conduct
 
     with Store.open(directory) as store:
         spec = store.spec()
-    return conduct(spec, directory, jobs, backend=backend, address=address, retry_failed=True)
+    return conduct(
+        spec,
+        directory,
+        jobs,
+        backend=backend,
+        address=address,
+        retry_failed=True,
+        accept_code=accept_code,
+    )

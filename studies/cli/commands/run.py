@@ -16,6 +16,7 @@ def command(
     jobs: MostJobs = None,
     backend: Backend = "loky",
     address: Address = None,
+    accept_code: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     set: Changes = (),
 ) -> int:
     """Run the study of a spec; the same command again continues it.
@@ -34,10 +35,14 @@ def command(
         nested-agents[dask]). The results are the same.
     address
         Of the scheduler of a running Dask cluster; if missing, one is started here.
+    accept_code
+        Go on with a study although the installed code that computes it has changed since.
     set
         Lay a value over the spec: --set learner.ridge=1 --set "seeds=[3, 5]". May be repeated.
     """
     from ...spec.spec import Spec
     from ..conduct import conduct
 
-    return conduct(Spec.load(spec, set), out, jobs, backend=backend, address=address)
+    return conduct(
+        Spec.load(spec, set), out, jobs, backend=backend, address=address, accept_code=accept_code
+    )

@@ -15,12 +15,13 @@ def command(directory: Directory) -> int:
     """
     from ...store.store import Store
     from ...workers.progress import progress
-    from ..display import duration
+    from ..display import count, duration
 
     with Store.open(directory) as store:
-        spec, now, failed = store.spec(), progress(store), store.failed()
-    conditions = now.total // len(spec.seeds)
-    print(f"study    {spec.study}: {conditions} conditions x {len(spec.seeds)} seeds")
+        outline, now, failed = store.outline(), progress(store), store.failed()
+        versions = store.versions_of_code()
+    extent = f"{count(len(outline.columns), 'condition')} x {count(len(outline.seeds), 'seed')}"
+    print(f"study    {outline.study}: {extent}")
     print(f"done     {now.done} of {now.total} trials")
     print(f"running  {len(now.running)}")
     for condition, seed, seconds in now.running:
@@ -28,8 +29,10 @@ def command(directory: Directory) -> int:
     print(f"failed   {now.failed}")
     print(f"left     {now.left}")
     if now.seconds:
-        count = f"{now.processes} process{'' if now.processes == 1 else 'es'}"
-        print(f"time     about {duration(now.seconds)} with {count}")
+        processes = count(now.processes, "process", "es")
+        print(f"time     about {duration(now.seconds)} with {processes}")
+    if versions > 1:
+        print(f"code     finished trials are of {versions} versions of the installed code")
     if now.refusal:
         print(f"\nnothing can be added: {now.refusal}")
     for line in now.damaged:

@@ -26,6 +26,7 @@ def command(
     format
         How to print the table; CSV holds every digit.
     """
+    from ....core.sources import Sources
     from ...analysis import published
     from ...analysis.results import read
     from ...catalogue.study import load_study
@@ -35,14 +36,16 @@ def command(
 
     if source.is_file():
         of_file = published.load(source)
-        spec, results, _ = of_file
+        outline, results, _ = of_file
+        sources = Sources()
         if of_file.note:
             say(f"{source}: {of_file.note}")
     else:
         with Store.open(source) as store:
             store.verify()
-            spec, results = store.spec(), read(store)
-    found = tabulate(load_study(spec.study).analyse(results).table, columns)
+            outline, results, sources = store.outline(), read(store), store.sources()
+    with sources.active():
+        found = tabulate(load_study(outline.study).analyse(results).table, columns)
     if format == "table":
         print_table(found)
     else:

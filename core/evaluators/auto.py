@@ -1,0 +1,39 @@
+"""The evaluator that suits a team: exact for few agents, sampled for some, additive for many."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from .additive import ExtremesSettings, MomentsSettings
+from .evaluator import DecisionProblem, Evaluator, EvaluatorSettings
+from .exact import MOST_JOINT_ACTIONS, ExactSettings
+from .sampling import Samples, SamplingSettings
+
+
+class AutoSettings(EvaluatorSettings):
+    """Exact enumeration as long as it is quick, then sampling, then sums where there are any."""
+
+    kind: Literal["auto"] = "auto"
+    exact_up_to: Annotated[int, Field(ge=1, le=10)] = 5
+    """Agents that may still be free for exact enumeration."""
+    sampling_up_to: Annotated[int, Field(ge=1)] = 12
+    """Agents that may still be free for sampling, if predictions can be had as sums."""
+    samples: Samples = 64
+    """As of the evaluator ``sampling``."""
+
+    def build(self, problem: DecisionProblem) -> Evaluator:
+        """Return the evaluator of a team."""
+        return self.chosen(problem).build(problem)
+
+    def chosen(self, problem: DecisionProblem) -> EvaluatorSettings:
+        """Return the settings of the evaluator that a team gets."""
+        hierarchy = problem.hierarchy
+        free = max(1 + len(hierarchy.below(i)) for i in range(len(hierarchy)))
+        if free <= self.exact_up_to and problem.n_actions**free <= MOST_JOINT_ACTIONS:
+            return ExactSettings()
+        if free <= self.sampling_up_to or not (problem.additive and problem.rule == "value"):
+            return SamplingSettings(samples=self.samples)
+        best_response = problem.teammates == "best-response"
+        return ExtremesSettings() if best_response else MomentsSettings()

@@ -1,0 +1,78 @@
+"""Objects in a spec made by Python: put in the words that a TOML file would have for them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ...core.evaluators import EVALUATORS
+from ...core.exploration import EXPLORATIONS
+from ...core.learners import LEARNERS
+from ...core.registry import Registry
+from ...core.settings import Settings
+from ...scenarios import SCENARIOS
+from ...topologies import TOPOLOGIES
+from .. import STUDIES
+from .errors import SpecError
+
+REGISTRIES: dict[str, Registry] = {
+    "study": STUDIES,
+    "scenario": SCENARIOS,
+    "topology": TOPOLOGIES,
+    "learner": LEARNERS,
+    "exploration": EXPLORATIONS,
+    "evaluator": EVALUATORS,
+}
+"""The registry of what stands at a key."""
+
+
+def plain(value: Any, key: str = "") -> Any:
+    """Return a table in which classes and functions are names, and their settings tables.
+
+    Parameters
+    ----------
+    value
+        A spec's table, or a part of it.
+    key
+        Where it stands, the last part of its dotted key.
+
+    Raises
+    ------
+    SpecError
+        If an object is defined in no file, so that no worker could ever find it.
+    """
+    if isinstance(value, Mapping):
+        return {k: plain(v, key if k == "kind" else str(k)) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return type(value)(plain(v, key) for v in value)
+    registry = REGISTRIES.get(key.rpartition(".")[2])
+    if isinstance(value, Settings):
+        return _of_settings(value, registry)
+    if isinstance(value, type) or callable(value) or hasattr(value, "function"):
+        name = _name(value, registry or Registry("state variable", {}))
+        return {"kind": name} if key in ("scenario", "learner", "topology") else name
+    return value
+
+
+def _of_settings(settings: Settings, registry: Registry | None) -> Any:
+    """Return the table of settings; what is None leaves what lies below as it is."""
+    table = settings.model_dump(exclude_none=True)
+    if registry is not None and not table.get("kind"):
+        owner = type(settings)
+        outer = owner.__qualname__.rpartition(".")[0]
+        thing: Any = owner
+        if outer:  # a class's nested Settings stand for the class
+            import sys
+
+            thing = sys.modules[owner.__module__]
+            for part in outer.split("."):
+                thing = getattr(thing, part)
+        table["kind"] = _name(thing, registry)
+    return table
+
+
+def _name(thing: Any, registry: Registry) -> str:
+    try:
+        return registry.reference_to(thing)
+    except ValueError as error:
+        raise SpecError(f"{registry.kind}: {error}") from None

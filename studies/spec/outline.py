@@ -1,0 +1,53 @@
+"""What a study consists of, as it was noted: read without running anything that it names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from .spec import Spec
+
+
+@dataclass(frozen=True)
+class Outline:
+    """A spec as plain words and numbers.
+
+    Attributes
+    ----------
+    study
+        Name of the study.
+    seeds, episodes, steps, evaluation
+        As in `Spec`.
+    columns
+        By condition, what tells it from the others.
+    table
+        The whole spec as a table.
+    """
+
+    study: str
+    seeds: tuple[int, ...]
+    episodes: int
+    steps: int
+    evaluation: int
+    columns: Mapping[str, Mapping[str, Any]]
+    table: Mapping[str, Any]
+
+    @classmethod
+    def of(cls, spec: Spec) -> Outline:
+        """Return the outline of a spec."""
+        return cls.noted(spec.table(), {c.label: c.columns for c in spec.conditions()})
+
+    @classmethod
+    def noted(cls, table: Mapping[str, Any], columns: Mapping[str, Mapping[str, Any]]) -> Outline:
+        """Return the outline that `Spec.table` and the columns of its conditions tell.
+
+        Raises
+        ------
+        KeyError, TypeError, ValueError
+            If it is no such table.
+        """
+        seeds = table["seeds"]
+        seeds = range(seeds) if isinstance(seeds, int) else seeds
+        length = (int(table[name]) for name in ("episodes", "steps", "evaluation"))
+        return cls(str(table["study"]), tuple(map(int, seeds)), *length, columns, table)

@@ -1,0 +1,67 @@
+"""The installed code that computes results: an edit of it is noticed, and told.
+
+Every module on which a trial's numbers depend has a digest of its text, to see at once whether it
+may have changed, and one of its syntax tree, to see whether it has: comments and layout do not
+count.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from pathlib import Path
+
+from ...core.sources import meaning
+
+PACKAGE = Path(__file__).parents[2]
+"""Where the package is installed."""
+COMPUTING = ("core", "topologies", "scenarios", "studies/trials", "studies/catalogue")
+"""Folders whose modules compute results."""
+SILENT = (
+    "checking",
+    "pictures",
+    "scripted",
+    "environments.py",
+    "figure.py",
+    "view.py",
+    "drawing.py",
+)
+"""Parts of them that do not."""
+
+Code = dict[str, tuple[str, str]]
+"""By module, digests of its text and of its syntax tree."""
+
+
+def modules() -> dict[str, str]:
+    """Return the text of every module that computes results, by its path in the package."""
+    found = {}
+    for folder in COMPUTING:
+        for path in sorted((PACKAGE / folder).rglob("*.py")):
+            name = path.relative_to(PACKAGE).as_posix()
+            if not set(name.split("/")) & set(SILENT):
+                found[name] = path.read_text(encoding="utf-8")
+    return found
+
+
+def present() -> Code:
+    """Return the digests of the installed code."""
+    return {name: (_digest(text), meaning(text, name)) for name, text in modules().items()}
+
+
+def changed(known: Mapping[str, tuple[str, str]]) -> list[str]:
+    """Return the modules that mean something else than they did, or are new or gone."""
+    texts = modules()
+    found = sorted(known.keys() ^ texts.keys())
+    for name, text in texts.items():
+        if name in known and _digest(text) != known[name][0]:
+            found += [name] * (meaning(text, name) != known[name][1])
+    return found
+
+
+def digest(code: Mapping[str, tuple[str, str]]) -> str:
+    """Return one short digest of what all modules mean."""
+    return _digest("".join(f"{name} {tree} " for name, (_, tree) in sorted(code.items())))
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:16]

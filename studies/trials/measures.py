@@ -1,0 +1,86 @@
+"""The measures of a study: those of its scenarios, joined, and as they are written down."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+from ...core.protocols import Measure
+from ..spec.errors import SpecError
+
+BEFORE = ("phase", "episode", "steps")
+"""The columns of an episode before its measures."""
+AFTER = ("return",)
+"""Those after them."""
+RESERVED = ("identity", "condition", "seed", "position", *BEFORE, *AFTER)
+"""What no measure may be called, as columns of results are called so."""
+
+
+def joined(
+    by_scenario: Iterable[Sequence[Measure]], taken: Iterable[str] = ()
+) -> tuple[Measure, ...]:
+    """Return the measures of several scenarios, each once, in the order in which they come.
+
+    Parameters
+    ----------
+    by_scenario
+        What each scenario declares.
+    taken
+        Names of further columns, which no measure may have.
+
+    Raises
+    ------
+    SpecError
+        If a name is reserved, or two scenarios mean different things by it.
+
+    Examples
+    --------
+    >>> one, other = Measure("energy_j", "energy", "J"), Measure("spread_m", "spread", "m")
+    >>> [measure.name for measure in joined([(one,), (other, one)])]
+    ['energy_j', 'spread_m']
+    """
+    reserved = {name.lower() for name in (*RESERVED, *taken)}
+    found: dict[str, Measure] = {}
+    for measures in by_scenario:
+        for measure in measures:
+            if measure.name.lower() in reserved:
+                raise SpecError(f"measure {measure.name!r}: a column of results is called so")
+            known = found.setdefault(measure.name.lower(), measure)
+            if column_of(known) != column_of(measure):
+                raise SpecError(
+                    f"measure {measure.name!r}: is declared as {_told(known)}, and by another "
+                    f"scenario of this study as {_told(measure)}"
+                )
+    return tuple(found.values())
+
+
+def column_of(measure: Measure) -> tuple[str, str, str, bool]:
+    """Return what equal columns have in common: name, unit, gathering, whether it is a rate."""
+    return measure.name, measure.unit, measure.gathering, measure.is_rate
+
+
+def _told(measure: Measure) -> str:
+    kind = "rate" if measure.is_rate else "number"
+    return f"{measure.name!r}, {measure.gathering} {kind} in {measure.unit!r}"
+
+
+def columns(measures: Iterable[Measure]) -> tuple[str, ...]:
+    """Return the columns of an episode: where it stands, its measures, its return."""
+    return (*BEFORE, *(measure.name for measure in measures), *AFTER)
+
+
+def tables(measures: Iterable[Measure]) -> list[dict[str, Any]]:
+    """Return measures as tables, fit for JSON."""
+    return [asdict(measure) for measure in measures]
+
+
+def measures_from(tables: Iterable[Mapping[str, Any]]) -> tuple[Measure, ...]:
+    """Return what `tables` was given.
+
+    Raises
+    ------
+    TypeError
+        If the tables are of something else.
+    """
+    return tuple(Measure(**table) for table in tables)
