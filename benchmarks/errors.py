@@ -52,7 +52,7 @@ BUDGET, SMALL_BUDGET = Decision().budget, 8192
 """Of the Latin hypercubes: the default, and one too small for all that eight agents can do."""
 SCENARIOS: dict[str, dict[str, Any]] = {
     "default": {},
-    "1 period": {"state_space": "paper", "hold": 1, "lookahead": 1},
+    "1 period": {"state_space": "paper", "action_repeat": 1, "prediction_horizon": 1},
 }
 
 

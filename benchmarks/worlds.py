@@ -160,7 +160,7 @@ def others(budget: float) -> tuple[list[Row], list[str]]:
 
 
 def _wheels(hold: int) -> Callable[[], None]:
-    env = WheelsEnv({"hold": hold}, steps=RUN)
+    env = WheelsEnv({"action_repeat": hold}, steps=RUN)
     env.reset(seed=0)
     rng = np.random.default_rng(1)
     drawn = cycle([{agent: int(rng.integers(4)) for agent in env.agents} for _ in range(100)])

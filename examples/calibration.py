@@ -57,7 +57,7 @@ def calibrated(robot: str, believed: str, episodes: int) -> tuple[Any, Any]:
             team.adapt(prediction, joint, transition)
             if transition.pushed is not None and np.hypot(*transition.pushed[:2]) > 0.002:
                 off = np.hypot(*(foreseen[:, 0] - transition.pushed)[:, :2].T)
-                errors.append(1000 * off * scenario.settings.hold * 0.064)
+                errors.append(1000 * off * scenario.settings.action_repeat * 0.064)
                 found.append(np.exp(team.calibration.constants - right))
             prediction = team.predict(scenario)
             team.learn(transition, prediction)

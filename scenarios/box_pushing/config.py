@@ -254,15 +254,15 @@ class BoxPushingSettings(ScenarioSettings):
     belief: BeliefSettings = BeliefSettings()
     """What the predictor `push` is told of constants that robots cannot see."""
     reward: RewardSettings = RewardSettings()
-    hold: Periods = 8
+    action_repeat: Periods = 8
     """Control periods of 64 ms for which a decision is held."""
-    lookahead: Periods = 24
+    prediction_horizon: Periods = 24
     """Control periods that predictions look ahead, the decision being held for all of them."""
     speed_increment: Annotated[float, Field(gt=0, le=1)] = 0.5
     """What increase and decrease change, as a fraction of the greatest wheel speed."""
     tolerance: Positive = 0.05
     """Distance of the box from the goal that counts as reached [m]."""
-    arena: Positive = 1.5
+    termination_radius: Positive = 1.5
     """Distance of the box from the goal [m] beyond which an episode is broken off."""
     orientation_tolerance: Positive | None = None
     """Orientation error that still counts as reached [rad]; none: any."""
@@ -292,7 +292,7 @@ class BoxPushingSettings(ScenarioSettings):
     @property
     def period(self) -> float:
         """Seconds for which a decision is held."""
-        return self.hold * CONTROL_PERIOD
+        return self.action_repeat * CONTROL_PERIOD
 
     @property
     def drawn(self) -> dict[str, float | str]:

@@ -115,7 +115,7 @@ class BoxPushing:
         self._belief = PushBelief.of(self._model, robots, settings.belief.stiffness)
         self._premises = Premises(
             self._belief, self._space, self.action_set, settings.speed_increment, self._limits,
-            self._task, self.infrared, settings.period, settings.lookahead * CONTROL_PERIOD,
+            self._task, self.infrared, settings.period, settings.prediction_horizon * CONTROL_PERIOD,
         )  # fmt: skip
         self._goal: FloatArray = np.zeros(3)
         self._sensing = np.random.default_rng(0)  # until reset
@@ -204,7 +204,7 @@ class BoxPushing:
         self._step += 1
         self._save()
         measured["seconds"] = {"physics": moved - begin, "sensors": sensed - moved}
-        truncated = not terminated and measured["distance_m"] > self.settings.arena
+        truncated = not terminated and measured["distance_m"] > self.settings.termination_radius
         return Transition(
             states, float(gained[0]), terminated, truncated, measured, motions, pushed
         )
@@ -241,13 +241,13 @@ class BoxPushing:
         if self._playground is None or self._saved is None:
             return BoxPrediction(situation, model, self._premises)
         future = Future(
-            self._playground, self._saved, self._failures, self._step, self.settings.hold
+            self._playground, self._saved, self._failures, self._step, self.settings.action_repeat
         )
         return ExactPrediction(situation, model, self._premises, future)
 
     def with_exact_prediction(self) -> BoxPushing:
         """Return a scenario alike that predicts one decision period by playing it."""
-        exactly = {"predictor": "exact", "lookahead": self.settings.hold}
+        exactly = {"predictor": "exact", "prediction_horizon": self.settings.action_repeat}
         settings = self.settings.model_copy(update={**exactly, "belief": BeliefSettings()})
         return type(self)(settings)
 
@@ -301,9 +301,9 @@ class BoxPushing:
     def _advance(self, commands: FloatArray) -> None:
         """Let the world go on for one decision period, the wheels being told `commands`."""
         if self._failures is None:
-            self.world.advance(commands, self.settings.hold)
+            self.world.advance(commands, self.settings.action_repeat)
         else:
-            self._failures.advance(self.world, commands, self._step, self.settings.hold)
+            self._failures.advance(self.world, commands, self._step, self.settings.action_repeat)
 
     def _distance(self) -> float:
         ahead = self._goal[:2] - self.world.box_pose[:2]

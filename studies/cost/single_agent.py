@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 
 from ...core.cost import Problem
 from ...core.loop import control_loop, policy_seed
-from ...core.settings import FrozenSettings, TDLambdaSettings
+from ...core.learners.frozen import FrozenSettings
+from ...core.learners.td import TDLambdaSettings
 from ...core.team import Team
 from ...scenarios.line_up import LineUpSettings
-from ...topologies import arrange, parse
+from ...topologies import parse
 from ..analysis.statistics import Estimate, rate
 from ..trials.trial import EVALUATION_WORLDS
 from .cost import LEARNER, RULES
@@ -130,7 +131,7 @@ def compare(
 def run(n: int, contender: str, step_size: float, seed: int, episodes: int) -> Run:
     """Train one contender on one seed, then evaluate it greedily."""
     topology = parse("single-agent" if contender == "single" else "chain")
-    scenario, hierarchy = arrange(topology, LineUpSettings(carts=n).build())
+    scenario, hierarchy = topology.arrange(LineUpSettings(carts=n).build())
     base = LEARNER.rule_base.model_copy(update={"order": scenario.state_space.n_variables})
     learner: TDLambdaSettings | FrozenSettings = TDLambdaSettings(
         rule_base=base, decision=LEARNER.decision, step_size=step_size, normalised=True

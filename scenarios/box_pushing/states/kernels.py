@@ -21,11 +21,11 @@ LANES = 32
 _EXACT = {"contract", "nsz"}
 
 COMPILED = (
-    "gap", "box_bearing", "side", "others_gap", "push_bearing", "miss", "box_distance", "approach",
+    "gap", "box_bearing", "side", "others_gap", "push_bearing", "cross_track_error", "box_distance", "approach",
     "box_turn", "bend",
 )  # fmt: skip
 """The built-in variables that are computed here, each in a row of scratch of its own."""
-GAP, BEARING, SIDE, OTHERS, PUSH, MISS, DISTANCE, APPROACH, TURN, BEND = range(len(COMPILED))
+GAP, BEARING, SIDE, OTHERS, PUSH, CROSS_TRACK, DISTANCE, APPROACH, TURN, BEND = range(len(COMPILED))
 # Rows of what several variables need; no column can name them.
 _COURSE, _X, _Y = len(COMPILED), len(COMPILED) + 1, len(COMPILED) + 2
 _ROWS = len(COMPILED) + 3
@@ -41,7 +41,7 @@ class Columns:
 
     Examples
     --------
-    >>> Columns(["miss", "gap"]).rows.tolist()
+    >>> Columns(["cross_track_error", "gap"]).rows.tolist()
     [5, 0]
     """
 
@@ -133,7 +133,7 @@ def _of_push(robots, box, goal, first, count, work):  # type: ignore[no-untyped-
         length = np.sqrt(dx * dx + dy * dy)
         across = (ahead * dy - left * dx) / (length if length > 0.0 else 1.0)
         beyond = np.copysign(work[DISTANCE * LANES + k], across)
-        work[MISS * LANES + k] = across if ahead * dx + left * dy >= 0.0 else beyond
+        work[CROSS_TRACK * LANES + k] = across if ahead * dx + left * dy >= 0.0 else beyond
 
 
 @njit(cache=True, error_model="numpy", fastmath=_EXACT)

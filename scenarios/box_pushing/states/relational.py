@@ -65,7 +65,7 @@ def push_bearing(view: View, robot: int) -> FloatArray:
     "m", -0.4, 0.4, centres=(-0.3, -0.06, 0.0, 0.06, 0.3),
     labels=("far right", "right", "none", "left", "far left"),
 )  # fmt: skip
-def miss(view: View, robot: int) -> FloatArray:
+def cross_track_error(view: View, robot: int) -> FloatArray:
     """By how much that push would miss the goal; beyond it the whole distance."""
     off = np.clip(push_bearing(view, robot), -0.5 * pi, 0.5 * pi)
     missed: FloatArray = view.distance * np.sin(off)

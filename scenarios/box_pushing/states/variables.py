@@ -105,7 +105,7 @@ STATE_VARIABLES = Registry(
     {
         name: f"{_PLACE}:{name}"
         for name in (
-            "gap", "box_bearing", "side", "others_gap", "push_bearing", "miss", "box_distance",
+            "gap", "box_bearing", "side", "others_gap", "push_bearing", "cross_track_error", "box_distance",
             "approach", "box_turn", "bend",
         )
     },

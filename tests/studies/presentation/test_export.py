@@ -13,7 +13,7 @@ from nested_agents.studies.trials.trial import trials_of
 
 SPEC = Spec.of(
     made_up.SPEC.table()
-    | {"seeds": 2, "sweep": {"preset": ["default", "frozen"], "scenario.hold": [8, 4]}}
+    | {"seeds": 2, "sweep": {"preset": ["default", "frozen"], "scenario.action_repeat": [8, 4]}}
 )
 
 
@@ -43,7 +43,7 @@ def test_csv_holds_every_episode_and_every_trial_with_every_swept_key(study, tmp
     episodes, trials = map(read, paths)
     assert len(episodes) == 7 * (4 + 2)
     assert list(episodes[0])[:6] == [
-        "condition", "preset", "scenario.hold", "seed", "phase", "episode",
+        "condition", "preset", "scenario.action_repeat", "seed", "phase", "episode",
     ]  # fmt: skip
     expected = {
         (t.condition, str(t.seed), row.phase, str(row.episode)): repr(row.return_)
@@ -76,7 +76,7 @@ def test_parquet_holds_the_same_with_types(study, tmp_path):
     types = {field.name: str(field.type) for field in parquet.read_schema(
         tmp_path / "episodes.parquet")}  # fmt: skip
     assert types["success"] == "bool"
-    assert types["scenario.hold"] == types["seed"] == "int64"
+    assert types["scenario.action_repeat"] == types["seed"] == "int64"
     assert types["return"] == "double"
 
 

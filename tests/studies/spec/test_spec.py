@@ -65,7 +65,7 @@ BAD = {
     "[[overrides]]\npreset = 'paper'": ["overrides[0].name: missing"],
     "overrides = [{name = ''}]": ["overrides[0].name = ''", "can be printed"],
     'overrides = [{name = "a\\nb"}]': ["overrides[0].name = 'a\\nb'", "can be printed"],
-    "scenario.hold = 99999999999": ["scenario.hold = 99999999999", "at most 10000"],
+    "scenario.action_repeat = 99999999999": ["scenario.action_repeat = 99999999999", "at most 10000"],
     "learner.sweeps = 99999999999": ["learner.sweeps = 99999999999", "at most 10000"],
     "overrides = [{name = 'a', larner = {}}]": ["overrides[0].larner", "did you mean 'learner'"],
     "overrides = [{name = 'a', learner = 3}]": ["overrides[0].learner = 3", "table"],
@@ -119,7 +119,7 @@ def test_controls_differ_from_the_default_in_the_learner_and_greedy_in_what_it_p
     conditions = Spec.of({"sweep": {"preset": ["default", "frozen", "random", "greedy"]}})
     default, *controls = [c.settings for c in conditions.conditions()]
     reward = default.scenario.reward.model_copy(update={"attraction_without_contact": True})
-    planned = default.scenario.model_copy(update={"lookahead": 48, "reward": reward})
+    planned = default.scenario.model_copy(update={"prediction_horizon": 48, "reward": reward})
     for control, scenario in zip(controls, [default.scenario] * 2 + [planned], strict=True):
         assert control.scenario == scenario
         assert control.topology == default.topology
@@ -253,10 +253,10 @@ def test_the_trials_of_all_overrides_are_counted_before_they_are_made():
 def test_evaluations_are_laid_over_the_scenario_of_every_condition():
     spec = Spec.parse(
         "evaluations.circle.box = 'circle'\nevaluations.hard.start = 'hard'\n"
-        "sweep.scenario.hold = [8, 4]"
+        "sweep.scenario.action_repeat = [8, 4]"
     )
     found = [
-        (name, scenario.box, scenario.start, scenario.hold)
+        (name, scenario.box, scenario.start, scenario.action_repeat)
         for condition in spec.conditions()
         for name, scenario in condition.evaluations
     ]

@@ -30,7 +30,7 @@ def test_one_robot_is_exact(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_the_box_goes_where_the_push_says_if_few_depart(seed: int) -> None:
-    prediction = moved(3, seed, hold=1, lookahead=2).predict()
+    prediction = moved(3, seed, action_repeat=1, prediction_horizon=2).predict()
     superposition, neutral = prediction.superposition, np.full((16, 6), 2)
     neutral[:, 0], neutral[:, 1] = np.arange(16) // 4, np.arange(16) % 4
     rest = superposition.contributions[1:, 10].sum(axis=0)  # the others maintain

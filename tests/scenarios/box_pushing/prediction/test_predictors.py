@@ -27,7 +27,7 @@ def scenario(predictor: str, **table: object) -> BoxPushing:
 @pytest.mark.parametrize("failures", [(), FAILURES], ids=["healthy", "failures"])
 @pytest.mark.parametrize("periods", [1, 2])
 def test_the_exact_one_foresees_to_the_bit(failures: tuple[object, ...], periods: int) -> None:
-    world = scenario("exact", start="easy", lookahead=8 * periods, failures=failures)
+    world = scenario("exact", start="easy", prediction_horizon=8 * periods, failures=failures)
     world.reset(world_seed(3, 0), 0)
     touched = False
     for _ in range(6):
@@ -59,7 +59,7 @@ def test_the_exact_one_foresees_to_the_bit(failures: tuple[object, ...], periods
 @pytest.mark.parametrize("failures", [(), FAILURES], ids=["healthy", "failures"])
 def test_looking_ahead_changes_nothing(failures: tuple[object, ...]) -> None:
     settings = BoxPushingSettings.model_validate(
-        {"predictor": "exact", "lookahead": 4, "hold": 4, "failures": failures}
+        {"predictor": "exact", "prediction_horizon": 4, "action_repeat": 4, "failures": failures}
     )
     assert check_scenario(lambda: BoxPushing(settings), steps=4) == tuple(CHECKS)
 

@@ -48,7 +48,7 @@ def test_relational_variables_by_hand() -> None:
     assert first["side"] == pytest.approx(0.0)
     # Their middle is behind on the left and pushes to the right.
     assert first["push_bearing"] == pytest.approx(-pi / 4)
-    assert first["miss"] == pytest.approx(-np.sqrt(0.5))
+    assert first["cross_track_error"] == pytest.approx(-np.sqrt(0.5))
     assert first["approach"] == pytest.approx(0.01)  # 3 cm in three periods
     assert first["box_turn"] == first["bend"] == pytest.approx(0.3)  # straight ahead
     second = dict(zip(VARIABLES, EVERY.shared(situation, 1)[0], strict=True))
@@ -58,7 +58,7 @@ def test_relational_variables_by_hand() -> None:
 
 def test_a_push_away_from_the_goal_misses_it_by_the_whole_distance() -> None:
     situation = view([[0.2, 0.1, 0.0]], [0.0, 0.0, 0.0], [0.06])
-    assert EVERY.shared(situation, 0)[0][VARIABLES.index("miss")] == -1.0
+    assert EVERY.shared(situation, 0)[0][VARIABLES.index("cross_track_error")] == -1.0
 
 
 def test_the_arc_to_the_goal_pose_bends_twice_as_far_as_the_course() -> None:
@@ -129,7 +129,7 @@ def test_a_fast_robot_gets_them() -> None:
 
 
 @pytest.mark.parametrize("robots", [1, 2, 5])
-@pytest.mark.parametrize("names", [VARIABLES, ("miss",), ("bend", "gap")])
+@pytest.mark.parametrize("names", [VARIABLES, ("cross_track_error",), ("bend", "gap")])
 def test_compiled_blocks_are_those_of_the_definition(names: tuple[str, ...], robots: int) -> None:
     rng = np.random.default_rng(robots)
     seen = View(
@@ -160,8 +160,8 @@ def test_lists_that_make_no_state_space_are_refused(names: tuple[str, ...], comp
 
 
 def test_a_state_space_may_be_listed() -> None:
-    scenario = BoxPushing(BoxPushingSettings(state_space=("gap", "miss")))
-    assert [v.name for v in scenario.state_space.variables] == ["wheel_speed", "gap", "miss"]
+    scenario = BoxPushing(BoxPushingSettings(state_space=("gap", "cross_track_error")))
+    assert [v.name for v in scenario.state_space.variables] == ["wheel_speed", "gap", "cross_track_error"]
     assert scenario.reset(0).shape == (4, 3)
 
 
