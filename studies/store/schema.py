@@ -38,7 +38,8 @@ SCHEMA = (
     """CREATE TABLE IF NOT EXISTS checksums (
         identity TEXT PRIMARY KEY REFERENCES trials ON DELETE CASCADE, sha256 TEXT NOT NULL)""",
 )
-"""Tables that all studies have alike; beside them `conditions` and `episodes`, whose columns differ."""
+"""Tables that studies have alike; beside them are `conditions` and `episodes`, whose columns
+differ."""
 
 
 def prepare(db: sqlite3.Connection, spec: Spec, measures: Sequence[Measure]) -> None:

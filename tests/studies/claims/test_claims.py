@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from made_up_results import ablation, arrays, scaling, shapes, wheel_failure
 
+from nested_agents.scenarios.box_pushing.scenario import MEASURES
 from nested_agents.studies import STUDIES
 from nested_agents.studies.analysis import published
 from nested_agents.studies.analysis.results import Results
@@ -57,7 +58,8 @@ def curves(default: float, paper: float, greedy: float) -> Results:
     training["default"]["contact_fraction"][:, :5] -= 0.5 * default - 0.3
     evaluation = {c: arrays(chance[-5:], rng) for c, chance in chances.items()}
     phases = {"training": training, "evaluation": evaluation}
-    return Results(training, evaluation, phases, dict.fromkeys(chances, tuple(range(20))))
+    seeds = dict.fromkeys(chances, tuple(range(20)))
+    return Results(training, evaluation, phases, seeds, measures=MEASURES)
 
 
 def orders(chances: list[float]) -> Results:

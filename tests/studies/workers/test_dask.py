@@ -68,7 +68,7 @@ def cluster(tmp_path_factory):
 
 @contextmanager
 def written(directory):
-    with Store.create(directory, made_up.SPEC) as store:
+    with Store.create(directory, made_up.SPEC, made_up.MEASURES) as store:
         yield store, store.pending(made_up.TRIALS)
 
 
