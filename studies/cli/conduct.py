@@ -10,7 +10,7 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 
 from ... import scenarios
-from ...core.protocols import DrawnScenario
+from ...core.protocols import DrawnScenario, Scenario
 from ..analysis.results import read
 from ..catalogue.study import load_study
 from ..presentation import figures
@@ -112,7 +112,7 @@ def carried_out(
 
 def _replay(store: Store, trial: Trial) -> list[Path]:
     """Draw what is recorded of a trial, if its scenario knows how."""
-    scenario = scenarios.build(trial.settings.scenario)
+    scenario: Scenario = scenarios.build(trial.settings.scenario)
     if not isinstance(scenario, DrawnScenario):
         display.say(f"no replay: {type(scenario).__name__} does not draw its episodes")
         return []

@@ -4,7 +4,7 @@ import sys
 
 import made_up
 
-from nested_agents.studies.catalogue.learning_curve import analysis as learning_curve
+from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli import conduct
 from nested_agents.studies.cli.main import main
 

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from nested_agents.studies.claims import claims
 from nested_agents.studies.cli.main import main
 
 ROOT = Path(__file__).resolve().parents[2]

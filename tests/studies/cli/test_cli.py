@@ -15,7 +15,7 @@ from types import ModuleType
 import made_up
 import pytest
 
-from nested_agents.studies.catalogue.learning_curve import analysis as learning_curve
+from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli import conduct
 from nested_agents.studies.cli.main import COMMANDS, main
 from nested_agents.studies.spec.spec import Spec

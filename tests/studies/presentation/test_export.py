@@ -133,8 +133,10 @@ def test_json_gives_the_table_that_the_study_gives(study, tmp_path, capsys):
     assert path == tmp_path / "results.json"
     assert main(["table", str(path), "--format", "markdown", *columns]) == 0
     assert capsys.readouterr().out == of_study
+    assert main(["table", str(study)]) == 0
+    of_study = capsys.readouterr().out
     assert main(["table", str(path)]) == 0
-    assert "distance" not in capsys.readouterr().out
+    assert capsys.readouterr().out == of_study
 
 
 @pytest.mark.parametrize("form", ["table", "latex", "csv"])
