@@ -15,7 +15,7 @@ from types import ModuleType
 import made_up
 import pytest
 
-from nested_agents.studies.catalogue.learning_curve import analysis as learning_curve
+from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli import conduct
 from nested_agents.studies.cli.main import COMMANDS, main
 from nested_agents.studies.spec.spec import Spec
@@ -30,7 +30,7 @@ def run_here(measure, *arguments):
     out, err = io.StringIO(), io.StringIO()
     with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
         patch.setattr(learning_curve, "measure", measure)
-        patch.setattr(conduct, "check", lambda spec: None)
+        patch.setattr(conduct, "check", lambda spec: made_up.MEASURES)
         patch.setenv("COLUMNS", "80")
         status = main([str(argument) for argument in arguments])
     return status, out.getvalue(), err.getvalue()
@@ -222,7 +222,7 @@ def test_a_replay_of_the_first_and_the_last_episode_is_drawn_once(tmp_path, monk
         sys.modules, "nested_agents.scenarios.box_pushing.pictures.rendering", rendering
     )
     monkeypatch.setattr(learning_curve, "measure", made_up.measure)
-    monkeypatch.setattr(conduct, "check", lambda spec: None)
+    monkeypatch.setattr(conduct, "check", lambda spec: made_up.MEASURES)
     for _ in range(2):
         assert conduct.conduct(made_up.SPEC, tmp_path, 2, replay=True) == 0
     assert len(drawn) == 2

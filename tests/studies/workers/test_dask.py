@@ -11,7 +11,7 @@ from pathlib import Path
 import made_up
 import pytest
 
-from nested_agents.studies.catalogue.learning_curve import analysis as learning_curve
+from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli import conduct
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.errors import SpecError
@@ -68,7 +68,7 @@ def cluster(tmp_path_factory):
 
 @contextmanager
 def written(directory):
-    with Store.create(directory, made_up.SPEC) as store:
+    with Store.create(directory, made_up.SPEC, made_up.MEASURES) as store:
         yield store, store.pending(made_up.TRIALS)
 
 
@@ -127,7 +127,7 @@ def run(tmp_path, *arguments):
 @pytest.fixture
 def made_up_results(monkeypatch):
     monkeypatch.setattr(learning_curve, "measure", made_up.measure)
-    monkeypatch.setattr(conduct, "check", lambda spec: None)
+    monkeypatch.setattr(conduct, "check", lambda spec: made_up.MEASURES)
 
 
 @pytest.mark.usefixtures("made_up_results")
