@@ -161,7 +161,11 @@ def test_lists_that_make_no_state_space_are_refused(names: tuple[str, ...], comp
 
 def test_a_state_space_may_be_listed() -> None:
     scenario = BoxPushing(BoxPushingSettings(state_space=("gap", "cross_track_error")))
-    assert [v.name for v in scenario.state_space.variables] == ["wheel_speed", "gap", "cross_track_error"]
+    assert [v.name for v in scenario.state_space.variables] == [
+        "wheel_speed",
+        "gap",
+        "cross_track_error",
+    ]
     assert scenario.reset(0).shape == (4, 3)
 
 
