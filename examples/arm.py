@@ -90,8 +90,8 @@ class Arm:
     def reward(self, distance):
         """Return the reward ``(...)``: for being there, and less for coming nearer."""
         nearer = self.distance - distance > 0.001
-        coming = np.where(nearer, 0.03 * np.exp(-1.5 * distance), -0.05)
-        return np.where(distance < 0.02, 0.1, coming)
+        coming = np.where(nearer, 0.003 * np.exp(-1.5 * distance), -0.005)
+        return np.where(distance < 0.02, 0.01, coming)
 
 
 class Outlook:

@@ -160,7 +160,15 @@ def listed(name: str, *shared: str) -> BoxStateSpace:
     )
 
 
-_PUSHING = ("gap", "box_bearing", "side", "others_gap", "cross_track_error", "box_distance", "approach")
+_PUSHING = (
+    "gap",
+    "box_bearing",
+    "side",
+    "others_gap",
+    "cross_track_error",
+    "box_distance",
+    "approach",
+)
 
 STATE_SPACES: dict[str, BoxStateSpace] = {
     # Eq. 1, in the order of its own and its shared part.
