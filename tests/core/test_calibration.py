@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from nested_agents.core.calibration import Calibration
-from nested_agents.core.settings import CalibrationSettings
+from nested_agents.core.calibration import CalibrationSettings
 
 SETTINGS = CalibrationSettings(enabled=True)
 LEVERS = np.array([0.1, 0.05])

@@ -14,7 +14,8 @@ from nested_agents.core.exploration import (
     build_explorer,
     greatest,
 )
-from nested_agents.core.settings import BurstExploration, PaperExploration
+from nested_agents.core.exploration import BurstExploration
+from nested_agents.core.exploration import PaperExploration
 
 VALUES = np.array([0.0, 3.0, 1.0, 2.0])
 

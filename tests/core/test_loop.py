@@ -10,7 +10,7 @@ import pytest
 
 from nested_agents.core.hierarchy import Hierarchy
 from nested_agents.core.loop import StepRecord, control_loop, policy_seed, world_seed
-from nested_agents.core.settings import (
+
     BatchTDSettings,
     BurstExploration,
     Decision,
@@ -153,7 +153,7 @@ def test_a_team_learns_to_push(line_world) -> None:
     settings = BatchTDSettings(
         rule_base=RuleBaseSettings(products=(("speed", "gap"),)),
         ridge=0.1,
-        mixing=1.0,
+        target_averaging_rate=1.0,
         discount=0.9,
         exploration=BurstExploration(rate=0.5, decay=0.7, floor=0.0),
         decision=Decision(rule="value"),

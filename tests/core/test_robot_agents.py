@@ -6,7 +6,9 @@ import pytest
 from nested_agents.core.loop import control_loop, policy_seed
 from nested_agents.core.protocols import EmbodiedScenario
 from nested_agents.core.robot_agents import RobotAgents, per_robot
-from nested_agents.core.settings import BatchTDSettings, Decision, SelfModelSettings
+from nested_agents.core.learners.batch import BatchTDSettings
+from nested_agents.core.decision import Decision
+from nested_agents.core.self_model import SelfModelSettings
 from nested_agents.core.team import Team
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing

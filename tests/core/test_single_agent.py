@@ -7,7 +7,8 @@ import pytest
 
 from nested_agents.core.hierarchy import Hierarchy
 from nested_agents.core.loop import control_loop
-from nested_agents.core.settings import RuleBaseSettings, TDLambdaSettings
+from nested_agents.core.rules.settings import RuleBaseSettings
+from nested_agents.core.learners.td import TDLambdaSettings
 from nested_agents.core.single_agent import SingleAgent
 from nested_agents.core.team import Team
 

@@ -13,7 +13,7 @@ from pydantic import TypeAdapter
 from nested_agents.core.evaluators import ExactEnumeration, Sampling
 from nested_agents.core.hierarchy import Hierarchy
 from nested_agents.core.robot_agents import per_robot
-from nested_agents.core.settings import Learner as LearnerSettings
+# FIXME Learner as LearnerSettings
 from nested_agents.core.team import Team
 
 PAPER = {"kind": "paper", "decay": 0.05, "clock": "episode"}
@@ -31,7 +31,7 @@ TEAMS = {
     "batch-td": {"kind": "batch-td", "ridge": 0.1, "exploration": BURST},
     "batch-td, sigmoid": {"kind": "batch-td", "rule_base": {"membership": "sigmoid"}},
     "anova-td": {"kind": "anova-td", "rule_base": {"order": 3}, "ridge": 0.1},
-    "fitted-value": {"kind": "fitted-value", "candidates": 5, "sweeps": 3},
+    "fitted-value": {"kind": "fitted-value", "candidates": 5, "regression_iterations": 3},
     "sampling": {
         "kind": "batch-td",
         "decision": {"evaluator": "sampling", "samples": 7, "others": "observed"},

@@ -10,7 +10,8 @@ from nested_agents.core.evaluators.summed import directions, sigma_points
 from nested_agents.core.hierarchy import Hierarchy
 from nested_agents.core.protocols import Blocks
 from nested_agents.core.rules.rule_base import RuleBase
-from nested_agents.core.settings import Decision, RuleBaseSettings
+from nested_agents.core.decision import Decision
+from nested_agents.core.rules.settings import RuleBaseSettings
 from nested_agents.core.spaces import StateSpace, Variable
 from nested_agents.core.team import _build_evaluator
 

@@ -10,7 +10,7 @@ from nested_agents.core.evaluators import ExactEnumeration, Sampling
 from nested_agents.core.hierarchy import Hierarchy
 from nested_agents.core.protocols import Blocks
 from nested_agents.core.rules.rule_base import RuleBase
-from nested_agents.core.settings import RuleBaseSettings
+from nested_agents.core.rules.settings import RuleBaseSettings
 from nested_agents.core.spaces import StateSpace, Variable
 
 A = 4

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from nested_agents.core.protocols import Blocks
 from nested_agents.core.rules import kernels
-from nested_agents.core.rules import reference as twins
+from nested_agents.core.rules import reference
 from nested_agents.core.rules.fuzzy import Partition
 from nested_agents.core.rules.rule_base import RuleBase
 
@@ -75,7 +75,7 @@ def rng() -> np.random.Generator:
 
 def test_values(base: RuleBase, rng: np.random.Generator) -> None:
     theta, states = rng.normal(size=base.n_rules), states_of(rng, 60)
-    expected = twins.values(base, theta, states)
+    expected = reference.values(base, theta, states)
     assert base.values(theta, states) == pytest.approx(expected, rel=0, abs=1e-12)
     # The dense kernel serves any shape; the compact one is a shortcut for triangles.
     dense = kernels.values_dense(theta, states, base.layout)
@@ -85,7 +85,7 @@ def test_values(base: RuleBase, rng: np.random.Generator) -> None:
 def test_block_values(base: RuleBase, rng: np.random.Generator) -> None:
     theta, blocks = rng.normal(size=base.n_rules), blocks_of(rng, base.n_own)
     codes = rng.integers(N_ACTIONS**N_AGENTS, size=90)
-    expected = twins.block_values(base, theta, blocks, codes)
+    expected = reference.block_values(base, theta, blocks, codes)
     assert base.block_values(theta, blocks, codes) == pytest.approx(expected, rel=0, abs=1e-12)
     # Whatever the shape, the other kernels agree.
     none = np.zeros(0, dtype=np.int64)
@@ -111,7 +111,7 @@ def test_enumerate(base: RuleBase, rng: np.random.Generator, agent: int, average
     every = np.tile(joint[:, None], grid.shape[1])
     every[agent:] = grid
     places = N_ACTIONS ** np.arange(N_AGENTS - 1, -1, -1)
-    values = twins.block_values(base, theta, blocks, places @ every).reshape(N_ACTIONS, -1)
+    values = reference.block_values(base, theta, blocks, places @ every).reshape(N_ACTIONS, -1)
     given = np.where(np.arange(N_AGENTS) < agent, places, 0)
     codes = (places[agent:] @ grid).reshape(N_ACTIONS, -1)
     tried = kernels.Tried(codes, given, below)
@@ -128,14 +128,14 @@ def test_enumerate(base: RuleBase, rng: np.random.Generator, agent: int, average
 
 def test_td_update(base: RuleBase, rng: np.random.Generator) -> None:
     theta, trace = rng.normal(size=(2, 3, base.n_rules))
-    theta_twin, trace_twin = theta.copy(), trace.copy()
+    theta_expected, trace_expected = theta.copy(), trace.copy()
     reach = np.full((3, base.n_parts), 5.0)
     for _ in range(60):
         states, steps = states_of(rng, 3), 0.1 * rng.normal(size=3)
         kernels.td_update(theta, trace, reach, states, steps, 0.38, base.layout)
-        twins.td_update(base, theta_twin, trace_twin, states, steps, 0.38)
-    assert trace == pytest.approx(trace_twin, rel=0, abs=1e-12)
-    assert theta == pytest.approx(theta_twin, rel=0, abs=1e-12)
+        reference.td_update(base, theta_expected, trace_expected, states, steps, 0.38)
+    assert trace == pytest.approx(trace_expected, rel=0, abs=1e-12)
+    assert theta == pytest.approx(theta_expected, rel=0, abs=1e-12)
 
 
 @pytest.mark.parametrize("discount", [0.95, 0.0])
@@ -143,18 +143,18 @@ def test_td_updates_with_their_errors(
     base: RuleBase, rng: np.random.Generator, discount: float
 ) -> None:
     theta, trace = rng.normal(size=(2, 3, base.n_rules))
-    theta_twin, trace_twin, lengths = theta.copy(), trace.copy(), np.array([1.0, 2.0, 0.5])
+    theta_expected, trace_expected, lengths = theta.copy(), trace.copy(), np.array([1.0, 2.0, 0.5])
     reach = np.full((3, base.n_parts), 5.0)
     for _ in range(5):
         states, entered = states_of(rng, 6).reshape(2, 3, -1)
         now, ahead = (
-            np.einsum("ij,ij->i", base.features(met), theta_twin) for met in (states, entered)
+            np.einsum("ij,ij->i", base.features(met), theta_expected) for met in (states, entered)
         )
         base.td_update(theta, trace, reach, states, entered, -0.3, discount, 0.1, lengths, 0.38)
         steps = 0.1 * (-0.3 + discount * ahead - now) / lengths
-        twins.td_update(base, theta_twin, trace_twin, states, steps, 0.38)
-    assert trace == pytest.approx(trace_twin, rel=0, abs=1e-12)
-    assert theta == pytest.approx(theta_twin, rel=0, abs=1e-12)
+        reference.td_update(base, theta_expected, trace_expected, states, steps, 0.38)
+    assert trace == pytest.approx(trace_expected, rel=0, abs=1e-12)
+    assert theta == pytest.approx(theta_expected, rel=0, abs=1e-12)
 
 
 def test_strengths_of_many(base: RuleBase, rng: np.random.Generator) -> None:
@@ -200,7 +200,7 @@ def test_single_precision(base: RuleBase, rng: np.random.Generator) -> None:
     for found, expected in (
         (
             base.block_values(theta[0], blocks, codes),
-            twins.block_values(base, wide[0][0], blocks, codes),
+            reference.block_values(base, wide[0][0], blocks, codes),
         ),
         (
             base.each(theta, states[:, None])[:, 0],
@@ -210,7 +210,7 @@ def test_single_precision(base: RuleBase, rng: np.random.Generator) -> None:
         assert found == pytest.approx(expected, rel=1e-5, abs=1e-5 * scale)
     reach = np.full((3, base.n_parts), 5.0)
     kernels.td_update(theta, trace, reach, states, steps, 0.38, base.layout)
-    twins.td_update(base, *wide, states, steps, 0.38)
+    reference.td_update(base, *wide, states, steps, 0.38)
     assert theta.dtype == trace.dtype == np.float32
     assert trace == pytest.approx(wide[1], rel=1e-5, abs=1e-5)
     assert theta == pytest.approx(wide[0], rel=1e-5, abs=1e-5)
@@ -243,23 +243,23 @@ def test_the_papers_78125_rules(membership: str, rng: np.random.Generator) -> No
     assert base.each(theta[None], states[None])[0] == pytest.approx(expected, rel=0, abs=1e-12)
     states = np.tile(states, (6, 1))
     states[:, 4:] += 0.01 * rng.normal(size=(24, 3))  # a few own blocks, shared ones near by
-    expected = twins.values(base, theta, states)
+    expected = reference.values(base, theta, states)
     assert base.values(theta, states) == pytest.approx(expected, rel=0, abs=1e-12)
     for size in (1, 2, 3, 24):
         blocks, codes = blocks_of(rng, 4, 7), rng.integers(N_ACTIONS**N_AGENTS, size=size)
         blocks.own[:, 3] = rng.choice([0.1, 0.5, 0.52, 0.9], len(blocks.own))  # levels shared
-        expected = twins.block_values(base, theta, blocks, codes)
+        expected = reference.block_values(base, theta, blocks, codes)
         found = base.block_values(theta, blocks, codes)
         assert found == pytest.approx(expected, rel=0, abs=1e-12)
 
     theta, trace = rng.normal(size=(2, 2, base.n_rules))
-    theta_twin, trace_twin = theta.copy(), trace.copy()
+    theta_expected, trace_expected = theta.copy(), trace.copy()
     steps = np.array([0.01, -0.02])
     reach = np.full((2, base.n_parts), 5.0)
     kernels.td_update(theta, trace, reach, states[:2], steps, 0.3996, base.layout)
-    twins.td_update(base, theta_twin, trace_twin, states[:2], steps, 0.3996)
-    assert np.abs(trace - trace_twin).max() <= 1e-12
-    assert np.abs(theta - theta_twin).max() <= 1e-12
+    reference.td_update(base, theta_expected, trace_expected, states[:2], steps, 0.3996)
+    assert np.abs(trace - trace_expected).max() <= 1e-12
+    assert np.abs(theta - theta_expected).max() <= 1e-12
 
 
 def test_add_features(base: RuleBase, rng: np.random.Generator) -> None:
