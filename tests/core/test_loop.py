@@ -8,16 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from nested_agents.core.decision import Decision
+from nested_agents.core.exploration import BurstExploration
 from nested_agents.core.hierarchy import Hierarchy
+from nested_agents.core.learners.batch import BatchTDSettings
+from nested_agents.core.learners.frozen import FrozenSettings
+from nested_agents.core.learners.td import TDLambdaSettings
 from nested_agents.core.loop import StepRecord, control_loop, policy_seed, world_seed
-
-    BatchTDSettings,
-    BurstExploration,
-    Decision,
-    FrozenSettings,
-    RuleBaseSettings,
-    TDLambdaSettings,
-)
+from nested_agents.core.rules.settings import RuleBaseSettings
 from nested_agents.core.team import Team
 
 LEARNING = TDLambdaSettings(step_size=0.1)
