@@ -58,6 +58,7 @@ _PLACES = {
     "build_hierarchy": ("topologies", "build"),
     "check_scenario": ("scenarios.checking.checker", "check_scenario"),
     "control_loop": ("core.loop", "control_loop"),
+    "greatest": ("core.exploration", "greatest"),
     "parse_topology": ("topologies", "parse"),
     "policy_seed": ("core.loop", "policy_seed"),
     "rate": ("studies.analysis.statistics", "rate"),
