@@ -21,7 +21,7 @@ from nested_agents.scenarios.box_pushing.prediction.belief import (
 from nested_agents.scenarios.box_pushing.prediction.prediction import mean_twists
 from nested_agents.scenarios.box_pushing.prediction.push import push
 from nested_agents.scenarios.box_pushing.scripted.controller import ScriptedController
-from nested_agents.topologies import arrange, parse
+from nested_agents.topologies import parse
 
 SOFT = {"stiffness": 0.5, "load": 2.0, "contact_friction": 0.5}
 STIFF = {"stiffness": 2.0, "load": 0.5, "contact_friction": 2.0}
@@ -38,7 +38,7 @@ def calibrating(world, topology="chain"):
     settings = BatchTDSettings(
         calibration=CalibrationSettings(enabled=True), decision=Decision(rule="random")
     )
-    seen, hierarchy = arrange(parse(topology), world)
+    seen, hierarchy = parse(topology).arrange(world)
     return seen, Team.build(settings, seen, hierarchy, policy_seed(0))
 
 
