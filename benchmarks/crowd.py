@@ -10,9 +10,10 @@ import argparse
 from itertools import pairwise
 from pathlib import Path
 
+from nested_agents.core.decision import Decision
 from nested_agents.core.hierarchy import Hierarchy
+from nested_agents.core.learners.td import TDLambdaSettings
 from nested_agents.core.loop import control_loop, policy_seed, world_seed
-from nested_agents.core.settings import Decision, TDLambdaSettings
 from nested_agents.core.team import Team
 from nested_agents.scenarios import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.pictures.rendering import snapshot

@@ -24,6 +24,7 @@ from rich.console import Console
 from rich.table import Table
 
 from nested_agents.core.arrays import FloatArray
+from nested_agents.core.decision import Decision
 from nested_agents.core.evaluators import (
     Evaluator,
     ExactEnumeration,
@@ -33,8 +34,8 @@ from nested_agents.core.evaluators import (
     Sampling,
 )
 from nested_agents.core.hierarchy import Hierarchy
+from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.loop import control_loop, policy_seed
-from nested_agents.core.settings import BatchTDSettings, Decision
 from nested_agents.core.team import Team
 from nested_agents.scenarios import BoxPushingSettings
 

@@ -41,6 +41,7 @@ _PLACES = {
     "Measure": ("core.protocols", "Measure"),
     "Partition": ("core.rules.fuzzy", "Partition"),
     "RuleBase": ("core.rules.rule_base", "RuleBase"),
+    "SUCCESS": ("core.protocols", "SUCCESS"),
     "Scenario": ("core.protocols", "Scenario"),
     "ScenarioSettings": ("core.settings", "ScenarioSettings"),
     "Session": ("studies.trials.trial", "Session"),
