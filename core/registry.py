@@ -14,7 +14,6 @@ thing. A class with a nested ``Settings`` stands for the model that builds it.
 from __future__ import annotations
 
 import difflib
-import inspect
 import os
 import sys
 from collections.abc import Callable, Iterable, Mapping
@@ -120,7 +119,7 @@ class Registry:
         except Exception as error:
             if name in self.built_in:
                 raise
-            raise ValueError(f"cannot be loaded: {type(error).__name__}: {error}") from None
+            raise ValueError(f"cannot be loaded: {sources.told(error)}") from None
         return found
 
     def reference_to(self, thing: Any) -> str:
@@ -213,7 +212,7 @@ class SettingsRegistry(Registry):
             raise ValueError(f"the settings of a {self.kind} must inherit {base}")
         if not callable(thing):
             raise ValueError(f"is no {self.kind}, but a {type(thing).__name__}")
-        model: Any = create_model(
+        model = create_model(
             own.__qualname__,
             __base__=own,
             __module__=own.__module__,
@@ -225,7 +224,7 @@ class SettingsRegistry(Registry):
             def build(settings: Settings, *given: Any) -> Any:
                 return thing(settings, *given) if has_own else thing(*given)
 
-            model.build = build
+            model.build = build  # type: ignore[attr-defined]
         return cast(type[Settings], model)
 
     def parsed(self, text: str) -> Settings:
@@ -290,10 +289,5 @@ class Plugged:
 
 def _relative(path: str) -> str:
     """Return a path as it is written from the working directory."""
-    here = os.path.realpath(os.getcwd())
-    there = (
-        os.path.realpath(inspect.getsourcefile(sys.modules["__main__"]) or path)
-        if not path
-        else os.path.realpath(path)
-    )
+    here, there = os.path.realpath(os.getcwd()), os.path.realpath(path)
     return os.path.relpath(there, here) if there.startswith(here + os.sep) else there
