@@ -25,8 +25,8 @@ CHUNK = 1
 class Baselines:
     """The same decision and update by other means; theta and traces are copies.
 
-    Only for exact enumeration with teammates ``empirical`` or ``uniform`` over a chain, and rule bases
-    of one term over all variables.
+    Only for exact enumeration with teammates ``empirical`` or ``uniform`` over a chain, and rule
+    bases of one term over all variables.
     """
 
     def __init__(self, situation: Situation) -> None:
@@ -60,7 +60,8 @@ class Baselines:
         blocks, theta = self.blocks[agent], self.theta[agent]
         states = blocks.states(indices)
         parts = [
-            self.rules.features(states[c : c + CHUNK]) @ theta for c in range(0, len(indices), CHUNK)
+            self.rules.features(states[c : c + CHUNK]) @ theta
+            for c in range(0, len(indices), CHUNK)
         ]
         return np.concatenate(parts)
 

@@ -86,9 +86,7 @@ def errors(
             for agent in range(n):
                 known = np.full(n, neutral)
                 known[:agent] = record.joint_action[:agent]
-                asked = Deliberation(
-                    agent, known, prediction, team.learner.theta, frequencies, rng
-                )
+                asked = Deliberation(agent, known, prediction, team.learner.theta, frequencies, rng)
                 drawn = np.array([reference.values(asked) for reference in references])
                 exact = drawn.mean(axis=0)
                 spread = np.ptp(exact)
@@ -125,7 +123,9 @@ def times(n_agents: int, budget: float = 3.0) -> dict[str, float]:
     kinds = {name: {"evaluator": name} for name in ("sampling", "moments")}
     if n_agents <= LARGEST_EXACT:
         kinds["exact"] = {"evaluator": "exact"}
-    moments = {name: situation(n_agents, ADDITIVE, kind).predict_and_act for name, kind in kinds.items()}
+    moments = {
+        name: situation(n_agents, ADDITIVE, kind).predict_and_act for name, kind in kinds.items()
+    }
     taken = paired(moments, budget=budget, clock=time.thread_time)
     return {name: 1e3 * taken.median(name) for name in moments}
 

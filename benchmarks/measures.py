@@ -77,7 +77,9 @@ def _check(moment: Situation, baselines: Baselines) -> None:
         indices = rng.choice(baselines.indices(agent, np.zeros(last + 1, dtype=np.int64)), 8)
         literal = baselines.literal(agent, indices)
         baselines._features = {}
-        ours = baselines.rules.block_values(baselines.theta[agent], baselines.blocks[agent], indices)
+        ours = baselines.rules.block_values(
+            baselines.theta[agent], baselines.blocks[agent], indices
+        )
         for name, values in (("ours", ours), ("factorised", baselines.factorised(agent, indices))):
             if np.abs(values - literal).max() > 1e-5 * np.abs(literal).max():
                 raise ArithmeticError(f"{name} and literal values differ at agent {agent}")

@@ -1,9 +1,7 @@
-"""
-How wrong predictors are
-========================
+"""How wrong predictors are: ``python -m benchmarks.prediction_errors``.
 
 A scripted controller pushes boxes of all shapes, with and without failures. After every decision
-period in contact, the poses that each predictor foresaw are held against those that came.
+period in contact, the poses that each predictor predicted are held against those that came.
 """
 
 from collections.abc import Mapping
@@ -84,7 +82,8 @@ def table(title: str, cases: Mapping[str, Mapping[str, Any]]) -> None:
     print()
 
 
-if __name__ == "__main__":
+def main() -> None:
+    """Print the tables."""
     table("box", {name: {"box": name} for name in BOXES})
     for robot, wheel in (("e-puck", "left"), ("four-wheel", "front-left")):
         cases = {
@@ -95,3 +94,7 @@ if __name__ == "__main__":
             for name, failure in FAILURES.items()
         }
         table(f"failure of one wheel, {robot}", cases)
+
+
+if __name__ == "__main__":
+    main()
