@@ -5,13 +5,13 @@ period in contact, the poses that each predictor predicted are held against thos
 """
 
 from collections.abc import Mapping
-from dataclasses import replace
 from math import hypot, pi
 from typing import Any
 
 import numpy as np
 
 from nested_agents.scenarios import BoxPushing, BoxPushingSettings
+from nested_agents.scenarios.box_pushing.prediction.prediction import BoxPrediction
 from nested_agents.scenarios.box_pushing.prediction.predictors import push_model
 from nested_agents.scenarios.box_pushing.scripted.controller import ScriptedController
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
@@ -46,7 +46,11 @@ def errors(**scenario: Any) -> tuple[int, list[float]]:
         for _ in range(STEPS):
             before = world.measure()
             joint = controller.act(before)
-            views = [replace(world.predict(), model=m).poses(joint[None]) for m in models]
+            now = world.predict()
+            views = [
+                BoxPrediction(now.situation, model, now.premises).poses(joint[None])
+                for model in models
+            ]
             transition = world.step(joint)
             after: Mapping[str, Any] = transition.info
             if after["contact_time"].any():

@@ -244,7 +244,8 @@ def told(error: BaseException) -> str:
 
     Examples
     --------
-    >>> told(ValueError("two\\nlines"))
+    >>> told(ValueError("""two
+    ... lines"""))
     'ValueError: two lines'
     """
     return f"{type(error).__name__}: {' '.join(str(error).split())}"
