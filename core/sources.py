@@ -240,12 +240,11 @@ def meaning(text: str, name: str) -> str:
 
 
 def told(error: BaseException) -> str:
-    """Return what an exception says, in one line.
+    r"""Return what an exception says, in one line.
 
     Examples
     --------
-    >>> told(ValueError("""two
-    ... lines"""))
+    >>> told(ValueError("two\nlines"))
     'ValueError: two lines'
     """
     return f"{type(error).__name__}: {' '.join(str(error).split())}"
