@@ -31,7 +31,7 @@ def main() -> None:
     settings = BoxPushingSettings(robots=options.robots)
     scenario = settings.build()
     hierarchy = Hierarchy(scenario.agents, list(pairwise(scenario.agents)))
-    learner = TDLambdaSettings(step_size=0.05, decision=Decision(others="mean"))
+    learner = TDLambdaSettings(step_size=0.05, decision=Decision(teammates="uniform"))
     team = Team.build(learner, scenario, hierarchy, policy_seed(options.seed))
     watch, steps = Stopwatch(), 0
     scenario.reset(world_seed(options.seed, 0), 0)
