@@ -112,7 +112,7 @@ class Registry:
         if place is None:
             raise ValueError(f"{closest(name, self.names())}, or one of your own as file.py:NAME")
         try:
-            return located(place)
+            found = located(place)
         except Exception as error:
             if name in self.built_in:
                 raise

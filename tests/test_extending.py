@@ -1,4 +1,4 @@
-"""The examples of docs/extending.md: as short as they claim, and run from outside the repository."""
+"""The examples of docs/extending.md: short, and run from outside the repository."""
 
 import re
 import subprocess

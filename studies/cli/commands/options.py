@@ -25,7 +25,7 @@ Figure = Annotated[Path | None, tyro.conf.arg(metavar="PATH", help_behavior_hint
 """A picture to write."""
 
 Backend = Literal["loky", "dask"]
-"""Kind of workers, see `nested_agents.studies.workers.workers`, whose import the help does not wait for."""
+"""Kind of workers; named here, since importing `nested_agents.studies.workers` delays the help."""
 
 Address = Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT", help_behavior_hint="")]
 """Of a Dask scheduler."""
