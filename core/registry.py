@@ -147,7 +147,7 @@ class Registry:
 
 
 class SettingsRegistry(Registry):
-    """The things of a kind that have settings, told apart by ``kind`` in a table.
+    """The things of a kind that have settings, distinguished by ``kind`` in a table.
 
     Parameters
     ----------

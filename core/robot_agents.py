@@ -34,7 +34,7 @@ from .protocols import (
 from .spaces import ActionSet, StateSpace
 
 MOST_ACTIONS = 4**4
-"""The most actions of a robot that are still told apart: those of four wheels."""
+"""The most actions of a robot that are still distinguished: those of four wheels."""
 
 
 class RobotAgents:

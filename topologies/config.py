@@ -319,7 +319,7 @@ def parse(text: str) -> TopologySettings:
 
 
 Topology = Annotated[TopologySettings, Plugged(TOPOLOGIES, parse)]
-"""Any topology's settings: a table told apart by `kind`, or a string for `parse`."""
+"""Any topology's settings: a table distinguished by `kind`, or a string for `parse`."""
 
 
 def hierarchy_of(

@@ -19,7 +19,7 @@ from .checks import with_edges
 
 
 def read_graph(path: str) -> nx.DiGraph:
-    """Read a graph from GraphML or JSON, told apart by suffix.
+    """Read a graph from GraphML or JSON, distinguished by suffix.
 
     JSON holds ``{"edges": [["a", "b"], ...], "alone": [...]}``, or networkx's node-link format.
     In GraphML an agent is named by its node's id.

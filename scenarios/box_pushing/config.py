@@ -136,7 +136,7 @@ Failure = Annotated[
     | NoisySettings,
     Field(discriminator="kind"),
 ]
-"""Any failure's settings, told apart by `kind`."""
+"""Any failure's settings, distinguished by `kind`."""
 
 
 Vertices = Annotated[tuple[tuple[float, float], ...], Field(min_length=3)]

@@ -23,10 +23,10 @@ Measure = Callable[[Results], "Measured | None"]
 
 LAST = slice(-5, None)
 FIRST = slice(None, 5)
-UNTOLD = ("frozen", "random")
+UNPLANNER = ("frozen", "random")
 """Controls that know no more of the task than a learner does before its first reward."""
-TOLD = "greedy"
-"""The control that is told the reward and plans by it."""
+PLANNER = "planner"
+"""The control that has the reward function and plans by it."""
 PAPER_NESTED, PAPER_SINGLE = 2.45e12, 1.1e27
 """What the paper prints in Section VII."""
 
@@ -53,7 +53,7 @@ class Measured:
     note: str = ""
 
 
-def learned(condition: str, known: tuple[str, ...] = UNTOLD) -> Measure:
+def learned(condition: str, known: tuple[str, ...] = UNPLANNER) -> Measure:
     """Return what measures success at the end of training, less that of the better control."""
 
     def outcomes(r: Results, name: str) -> np.ndarray:
@@ -72,11 +72,11 @@ def learned(condition: str, known: tuple[str, ...] = UNTOLD) -> Measure:
     return compute
 
 
-def sooner_than_told(results: Results) -> Measured | None:
-    """Measure the default's decisions in an episode after training, over greedy's, seed by seed."""
-    if not {"default", TOLD} <= results.evaluation.keys():
+def sooner_than_planned(results: Results) -> Measured | None:
+    """Measure the default's decisions in an evaluation episode over the planner's, by seed."""
+    if not {"default", PLANNER} <= results.evaluation.keys():
         return None
-    base, own = paired(results, TOLD, "default", lambda r, c: r.evaluation[c]["steps"].mean(axis=1))
+    base, own = paired(results, PLANNER, "default", _evaluation_steps)
     return Measured(bootstrap(own / base), len(own)) if len(own) else None
 
 
@@ -101,7 +101,7 @@ def oriented(results: Results) -> Measured | None:
 
 
 def contact_gained(results: Results) -> Measured | None:
-    """Measure by how much more the default's time in contact grows than the greedy control's.
+    """Measure by how much more the default's time in contact grows than the planner's.
 
     That of any agent grows in training, since fewer and fewer actions are random.
     """
@@ -111,9 +111,9 @@ def contact_gained(results: Results) -> Measured | None:
         return np.asarray(contact[:, LAST].mean(axis=1) - contact[:, FIRST].mean(axis=1))
 
     known = [c for c, arrays in results.training.items() if "contact_fraction" in arrays]
-    if not {"default", TOLD} <= set(known):
+    if not {"default", PLANNER} <= set(known):
         return None
-    base, own = paired(results, TOLD, "default", gained)
+    base, own = paired(results, PLANNER, "default", gained)
     return Measured(bootstrap(own - base), len(own)) if len(own) else None
 
 
@@ -133,7 +133,7 @@ def order_matters(results: Results) -> Measured | None:
 
     Intervals of the differences are simultaneous (Bonferroni); p is that of Friedman's test.
     """
-    found = [c for c in analyse_orders(results).comparisons if c.title.endswith("greedy")]
+    found = [c for c in analyse_orders(results).comparisons if c.title.startswith("evaluation")]
     if not found:
         return None
     first, *others = (arrays["success"] for arrays in results.evaluation.values())
@@ -178,15 +178,19 @@ def success_by_size(results: Results) -> Measured | None:
         return None
 
     fewest, most = (
-        max(sizes[robots], key=lambda c: float(_greedy(results, c).mean()))
+        max(sizes[robots], key=lambda c: float(_evaluation_success(results, c).mean()))
         for robots in (min(sizes), max(sizes))
     )
-    base, own = paired(results, fewest, most, _greedy)
+    base, own = paired(results, fewest, most, _evaluation_success)
     note = f"{max(sizes)} against {min(sizes)} robots"
     return Measured(ratio(own, base), len(own), note=note) if len(own) else None
 
 
-def _greedy(results: Results, condition: str) -> np.ndarray:
+def _evaluation_steps(results: Results, condition: str) -> np.ndarray:
+    return np.asarray(results.evaluation[condition]["steps"].mean(axis=1))
+
+
+def _evaluation_success(results: Results, condition: str) -> np.ndarray:
     return np.asarray(results.evaluation[condition]["success"])
 
 
@@ -218,12 +222,12 @@ def worst_shape(results: Results) -> Measured | None:
 
 
 def without(condition: str) -> Measure:
-    """Return what measures the greedy success of a condition relative to the default's."""
+    """Return what measures the evaluation success of a condition relative to the default's."""
 
     def compute(results: Results) -> Measured | None:
         if not {condition, "default"} <= results.evaluation.keys():
             return None
-        base, own = paired(results, "default", condition, _greedy)
+        base, own = paired(results, "default", condition, _evaluation_success)
         return Measured(ratio(own, base), len(own)) if len(own) else None
 
     return compute

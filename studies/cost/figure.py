@@ -117,7 +117,7 @@ def _marker(index: int) -> dict[str, Any]:
 
 
 def _hollow(index: int) -> dict[str, Any]:
-    """Hollow and ever smaller, so that markers in one place can be told apart."""
+    """Hollow and ever smaller, so that markers in one place can be distinguished."""
     return {"markerfacecolor": "none", "markersize": max(9.0 - 1.2 * index, 3.5)}
 
 

@@ -126,9 +126,8 @@ def _bodies(found: Explained) -> Iterator[str]:
     yield from _wrapped(
         "What a wheel does to the motion of its robot, per m/s of its commanded speed: metres per "
         "second ahead and to the left, radians per second. Wheels that are driven alike most of "
-        f"the time are hardly told apart. {', '.join(moments[m] for m in bodies.moments)}:".replace(
-            "apart. a", "apart. A"
-        )
+        "the time are hardly distinguished. Shown: "
+        f"{', '.join(moments[m] for m in bodies.moments)}."
     )
     yield ""
     yield from explain_body.table(bodies, found.wheels)

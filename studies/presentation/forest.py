@@ -37,8 +37,8 @@ class Panel:
 def draw(panels: Sequence[Panel], unit: str) -> Figure | None:
     """Return a figure of panels side by side, sorted by the last one; None if there are none.
 
-    Points are means over seeds, bars their 95 % intervals. Full points are told from the null
-    (p < .05, adjusted), hollow ones are not.
+    Points are means over seeds, bars their 95 % intervals. Full points differ significantly from
+    the null (p < .05, adjusted), hollow ones do not.
     """
     panels = [panel for panel in panels if panel.lines]
     if not panels:
@@ -61,11 +61,11 @@ def _panel(axes: Axes, panel: Panel, names: Sequence[str], unit: str) -> None:
     axes.axvline(panel.null, color="#888888", linewidth=0.8)
     for line in panel.lines:
         row, estimate = names.index(line.condition), line.estimate
-        told = line.p < LEVEL
+        significant = line.p < LEVEL
         colour = COLOURS[0] if estimate.value >= panel.null else COLOURS[1]
         if np.isfinite([estimate.low, estimate.high]).all():
             axes.plot([estimate.low, estimate.high], [row, row], color=colour, linewidth=1.5)
-        face = colour if told else "white"
+        face = colour if significant else "white"
         axes.plot(float(estimate.value), row, "o", color=colour, markerfacecolor=face, markersize=5)
     axes.set_title(panel.title, loc="left")
     axes.set_xlabel(unit)
@@ -76,8 +76,8 @@ def _legend(figure: Figure, panels: Sequence[Panel]) -> None:
     handles = [
         Line2D([], [], marker="o", ls="", color="#444444", markerfacecolor=face, label=text)
         for face, text in (
-            ("#444444", "told apart (adjusted p < .05)"),
-            ("white", "not told apart"),
+            ("#444444", "significantly different (adjusted p < .05)"),
+            ("white", "no significant difference"),
         )
     ]
     seeds = sorted({line.seeds for panel in panels for line in panel.lines})

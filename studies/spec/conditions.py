@@ -139,9 +139,9 @@ def grid(
         name = label(point, override.name if override else "") or preset
         where = f" (condition {name!r})" if point or override else ""
         settings = resolve(preset, tables, point, where, override)
-        twin = seen.setdefault(settings.canonical(), name)
-        if twin != name or name in labels:
-            raise SpecError(f"{source}: conditions {twin!r} and {name!r} are the same")
+        other = seen.setdefault(settings.canonical(), name)
+        if other != name or name in labels:
+            raise SpecError(f"{source}: conditions {other!r} and {name!r} are the same")
         labels.add(name)
         columns: dict[str, Any] = {"name": override.name} if override else {}
         columns |= {key: _scalar(point[key]) if key in point else "" for key in keys}
@@ -255,7 +255,7 @@ def tuples(value: Any) -> Any:
 
 
 def _brief(value: object) -> str:
-    """Return a value for a label: a long list is cut, and told from its like by a checksum."""
+    """Return a value for a label: a long list is cut, and distinguished by a checksum."""
     text = str(_scalar(value))
     if isinstance(value, str) or len(text) <= 60:
         return text

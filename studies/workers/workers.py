@@ -1,6 +1,6 @@
 """Who runs the trials: processes on this machine, or workers of a Dask cluster on many.
 
-A family of siblings with one interface, told apart by the name of their backend. Whoever runs a
+A family of siblings with one interface, distinguished by the name of their backend. Whoever runs a
 trial, its bits are the same: each trial has a process to itself, linear algebra uses one thread.
 """
 

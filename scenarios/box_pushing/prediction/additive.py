@@ -1,4 +1,4 @@
-"""The push to first order: how far the box goes, as a sum of what each robot contributes.
+"""Additive (first-order) prediction: how far the box goes, as a sum of what each robot contributes.
 
 Robots that push together do not add up from nothing: two that push a box side by side move it
 hardly faster than one. So contributions are counted from a *reference* in which every robot moves

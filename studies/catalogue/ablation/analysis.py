@@ -2,7 +2,7 @@
 
 The first condition is the reference; every other one differs from it in one ingredient, removed or
 replaced. All meet the same worlds, seed by seed. Two measures were fixed beforehand: how fast a
-team learns (success over all of training) and how well it ends (success greedy, after training).
+team learns (success over all of training) and how well it ends (evaluation success).
 The differences are tested by permutation of signs, and p is adjusted by Holm's method over all
 conditions and both measures.
 """
@@ -18,8 +18,8 @@ from ...analysis.results import Results
 from ...analysis.statistics import Estimate, rate
 from ...analysis.summary import Summary
 
-PHASES = {"training": "training", "greedy": "evaluation"}
-"""The measures, each the success rate in a phase."""
+PHASES = ("training", "evaluation")
+"""The measures: success rates in these phases."""
 
 
 @dataclass(frozen=True)
@@ -45,8 +45,8 @@ def analyse(results: Results) -> Ablation:
     """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
     conditions = list(results.training)
     measures = {
-        title: lambda r, condition, phase=phase: r.phases[phase][condition]["success"].mean(axis=1)
-        for title, phase in PHASES.items()
+        phase: lambda r, condition, phase=phase: r.phases[phase][condition]["success"].mean(axis=1)
+        for phase in PHASES
         if phase in results.phases
     }
     found = differences(results, conditions[0], conditions[1:], measures) if conditions else ()
@@ -56,7 +56,7 @@ def analyse(results: Results) -> Ablation:
     for condition in conditions:
         estimates = {}
         for title in measures:
-            estimates[title] = rate(results.phases[PHASES[title]][condition]["success"])
+            estimates[title] = rate(results.phases[title][condition]["success"])
             estimates[f"{title}, difference"] = by_place.get((condition, title), unknown)
         table.append(Summary(condition, len(results.seeds[condition]), estimates))
     return Ablation(tuple(table), found, tuple(_notes(found)))
@@ -70,8 +70,8 @@ def _notes(found: tuple[Difference, ...]) -> list[str]:
         )
         lines.append(f"\nsuccess {title}, p adjusted over {len(found)} comparisons:")
         for word, sign in (("worse", -1), ("better", 1)):
-            told = [d for d in own if d.p < LEVEL and d.estimate.value * sign > 0]
-            lines += [f"  {word}: {d.condition}, {d.shown}" for d in told]
+            significant = [d for d in own if d.p < LEVEL and d.estimate.value * sign > 0]
+            lines += [f"  {word}: {d.condition}, {d.shown}" for d in significant]
         others = [d.condition for d in own if d.p >= LEVEL]
-        lines += [f"  not told apart: {name}" for name in others]
+        lines += [f"  no significant difference: {name}" for name in others]
     return lines

@@ -2,7 +2,7 @@
 
 The paper calls its chain "in fact arbitrary" (Section X-A). Conditions are orders of the agents;
 all meet the same worlds, seed by seed. Two measures were fixed beforehand: how fast a team learns
-(success over all of training) and how well it ends (success greedy, after training). For each,
+(success over all of training) and how well it ends (evaluation success). For each,
 Friedman's test asks whether the orders differ at all, and the first condition is compared with each
 other one; p-values are adjusted by Holm's method over the two tests, and over all comparisons.
 """
@@ -38,7 +38,7 @@ class Measure:
 
 MEASURES = (
     Measure("success, all training", "training"),
-    Measure("success, greedy", "evaluation"),
+    Measure("evaluation success", "evaluation"),
 )
 
 
@@ -162,7 +162,7 @@ def _verdict(comparisons: tuple[Comparison, ...]) -> list[str]:
         n, k = c.values.shape
         means = c.values.mean(axis=0)
         best, worst = int(means.argmax()), int(means.argmin())
-        differ = "differ" if c.p < LEVEL else "are not told apart"
+        differ = "differ" if c.p < LEVEL else "do not differ significantly"
         named = int((c.against_first < LEVEL).sum())
         lines.append(
             f"{c.title}: {k} orders {differ} (Friedman {c.test.statistic:.1f}, p = {c.test.p:.2g}, "

@@ -1,7 +1,7 @@
 """The learning-curve study: how the agents fare from episode to episode (Fig. 5 and 6).
 
 Every claim of learning needs its controls beside it: one whose weights stay frozen tells learning
-from luck, one that is told the reward tells it from what the predictor alone achieves.
+from luck, one that has the reward function tells it from what the predictor alone achieves.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ def figure_of(analysis: LearningCurves) -> Figure:
     """Return the figure, a panel for every measure that is followed.
 
     Lines are means over seeds, bands their 95 % intervals. A condition has a colour and a style of
-    line of its own, so that lines upon each other are told apart.
+    line of its own, so that lines upon each other are distinguished.
     """
     count = len(analysis.followed)
     columns = min(COLUMNS, count)

@@ -27,7 +27,8 @@ from ...trials.contact import ContactShares
 from ...trials.trial import Session, Trial, TrialResult
 
 COLUMNS = (
-    "success", "greedy", "all touch", "decide [ms]", "learn [ms]", "team [MB]", "process [MB]",
+    "success", "evaluation success", "all touch",
+    "decide [ms]", "learn [ms]", "team [MB]", "process [MB]",
 )  # fmt: skip
 """What the table shows."""
 MEMORY = Path("/proc/self/status")
@@ -171,8 +172,8 @@ def analyse(results: Results) -> Scaling:
         if "process_bytes" in usage:
             values["process [MB]"] = bootstrap(1e-6 * usage["process_bytes"])
         if condition in results.evaluation:
-            greedy = rate(results.evaluation[condition]["success"])
-            values = {"success": values.pop("success"), "greedy": greedy} | values
+            evaluation = rate(results.evaluation[condition]["success"])
+            values = {"success": values.pop("success"), "evaluation success": evaluation} | values
         if "all_touching" in numbers:
             values["all touch"] = bootstrap(numbers["all_touching"])
         agents, passed = (int(numbers[n][0]) for n in ("agents", "messages"))

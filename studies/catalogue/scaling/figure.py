@@ -16,7 +16,7 @@ from .analysis import Scaling
 
 MARKERS = "osD^vP"
 PANELS = (
-    ("greedy", "success, greedy", False),
+    ("evaluation success", "evaluation success", False),
     ("decide [ms]", "deciding, per step [ms]", True),
     ("learn [ms]", "learning, per step [ms]", True),
     ("team [MB]", "arrays of the team [MB]", True),
@@ -45,7 +45,7 @@ def figure_of(analysis: Scaling) -> Figure:
                 axes.set_yscale("log")
             else:
                 top = 1.1 * axes.get_ylim()[1]
-                axes.set_ylim(*((-0.03, 1.03) if name == "greedy" else (0.0, top)))
+                axes.set_ylim(*((-0.03, 1.03) if name == "evaluation success" else (0.0, top)))
         for period in {p.period for p in analysis.points if p.period is not None}:
             panels[0][1].axhline(1e3 * period, color="#888888", linewidth=0.8, ls=":")
         _messages(panels[1][2], analysis, evaluators)

@@ -2,8 +2,8 @@
 
 Training goes on through the failure. At its onset the team is also copied: the copy meets the same
 worlds under the same exploration with its weights kept as they are. Conditions that are swept over
-``learner.self_model.enabled`` give all four cases, told apart by what adapts: nothing, the weights,
-the self-model (by which predictions know the wheel has changed), or both.
+``learner.self_model.enabled`` give all four cases, by what adapts: nothing, the weights, the
+self-model (by which predictions know the wheel has changed), or both.
 
 Levels are success rates over `BLOCK` episodes: before the failure, just after it, and at the end
 of training. A seed has recovered at the first episode from which on `BLOCK` episodes reach
@@ -231,7 +231,7 @@ def courses_of(results: Results) -> list[Course]:
 
 
 def _twin(condition: str, columns: Mapping[str, Any]) -> tuple[str, str]:
-    """Return what a condition has in common with its twin, as a label, and which of them it is."""
+    """Return what a condition has in common with its counterpart, as a label, and which it is."""
     enabled = str(columns.get(SWEPT, ""))
     if not enabled:
         return condition, ""
@@ -251,7 +251,7 @@ def _summary(course: Course) -> Summary:
             "recovered": rate(recovered[:, None]),
             "episodes": bootstrap(episodes),
             "steps": bootstrap(steps),
-            "area lost": bootstrap(course.lost),
+            "cumulative loss": bootstrap(course.lost),
         }
     return Summary(f"{course.fault}: {course.adapts}", len(course.success), estimates)
 

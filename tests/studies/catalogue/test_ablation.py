@@ -9,7 +9,7 @@ from nested_agents.studies.catalogue.ablation.analysis import analyse
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
 
-CHANCES = {"default": 0.8, "no replay": 0.2, "no arena": 0.8, "more of it": 1.0}
+CHANCES = {"default": 0.8, "no replay": 0.2, "no termination radius": 0.8, "more of it": 1.0}
 
 
 def test_what_matters_is_named_and_what_does_not_is_not() -> None:
@@ -17,12 +17,12 @@ def test_what_matters_is_named_and_what_does_not_is_not() -> None:
     text = "\n".join(analysis.notes)
     assert "worse: no replay" in text
     assert "better: more of it" in text
-    assert text.count("not told apart: no arena") == 2
+    assert text.count("no significant difference: no termination radius") == 2
     assert "p adjusted over 6 comparisons" in text
     assert [line.condition for line in analysis.table] == list(CHANCES)
     by_name = {line.condition: line.estimates for line in analysis.table}
-    assert by_name["default"]["greedy, difference"].value == 0.0
-    assert by_name["no replay"]["greedy, difference"].high < -0.4
+    assert by_name["default"]["evaluation, difference"].value == 0.0
+    assert by_name["no replay"]["evaluation, difference"].high < -0.4
 
 
 def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:

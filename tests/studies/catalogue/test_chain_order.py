@@ -36,7 +36,7 @@ def test_equal_orders_are_not_told_apart() -> None:
     analysis = analyse(made_up([0.7] * 6))
     assert [c.p > 0.05 for c in analysis.comparisons] == [True, True]
     assert all((c.against_first > 0.05).all() for c in analysis.comparisons)
-    assert "6 orders are not told apart" in analysis.notes[0]
+    assert "6 orders do not differ significantly" in analysis.notes[0]
 
 
 def test_one_bad_order_is_found_and_named() -> None:

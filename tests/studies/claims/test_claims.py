@@ -50,10 +50,10 @@ def test_criteria_decide_by_the_whole_interval(criterion, measured, verdict) -> 
     assert criterion.decide(measured) == verdict
 
 
-def curves(default: float, paper: float, greedy: float) -> Results:
+def curves(default: float, paper: float, planner: float) -> Results:
     rng = np.random.default_rng(5)
     chances = {"default": np.linspace(0.0, 4 * default, 20).clip(0, default)}
-    others = {"pose": default, "frozen": 0.02, "random": 0.0, "greedy": greedy, "paper": paper}
+    others = {"pose": default, "frozen": 0.02, "random": 0.0, "planner": planner, "paper": paper}
     chances |= {c: np.full(20, p) for c, p in others.items()}
     training = {c: arrays(chance, rng) for c, chance in chances.items()}
     training["default"]["contact_fraction"][:, :5] -= 0.5 * default - 0.3
@@ -115,7 +115,7 @@ def test_few_seeds_decide_nothing() -> None:
 
 def spec_of(study: str, folder: Path | None = None) -> Spec:
     """The spec of a study as it comes with it, or as it stands in a folder."""
-    name = STUDIES[study].rpartition(".")[2]
+    name = study.replace("-", "_")
     return Spec.load((folder or CATALOGUE / name) / f"{name}.toml")
 
 
@@ -126,7 +126,7 @@ def test_claims_name_studies_and_conditions_that_their_specs_have() -> None:
             assert spec.study == study
             labels = {condition.label for condition in spec.conditions()}
             wanted = {
-                "learning-curve": {"default", "frozen", "random", "greedy", "paper"},
+                "learning-curve": {"default", "frozen", "random", "planner", "paper"},
                 "ablation": {"default", "static predictor"},
                 "wheel-failure": {f"{f}, enabled={e}" for f in FAULTS for e in ("true", "false")},
             }.get(study, set())
@@ -209,7 +209,7 @@ def test_the_table_is_printed_in_every_form(form, capsys, monkeypatch) -> None:
 
 
 def test_every_study_can_be_loaded() -> None:
-    for name in STUDIES:
+    for name in STUDIES.names():
         study = load_study(name)
         assert callable(study.measure)
         assert study.analyse(Results({}, {})).table == ()
@@ -239,11 +239,11 @@ REST = {
 @pytest.mark.slow
 def test_studies_are_run_read_again_and_published(tmp_path, capsys, monkeypatch) -> None:
     (tmp_path / "quick").mkdir()
-    for study, module in STUDIES.items():
+    for study, rest in REST.items():
         episodes = 10 if study == "wheel-failure" else 1
-        text = TINY.format(study=study, episodes=episodes, rest=REST[study])
-        (tmp_path / "quick" / f"{module}.toml").write_text(text)
-    monkeypatch.setattr(claims, "SPECS", tmp_path)
+        text = TINY.format(study=study, episodes=episodes, rest=rest)
+        (tmp_path / "quick" / f"{study.replace('-', '_')}.toml").write_text(text)
+    monkeypatch.setattr(claims, "QUICK", tmp_path / "quick")
     monkeypatch.setattr(claims, "PUBLISHED", tmp_path / "published")
     arguments = ["claims", "--quick", "--out", str(tmp_path / "out"), "--jobs", "1"]
     arguments += ["--publish", str(tmp_path / "published"), "--format", "markdown"]

@@ -240,7 +240,7 @@ def test_the_replay_of_one_episode_is_of_the_last(tmp_path):
 def test_the_demos_spec_is_valid_toml(capsys, tmp_path):
     assert main(["demo", "--print-spec"]) == 0
     spec = Spec.parse(capsys.readouterr().out)
-    assert [c.label for c in spec.conditions()] == ["default", "frozen", "random", "greedy"]
+    assert [c.label for c in spec.conditions()] == ["default", "frozen", "random", "planner"]
     assert len(spec.seeds) >= 8
 
 

@@ -118,8 +118,8 @@ def test_the_paper_preset_holds_the_printed_constants():
     assert (learner.rule_base.order, learner.rule_base.memberships) == (7, 5)
 
 
-def test_controls_differ_from_the_default_in_the_learner_and_greedy_in_what_it_plans_by():
-    conditions = Spec.of({"sweep": {"preset": ["default", "frozen", "random", "greedy"]}})
+def test_controls_differ_from_the_default_in_the_learner_and_planner_in_what_it_plans_by():
+    conditions = Spec.of({"sweep": {"preset": ["default", "frozen", "random", "planner"]}})
     default, *controls = [c.settings for c in conditions.conditions()]
     reward = default.scenario.reward.model_copy(update={"attraction_without_contact": True})
     planned = default.scenario.model_copy(update={"prediction_horizon": 48, "reward": reward})
