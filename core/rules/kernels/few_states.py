@@ -25,6 +25,7 @@ def _sums(rows, one, two, first, second, tops, parts, least):  # type: ignore[no
         for i in range(len(bounds)):
             bounds[i] = max(tops[0, p] * parts[0, i], tops[1, p] * parts[1, i])
         begin, end = hull(bounds, 0, len(bounds), least)
+        # The plain loop makes an update take 1.0 to 1.1 times as long (paired, 5^7 rules, n = 4).
         if m == 5:
             a, b, c, d, e = one[at], one[at + 1], one[at + 2], one[at + 3], one[at + 4]
             u, v, w, x, y = two[at], two[at + 1], two[at + 2], two[at + 3], two[at + 4]

@@ -15,6 +15,7 @@ def _fold_weights(weights, start, size, m, strengths, out, lanes) -> None:  # ty
     """Contract the last axis of weights that are the same in all lanes."""
     for i in range(size // m):
         at = start + i * m
+        # The plain loop makes a decision take 1.02 to 1.06 times as long (paired, 5^7, n = 4).
         if m == 5:
             a, b, c = weights[at], weights[at + 1], weights[at + 2]
             d, e = weights[at + 3], weights[at + 4]
@@ -37,14 +38,6 @@ def _fold_rows(rows, size, m, strengths, out, lanes) -> None:  # type: ignore[no
     """Contract the last axis of `size` rows of lanes."""
     for i in range(size // m):
         at = i * m
-        if m == 5:
-            for k in range(np.uint64(lanes)):
-                out[i, k] = (
-                    (rows[at, k] * strengths[0, k] + rows[at + 1, k] * strengths[1, k])
-                    + (rows[at + 2, k] * strengths[2, k] + rows[at + 3, k] * strengths[3, k])
-                    + rows[at + 4, k] * strengths[4, k]
-                )
-            continue
         for k in range(np.uint64(lanes)):
             out[i, k] = rows[at, k] * strengths[0, k]
         for s in range(1, m):
