@@ -12,11 +12,10 @@ from matplotlib.lines import Line2D
 
 from ...topologies.view import aligned
 from ..analysis.statistics import Estimate
-from ..analysis.summary import interval
-from ..analysis.summary import number as short
+from ..analysis.summary import interval, two_figures
 from ..presentation.figures import COLOURS, SETTINGS, write
 from .single_agent import BLOCK, CONTENDERS, Contest
-from .table import number
+from .table import scientific
 
 
 def table(contests: Sequence[Contest]) -> str:
@@ -30,9 +29,9 @@ def table(contests: Sequence[Contest]) -> str:
                 "-" if c.contender == CONTENDERS[2] else f"{c.step_size:g}",
                 _rate(c.last),
                 _rate(c.greedy),
-                number(c.weights),
-                number(c.formula),
-                number(round(c.rule_evaluations)),
+                scientific(c.weights),
+                scientific(c.formula),
+                scientific(round(c.rule_evaluations)),
                 f"{1e3 * c.seconds:.2f}",
             ]
         )
@@ -82,4 +81,4 @@ def draw(contests: Sequence[Contest], path: Path) -> None:
 
 
 def _rate(estimate: Estimate) -> str:
-    return f"{short(float(estimate.value))} [{interval(estimate)}]"
+    return f"{two_figures(float(estimate.value))} [{interval(estimate)}]"
