@@ -85,7 +85,11 @@ class Command(click.Command):
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Read the arguments, after every further value has got an option of its own."""
-        return super().parse_args(ctx, list(self._separated(args)))
+        try:
+            return super().parse_args(ctx, list(self._separated(args)))
+        except click.UsageError as error:
+            error.ctx = error.ctx or ctx
+            raise
 
     def _separated(self, arguments: Iterable[str]) -> Iterator[str]:
         several = {n: option for option in self.params for n in option.opts

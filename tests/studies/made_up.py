@@ -9,11 +9,12 @@ import numpy as np
 
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.episodes import EpisodeRow
-from nested_agents.studies.trials.trial import TrialResult, trials_of
+from nested_agents.studies.trials.trial import TrialResult, measures_of_spec, trials_of
 
 SPEC = Spec.of({"seeds": 3, "episodes": 4, "steps": 5, "evaluation": 2,
                 "sweep": {"preset": ["default", "frozen"]}})  # fmt: skip
 TRIALS = trials_of(SPEC)
+MEASURES = measures_of_spec(SPEC)
 
 
 def measure(trial):

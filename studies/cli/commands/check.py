@@ -52,7 +52,7 @@ def command(source: str, steps: int, changes: tuple[str, ...]) -> int:
 
 def _cases(source: str, changes: tuple[str, ...]) -> Iterator[Case]:
     """Yield what is to be checked, each scenario of a spec once."""
-    from ....topologies.files import from_python
+    from ....core.sources import Sources
     from ...spec.errors import SpecError
     from ...spec.spec import Spec
 
@@ -60,7 +60,7 @@ def _cases(source: str, changes: tuple[str, ...]) -> Iterator[Case]:
         if changes:
             raise SpecError("--set: lays values over a spec, not over a Python file")
         try:
-            factory = from_python(source)
+            factory = Sources(Path()).load(source)
         except ValueError as error:
             raise SpecError(" ".join(str(error).split())) from None
         try:

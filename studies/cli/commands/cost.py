@@ -39,7 +39,7 @@ MOST_AGENTS = 10_000
 )
 @click.option("--actions", type=Whole(), metavar="N", default=4, help="|A|, actions of one agent.")
 @click.option(
-    "--iterations", type=Whole(), metavar="N", default=450, help="L, iterations of an epoch."
+    "--iterations", type=Whole(), metavar="N", default=450, help="L, iterations (steps) of an epoch."
 )
 @click.option(
     "--measured/--no-measured", help="Also count and time steps of the running system."

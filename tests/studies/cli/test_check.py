@@ -12,7 +12,7 @@ SPEC = """
 preset = "frozen"
 
 [scenario]
-hold = 2
+action_repeat = 2
 
 [[scenario.failures]]
 kind = "seized"
@@ -133,8 +133,8 @@ def test_a_scenario_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFixture[st
         ("failing", "own.py:failing, called without arguments, raised ValueError: no cart"),
         ("exploding", "raised RuntimeError: no track"),
         ("sized", "raised TypeError: sized() missing 1 required positional argument: 'n'"),
-        ("missing", "has no function 'missing'"),
-        ("", "must be written path/to/file.py:function"),
+        ("missing", "has no 'missing', it has: Drifting"),
+        ("", "must be written path/to/file.py:name"),
     ):
         assert main(["check", f"{path}:{name}"]) == 2
         out, err = capsys.readouterr()

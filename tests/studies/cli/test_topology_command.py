@@ -106,7 +106,7 @@ def test_a_plot_is_written(said, tmp_path: Path) -> None:
     ("arguments", "message"),
     [
         (("show",), "SPEC is missing"),
-        (("draw",), "invalid choice 'draw'"),
+        (("draw",), "list|show draw: known: list, show"),
         (("list", "chain"), "topology list chain: takes no SPEC"),
         (("list", "--agents", "3"), "topology list --agents 3: is for topology show"),
         (("show", "chain:"), "topology 'chain:': order must be written a,b,c, received ''"),

@@ -114,7 +114,7 @@ def test_numbers() -> None:
         (("--topology",), "topology = none, allowed: one or more"),
         (("--topology", "--format", "csv"), "topology = none, allowed: one or more"),
         (("--topology", "per-robot"), "what whole robots try is in: nested-agents topology show"),
-        (("--format", "xml"), "invalid choice 'xml'"),
+        (("--format", "xml"), "--format xml: known: csv, json, latex, table"),
         (
             ("--learning", "--agents", "3"),
             "--agents: is not for --learning, which measures a fixed",

@@ -20,7 +20,7 @@ def content(store):
 
 
 def run(directory, measure, jobs=2):
-    with Store.create(directory, made_up.SPEC) as store:
+    with Store.create(directory, made_up.SPEC, made_up.MEASURES) as store:
         pending = store.pending(made_up.TRIALS)
         outcomes = list(run_trials(pending, store, measure, LokyWorkers(jobs)))
         return outcomes, content(store), store.failed()
@@ -43,7 +43,7 @@ def test_one_and_two_jobs_give_the_same_rows_and_recordings(tmp_path, uninterrup
 
 
 def test_results_are_kept_one_by_one_and_the_rest_runs_later(tmp_path, uninterrupted):
-    with Store.create(tmp_path, made_up.SPEC) as store:
+    with Store.create(tmp_path, made_up.SPEC, made_up.MEASURES) as store:
         running = run_trials(store.pending(made_up.TRIALS), store, made_up.slow, LokyWorkers(2))
         first = next(running)
         assert store.counts()["done"] >= 1
@@ -70,7 +70,7 @@ def test_a_failed_trial_is_run_again_only_on_request(tmp_path, uninterrupted):
     run(tmp_path, made_up.failing)
     outcomes, _, _ = run(tmp_path, made_up.measure)
     assert outcomes == []
-    with Store.create(tmp_path, made_up.SPEC) as store:
+    with Store.create(tmp_path, made_up.SPEC, made_up.MEASURES) as store:
         assert store.forget_failed() == 1
     outcomes, rows, failed = run(tmp_path, made_up.measure)
     assert (len(outcomes), failed, rows) == (1, [], uninterrupted)
@@ -97,7 +97,7 @@ def test_a_trial_that_kills_every_worker_fails_alone(tmp_path):
 
 def test_workers_compute_with_one_thread(tmp_path):
     for jobs in (1, 2):
-        with Store.create(tmp_path / str(jobs), made_up.SPEC) as store:
+        with Store.create(tmp_path / str(jobs), made_up.SPEC, made_up.MEASURES) as store:
             workers = LokyWorkers(jobs)
             outcomes = list(run_trials(made_up.TRIALS[:2], store, made_up.threads, workers))
             assert [o.error for o in outcomes] == [None, None]
@@ -116,7 +116,7 @@ def test_workers_do_not_outlive_a_killed_parent(tmp_path):
         from nested_agents.studies.workers.runner import run_trials
         from nested_agents.studies.store.store import Store
         from pathlib import Path
-        with Store.create(Path(sys.argv[1]), made_up.SPEC) as store:
+        with Store.create(Path(sys.argv[1]), made_up.SPEC, made_up.MEASURES) as store:
             for _ in run_trials(made_up.TRIALS, store, made_up.pids, LokyWorkers(2)):
                 pass
     """
