@@ -208,11 +208,11 @@ class SettingsRegistry(Registry):
             raise ValueError(f"the settings of a {self.kind} must inherit {base}")
         if not callable(thing):
             raise ValueError(f"is no {self.kind}, but a {type(thing).__name__}")
-        model = create_model(
-            getattr(own, "__qualname__", "Settings"),
+        model: Any = create_model(
+            own.__qualname__,
             __base__=own,
             __module__=own.__module__,
-            kind=(Literal[name], name),
+            kind=(cast(Any, Literal[name]), name),
         )
         if not is_model:
             has_own = hasattr(thing, "Settings")
@@ -220,8 +220,8 @@ class SettingsRegistry(Registry):
             def build(settings: Settings, *given: Any) -> Any:
                 return thing(settings, *given) if has_own else thing(*given)
 
-            model.build = build  # type: ignore[attr-defined]
-        return model
+            model.build = build
+        return cast(type[Settings], model)
 
     def parsed(self, text: str) -> Settings:
         """Return the settings that a name alone stands for.

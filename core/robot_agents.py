@@ -1,7 +1,7 @@
 """One agent per robot: the mapping that the paper's one agent per wheel stands against (X-B).
 
-`RobotAgents` shows a scenario as one whose agents drive whole robots. An agent's action is a local
-code: the actions of all its wheels at once. Its state is the own variables of all its wheels and
+`RobotAgents` shows a scenario as one whose agents drive whole robots. An agent's action is a
+robot-action index: the actions of all its wheels at once. Its state is the own variables of all its wheels and
 the variables that they share; everything else of this package works on it unchanged. Joint actions
 keep their indices, as the digits of a robot's wheels read as one.
 """
@@ -90,10 +90,18 @@ class RobotAgents:
 
     def predict(self) -> RobotPrediction:
         """Predict from the present state."""
-        return RobotPrediction(self.scenario.predict(), self)
+        return self.prediction_of(self.scenario.predict())
+
+    def prediction_of(self, prediction: Prediction) -> RobotPrediction:
+        """Return the scenario's own prediction for robots, with what it can do."""
+        if hasattr(prediction, "reward_table"):
+            return TabulatedRobotPrediction(prediction, self)
+        if hasattr(prediction, "rewards"):
+            return RewardedRobotPrediction(prediction, self)
+        return RobotPrediction(prediction, self)
 
     def wheels(self, joint_actions: IntArray) -> IntArray:
-        """Return the actions of all wheels ``(m, n)`` for robot-action indexs ``(m, M)``."""
+        """Return the actions of all wheels ``(m, n)`` for robot-action indices ``(m, M)``."""
         return self._local[joint_actions].reshape(len(joint_actions), -1)
 
     def _joined(self, states: FloatArray) -> FloatArray:
@@ -131,7 +139,7 @@ class EmbodiedRobotAgents(RobotAgents):
             prediction = cast(EmbodiedScenario, self.scenario).predict_with(effects)
         else:
             prediction = cast(CalibratedScenario, self.scenario).predict_with(effects, constants)
-        return RobotPrediction(prediction, self)
+        return self.prediction_of(prediction)
 
 
 def per_robot(scenario: Scenario) -> RobotAgents:
@@ -159,15 +167,43 @@ class RobotPrediction:
         self._n_own = robots.scenario.state_space.n_own
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
-        """Return the next states of a robot for robot-action indexs ``(m, M)``."""
+        """Return the next states of a robot for robot-action indices ``(m, M)``."""
         wheels = self._robots.wheels(joint_actions)
         parts = [self._prediction.states(wheel, wheels) for wheel in self._groups[agent]]
         own = [part[:, : self._n_own] for part in parts]
         return np.concatenate([*own, parts[0][:, self._n_own :]], axis=1)
 
+    @property
+    def groups(self) -> tuple[tuple[int, ...], ...]:
+        """Wheels by body."""
+        return cast(EmbodiedPrediction, self._prediction).groups
+
+    def commands(self, joint_action: IntArray) -> FloatArray:
+        """Return the wheel speeds that robot-action indices ``(M,)`` would command."""
+        wheels = self._robots.wheels(joint_action[None])[0]
+        return cast(EmbodiedPrediction, self._prediction).commands(wheels)
+
+    def slips(self, joint_action: IntArray) -> FloatArray:
+        """Return by how much contact is predicted to change the bodies' twists, ``(M, 3)``."""
+        wheels = self._robots.wheels(joint_action[None])[0]
+        return cast(EmbodiedPrediction, self._prediction).slips(wheels)
+
+    def outcomes(self, joint_action: IntArray, constants: FloatArray) -> FloatArray:
+        """Return what robot-action indices ``(M,)`` would lead to under constants ``(k, n)``."""
+        wheels = self._robots.wheels(joint_action[None])[0]
+        return cast(CalibratedPrediction, self._prediction).outcomes(wheels, constants)
+
+
+class RewardedRobotPrediction(RobotPrediction):
+    """The same of a prediction that knows the reward."""
+
     def rewards(self, joint_actions: IntArray) -> FloatArray:
-        """Return the predicted rewards of robot-action indexs ``(m, M)``."""
+        """Return the predicted rewards of robot-action indices ``(m, M)``."""
         return cast(RewardPrediction, self._prediction).rewards(self._robots.wheels(joint_actions))
+
+
+class TabulatedRobotPrediction(RewardedRobotPrediction):
+    """The same of a prediction that has tables of all joint actions."""
 
     def blocks(self, agent: int) -> Blocks:
         """Return the next states of a robot for all joint actions."""
@@ -179,28 +215,8 @@ class RobotPrediction:
         )
 
     def reward_table(self) -> FloatArray:
-        """Return the predicted rewards of all joint actions by code."""
+        """Return the predicted rewards of all joint actions by index."""
         return cast(TabulatedPrediction, self._prediction).reward_table()
-
-    @property
-    def groups(self) -> tuple[tuple[int, ...], ...]:
-        """Wheels by body."""
-        return cast(EmbodiedPrediction, self._prediction).groups
-
-    def commands(self, joint_action: IntArray) -> FloatArray:
-        """Return the wheel speeds that robot-action indexs ``(M,)`` would command."""
-        wheels = self._robots.wheels(joint_action[None])[0]
-        return cast(EmbodiedPrediction, self._prediction).commands(wheels)
-
-    def slips(self, joint_action: IntArray) -> FloatArray:
-        """Return by how much contact is predicted to change the bodies' twists, ``(M, 3)``."""
-        wheels = self._robots.wheels(joint_action[None])[0]
-        return cast(EmbodiedPrediction, self._prediction).slips(wheels)
-
-    def outcomes(self, joint_action: IntArray, constants: FloatArray) -> FloatArray:
-        """Return what robot-action indexs ``(M,)`` would lead to under constants ``(k, n)``."""
-        wheels = self._robots.wheels(joint_action[None])[0]
-        return cast(CalibratedPrediction, self._prediction).outcomes(wheels, constants)
 
 
 def robot_of(agent: str) -> str:

@@ -1,7 +1,7 @@
 """The one agent that Section VII compares with: joint state, ``|A| ** n`` actions (Eq. 23).
 
 `SingleAgent` shows a scenario of n agents as one of a single agent. Its state is the states of all
-agents one after the other, its action a joint action by code; everything else of this package works
+agents one after the other, its action a joint-action index; everything else of this package works
 on it unchanged. It is practicable for few agents only.
 """
 
@@ -20,7 +20,6 @@ from .protocols import (
     Prediction,
     RewardPrediction,
     Scenario,
-    TabulatedPrediction,
     Transition,
     measures_of,
 )
@@ -52,7 +51,7 @@ class SingleAgent:
             raise ValueError(
                 f"single agent: {len(single)} ** {n} actions, allowed: {MOST_ACTIONS} or fewer"
             )
-        # Row c holds the joint action of code c.
+        # Row c holds the joint action of joint-action index c.
         self._joint = np.array(list(product(range(len(single)), repeat=n)), dtype=np.int64)
         names = tuple("+".join(single.names[a] for a in row) for row in self._joint)
         neutral = int(np.flatnonzero((self._joint == single.neutral).all(axis=1))[0])
@@ -73,13 +72,16 @@ class SingleAgent:
         return self.scenario.reset(seed, episode).reshape(1, -1)
 
     def step(self, joint_action: IntArray) -> Transition:
-        """Carry out the joint action of code ``joint_action[0]``."""
+        """Carry out the joint action of index ``joint_action[0]``."""
         transition = self.scenario.step(self._joint[joint_action[0]])
         return replace(transition, states=transition.states.reshape(1, -1))
 
     def predict(self) -> SingleAgentPrediction:
         """Predict from the present state."""
-        return SingleAgentPrediction(self.scenario.predict(), self._joint)
+        prediction = self.scenario.predict()
+        rewarded = hasattr(prediction, "rewards")
+        kind = RewardedSingleAgentPrediction if rewarded else SingleAgentPrediction
+        return kind(prediction, self._joint)
 
 
 def single_agent(scenario: Scenario) -> SingleAgent:
@@ -89,34 +91,38 @@ def single_agent(scenario: Scenario) -> SingleAgent:
 
 
 class SingleAgentPrediction:
-    """The prediction of a scenario of n agents, for joint states and codes.
+    """The prediction of a scenario of n agents, for joint states and joint-action indices.
 
     Parameters
     ----------
     prediction
         The scenario's own.
     joint
-        ``(A ** n, n)`` all joint actions by code.
+        ``(A ** n, n)`` all joint actions by index.
     """
 
     def __init__(self, prediction: Prediction, joint: IntArray) -> None:
         self._prediction, self._joint = prediction, joint
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
-        """Return the next joint states ``(m, n * d)`` for codes ``(m, 1)``."""
+        """Return the next joint states ``(m, n * d)`` for joint-action indices ``(m, 1)``."""
         joint = self._joint[joint_actions[:, 0]]
         parts = [self._prediction.states(i, joint) for i in range(joint.shape[1])]
         return np.concatenate(parts, axis=1)
 
+    def blocks(self, agent: int) -> Blocks:
+        """Return the next joint states of all indices; no variable is the agent's own alone."""
+        every = np.arange(len(self._joint))[:, None]
+        return Blocks(np.zeros((1, 0)), self.states(0, every), 1)
+
+
+class RewardedSingleAgentPrediction(SingleAgentPrediction):
+    """The same of a prediction that knows the reward."""
+
     def rewards(self, joint_actions: IntArray) -> FloatArray:
-        """Return the predicted rewards ``(m,)`` of codes ``(m, 1)``."""
+        """Return the predicted rewards ``(m,)`` of joint-action indices ``(m, 1)``."""
         return cast(RewardPrediction, self._prediction).rewards(self._joint[joint_actions[:, 0]])
 
-    def blocks(self, agent: int) -> Blocks:
-        """Return the next joint states of all codes; no variable is the agent's own alone."""
-        codes = np.arange(len(self._joint))[:, None]
-        return Blocks(np.zeros((1, 0)), self.states(0, codes), 1)
-
     def reward_table(self) -> FloatArray:
-        """Return the predicted rewards of all codes."""
-        return cast(TabulatedPrediction, self._prediction).reward_table()
+        """Return the predicted rewards of all joint-action indices."""
+        return cast(RewardPrediction, self._prediction).rewards(self._joint)

@@ -158,8 +158,9 @@ class Team:
             If it decides by rewards, and the prediction knows none; one line.
         """
         problem = getattr(self.evaluator, "problem", None)
-        by_reward = isinstance(problem, DecisionProblem) and problem.rule != "value"
-        if by_reward and not isinstance(prediction, RewardPrediction):
+        if not isinstance(problem, DecisionProblem) or problem.rule == "value":
+            return
+        if not isinstance(prediction, RewardPrediction):
             raise ValueError(
                 f"learner.decision.rule = {problem.rule!r}: the scenario predicts no rewards, "
                 "use value"

@@ -11,6 +11,7 @@ STUDIES = Registry(
         "shapes": f"{__name__}.catalogue.shapes",
         "wheel-failure": f"{__name__}.catalogue.wheel_failure",
         "scaling": f"{__name__}.catalogue.scaling",
+        "single-agent": f"{__name__}.catalogue.single_agent",
     },
 )
 """Studies by name; what they offer is in `nested_agents.studies.catalogue.study`."""

@@ -10,6 +10,7 @@ import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
+import networkx as nx
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -19,6 +20,11 @@ ALLOWED = {
     "scenarios": {"scenarios", "core"},
     "studies": {"studies", "core", "topologies", "scenarios"},
 }
+STUDIES = (
+    "spec", "trials", "store", "workers", "analysis", "presentation", "catalogue", "run",
+    "claims", "cost", "explain", "report", "cli",
+)  # fmt: skip
+"""The rooms of studies/, each of which may import those before it."""
 MAX_BYTES = 1_000_000
 
 
@@ -99,6 +105,79 @@ def test_a_forbidden_import_is_found(module: str, source: str) -> None:
 )
 def test_an_allowed_import_is_not(module: str, source: str) -> None:
     assert forbidden_imports(source, module) == []
+
+
+def imports_between(sources: dict[str, tuple[str, bool]]) -> nx.DiGraph:
+    """Which module imports which, of modules by name: their source, and whether packages.
+
+    Imports inside functions and for type checking count like all others.
+    """
+    graph = nx.DiGraph()
+    for module, (source, is_package) in sources.items():
+        graph.add_node(module)
+        for line, name in imported_modules(source, module, is_package=is_package):
+            stem = name if name in sources else name.rpartition(".")[0]
+            if stem in sources and stem != module:
+                graph.add_edge(module, stem, line=line)
+    return graph
+
+
+def circles(graph: nx.DiGraph) -> list[str]:
+    """The circles of imports, each as one line."""
+    return [
+        " <-> ".join(sorted(circle))
+        for circle in nx.strongly_connected_components(graph)
+        if len(circle) > 1
+    ]
+
+
+def wrong_arrows(graph: nx.DiGraph) -> list[str]:
+    """The imports inside studies/ that point from a room to a later one."""
+    found = []
+    for module, imported, line in graph.edges(data="line"):
+        rooms = [name.split(".")[2] for name in (module, imported) if name.count(".") > 1]
+        if len(rooms) == 2 and all(n.startswith("nested_agents.studies.") for n in (module, imported)):
+            place, target = map(STUDIES.index, rooms)
+            if target > place:
+                found.append(f"{module}:{line} imports {imported}; {rooms[0]} is below {rooms[1]}")
+    return found
+
+
+@pytest.fixture(scope="module")
+def graph() -> nx.DiGraph:
+    return imports_between(
+        {
+            module: (path.read_text(encoding="utf-8"), path.name == "__init__.py")
+            for package in ALLOWED
+            for path, module in modules_of(package)
+        }
+    )
+
+
+def test_no_files_import_each_other_in_a_circle(graph: nx.DiGraph) -> None:
+    assert graph.number_of_edges() > 100
+    assert circles(graph) == []
+
+
+def test_imports_inside_studies_point_one_way(graph: nx.DiGraph) -> None:
+    assert wrong_arrows(graph) == []
+
+
+def test_a_circle_and_a_wrong_arrow_are_named() -> None:
+    at_type_checking = "if TYPE_CHECKING:\n    from ..report.page import Page"
+    graph = imports_between(
+        {
+            "nested_agents.studies.store.store": (at_type_checking, False),
+            "nested_agents.studies.report.page": ("def f():\n    from ..store import store", False),
+        }
+    )
+    assert circles(graph) == [
+        "nested_agents.studies.report.page <-> nested_agents.studies.store.store"
+    ]
+    assert wrong_arrows(graph) == [
+        "nested_agents.studies.store.store:2 imports nested_agents.studies.report.page; "
+        "store is below report"
+    ]
 
 
 @pytest.mark.parametrize("package", ALLOWED)

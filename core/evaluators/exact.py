@@ -97,7 +97,7 @@ class ExactEnumeration(Aggregation):
         probabilities = None
         if problem.teammates == "empirical":
             probabilities = probabilities_of(deliberation.frequencies, below)
-        if tabulated:
+        if tabulated and hasattr(deliberation.prediction, "reward_table"):
             table = self._by_tables(deliberation)
         else:
             table = self.by_states(deliberation, combined)

@@ -115,7 +115,8 @@ class BoxPushing:
         self._belief = PushBelief.of(self._model, robots, settings.belief.stiffness)
         self._premises = Premises(
             self._belief, self._space, self.action_set, settings.speed_increment, self._limits,
-            self._task, self.infrared, settings.period, settings.prediction_horizon * CONTROL_PERIOD,
+            self._task, self.infrared, settings.period,
+            settings.prediction_horizon * CONTROL_PERIOD,
         )  # fmt: skip
         self._goal: FloatArray = np.zeros(3)
         self._sensing = np.random.default_rng(0)  # until reset

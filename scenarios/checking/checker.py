@@ -4,8 +4,9 @@ Whole episodes of random actions are played and compared to the last bit: states
 episode, motions and measurements of every step. Not compared are the measured times, ``seconds``.
 Predictions are held against each other (see `predictions`), and, of scenarios that can be predicted
 exactly, against what is then sensed (see `sensing`); how good others are is not checked. What a
-scenario need not have, such as measures or tables, is checked where it is there. A further check is one function and one line in `CHECKS`; it
-returns what is wrong, in one line, or nothing. What a scenario raises is what is wrong with it.
+scenario need not have, such as measures or tables, is checked where it is there. A further check is
+one function and one line in `CHECKS`; it returns what is wrong, in one line, or nothing. What a
+scenario raises is what is wrong with it.
 """
 
 from __future__ import annotations
@@ -177,7 +178,7 @@ def _form(of: Examination) -> str | None:
 
 
 def _measures(of: Examination) -> str | None:
-    """Check that what a scenario declares to be measured and recorded is there, and is so shaped."""
+    """Check that what a scenario declares to be measured and recorded is there."""
     scenario: Any = of.factory()
     measures = tuple(getattr(scenario, "measures", ()))
     names = [measure.name for measure in measures]

@@ -17,14 +17,15 @@ from rich.console import Console
 from rich.progress import track
 
 from ...core.protocols import Scenario
+from ...core.registry import closest
 from ...core.rules.rule_base import RuleBase
 from ...core.spaces import Variable
 from ...core.team import Team
 from ...scenarios.box_pushing.scenario import BoxPushing
-from ..spec.errors import SpecError, closest
+from ..spec.errors import SpecError
 from ..store.store import Store
 from ..trials.measures import columns
-from ..trials.trial import RESULTS_VERSION, Session, Trial, trials_of
+from ..trials.trial import Session, Trial, trials_of
 from . import policy as explain_policy
 from . import rules as explain_rules
 from .body import Bodies
@@ -70,11 +71,8 @@ def choose(store: Store, condition: str | None, seed: int | None) -> Trial:
     SpecError
         If there is no such trial, it has not finished, or other code made the results.
     """
-    if (version := store.meta("results_version")) != str(RESULTS_VERSION):
-        raise SpecError(
-            f"{store.directory}: holds results of version {version}, this is version "
-            f"{RESULTS_VERSION}, which would train another team"
-        )
+    if (outdated := store.outdated()) is not None:
+        raise SpecError(f"{outdated.partition(';')[0]}: it would train another team")
     spec = store.spec()
     conditions = [c.label for c in spec.conditions()]
     condition = conditions[0] if condition is None else condition
@@ -98,12 +96,18 @@ def explained(store: Store, trial: Trial) -> Explained:
         If the trial cannot be built, or an episode of the training is not, to the last bit, the one
         that is kept.
     """
+    with trial.sources.active():
+        return _explained(store, trial)
+
+
+def _explained(store: Store, trial: Trial) -> Explained:
     team, scenario, bodies = _trained(store, trial)
     rules = RuleBase.build(scenario.state_space, trial.settings.learner.rule_base)
-    parts = tuple(explain_rules.take_apart(rules, theta) for theta in team.learner.theta)
+    taken = [explain_rules.take_apart(rules, theta) for theta in team.learner.theta]
+    parts = tuple(taken[row] for row in team.rows)
     fields: list[Field] | str
     if not isinstance(scenario, BoxPushing):
-        fields = "its agents are no wheels"
+        fields = "the scenario has no robots around a box"
     elif team.evaluator is None:
         fields = "actions are drawn at random"
     else:

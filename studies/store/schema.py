@@ -45,7 +45,8 @@ SCHEMA = (
     """CREATE TABLE IF NOT EXISTS checksums (
         identity TEXT PRIMARY KEY REFERENCES trials ON DELETE CASCADE, sha256 TEXT NOT NULL)""",
 )
-"""Tables that all studies have alike; the columns of `conditions` and `episodes` differ."""
+"""Tables that studies have alike; beside them are `conditions` and `episodes`, whose columns
+differ."""
 
 
 def prepare(

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from nested_agents.core.calibration import Calibration
-from nested_agents.core.settings import CalibrationSettings
+from nested_agents.core.calibration import Calibration, CalibrationSettings
 
 SETTINGS = CalibrationSettings(enabled=True)
 LEVERS = np.array([0.1, 0.05])
@@ -25,9 +24,9 @@ def taught(calibration, truth, steps, seed=0, noise=0.004):
 
 def test_one_step_of_a_linear_prediction_is_the_kalman_filters():
     calibration = Calibration(CalibrationSettings(enabled=True, drift=0.0), 1, np.array([0.1]))
-    foreseen = np.zeros((2, 1, 3))
-    foreseen[:, 0, 0] = 0.02 * calibration.points[:, 0]
-    calibration.observe(np.array([[0.01, 0.0, 0.0]]), foreseen)
+    predicted = np.zeros((2, 1, 3))
+    predicted[:, 0, 0] = 0.02 * calibration.points[:, 0]
+    calibration.observe(np.array([[0.01, 0.0, 0.0]]), predicted)
     expected = 0.02**2 * 0.49 + 0.008**2
     assert calibration.constants[0] == pytest.approx(0.49 * 0.02 / expected * 0.01, rel=1e-12)
     variance = 0.49 - (0.49 * 0.02) ** 2 / expected
@@ -37,10 +36,10 @@ def test_one_step_of_a_linear_prediction_is_the_kalman_filters():
 def test_a_turn_counts_by_its_lever():
     one, other = (Calibration(SETTINGS, 1, np.array([0.1])) for _ in range(2))
     for calibration, part, lever in ((one, 0, 1.0), (other, 2, 0.1)):
-        foreseen, measured = np.zeros((2, 1, 3)), np.zeros((1, 3))
-        foreseen[:, 0, part] = 0.02 / lever * calibration.points[:, 0]
+        predicted, measured = np.zeros((2, 1, 3)), np.zeros((1, 3))
+        predicted[:, 0, part] = 0.02 / lever * calibration.points[:, 0]
         measured[0, part] = 0.01 / lever
-        calibration.observe(measured, foreseen)
+        calibration.observe(measured, predicted)
     np.testing.assert_allclose(one.constants, other.constants, rtol=1e-12)
 
 
@@ -72,10 +71,10 @@ def test_what_is_not_believed_hardly_counts():
 
 def test_nothing_becomes_less_certain_than_it_was_at_first():
     calibration = Calibration(CalibrationSettings(enabled=True, drift=0.5), 2, LEVERS)
-    foreseen = outcome(calibration.points)
+    predicted = outcome(calibration.points)
     for _ in range(20):
-        foreseen = np.tensordot(calibration.points * [1.0, 0.0], SLOPES, axes=1)
-        calibration.observe(np.zeros((2, 3)), foreseen)
+        predicted = np.tensordot(calibration.points * [1.0, 0.0], SLOPES, axes=1)
+        calibration.observe(np.zeros((2, 3)), predicted)
     assert (calibration.deviations <= SETTINGS.prior * (1 + 1e-12)).all()
     assert calibration.deviations[0] < 0.6
 

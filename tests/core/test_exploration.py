@@ -7,14 +7,14 @@ import pytest
 from pydantic import ValidationError
 
 from nested_agents.core.exploration import (
+    BurstExploration,
     Bursts,
     EpsilonDecreasingBoltzmann,
     Greedy,
+    PaperExploration,
     boltzmann,
-    build_explorer,
     greatest,
 )
-from nested_agents.core.settings import BurstExploration, PaperExploration
 
 VALUES = np.array([0.0, 3.0, 1.0, 2.0])
 
@@ -24,7 +24,7 @@ def rng() -> np.random.Generator:
     return np.random.default_rng(7)
 
 
-def shares(draws: list[int], n: int) -> np.ndarray:
+def fractions(draws: list[int], n: int) -> np.ndarray:
     return np.bincount(draws, minlength=n) / len(draws)
 
 
@@ -102,7 +102,7 @@ def test_how_actions_are_drawn(
     settings: dict, expected: np.ndarray, rng: np.random.Generator
 ) -> None:
     explorer = EpsilonDecreasingBoltzmann(PaperExploration(max_temperature=3.0, **settings))
-    drawn = shares([explorer.choose(0, VALUES, rng) for _ in range(20000)], 4)
+    drawn = fractions([explorer.choose(0, VALUES, rng) for _ in range(20000)], 4)
     # Five standard deviations of a share of 20000 draws are below 0.018.
     assert drawn == pytest.approx(expected, abs=0.018)
 
@@ -165,7 +165,7 @@ def test_agents_burst_independently(rng: np.random.Generator) -> None:
 
 def test_ties_are_broken_at_random(rng: np.random.Generator) -> None:
     values = np.array([1.0, 5.0, 5.0, 5.0 - 1e-13, 5.0 - 1e-6])
-    drawn = shares([greatest(values, rng) for _ in range(9000)], 5)
+    drawn = fractions([greatest(values, rng) for _ in range(9000)], 5)
     assert drawn == pytest.approx([0, 1 / 3, 1 / 3, 1 / 3, 0], abs=0.025)
 
 
@@ -190,8 +190,8 @@ def test_greedy_remembers_nothing(rng: np.random.Generator) -> None:
 
 
 def test_settings_choose_the_explorer() -> None:
-    assert isinstance(build_explorer(PaperExploration(), 3), EpsilonDecreasingBoltzmann)
-    bursts = build_explorer(BurstExploration(), 3)
+    assert isinstance(PaperExploration().build(3), EpsilonDecreasingBoltzmann)
+    bursts = BurstExploration().build(3)
     assert isinstance(bursts, Bursts)
     assert bursts.memory.shape == (7,)
 

@@ -8,16 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from nested_agents.core.decision import Decision
+from nested_agents.core.exploration import BurstExploration
 from nested_agents.core.hierarchy import Hierarchy
+from nested_agents.core.learners.batch import BatchTDSettings
+from nested_agents.core.learners.frozen import FrozenSettings
+from nested_agents.core.learners.td import TDLambdaSettings
 from nested_agents.core.loop import StepRecord, control_loop, policy_seed, world_seed
-from nested_agents.core.settings import (
-    BatchTDSettings,
-    BurstExploration,
-    Decision,
-    FrozenSettings,
-    RuleBaseSettings,
-    TDLambdaSettings,
-)
+from nested_agents.core.rules.settings import RuleBaseSettings
 from nested_agents.core.team import Team
 
 LEARNING = TDLambdaSettings(step_size=0.1)
@@ -153,7 +151,7 @@ def test_a_team_learns_to_push(line_world) -> None:
     settings = BatchTDSettings(
         rule_base=RuleBaseSettings(products=(("speed", "gap"),)),
         ridge=0.1,
-        mixing=1.0,
+        target_averaging_rate=1.0,
         discount=0.9,
         exploration=BurstExploration(rate=0.5, decay=0.7, floor=0.0),
         decision=Decision(rule="value"),

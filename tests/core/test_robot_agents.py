@@ -3,15 +3,17 @@
 import numpy as np
 import pytest
 
+from nested_agents.core.decision import Decision
+from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.loop import control_loop, policy_seed
 from nested_agents.core.protocols import EmbodiedScenario
 from nested_agents.core.robot_agents import RobotAgents, per_robot
-from nested_agents.core.settings import BatchTDSettings, Decision, SelfModelSettings
+from nested_agents.core.self_model import SelfModelSettings
 from nested_agents.core.team import Team
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.checking.checker import CHECKS, check_scenario
-from nested_agents.topologies import arrange, parse
+from nested_agents.topologies import parse
 
 
 def test_a_robot_has_the_states_and_actions_of_its_wheels(line_world) -> None:
@@ -57,7 +59,7 @@ def test_both_evaluators_and_a_self_model_work_on_it() -> None:
             decision=Decision(evaluator=evaluator),  # type: ignore[arg-type]
             self_model=SelfModelSettings(enabled=True),
         )
-        scenario, hierarchy = arrange(parse("per-robot"), BoxPushing(settings))
+        scenario, hierarchy = parse("per-robot").arrange(BoxPushing(settings))
         assert hierarchy.edges == ((0, 1),)
         team = Team.build(learner, scenario, hierarchy, policy_seed(0))
         nominal = team.self_model.effects[0].copy()

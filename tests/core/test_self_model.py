@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from nested_agents.core.self_model import SelfModel
-from nested_agents.core.settings import SelfModelSettings
+from nested_agents.core.self_model import SelfModel, SelfModelSettings
 
 # A differential drive: axle 0.05 m.
 NOMINAL = np.array([[0.5, 0.5, 0.0], [0.0, 0.0, 0.0], [-20.0, 20.0, 0.0]])

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pydantic import TypeAdapter
 
-from nested_agents.core.evaluators import ExactEnumeration, Sampling
+from nested_agents.core.evaluators.exact import ExactEnumeration
+from nested_agents.core.evaluators.sampling import Sampling
 from nested_agents.core.hierarchy import Hierarchy
+from nested_agents.core.learners import LEARNERS, LearnerSettings
 from nested_agents.core.robot_agents import per_robot
-from nested_agents.core.settings import Learner as LearnerSettings
 from nested_agents.core.team import Team
 
 PAPER = {"kind": "paper", "decay": 0.05, "clock": "episode"}
@@ -24,25 +24,27 @@ TEAMS = {
     "td-lambda, 75 rules": {
         "kind": "td-lambda",
         "rule_base": {"membership": "sigmoid", "memberships": 5, "order": 2},
-        "decision": {"others": "observed"},
+        "decision": {"teammates": "empirical"},
     },
     "td-lambda, averaged": {"kind": "td-lambda", "step_size": 0.1, "averaging": 5.0},
     "gradient-td": {"kind": "gradient-td", "exploration": PAPER},
     "batch-td": {"kind": "batch-td", "ridge": 0.1, "exploration": BURST},
     "batch-td, sigmoid": {"kind": "batch-td", "rule_base": {"membership": "sigmoid"}},
     "anova-td": {"kind": "anova-td", "rule_base": {"order": 3}, "ridge": 0.1},
-    "fitted-value": {"kind": "fitted-value", "candidates": 5, "sweeps": 3},
     "sampling": {
         "kind": "batch-td",
-        "decision": {"evaluator": "sampling", "samples": 7, "others": "observed"},
+        "decision": {
+            "evaluator": {"kind": "sampling", "samples": 7},
+            "teammates": "empirical",
+        },
     },
     "frozen": {"kind": "frozen", "decision": {"rule": "reward-and-value"}},
     "random": {"kind": "td-lambda", "decision": {"rule": "random"}},
 }
 
 
-def settings_of(name: str):
-    return TypeAdapter(LearnerSettings).validate_python(TEAMS[name])
+def settings_of(table: dict) -> LearnerSettings:
+    return LEARNERS.model(table["kind"]).model_validate(table)
 
 
 def chain_of(agents: tuple[str, ...]) -> Hierarchy:
@@ -56,7 +58,7 @@ def world(line_world):
 
 def team_of(name: str, world, seed: int = 1, hierarchy: Hierarchy | None = None) -> Team:
     hierarchy = hierarchy or chain_of(world.agents)
-    return Team.build(settings_of(name), world, hierarchy, np.random.SeedSequence(seed))
+    return Team.build(settings_of(TEAMS[name]), world, hierarchy, np.random.SeedSequence(seed))
 
 
 def run_steps(team: Team, world, steps: int) -> list[list[int]]:
@@ -64,7 +66,7 @@ def run_steps(team: Team, world, steps: int) -> list[list[int]]:
     for _ in range(steps):
         joint = team.act(world.predict())
         transition = world.step(joint)
-        team.learn(transition, world.predict())
+        team.learn(transition)
         actions.append(joint.tolist())
     return actions
 
@@ -125,7 +127,7 @@ def test_same_seed_same_bits_other_seed_other_actions(name: str, world) -> None:
 
 
 def test_a_file_holds_arrays_only(world, tmp_path: Path) -> None:
-    team = team_of("fitted-value", world)
+    team = team_of("batch-td", world)
     run_episode(team, world, 0)
     team.save(tmp_path / "team.npz")
     with np.load(tmp_path / "team.npz", allow_pickle=False) as arrays:
@@ -182,9 +184,9 @@ class Witness:
     def __init__(self, best: list[int]) -> None:
         self.best, self.told = best, {}
 
-    def values(self, agent, joint_action, theta, prediction, frequencies, rng) -> np.ndarray:
-        self.told[agent] = joint_action.tolist()
-        return np.eye(4)[self.best[agent]]
+    def values(self, deliberation) -> np.ndarray:
+        self.told[deliberation.agent] = deliberation.joint_action.tolist()
+        return np.eye(4)[self.best[deliberation.agent]]
 
 
 @pytest.mark.parametrize(
@@ -241,8 +243,8 @@ def test_a_random_team_draws_all_actions_alike(world) -> None:
     team = team_of("random", world)
     world.reset(0)
     drawn = np.array([team.act(world.predict()) for _ in range(4000)])
-    shares = np.stack([(drawn == action).mean(axis=0) for action in range(4)])
-    assert shares == pytest.approx(np.full((4, 4), 0.25), abs=0.035)
+    fractions = np.stack([(drawn == action).mean(axis=0) for action in range(4)])
+    assert fractions == pytest.approx(np.full((4, 4), 0.25), abs=0.035)
 
 
 def test_counts_of_an_episode(world) -> None:
@@ -260,16 +262,14 @@ def test_counts_of_an_episode(world) -> None:
     ("decision", "kind"),
     [
         ({}, ExactEnumeration),
-        ({"exact_up_to": 3}, Sampling),
+        ({"evaluator": {"kind": "auto", "exact_up_to": 3}}, Sampling),
         ({"evaluator": "sampling"}, Sampling),
-        ({"exact_up_to": 3, "evaluator": "exact"}, ExactEnumeration),
-        ({"exact_up_to": 10}, ExactEnumeration),
+        ({"evaluator": "exact"}, ExactEnumeration),
+        ({"evaluator": {"kind": "auto", "exact_up_to": 10}}, ExactEnumeration),
     ],
 )
 def test_the_evaluator_follows_the_settings(decision: dict, kind: type, world) -> None:
-    settings = TypeAdapter(LearnerSettings).validate_python(
-        {"kind": "frozen", "decision": decision}
-    )
+    settings = settings_of({"kind": "frozen", "decision": decision})
     team = Team.build(settings, world, chain_of(world.agents), np.random.SeedSequence(1))
     assert isinstance(team.evaluator, kind)
 
@@ -277,7 +277,7 @@ def test_the_evaluator_follows_the_settings(decision: dict, kind: type, world) -
 def test_what_is_too_much_to_enumerate_is_sampled(line_world) -> None:
     # 256 joint actions of four wheels each: four agents have four thousand million.
     scenario = per_robot(line_world(carts=4, wheels=4))
-    learner = TypeAdapter(LearnerSettings).validate_python({"kind": "frozen"})
+    learner = settings_of({"kind": "frozen"})
     hierarchy = chain_of(scenario.agents)
     team = Team.build(learner, scenario, hierarchy, np.random.SeedSequence(1))
     assert isinstance(team.evaluator, Sampling)
@@ -316,8 +316,8 @@ def test_permuting_agents_permutes_what_is_learned(name: str, line_world) -> Non
             team.begin_episode()
         for _ in range(10):
             joint = rng.integers(4, size=3)
-            one.learn(here.step(joint), here.predict())
-            two.learn(there.step(joint[there.order]), there.predict())
+            one.learn(here.step(joint))
+            two.learn(there.step(joint[there.order]))
         one.end_episode()
         two.end_episode()
     assert np.abs(one.learner.theta).max() > 0

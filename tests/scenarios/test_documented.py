@@ -38,7 +38,7 @@ def test_a_scenario_of_ones_own(
     (tmp_path / "tank.py").write_text(scenario)
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
-    assert "nested-agents check tank.py:Tank\n" in TEXT
+    assert "nested-agents check examples/tank.py:Tank\n" in TEXT
     assert main(["check", "tank.py:Tank"]) == 0
     assert capsys.readouterr().out.startswith("passed  Tank: ")
     exec(training, {"__name__": "example"})

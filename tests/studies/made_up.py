@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
+from nested_agents.scenarios.box_pushing.scenario import MEASURES
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.episodes import EpisodeRow
-from nested_agents.studies.trials.trial import TrialResult, measures_of_spec, trials_of
+from nested_agents.studies.trials.trial import TrialResult, trials_of
 
 SPEC = Spec.of({"seeds": 3, "episodes": 4, "steps": 5, "evaluation": 2,
                 "sweep": {"preset": ["default", "frozen"]}})  # fmt: skip
 TRIALS = trials_of(SPEC)
-MEASURES = measures_of_spec(SPEC)
 
 
 def measure(trial):
@@ -23,15 +23,16 @@ def measure(trial):
     phases = [("training", trial.episodes), ("evaluation", trial.evaluation)]
     rows = tuple(
         EpisodeRow(
-            phase, episode, int(rng.integers(1, trial.steps + 1)), bool(rng.random() < 0.5),
-            bool(rng.random() < 0.5), *rng.random(4).tolist(),
+            phase, episode, int(rng.integers(1, trial.steps + 1)),
+            {m.name: bool(rng.random() < 0.5) if m.is_rate else rng.random() for m in MEASURES},
+            rng.random(),
         )
         for phase, count in phases
         for episode in range(count)
     )  # fmt: skip
     recording = {"box_pose": rng.random((6, 3)), "box": np.array("square")}
     seconds = dict.fromkeys(("decision", "physics", "sensors", "learning"), rng.random())
-    return TrialResult(rows, {"first": recording, "last": recording}, seconds)
+    return TrialResult(rows, MEASURES, {"first": recording, "last": recording}, seconds)
 
 
 def slow(trial):

@@ -7,9 +7,8 @@ import made_up
 from nested_agents.studies import run as studies_run
 from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli.main import main
-from nested_agents.studies.trials.trial import measures_of_spec
 
 if __name__ == "__main__":
     learning_curve.measure = getattr(made_up, sys.argv[1])
-    studies_run.check = measures_of_spec
+    studies_run.check = lambda spec: made_up.MEASURES
     sys.exit(main(sys.argv[2:]))

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from nested_agents.scenarios.box_pushing.scenario import MEASURES
 from nested_agents.studies.analysis.results import Results
 
 SEEDS = 20
@@ -28,7 +29,8 @@ def ablation(chances: dict[str, float], seeds: int = SEEDS) -> Results:
     training = {c: arrays(np.full(20, p), rng, seeds) for c, p in chances.items()}
     evaluation = {c: arrays(np.full(10, p), rng, seeds) for c, p in chances.items()}
     phases = {"training": training, "evaluation": evaluation}
-    return Results(training, evaluation, phases, dict.fromkeys(chances, tuple(range(seeds))))
+    found = dict.fromkeys(chances, tuple(range(seeds)))
+    return Results(training, evaluation, phases, found, measures=MEASURES)
 
 
 def shapes(chances: dict[str, float], trained: float = 0.95, seeds: int = SEEDS) -> Results:
@@ -50,7 +52,7 @@ def wheel_failure(
 ) -> Results:
     """By fault and what adapts, the level that is reached ten episodes after the failure."""
     rng = np.random.default_rng(3)
-    base = Results({}, {}, {"training": {}, "weights kept": {}})
+    base = Results({}, {}, {"training": {}, "weights kept": {}}, measures=MEASURES)
     before = np.minimum(0.95, np.linspace(0.0, 2.0, onset))
     for fault, by_case in ends.items():
         for enabled, cases in (

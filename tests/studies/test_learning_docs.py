@@ -4,11 +4,12 @@ from pathlib import Path
 
 import pytest
 
+from nested_agents.studies.claims import claims
 from nested_agents.studies.cli.main import main
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "learning.md"
-COLUMNS = ("success last 5", "success greedy", "steps greedy")
+COLUMNS = ("success last 5", "evaluation success", "evaluation steps")
 
 
 @pytest.mark.parametrize("name", ["learning-curve", "tasks", "told"])

@@ -21,8 +21,8 @@ LANES = 32
 _EXACT = {"contract", "nsz"}
 
 COMPILED = (
-    "gap", "box_bearing", "side", "others_gap", "push_bearing", "cross_track_error", "box_distance", "approach",
-    "box_turn", "bend",
+    "gap", "box_bearing", "side", "others_gap", "push_bearing", "cross_track_error",
+    "box_distance", "approach", "box_turn", "bend",
 )  # fmt: skip
 """The built-in variables that are computed here, each in a row of scratch of its own."""
 GAP, BEARING, SIDE, OTHERS, PUSH, CROSS_TRACK, DISTANCE, APPROACH, TURN, BEND = range(len(COMPILED))
@@ -116,7 +116,7 @@ def _of_box(box, goal, before, periods, first, count, work):  # type: ignore[no-
 
 @njit(cache=True, error_model="numpy", fastmath=_EXACT)
 def _of_push(robots, box, goal, first, count, work):  # type: ignore[no-untyped-def]
-    """Write where the robots' middle would push the box, and by how much it would miss."""
+    """Write where the robots' middle would push the box, and its cross-track error."""
     n, gx, gy = len(robots), goal[0], goal[1]
     for k in range(count):
         work[_X * LANES + k] = work[_Y * LANES + k] = 0.0

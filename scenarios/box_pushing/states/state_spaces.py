@@ -18,7 +18,7 @@ import numpy as np
 from ....core.arrays import FloatArray
 from ....core.spaces import StateSpace, Variable
 from .kernels import COMPILED, Columns
-from .variables import StateVariable, found
+from .variables import found
 from .view import View, wrap
 
 
@@ -79,21 +79,19 @@ class Listed:
     """
 
     def __init__(self, names: Sequence[str]) -> None:
-        self._all = [(found(name), name in COMPILED) for name in names]
-        self.variables = tuple(thing.variable for thing, _ in self._all)
+        things = [found(name) for name in names]
+        is_compiled = np.array([name in COMPILED for name in names], dtype=bool)
+        self.variables = tuple(thing.variable for thing in things)
+        self.functions = tuple(thing for thing, c in zip(things, is_compiled, strict=True) if not c)
+        self._things, self._is_compiled = things, is_compiled
         self._columns = Columns([name for name in names if name in COMPILED])
-        self.functions: tuple[StateVariable, ...] = tuple(
-            thing for thing, is_compiled in self._all if not is_compiled
-        )
-        compiled = [is_compiled for _, is_compiled in self._all]
-        self._compiled, self._others = np.flatnonzero(compiled), np.flatnonzero(~np.array(compiled))
 
     def sensed(self, view: View, robot: int) -> FloatArray:
         """Return the shared block ``(m, variables)`` of a robot, by the functions alone."""
         guarded = view.guarded() if self.functions else view
         columns = [
             thing(view, robot) if is_compiled else thing.checked(guarded, robot)
-            for thing, is_compiled in self._all
+            for thing, is_compiled in zip(self._things, self._is_compiled, strict=True)
         ]
         return np.stack(columns, axis=1)
 
@@ -102,11 +100,11 @@ class Listed:
         compiled = self._columns.of(view, robots)
         if not self.functions:
             return list(compiled)
-        blocks = np.empty((len(robots), len(view.box), len(self._all)))
-        blocks[:, :, self._compiled] = compiled
-        guarded = view.guarded()
+        blocks = np.empty((len(robots), len(view.box), len(self._things)))
+        blocks[:, :, self._is_compiled] = compiled
+        columns, guarded = np.flatnonzero(~self._is_compiled), view.guarded()
         for block, robot in zip(blocks, robots, strict=True):
-            for column, function in zip(self._others, self.functions, strict=True):
+            for column, function in zip(columns, self.functions, strict=True):
                 block[:, column] = function.checked(guarded, robot)
         return list(blocks)
 
@@ -162,7 +160,15 @@ def listed(name: str, *shared: str) -> BoxStateSpace:
     )
 
 
-_PUSHING = ("gap", "box_bearing", "side", "others_gap", "cross_track_error", "box_distance", "approach")
+_PUSHING = (
+    "gap",
+    "box_bearing",
+    "side",
+    "others_gap",
+    "cross_track_error",
+    "box_distance",
+    "approach",
+)
 
 STATE_SPACES: dict[str, BoxStateSpace] = {
     # Eq. 1, in the order of its own and its shared part.

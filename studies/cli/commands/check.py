@@ -52,7 +52,7 @@ def command(source: str, steps: int, changes: tuple[str, ...]) -> int:
 
 def _cases(source: str, changes: tuple[str, ...]) -> Iterator[Case]:
     """Yield what is to be checked, each scenario of a spec once."""
-    from ....core.sources import Sources
+    from ....core.sources import active
     from ...spec.errors import SpecError
     from ...spec.spec import Spec
 
@@ -60,7 +60,7 @@ def _cases(source: str, changes: tuple[str, ...]) -> Iterator[Case]:
         if changes:
             raise SpecError("--set: lays values over a spec, not over a Python file")
         try:
-            factory = Sources(Path()).load(source)
+            factory = active().load(source)
         except ValueError as error:
             raise SpecError(" ".join(str(error).split())) from None
         try:

@@ -5,14 +5,18 @@ from itertools import product
 import numpy as np
 import pytest
 
-from nested_agents.core.evaluators import ExactEnumeration, Extremes, Moments, Sampling
-from nested_agents.core.evaluators.summed import directions, sigma_points
+from nested_agents.core.decision import Decision
+from nested_agents.core.evaluators.additive import Extremes, Moments, directions, sigma_points
+from nested_agents.core.evaluators.evaluator import DecisionProblem, Deliberation
+from nested_agents.core.evaluators.exact import ExactEnumeration
+from nested_agents.core.evaluators.sampling import Sampling
 from nested_agents.core.hierarchy import Hierarchy
+from nested_agents.core.learners.frozen import FrozenSettings
 from nested_agents.core.protocols import Blocks
 from nested_agents.core.rules.rule_base import RuleBase
-from nested_agents.core.settings import Decision, RuleBaseSettings
+from nested_agents.core.rules.settings import RuleBaseSettings
 from nested_agents.core.spaces import StateSpace, Variable
-from nested_agents.core.team import _build_evaluator
+from nested_agents.core.team import Team
 
 A, NEUTRAL, N = 4, 2, 4
 GROUPS = ((0, 1), (2, 3))
@@ -45,6 +49,12 @@ class Summed:
         return np.concatenate([local[:, None], sums], axis=1)
 
 
+def problem_of(
+    rules: RuleBase, hierarchy: Hierarchy, rule: str, teammates: str, additive: bool = True
+) -> DecisionProblem:
+    return DecisionProblem(rules, hierarchy, A, GROUPS, additive, rule, teammates, 0.9)
+
+
 @pytest.fixture
 def rng() -> np.random.Generator:
     return np.random.default_rng(5)
@@ -61,28 +71,28 @@ def hierarchy(request: pytest.FixtureRequest) -> Hierarchy:
 
 
 @pytest.mark.parametrize(
-    ("summed", "others"), [(Moments, "mean"), (Moments, "observed"), (Extremes, "max")]
+    ("additive", "teammates"),
+    [(Moments, "uniform"), (Moments, "empirical"), (Extremes, "best-response")],
 )
 def test_exact_where_values_are_linear(
-    summed, others: str, hierarchy: Hierarchy, rules: RuleBase, rng: np.random.Generator
+    additive, teammates: str, hierarchy: Hierarchy, rules: RuleBase, rng: np.random.Generator
 ) -> None:
     prediction, theta = Summed(rng), rng.normal(size=rules.n_rules)
-    if others == "max":  # the greatest sum lies along the second axis: one of the directions
+    if (
+        teammates == "best-response"
+    ):  # the greatest sum lies along the second axis: one of the directions
         theta[2:4] = 0.0
     frequencies = rng.dirichlet(np.ones(A), size=N)
-    common = (rules, hierarchy, A, "value", others, 0.9)
-    exact = ExactEnumeration(*common)
-    exact._tabulated = True
+    common = problem_of(rules, hierarchy, "value", teammates)
+    exact = ExactEnumeration(common)
     places = A ** np.arange(N - 1, -1, -1)
     exact._tried = [exact._tried_by(i, places) for i in range(N)]
-    evaluator = summed(GROUPS, *common)
+    evaluator = additive(common)
     for agent in range(N):
         joint = np.full(N, NEUTRAL)
         joint[list(hierarchy.above(agent))] = 1
-        arguments = (agent, joint, theta, prediction, frequencies, rng)
-        assert evaluator.values(*arguments) == pytest.approx(
-            exact.values(*arguments), rel=0, abs=1e-12
-        )
+        asked = Deliberation(agent, joint, prediction, [theta] * N, frequencies, rng)
+        assert evaluator.values(asked) == pytest.approx(exact.values(asked), rel=0, abs=1e-12)
     assert evaluator.counts.joint_actions > 0
 
 
@@ -103,30 +113,39 @@ def test_directions_are_unit_and_distinct() -> None:
 
 
 @pytest.mark.parametrize(
-    ("summed", "rule", "others"),
-    [(Moments, "reward", "mean"), (Moments, "value", "max"), (Extremes, "value", "mean")],
+    ("additive", "rule", "teammates"),
+    [
+        (Moments, "reward", "uniform"),
+        (Moments, "value", "best-response"),
+        (Extremes, "value", "uniform"),
+    ],
 )
 def test_what_cannot_be_evaluated_is_refused(
-    summed, rule: str, others: str, rules: RuleBase
+    additive, rule: str, teammates: str, rules: RuleBase
 ) -> None:
-    with pytest.raises(ValueError, match=r"^learner\.decision\.(rule|others) = "):
-        summed(GROUPS, rules, Hierarchy("abcd", []), A, rule, others, 0.9)
+    with pytest.raises(ValueError, match=r"^learner\.decision\.(rule|teammates) = "):
+        additive(problem_of(rules, Hierarchy("abcd", []), rule, teammates))
 
 
-def test_auto_goes_by_size(rules: RuleBase, line_world) -> None:
-    for carts, superposes, others in product((2, 5, 8), (False, True), ("max", "mean")):
+def evaluator_of(world, hierarchy: Hierarchy, decision: Decision):
+    settings = FrozenSettings(decision=decision)
+    return Team.build(settings, world, hierarchy, np.random.SeedSequence(1)).evaluator
+
+
+def test_auto_goes_by_size(line_world) -> None:
+    for carts, superposes, teammates in product(
+        (2, 5, 8), (False, True), ("best-response", "uniform")
+    ):
         world = line_world(carts, 2)
         world.superposes = superposes
         chain = Hierarchy(world.agents, list(zip(world.agents, world.agents[1:], strict=False)))
-        found = type(_build_evaluator(Decision(others=others), rules, chain, world, 0.9))
-        summed = Extremes if others == "max" else Moments
-        beyond = summed if superposes else Sampling
+        found = type(evaluator_of(world, chain, Decision(teammates=teammates)))
+        additive = Extremes if teammates == "best-response" else Moments
+        beyond = additive if superposes else Sampling
         assert found is {2: ExactEnumeration, 5: Sampling, 8: beyond}[carts]
 
 
-def test_sums_need_a_scenario_that_has_them(rules: RuleBase, line_world) -> None:
+def test_sums_need_a_scenario_that_has_them(line_world) -> None:
     world = line_world(2, 2)
     with pytest.raises(ValueError, match="the scenario predicts no sums"):
-        _build_evaluator(
-            Decision(evaluator="extremes"), rules, Hierarchy(world.agents, []), world, 0.9
-        )
+        evaluator_of(world, Hierarchy(world.agents, []), Decision(evaluator="extremes"))

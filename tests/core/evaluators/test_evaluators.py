@@ -5,12 +5,20 @@ from itertools import product
 import numpy as np
 import pytest
 
-from nested_agents.core import evaluators
-from nested_agents.core.evaluators import ExactEnumeration, Sampling
+from nested_agents.core.evaluators.evaluator import (
+    DecisionProblem,
+    Deliberation,
+    Rule,
+    Teammates,
+    combinations,
+    probabilities_of,
+)
+from nested_agents.core.evaluators.exact import MOST_JOINT_ACTIONS, ExactEnumeration
+from nested_agents.core.evaluators.sampling import Sampling
 from nested_agents.core.hierarchy import Hierarchy
 from nested_agents.core.protocols import Blocks
 from nested_agents.core.rules.rule_base import RuleBase
-from nested_agents.core.settings import RuleBaseSettings
+from nested_agents.core.rules.settings import RuleBaseSettings
 from nested_agents.core.spaces import StateSpace, Variable
 
 A = 4
@@ -24,7 +32,7 @@ EDGES = {
     "apart": [],
 }
 RULES = ("value", "reward", "reward-and-value")
-OTHERS = ("max", "mean", "observed")
+TEAMMATES = ("best-response", "uniform", "empirical")
 DISCOUNT = 0.9
 ONE_VARIABLE = StateSpace("demo", (Variable("x", "m", 0.0, 1.0),))
 
@@ -33,6 +41,13 @@ def hierarchy_of(name: str, agents: tuple[str, ...] = tuple("abcd")) -> Hierarch
     """The named hierarchy over four agents that may bear other names."""
     rename = dict(zip("abcd", agents, strict=True))
     return Hierarchy(agents, [(rename[x], rename[y]) for x, y in EDGES[name]])
+
+
+def problem_of(
+    rules: RuleBase, hierarchy: Hierarchy, rule: Rule, teammates: Teammates
+) -> DecisionProblem:
+    alone = tuple((i,) for i in range(len(hierarchy)))
+    return DecisionProblem(rules, hierarchy, A, alone, False, rule, teammates, DISCOUNT)
 
 
 class Tabled:
@@ -58,8 +73,8 @@ class Tabled:
     def permuted(self, permutation: list[int]) -> "Tabled":
         """The same world with agent ``permutation[k]`` listed as k-th."""
         n = len(permutation)
-        codes = np.arange(A**n).reshape((A,) * n).transpose(permutation).ravel()
-        return Tabled(self.table[permutation][:, codes], self.rewarded[codes])
+        indices = np.arange(A**n).reshape((A,) * n).transpose(permutation).ravel()
+        return Tabled(self.table[permutation][:, indices], self.rewarded[indices])
 
 
 class NoTables(Tabled):
@@ -98,7 +113,7 @@ def frequencies_of(rng: np.random.Generator, n: int = 4) -> np.ndarray:
 
 def brute_force(
     agent: int, joint_action, hierarchy: Hierarchy, theta, rules: RuleBase, prediction,
-    frequencies, rule: str, others: str,
+    frequencies, rule: str, teammates: str,
 ) -> np.ndarray:  # fmt: skip
     """Section V read aloud: propose each action, try all joint actions below, gather."""
     gathered = []
@@ -119,31 +134,31 @@ def brute_force(
             weights.append(weight)
         best, mean = max(values), sum(values) / len(values)
         observed = float(np.dot(values, weights))
-        gathered.append({"max": best, "mean": mean, "observed": observed}[others])
+        gathered.append({"best-response": best, "uniform": mean, "empirical": observed}[teammates])
     return np.array(gathered)
 
 
-@pytest.mark.parametrize("others", OTHERS)
+@pytest.mark.parametrize("teammates", TEAMMATES)
 @pytest.mark.parametrize("rule", RULES)
 @pytest.mark.parametrize("name", EDGES)
 def test_enumeration_is_brute_force(
-    name: str, rule: str, others: str, world, rules: RuleBase, rng: np.random.Generator
+    name: str, rule: str, teammates: str, world, rules: RuleBase, rng: np.random.Generator
 ) -> None:
     hierarchy = hierarchy_of(name, world.agents)
     prediction, frequencies = world.predict(), frequencies_of(rng)
     theta = rng.normal(size=(4, rules.n_rules))
-    common = (rules, hierarchy, A, rule, others, DISCOUNT)
-    exact, all_sampled = ExactEnumeration(*common), Sampling(A**3, *common)
+    common = problem_of(rules, hierarchy, rule, teammates)
+    exact, all_sampled = ExactEnumeration(common), Sampling(A**3, common)
     for agent in range(4):
         joint = np.full(4, NEUTRAL)
         joint[list(hierarchy.above(agent))] = rng.integers(A, size=len(hierarchy.above(agent)))
         before = joint.copy()
-        arguments = (agent, joint, theta[agent], prediction, frequencies, rng)
+        asked = Deliberation(agent, joint, prediction, theta, frequencies, rng)
         expected = brute_force(
-            agent, joint, hierarchy, theta[agent], rules, prediction, frequencies, rule, others
+            agent, joint, hierarchy, theta[agent], rules, prediction, frequencies, rule, teammates
         )
-        assert exact.values(*arguments) == pytest.approx(expected, rel=0, abs=1e-12)
-        assert all_sampled.values(*arguments) == pytest.approx(expected, rel=0, abs=1e-12)
+        assert exact.values(asked) == pytest.approx(expected, rel=0, abs=1e-12)
+        assert all_sampled.values(asked) == pytest.approx(expected, rel=0, abs=1e-12)
         assert (joint == before).all()
     tried = hierarchy.joint_actions(A)
     evaluations = 0 if rule == "reward" else tried * rules.n_rules
@@ -151,16 +166,18 @@ def test_enumeration_is_brute_force(
         assert (counts.joint_actions, counts.rule_evaluations) == (tried, evaluations)
 
 
-@pytest.mark.parametrize("others", OTHERS)
-def test_without_structure_too(others: str, rng: np.random.Generator, rules: RuleBase) -> None:
+@pytest.mark.parametrize("teammates", TEAMMATES)
+def test_without_structure_too(teammates: str, rng: np.random.Generator, rules: RuleBase) -> None:
     flat = RuleBase(rules.partitions, rules.terms)
     prediction = Tabled(rng.uniform(-1, 2, (4, A**4, 3)), rng.normal(size=A**4))
     frequencies, theta = frequencies_of(rng), rng.normal(size=flat.n_rules)
     hierarchy = hierarchy_of("diamond")
-    evaluator = ExactEnumeration(flat, hierarchy, A, "reward-and-value", others, DISCOUNT)
+    evaluator = ExactEnumeration(problem_of(flat, hierarchy, "reward-and-value", teammates))
     for agent in range(4):
         joint = np.full(4, NEUTRAL)
-        found = evaluator.values(agent, joint, theta, prediction, frequencies, rng)
+        found = evaluator.values(
+            Deliberation(agent, joint, prediction, [theta] * 4, frequencies, rng)
+        )
         expected = brute_force(
             agent,
             joint,
@@ -170,15 +187,15 @@ def test_without_structure_too(others: str, rng: np.random.Generator, rules: Rul
             prediction,
             frequencies,
             "reward-and-value",
-            others,
+            teammates,
         )
         assert found == pytest.approx(expected, rel=0, abs=1e-12)
 
 
-@pytest.mark.parametrize("others", OTHERS)
+@pytest.mark.parametrize("teammates", TEAMMATES)
 @pytest.mark.parametrize("name", EDGES)
 def test_permuting_agents_permutes_values(
-    name: str, others: str, rng: np.random.Generator, rules: RuleBase
+    name: str, teammates: str, rng: np.random.Generator, rules: RuleBase
 ) -> None:
     flat = RuleBase(rules.partitions, rules.terms)
     prediction = Tabled(rng.uniform(-1, 2, (4, A**4, 3)), rng.normal(size=A**4))
@@ -186,13 +203,15 @@ def test_permuting_agents_permutes_values(
     hierarchy, permutation = hierarchy_of(name), [2, 0, 3, 1]
     other = hierarchy.permuted(permutation)
     joint = rng.integers(A, size=4)
-    here = ExactEnumeration(flat, hierarchy, A, "reward-and-value", others, DISCOUNT)
-    there = ExactEnumeration(flat, other, A, "reward-and-value", others, DISCOUNT)
+    here = ExactEnumeration(problem_of(flat, hierarchy, "reward-and-value", teammates))
+    there = ExactEnumeration(problem_of(flat, other, "reward-and-value", teammates))
     for k, agent in enumerate(permutation):
-        expected = here.values(agent, joint, theta[agent], prediction, frequencies, rng)
+        expected = here.values(Deliberation(agent, joint, prediction, theta, frequencies, rng))
         found = there.values(
-            k, joint[permutation], theta[agent], prediction.permuted(permutation),
-            frequencies[permutation], rng,
+            Deliberation(
+                k, joint[permutation], prediction.permuted(permutation), theta[permutation],
+                frequencies[permutation], rng,
+            )
         )  # fmt: skip
         assert found == pytest.approx(expected, rel=0, abs=1e-12)
 
@@ -205,11 +224,13 @@ def test_frequent_actions_weigh_more_by_hand() -> None:
     frequencies = np.array([[0.25] * 4, [0.1, 0.2, 0.3, 0.4]])
     rules = RuleBase.build(ONE_VARIABLE, RuleBaseSettings())
     rng = np.random.default_rng(0)
-    for others, expected in (("observed", 2.0), ("mean", 1.5), ("max", 3.0)):
+    for teammates, expected in (("empirical", 2.0), ("uniform", 1.5), ("best-response", 3.0)):
         hierarchy = Hierarchy("ab", [("a", "b")])
-        evaluator = ExactEnumeration(rules, hierarchy, A, "reward", others, DISCOUNT)
+        evaluator = ExactEnumeration(problem_of(rules, hierarchy, "reward", teammates))
         theta = np.zeros(rules.n_rules)
-        found = evaluator.values(0, np.full(2, NEUTRAL), theta, prediction, frequencies, rng)
+        found = evaluator.values(
+            Deliberation(0, np.full(2, NEUTRAL), prediction, [theta] * 4, frequencies, rng)
+        )
         assert found == pytest.approx([expected, 0.0, 0.0, 0.0], abs=1e-15)
 
 
@@ -217,13 +238,18 @@ def test_sampling_converges(world, rules: RuleBase, rng: np.random.Generator) ->
     hierarchy = hierarchy_of("chain", world.agents)
     prediction, frequencies = world.predict(), frequencies_of(rng)
     theta, joint = rng.normal(size=rules.n_rules), np.full(4, NEUTRAL)
-    for others in OTHERS:
-        common = (rules, hierarchy, A, "value", others, DISCOUNT)
-        exact = ExactEnumeration(*common).values(0, joint, theta, prediction, frequencies, rng)
+    for teammates in TEAMMATES:
+        common = problem_of(rules, hierarchy, "value", teammates)
+        exact = ExactEnumeration(common).values(
+            Deliberation(0, joint, prediction, [theta] * 4, frequencies, rng)
+        )
         # 63 of the 64 joint actions below would be drawn: with repetition, hence at random.
-        sampling = Sampling(63, *common)
-        draws = [sampling.values(0, joint, theta, prediction, frequencies, rng) for _ in range(300)]
-        if others == "max":  # from below, and found sooner or later
+        sampling = Sampling(63, common)
+        draws = [
+            sampling.values(Deliberation(0, joint, prediction, [theta] * 4, frequencies, rng))
+            for _ in range(300)
+        ]
+        if teammates == "best-response":  # from below, and found sooner or later
             assert np.max(draws, axis=0) == pytest.approx(exact, rel=0, abs=1e-12)
         else:
             error = np.mean(draws, axis=0) - exact
@@ -235,10 +261,12 @@ def test_a_sample_is_shared_by_all_own_actions(rng: np.random.Generator) -> None
     below = rng.normal(size=A**3)
     prediction = Tabled(np.zeros((4, A**4, 1)), np.tile(below, A))
     rules = RuleBase.build(ONE_VARIABLE, RuleBaseSettings())
-    for others in OTHERS:
-        sampling = Sampling(5, rules, hierarchy_of("chain"), A, "reward", others, DISCOUNT)
+    for teammates in TEAMMATES:
+        sampling = Sampling(5, problem_of(rules, hierarchy_of("chain"), "reward", teammates))
         theta, joint = np.zeros(rules.n_rules), np.full(4, NEUTRAL)
-        found = sampling.values(0, joint, theta, prediction, frequencies_of(rng), rng)
+        found = sampling.values(
+            Deliberation(0, joint, prediction, [theta] * 4, frequencies_of(rng), rng)
+        )
         assert np.ptp(found) == pytest.approx(0.0, abs=1e-15)
         assert sampling.counts.joint_actions == A * 5
 
@@ -248,34 +276,38 @@ def test_nothing_is_tabulated_if_fewer_are_tried(
     name: str, rng: np.random.Generator, rules: RuleBase
 ) -> None:
     prediction = NoTables(rng.uniform(-1, 2, (4, A**4, 3)), rng.normal(size=A**4))
-    evaluator = ExactEnumeration(rules, hierarchy_of(name), A, "reward-and-value", "max", DISCOUNT)
+    evaluator = ExactEnumeration(
+        problem_of(rules, hierarchy_of(name), "reward-and-value", "best-response")
+    )
     theta, joint = rng.normal(size=rules.n_rules), np.full(4, NEUTRAL)
     for agent in range(4):
-        evaluator.values(agent, joint, theta, prediction, frequencies_of(rng), rng)
+        evaluator.values(
+            Deliberation(agent, joint, prediction, [theta] * 4, frequencies_of(rng), rng)
+        )
 
 
 def test_a_hundred_agents_apart_are_enumerated() -> None:
     names = [f"agent{i}" for i in range(100)]
     rules = RuleBase.build(ONE_VARIABLE, RuleBaseSettings())
-    ExactEnumeration(rules, Hierarchy(names, []), A, "value", "max", DISCOUNT)
+    ExactEnumeration(problem_of(rules, Hierarchy(names, []), "value", "best-response"))
 
 
 def test_too_many_joint_actions_are_refused() -> None:
     names = [f"agent{i}" for i in range(13)]
     edges = [("agent0", name) for name in names[1:]]
     rules = RuleBase.build(ONE_VARIABLE, RuleBaseSettings())
-    assert evaluators.MOST_JOINT_ACTIONS == A**12
+    assert MOST_JOINT_ACTIONS == A**12
     with pytest.raises(
         ValueError,
         match=r"^learner\.decision\.evaluator: agent 'agent0' would try 4 \*\* 13 joint actions",
     ) as caught:
-        ExactEnumeration(rules, Hierarchy(names, edges), A, "value", "max", DISCOUNT)
+        ExactEnumeration(problem_of(rules, Hierarchy(names, edges), "value", "best-response"))
     assert "\n" not in str(caught.value)
 
 
-def test_weights_are_products_of_frequencies(rng: np.random.Generator) -> None:
+def test_probabilities_are_products_of_frequencies(rng: np.random.Generator) -> None:
     frequencies = frequencies_of(rng)
-    tried = evaluators.evaluator.combinations((1, 3), A)
+    tried = combinations((1, 3), A)
     expected = frequencies[1, tried[:, 0]] * frequencies[3, tried[:, 1]]
-    found = evaluators.evaluator.weights_of(frequencies, (1, 3))
+    found = probabilities_of(frequencies, (1, 3))
     assert found == pytest.approx(expected / expected.sum(), rel=0, abs=1e-15)

@@ -5,12 +5,11 @@ from functools import reduce
 import numpy as np
 import pytest
 
-from nested_agents.core.learners.anova import MOST_RULES, AnovaTD, spread
-from nested_agents.core.learners.batch import REWARD_SCALE, BatchTD
+from nested_agents.core.learners.anova import MOST_RULES, AnovaTD, AnovaTDSettings, spread
+from nested_agents.core.learners.batch import REWARD_SCALE, BatchTD, BatchTDSettings
 from nested_agents.core.learners.dictionary import Dictionary, kernel
 from nested_agents.core.rules.fuzzy import Partition
 from nested_agents.core.rules.rule_base import RuleBase
-from nested_agents.core.settings import AnovaTDSettings, BatchTDSettings
 
 EXACT = 1e-9
 """A tolerance at which every after-state that differs enters the dictionary."""
@@ -65,7 +64,7 @@ def by_hand(rules: RuleBase, episodes: list[tuple], s: AnovaTDSettings) -> np.nd
     rows = []
     for i in range(episodes[0][0].shape[1]):
         theta = np.zeros(rules.n_rules)
-        for _ in range(s.sweeps):
+        for _ in range(s.regression_iterations):
             features, targets = [], []
             for states, given, terminal in episodes:
                 phi = rules.features(states[:, i])
@@ -83,7 +82,7 @@ def by_hand(rules: RuleBase, episodes: list[tuple], s: AnovaTDSettings) -> np.nd
             x = np.array(features)
             gram = x.T @ x + s.ridge * np.eye(x.shape[1])
             theta = root @ np.linalg.solve(gram, x.T @ np.array(targets))
-        rows.append(theta * s.mixing / REWARD_SCALE)
+        rows.append(theta * s.target_averaging_rate / REWARD_SCALE)
     return np.array(rows)
 
 
@@ -118,10 +117,15 @@ def test_spreading_multiplies_by_the_covariance() -> None:
 def test_it_is_the_ridge_regression_of_all_rules(membership: str, decay: float, rho: float) -> None:
     rules = rules_of(membership)
     settings = AnovaTDSettings(
-        interaction=rho, tolerance=EXACT, ridge=0.5, sweeps=4, discount=0.8, trace_decay=decay
+        interaction=rho,
+        tolerance=EXACT,
+        ridge=0.5,
+        regression_iterations=4,
+        discount=0.8,
+        trace_decay=decay,
     )
     episodes = episodes_of(3, 2)
-    learner = AnovaTD(settings, rules, 2)
+    learner = AnovaTD(settings, rules, np.arange(2))
     for episode in episodes:
         feed(learner, episode, last=len(episode[0]))  # without regressing
     assert learner.end_episode() == 2 * 24
@@ -131,9 +135,16 @@ def test_it_is_the_ridge_regression_of_all_rules(membership: str, decay: float, 
 
 
 def test_without_interactions_it_is_batch_td_of_order_one() -> None:
-    common = {"ridge": 0.5, "sweeps": 4, "discount": 0.8, "mixing": 0.5}
-    full = AnovaTD(AnovaTDSettings(interaction=1e-7, tolerance=EXACT, **common), rules_of(), 2)
-    first = BatchTD(BatchTDSettings(**common), rules_of(order=1), 2)
+    common = {
+        "ridge": 0.5,
+        "regression_iterations": 4,
+        "discount": 0.8,
+        "target_averaging_rate": 0.5,
+    }
+    full = AnovaTD(
+        AnovaTDSettings(interaction=1e-7, tolerance=EXACT, **common), rules_of(), np.arange(2)
+    )
+    first = BatchTD(BatchTDSettings(**common), rules_of(order=1), np.arange(2))
     for episode in episodes_of(4, 2):
         feed(full, episode)
         feed(first, episode)
@@ -171,9 +182,11 @@ def test_the_same_coordinates_however_states_are_divided() -> None:
 
 
 def test_a_restored_learner_goes_on_with_the_same_bits() -> None:
-    settings = AnovaTDSettings(sweeps=3, ridge=0.1, interval=3, tolerance=0.02, dictionary=9)
+    settings = AnovaTDSettings(
+        regression_iterations=3, ridge=0.1, interval=3, tolerance=0.02, dictionary=9
+    )
     episodes = episodes_of(8, 2)
-    learner, restored = (AnovaTD(settings, rules_of(), 2) for _ in range(2))
+    learner, restored = (AnovaTD(settings, rules_of(), np.arange(2)) for _ in range(2))
     for episode in episodes[:3]:
         feed(learner, episode)
     feed(learner, episodes[0], last=3)
@@ -191,7 +204,7 @@ def test_a_restored_learner_goes_on_with_the_same_bits() -> None:
 def test_other_rule_bases_are_refused(terms: list[tuple[int, ...]]) -> None:
     rules = RuleBase(rules_of().partitions, terms, 1)
     with pytest.raises(ValueError, match=r"set learner\.rule_base\.order = 3") as caught:
-        AnovaTD(AnovaTDSettings(), rules, 1)
+        AnovaTD(AnovaTDSettings(), rules, np.arange(1))
     assert "\n" not in str(caught.value)
 
 
@@ -199,4 +212,4 @@ def test_too_many_rules_are_refused() -> None:
     rules = RuleBase([Partition((0.0, 1.0), "triangular")] * 21, [tuple(range(21))])
     said = f"2097152 rules, allowed up to {MOST_RULES}; use fewer variables or memberships"
     with pytest.raises(ValueError, match=said):
-        AnovaTD(AnovaTDSettings(), rules, 1)
+        AnovaTD(AnovaTDSettings(), rules, np.arange(1))

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from nested_agents.core.learners.batch import REWARD_SCALE, BatchTD, FittedValue
+from nested_agents.core.learners.batch import REWARD_SCALE, BatchTD, BatchTDSettings
 from nested_agents.core.rules.fuzzy import Partition
 from nested_agents.core.rules.rule_base import RuleBase
-from nested_agents.core.settings import BatchTDSettings, FittedValueSettings
 
 TABLE = RuleBase([Partition((0.0, 1.0, 2.0, 3.0, 4.0), "triangular")], [(0,)])
 
@@ -17,22 +16,20 @@ def fuzzy(membership: str) -> RuleBase:
 
 
 def episodes_of(rng: np.random.Generator, n_agents: int) -> list[tuple]:
-    """Episodes (states (T, n, 2), rewards (T,), terminal, candidates (T, n, 6, 2))."""
+    """Episodes (states (T, n, 2), rewards (T,), terminal)."""
     made = []
     for length, terminal in ((7, True), (1, False), (5, False), (1, True)):
         states = rng.uniform(-1, 1, (length, n_agents, 2))
-        # Single precision, as they are stored.
-        nexts = rng.uniform(-1, 1, (length, n_agents, 6, 2)).astype(np.float32).astype(float)
-        made.append((states, 0.01 * rng.normal(size=length), terminal, nexts))
+        made.append((states, 0.01 * rng.normal(size=length), terminal))
     return made
 
 
 def feed(learner: BatchTD, episode: tuple) -> int:
-    states, rewards, terminal, nexts = episode
+    states, rewards, terminal = episode
     learner.begin_episode()
     for t in range(len(states)):
         last = t == len(states) - 1
-        learner.observe(states[t], float(rewards[t]), terminal and last, nexts[t])
+        learner.observe(states[t], float(rewards[t]), terminal and last)
     return learner.end_episode()
 
 
@@ -48,21 +45,18 @@ def lambda_return(
     return float((1 - decay) * values[t] + decay * ahead)
 
 
-def ridge_by_hand(
-    rules: RuleBase, episodes: list[tuple], settings: BatchTDSettings | FittedValueSettings
-) -> np.ndarray:
+def ridge_by_hand(rules: RuleBase, episodes: list[tuple], settings: BatchTDSettings) -> np.ndarray:
     """Consequent weights of all agents after `episodes`, regressing after each of them."""
     n_agents, gamma = episodes[0][0].shape[1], settings.discount
-    fitted = isinstance(settings, FittedValueSettings)
     theta = np.zeros((n_agents, rules.n_rules))
     for k in range(1, len(episodes) + 1):
         seen = REWARD_SCALE * np.concatenate([episode[1] for episode in episodes[:k]])
         low, high = seen.min() / (1 - gamma), seen.max() / (1 - gamma)
         for i in range(n_agents):
             w = REWARD_SCALE * theta[i]
-            for _ in range(settings.sweeps):
+            for _ in range(settings.regression_iterations):
                 rows, targets = [], []
-                for states, rewards, terminal, nexts in episodes[:k]:
+                for states, rewards, terminal in episodes[:k]:
                     phi = rules.features(states[:, i])
                     for t in range(len(states)):
                         reward = REWARD_SCALE * rewards[t]
@@ -70,8 +64,6 @@ def ridge_by_hand(
                             if not terminal:
                                 continue
                             target = reward / (1 - gamma)
-                        elif fitted:
-                            target = reward + gamma * (rules.features(nexts[t, i]) @ w).max()
                         else:
                             target = reward + gamma * lambda_return(
                                 t + 1, phi @ w, REWARD_SCALE * rewards, terminal, settings
@@ -81,7 +73,7 @@ def ridge_by_hand(
                 x = np.array(rows).reshape(-1, rules.n_rules)
                 gram = x.T @ x + settings.ridge * np.eye(rules.n_rules)
                 w = np.linalg.solve(gram, x.T @ np.array(targets))
-            theta[i] += settings.mixing * (w / REWARD_SCALE - theta[i])
+            theta[i] += settings.target_averaging_rate * (w / REWARD_SCALE - theta[i])
     return theta
 
 
@@ -92,23 +84,13 @@ def test_batch_td_is_the_ridge_regression_written_out(
     membership: str, ridge: float, decay: float
 ) -> None:
     rules = fuzzy(membership)
-    settings = BatchTDSettings(ridge=ridge, sweeps=4, discount=0.8, trace_decay=decay)
+    settings = BatchTDSettings(
+        ridge=ridge, regression_iterations=4, discount=0.8, trace_decay=decay
+    )
     episodes = episodes_of(np.random.default_rng(1), 2)
-    learner = BatchTD(settings, rules, 2)
+    learner = BatchTD(settings, rules, np.arange(2))
     for episode in episodes:
         assert feed(learner, episode) == 2 * rules.n_rules
-    expected = ridge_by_hand(rules, episodes, settings)
-    assert learner.theta == pytest.approx(expected, rel=0, abs=1e-12)
-
-
-@pytest.mark.parametrize("membership", ["triangular", "sigmoid"])
-def test_fitted_value_is_the_ridge_regression_written_out(membership: str) -> None:
-    rules = fuzzy(membership)
-    settings = FittedValueSettings(ridge=0.1, sweeps=4, discount=0.8, candidates=6)
-    episodes = episodes_of(np.random.default_rng(2), 2)
-    learner = FittedValue(settings, rules, 2)
-    for episode in episodes:
-        feed(learner, episode)
     expected = ridge_by_hand(rules, episodes, settings)
     assert learner.theta == pytest.approx(expected, rel=0, abs=1e-12)
 
@@ -116,29 +98,26 @@ def test_fitted_value_is_the_ridge_regression_written_out(membership: str) -> No
 def test_batch_td_solves_a_known_chain() -> None:
     # The chain of test_td: V(4) = 0.3 / 0.1 = 3, 2.7, -2 + 2.43 = 0.43, 0.387, 1 + 0.3483. The
     # targets stay within the range -2 / 0.1 to 1 / 0.1 of discounted sums.
-    settings = BatchTDSettings(ridge=1e-13, sweeps=300, discount=0.9, mixing=1.0)
-    learner = BatchTD(settings, TABLE, 1)
+    settings = BatchTDSettings(
+        ridge=1e-13, regression_iterations=300, discount=0.9, target_averaging_rate=1.0
+    )
+    learner = BatchTD(settings, TABLE, np.arange(1))
     states = np.arange(5.0).reshape(5, 1, 1)
-    feed(learner, (states, np.array([1.0, 0.0, -2.0, 0.0, 0.3]), True, [None] * 5))
+    feed(learner, (states, np.array([1.0, 0.0, -2.0, 0.0, 0.3]), True))
     assert learner.theta[0] == pytest.approx([1.3483, 0.387, 0.43, 2.7, 3.0], rel=0, abs=1e-10)
-
-
-def test_fitted_value_solves_a_known_decision() -> None:
-    # In state 0 one may stay (reward 0.1 for ever: worth 1) or enter 1, terminal, reward 0.3,
-    # worth 3. Experience only ever stays; V(0) = 0.1 + 0.9 * max(V(0), 3) = 2.8.
-    settings = FittedValueSettings(ridge=1e-13, sweeps=300, discount=0.9, candidates=2, mixing=1.0)
-    learner = FittedValue(settings, TABLE, 1)
-    both = np.array([[[0.0], [1.0]]])
-    feed(learner, (np.ones((1, 1, 1)), np.array([0.3]), True, [both]))
-    feed(learner, (np.zeros((4, 1, 1)), np.full(4, 0.1), False, [both] * 4))
-    assert learner.theta[0, :2] == pytest.approx([2.8, 3.0], rel=0, abs=1e-10)
 
 
 def test_targets_stay_within_what_rewards_can_sum_to() -> None:
     # theta far too large: the first target R + 0.9 * 1e6 is cut to 1 / (1 - 0.9) = 10.
-    learner = BatchTD(BatchTDSettings(ridge=1e-13, sweeps=1, discount=0.9, mixing=1.0), TABLE, 1)
+    learner = BatchTD(
+        BatchTDSettings(
+            ridge=1e-13, regression_iterations=1, discount=0.9, target_averaging_rate=1.0
+        ),
+        TABLE,
+        np.arange(1),
+    )
     learner.theta[:] = 1e6
-    feed(learner, (np.array([[[0.0]], [[1.0]]]), np.array([1.0, -1.0]), False, [None] * 2))
+    feed(learner, (np.array([[[0.0]], [[1.0]]]), np.array([1.0, -1.0]), False))
     assert learner.theta[0, :2] == pytest.approx([10.0, 0.0], rel=0, abs=1e-10)
 
 
@@ -146,12 +125,12 @@ def test_an_episode_given_up_is_not_linked_to_the_next() -> None:
     episodes = episodes_of(np.random.default_rng(3), 1)
     given_up, next_one = episodes[2], episodes[0]
     rules = fuzzy("triangular")
-    learner = BatchTD(BatchTDSettings(sweeps=3, ridge=0.1), rules, 1)
+    learner = BatchTD(BatchTDSettings(regression_iterations=3, ridge=0.1), rules, np.arange(1))
     learner.begin_episode()
     for state, reward in zip(given_up[0], given_up[1], strict=True):
         learner.observe(state, float(reward), False)
     feed(learner, next_one)
-    expected = BatchTD(BatchTDSettings(sweeps=3, ridge=0.1), rules, 1)
+    expected = BatchTD(BatchTDSettings(regression_iterations=3, ridge=0.1), rules, np.arange(1))
     expected.theta[:] = 0.0
     feed(expected, given_up)
     expected.theta[:] = 0.0
@@ -161,14 +140,16 @@ def test_an_episode_given_up_is_not_linked_to_the_next() -> None:
 
 def test_a_long_episode_is_regressed_on_while_it_runs() -> None:
     rules = fuzzy("triangular")
-    states, rewards, _, nexts = episodes_of(np.random.default_rng(4), 1)[0]
-    learner = BatchTD(BatchTDSettings(sweeps=3, ridge=0.1, interval=2), rules, 1)
-    feed(learner, (states, rewards, True, nexts))
+    states, rewards, _ = episodes_of(np.random.default_rng(4), 1)[0]
+    learner = BatchTD(
+        BatchTDSettings(regression_iterations=3, ridge=0.1, interval=2), rules, np.arange(1)
+    )
+    feed(learner, (states, rewards, True))
     theta = np.zeros_like(learner.theta)
     for seen in [*range(2, len(states), 2), len(states)]:
-        whole = BatchTD(BatchTDSettings(sweeps=3, ridge=0.1), rules, 1)
+        whole = BatchTD(BatchTDSettings(regression_iterations=3, ridge=0.1), rules, np.arange(1))
         whole.theta[:] = theta
-        feed(whole, (states[:seen], rewards[:seen], seen == len(states), nexts[:seen]))
+        feed(whole, (states[:seen], rewards[:seen], seen == len(states)))
         theta = whole.theta
     assert len(states) > 3
     assert (learner.theta == theta).all()
@@ -176,9 +157,12 @@ def test_a_long_episode_is_regressed_on_while_it_runs() -> None:
 
 def test_a_restored_learner_regresses_at_the_same_decisions() -> None:
     rules = fuzzy("triangular")
-    settings = BatchTDSettings(sweeps=3, ridge=0.1, interval=3)
+    settings = BatchTDSettings(regression_iterations=3, ridge=0.1, interval=3)
     first, _, second, _ = episodes_of(np.random.default_rng(5), 1)
-    learner, restored = BatchTD(settings, rules, 1), BatchTD(settings, rules, 1)
+    learner, restored = (
+        BatchTD(settings, rules, np.arange(1)),
+        BatchTD(settings, rules, np.arange(1)),
+    )
     feed(learner, first)
     learner.begin_episode()
     learner.observe(second[0][0], float(second[1][0]), False)
@@ -190,7 +174,7 @@ def test_a_restored_learner_regresses_at_the_same_decisions() -> None:
 
 
 def test_no_experience_teaches_nothing() -> None:
-    learner = BatchTD(BatchTDSettings(), TABLE, 2)
+    learner = BatchTD(BatchTDSettings(), TABLE, np.arange(2))
     learner.begin_episode()
     assert learner.end_episode() == 0
     assert not learner.theta.any()
@@ -199,11 +183,5 @@ def test_no_experience_teaches_nothing() -> None:
 def test_too_many_rules_are_refused() -> None:
     rules = RuleBase([Partition((0.0, 1.0), "triangular")] * 13, [tuple(range(13))])
     with pytest.raises(ValueError, match="8192 rules, allowed up to 4096") as caught:
-        BatchTD(BatchTDSettings(), rules, 1)
+        BatchTD(BatchTDSettings(), rules, np.arange(1))
     assert "\n" not in str(caught.value)
-
-
-def test_fitted_value_needs_predictions() -> None:
-    learner = FittedValue(FittedValueSettings(), TABLE, 1)
-    with pytest.raises(ValueError, match="needs predicted next states"):
-        learner.observe(np.zeros((1, 1)), 0.0, False)

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from nested_agents.core.learners.gradient import GradientTD
-from nested_agents.core.learners.td import TDLambda
+from nested_agents.core.learners.gradient import GradientTD, GradientTDSettings
+from nested_agents.core.learners.td import TDLambda, TDLambdaSettings
 from nested_agents.core.rules.fuzzy import Partition
 from nested_agents.core.rules.rule_base import RuleBase
-from nested_agents.core.settings import GradientTDSettings, TDLambdaSettings
 
 CORRECTIONS = ("tdc", "gtd2")
 FUZZY = RuleBase(
@@ -36,7 +35,7 @@ def test_the_equations_written_out(correction: str, trace_decay: float) -> None:
         correction=correction, step_size=alpha, second_step_size=beta, discount=gamma,
         trace_decay=trace_decay,
     )  # fmt: skip
-    learner = GradientTD(settings, FUZZY, 1)
+    learner = GradientTD(settings, FUZZY, np.arange(1))
     feed(learner, states, rewards, terminal=True)
     phi = np.vstack([FUZZY.features(states), np.zeros(FUZZY.n_rules)])
     rewards = rewards.copy()
@@ -62,7 +61,7 @@ def test_a_known_chain_is_learned(correction: str, trace_decay: float) -> None:
         correction=correction, step_size=0.3, second_step_size=0.3, discount=0.5,
         trace_decay=trace_decay,
     )  # fmt: skip
-    learner = GradientTD(settings, table, 1)
+    learner = GradientTD(settings, table, np.arange(1))
     for _ in range(1500):
         feed(learner, np.arange(5.0)[:, None], np.array([1.0, 0.0, -2.0, 0.0, 0.3]), True)
     assert learner.theta[0] == pytest.approx([0.5375, -0.925, -1.85, 0.3, 0.6], rel=0, abs=1e-10)
@@ -76,13 +75,15 @@ def test_it_converges_where_td_diverges(correction: str) -> None:
     # visited. Gradient TD finds weights without a TD error.
     rules = RuleBase([Partition((0.0, 1.0), "triangular")], [(0,)])
     states, rewards, gamma = np.array([[0.4], [0.0]]), np.array([1.0, 0.0]), 0.95
-    td = TDLambda(TDLambdaSettings(step_size=0.5, trace_decay=0.0, discount=gamma), rules, 1)
+    td = TDLambda(
+        TDLambdaSettings(step_size=0.5, trace_decay=0.0, discount=gamma), rules, np.arange(1)
+    )
     gradient = GradientTD(
         GradientTDSettings(
             correction=correction, step_size=0.1, second_step_size=1.0, trace_decay=0.0,
             discount=gamma,
         ),
-        rules, 1,
+        rules, np.arange(1),
     )  # fmt: skip
     for _ in range(4000):
         feed(td, states, rewards, False)
@@ -95,13 +96,13 @@ def test_it_converges_where_td_diverges(correction: str) -> None:
 def test_agents_learn_each_on_its_own() -> None:
     rng = np.random.default_rng(2)
     states, rewards = rng.uniform(-1, 1, (8, 3, 2)), rng.normal(size=8)
-    team = GradientTD(GradientTDSettings(), FUZZY, 3)
-    permuted, order = GradientTD(GradientTDSettings(), FUZZY, 3), [2, 0, 1]
+    team = GradientTD(GradientTDSettings(), FUZZY, np.arange(3))
+    permuted, order = GradientTD(GradientTDSettings(), FUZZY, np.arange(3)), [2, 0, 1]
     for t in range(8):
         team.observe(states[t], rewards[t], t == 7)
         permuted.observe(states[t, order], rewards[t], t == 7)
     assert (permuted.theta == team.theta[order]).all()
-    alone = GradientTD(GradientTDSettings(), FUZZY, 1)
+    alone = GradientTD(GradientTDSettings(), FUZZY, np.arange(1))
     for t in range(8):
         alone.observe(states[t, 1:2], rewards[t], t == 7)
     assert alone.theta[0] == pytest.approx(team.theta[1], rel=0, abs=1e-14)

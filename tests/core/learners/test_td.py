@@ -5,11 +5,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nested_agents.core.learners.td import TDLambda
-from nested_agents.core.rules import reference as twins
+from nested_agents.core.learners.td import TDLambda, TDLambdaSettings
+from nested_agents.core.rules import reference
 from nested_agents.core.rules.fuzzy import Partition
 from nested_agents.core.rules.rule_base import RuleBase
-from nested_agents.core.settings import TDLambdaSettings
 
 LOW_HIGH = Partition((0.0, 1.0), "triangular")
 EIGHT_RULES = RuleBase([LOW_HIGH] * 3, [(0, 1, 2)])
@@ -21,7 +20,7 @@ FUZZY = RuleBase(
 
 
 def learner_of(rules: RuleBase, n_agents: int = 1, **settings: object) -> TDLambda:
-    return TDLambda(TDLambdaSettings(**settings), rules, n_agents)
+    return TDLambda(TDLambdaSettings(**settings), rules, np.arange(n_agents))
 
 
 def feed(learner: TDLambda, states: np.ndarray, rewards: np.ndarray, terminal: bool) -> None:
@@ -43,7 +42,7 @@ def frozen_increments(
         total += learner.theta - held
         learner.theta[:] = held
     if terminal:  # on entering it `observe` would update twice without a chance to hold theta
-        learner._update(states[-1:], float(rewards[-1]) / (1 - learner.settings.discount), None)
+        learner._update(states[-1:], rewards[-1:] / (1 - learner.settings.discount), None)
         total += learner.theta - held
         learner.theta[:] = held
     return total[0]
@@ -141,13 +140,13 @@ def test_the_equations_written_out(trace_decay: float, terminal: bool) -> None:
     feed(learner, states, rewards, terminal)
     theta, trace = np.zeros((1, FUZZY.n_rules)), np.zeros((1, FUZZY.n_rules))
     for t in range(30 if terminal else 29):
-        here = twins.values(FUZZY, theta[0], states[t : t + 1])
+        here = reference.values(FUZZY, theta[0], states[t : t + 1])
         if t < 29:
-            target = rewards[t] + gamma * twins.values(FUZZY, theta[0], states[t + 1 : t + 2])
+            target = rewards[t] + gamma * reference.values(FUZZY, theta[0], states[t + 1 : t + 2])
         else:
             target = rewards[t] / (1.0 - gamma)
         steps = alpha * (target - here)
-        twins.td_update(FUZZY, theta, trace, states[t : t + 1], steps, gamma * trace_decay)
+        reference.td_update(FUZZY, theta, trace, states[t : t + 1], steps, gamma * trace_decay)
     assert learner.theta == pytest.approx(theta, rel=0, abs=1e-12)
 
 
@@ -162,7 +161,7 @@ def test_offline_td_lambda_is_the_lambda_return(trace_decay: float, terminal: bo
     states, rewards = rng.uniform(-1, 1, (last + 1, 2)), rng.normal(size=last + 1)
     learner = learner_of(FUZZY, step_size=alpha, discount=gamma, trace_decay=lam)
     learner.theta[:] = rng.normal(size=learner.theta.shape)
-    f = twins.values(FUZZY, learner.theta[0], states)
+    f = reference.values(FUZZY, learner.theta[0], states)
     end = last + 1 if terminal else last
 
     def n_step(t: int, n: int) -> float:

@@ -1,4 +1,4 @@
-"""Every kernel against its plain-NumPy twin, over many shapes of rule base."""
+"""Every kernel against its plain-NumPy reference implementation, over many shapes of rule base."""
 
 from itertools import combinations
 from math import pi
@@ -9,12 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nested_agents.core.protocols import Blocks
-from nested_agents.core.rules import kernels
-from nested_agents.core.rules import reference as twins
+from nested_agents.core.rules import kernels, reference
 from nested_agents.core.rules.fuzzy import Partition
 from nested_agents.core.rules.rule_base import RuleBase
 
 N_ACTIONS, N_AGENTS, GROUP = 4, 4, 2
+ROWS = np.arange(3)
 TERMS = {
     "order 1": [(0,), (1,), (2,), (3,)],
     "order 2": list(combinations(range(4), 2)),
@@ -45,7 +45,7 @@ def blocks_of(rng: np.random.Generator, n_own: int, d: int = 4) -> Blocks:
     shared = states_of(rng, N_ACTIONS**N_AGENTS, d)[:, n_own:]
     divisor = int(rng.choice([1, N_ACTIONS, N_ACTIONS**GROUP]))
     own_rows = shared_rows = np.zeros(0, dtype=np.int64)
-    if rng.random() < 0.7:  # several codes lead to one
+    if rng.random() < 0.7:  # several indices lead to one
         own_rows = rng.integers(len(own), size=len(own))
         shared_rows = rng.integers(len(shared) // 2, size=len(shared))
     return Blocks(
@@ -75,7 +75,7 @@ def rng() -> np.random.Generator:
 
 def test_values(base: RuleBase, rng: np.random.Generator) -> None:
     theta, states = rng.normal(size=base.n_rules), states_of(rng, 60)
-    expected = twins.values(base, theta, states)
+    expected = reference.values(base, theta, states)
     assert base.values(theta, states) == pytest.approx(expected, rel=0, abs=1e-12)
     # The dense kernel serves any shape; the compact one is a shortcut for triangles.
     dense = kernels.values_dense(theta, states, base.layout)
@@ -84,12 +84,12 @@ def test_values(base: RuleBase, rng: np.random.Generator) -> None:
 
 def test_block_values(base: RuleBase, rng: np.random.Generator) -> None:
     theta, blocks = rng.normal(size=base.n_rules), blocks_of(rng, base.n_own)
-    codes = rng.integers(N_ACTIONS**N_AGENTS, size=90)
-    expected = twins.block_values(base, theta, blocks, codes)
-    assert base.block_values(theta, blocks, codes) == pytest.approx(expected, rel=0, abs=1e-12)
+    indices = rng.integers(N_ACTIONS**N_AGENTS, size=90)
+    expected = reference.block_values(base, theta, blocks, indices)
+    assert base.block_values(theta, blocks, indices) == pytest.approx(expected, rel=0, abs=1e-12)
     # Whatever the shape, the other kernels agree.
     none = np.zeros(0, dtype=np.int64)
-    tried = kernels.Tried(codes[:, None], none, none)
+    tried = kernels.Tried(indices[:, None], none, none)
     kinds = [kernels.enumerate_dense]
     if base.compact:
         kinds += [kernels.enumerate_looked_up, kernels.enumerate_contracted]
@@ -105,37 +105,39 @@ def test_block_values(base: RuleBase, rng: np.random.Generator) -> None:
 @pytest.mark.parametrize("agent", [0, 1, 3])
 def test_enumerate(base: RuleBase, rng: np.random.Generator, agent: int, averaged: bool) -> None:
     theta, blocks = rng.normal(size=base.n_rules), blocks_of(rng, base.n_own)
-    joint, chances = rng.integers(N_ACTIONS, size=N_AGENTS), rng.random((N_AGENTS, N_ACTIONS))
+    joint, probabilities = rng.integers(N_ACTIONS, size=N_AGENTS), rng.random((N_AGENTS, N_ACTIONS))
     below = np.arange(agent + 1, N_AGENTS)
     grid = np.indices((N_ACTIONS,) * (1 + len(below))).reshape(1 + len(below), -1)
     every = np.tile(joint[:, None], grid.shape[1])
     every[agent:] = grid
     places = N_ACTIONS ** np.arange(N_AGENTS - 1, -1, -1)
-    values = twins.block_values(base, theta, blocks, places @ every).reshape(N_ACTIONS, -1)
+    values = reference.block_values(base, theta, blocks, places @ every).reshape(N_ACTIONS, -1)
     given = np.where(np.arange(N_AGENTS) < agent, places, 0)
-    codes = (places[agent:] @ grid).reshape(N_ACTIONS, -1)
-    tried = kernels.Tried(codes, given, below)
+    indices = (places[agent:] @ grid).reshape(N_ACTIONS, -1)
+    tried = kernels.Tried(indices, given, below)
     expected = values.max(axis=1)
     if averaged:
         weights = np.ones(1)
         for one in below:
-            weights = np.multiply.outer(weights, chances[one]).ravel()
+            weights = np.multiply.outer(weights, probabilities[one]).ravel()
         expected = values @ (weights / weights.sum())
-    found = base.enumerate(theta, blocks, tried, joint, chances if averaged else np.zeros((0, 0)))
+    found = base.enumerate(
+        theta, blocks, tried, joint, probabilities if averaged else np.zeros((0, 0))
+    )
     assert found == pytest.approx(expected, rel=0, abs=1e-12)
     assert not base.enumerate(0.0 * theta, blocks, tried, joint, np.zeros((0, 0))).any()
 
 
 def test_td_update(base: RuleBase, rng: np.random.Generator) -> None:
     theta, trace = rng.normal(size=(2, 3, base.n_rules))
-    theta_twin, trace_twin = theta.copy(), trace.copy()
+    theta_expected, trace_expected = theta.copy(), trace.copy()
     reach = np.full((3, base.n_parts), 5.0)
     for _ in range(60):
         states, steps = states_of(rng, 3), 0.1 * rng.normal(size=3)
-        kernels.td_update(theta, trace, reach, states, steps, 0.38, base.layout)
-        twins.td_update(base, theta_twin, trace_twin, states, steps, 0.38)
-    assert trace == pytest.approx(trace_twin, rel=0, abs=1e-12)
-    assert theta == pytest.approx(theta_twin, rel=0, abs=1e-12)
+        kernels.td_update(theta, ROWS, trace, reach, states, steps, 0.38, base.layout)
+        reference.td_update(base, theta_expected, trace_expected, states, steps, 0.38)
+    assert trace == pytest.approx(trace_expected, rel=0, abs=1e-12)
+    assert theta == pytest.approx(theta_expected, rel=0, abs=1e-12)
 
 
 @pytest.mark.parametrize("discount", [0.95, 0.0])
@@ -143,18 +145,21 @@ def test_td_updates_with_their_errors(
     base: RuleBase, rng: np.random.Generator, discount: float
 ) -> None:
     theta, trace = rng.normal(size=(2, 3, base.n_rules))
-    theta_twin, trace_twin, lengths = theta.copy(), trace.copy(), np.array([1.0, 2.0, 0.5])
+    theta_expected, trace_expected, lengths = theta.copy(), trace.copy(), np.array([1.0, 2.0, 0.5])
+    rewards = np.array([-0.3, 0.0, 0.7])
     reach = np.full((3, base.n_parts), 5.0)
     for _ in range(5):
         states, entered = states_of(rng, 6).reshape(2, 3, -1)
         now, ahead = (
-            np.einsum("ij,ij->i", base.features(met), theta_twin) for met in (states, entered)
+            np.einsum("ij,ij->i", base.features(met), theta_expected) for met in (states, entered)
         )
-        base.td_update(theta, trace, reach, states, entered, -0.3, discount, 0.1, lengths, 0.38)
-        steps = 0.1 * (-0.3 + discount * ahead - now) / lengths
-        twins.td_update(base, theta_twin, trace_twin, states, steps, 0.38)
-    assert trace == pytest.approx(trace_twin, rel=0, abs=1e-12)
-    assert theta == pytest.approx(theta_twin, rel=0, abs=1e-12)
+        base.td_update(
+            theta, ROWS, trace, reach, states, entered, rewards, discount, 0.1, lengths, 0.38
+        )
+        steps = 0.1 * (rewards + discount * ahead - now) / lengths
+        reference.td_update(base, theta_expected, trace_expected, states, steps, 0.38)
+    assert trace == pytest.approx(trace_expected, rel=0, abs=1e-12)
+    assert theta == pytest.approx(theta_expected, rel=0, abs=1e-12)
 
 
 def test_strengths_of_many(base: RuleBase, rng: np.random.Generator) -> None:
@@ -193,14 +198,14 @@ def test_each(base: RuleBase, rng: np.random.Generator, count: int) -> None:
 
 def test_single_precision(base: RuleBase, rng: np.random.Generator) -> None:
     theta, trace = rng.normal(size=(2, 3, base.n_rules)).astype(np.float32)
-    blocks, codes = blocks_of(rng, base.n_own), rng.integers(N_ACTIONS**N_AGENTS, size=50)
+    blocks, indices = blocks_of(rng, base.n_own), rng.integers(N_ACTIONS**N_AGENTS, size=50)
     states, steps = states_of(rng, 3), 0.1 * rng.normal(size=3)
     wide = theta.astype(float), trace.astype(float)
     scale = float(np.abs(theta).max())
     for found, expected in (
         (
-            base.block_values(theta[0], blocks, codes),
-            twins.block_values(base, wide[0][0], blocks, codes),
+            base.block_values(theta[0], blocks, indices),
+            reference.block_values(base, wide[0][0], blocks, indices),
         ),
         (
             base.each(theta, states[:, None])[:, 0],
@@ -209,8 +214,8 @@ def test_single_precision(base: RuleBase, rng: np.random.Generator) -> None:
     ):
         assert found == pytest.approx(expected, rel=1e-5, abs=1e-5 * scale)
     reach = np.full((3, base.n_parts), 5.0)
-    kernels.td_update(theta, trace, reach, states, steps, 0.38, base.layout)
-    twins.td_update(base, *wide, states, steps, 0.38)
+    kernels.td_update(theta, ROWS, trace, reach, states, steps, 0.38, base.layout)
+    reference.td_update(base, *wide, states, steps, 0.38)
     assert theta.dtype == trace.dtype == np.float32
     assert trace == pytest.approx(wide[1], rel=1e-5, abs=1e-5)
     assert theta == pytest.approx(wide[0], rel=1e-5, abs=1e-5)
@@ -220,9 +225,9 @@ def test_block_values_agree_with_values_of_the_states(
     base: RuleBase, rng: np.random.Generator
 ) -> None:
     theta, blocks = rng.normal(size=base.n_rules), blocks_of(rng, base.n_own)
-    codes = np.arange(N_ACTIONS**N_AGENTS)
-    expected = base.values(theta, blocks.states(codes))
-    assert base.block_values(theta, blocks, codes) == pytest.approx(expected, rel=0, abs=1e-12)
+    indices = np.arange(N_ACTIONS**N_AGENTS)
+    expected = base.values(theta, blocks.states(indices))
+    assert base.block_values(theta, blocks, indices) == pytest.approx(expected, rel=0, abs=1e-12)
 
 
 def test_a_states_array_in_any_memory_order(base: RuleBase, rng: np.random.Generator) -> None:
@@ -243,28 +248,52 @@ def test_the_papers_78125_rules(membership: str, rng: np.random.Generator) -> No
     assert base.each(theta[None], states[None])[0] == pytest.approx(expected, rel=0, abs=1e-12)
     states = np.tile(states, (6, 1))
     states[:, 4:] += 0.01 * rng.normal(size=(24, 3))  # a few own blocks, shared ones near by
-    expected = twins.values(base, theta, states)
+    expected = reference.values(base, theta, states)
     assert base.values(theta, states) == pytest.approx(expected, rel=0, abs=1e-12)
     for size in (1, 2, 3, 24):
-        blocks, codes = blocks_of(rng, 4, 7), rng.integers(N_ACTIONS**N_AGENTS, size=size)
+        blocks, indices = blocks_of(rng, 4, 7), rng.integers(N_ACTIONS**N_AGENTS, size=size)
         blocks.own[:, 3] = rng.choice([0.1, 0.5, 0.52, 0.9], len(blocks.own))  # levels shared
-        expected = twins.block_values(base, theta, blocks, codes)
-        found = base.block_values(theta, blocks, codes)
+        expected = reference.block_values(base, theta, blocks, indices)
+        found = base.block_values(theta, blocks, indices)
         assert found == pytest.approx(expected, rel=0, abs=1e-12)
 
     theta, trace = rng.normal(size=(2, 2, base.n_rules))
-    theta_twin, trace_twin = theta.copy(), trace.copy()
+    theta_expected, trace_expected = theta.copy(), trace.copy()
     steps = np.array([0.01, -0.02])
     reach = np.full((2, base.n_parts), 5.0)
-    kernels.td_update(theta, trace, reach, states[:2], steps, 0.3996, base.layout)
-    twins.td_update(base, theta_twin, trace_twin, states[:2], steps, 0.3996)
-    assert np.abs(trace - trace_twin).max() <= 1e-12
-    assert np.abs(theta - theta_twin).max() <= 1e-12
+    kernels.td_update(theta, ROWS[:2], trace, reach, states[:2], steps, 0.3996, base.layout)
+    reference.td_update(base, theta_expected, trace_expected, states[:2], steps, 0.3996)
+    assert np.abs(trace - trace_expected).max() <= 1e-12
+    assert np.abs(theta - theta_expected).max() <= 1e-12
 
 
 def test_add_features(base: RuleBase, rng: np.random.Generator) -> None:
     target, states = rng.normal(size=(3, base.n_rules)), states_of(rng, 3)
     weights = rng.normal(size=3)
     expected = target + weights[:, None] * base.features(states)
-    kernels.add_features(target, states, weights, base.layout)
+    kernels.add_features(target, ROWS, states, weights, base.layout)
     assert target == pytest.approx(expected, rel=0, abs=1e-12)
+
+
+def test_agents_of_one_row_change_it_in_turn(base: RuleBase, rng: np.random.Generator) -> None:
+    rows, discount = np.array([1, 0, 1]), 0.95
+    theta, trace = rng.normal(size=(2, base.n_rules)), np.zeros((3, base.n_rules))
+    expected, trace_expected = theta.copy(), trace.copy()
+    reach, lengths, rewards = np.zeros((3, base.n_parts)), np.ones(3), rng.normal(size=3)
+    for _ in range(4):
+        states, entered = states_of(rng, 6).reshape(2, 3, -1)
+        base.td_update(
+            theta, rows, trace, reach, states, entered, rewards, discount, 0.1, lengths, 0.38
+        )
+        for i, row in enumerate(rows):
+            one = slice(i, i + 1)
+            f = reference.values(base, expected[row], np.stack([states[i], entered[i]]))
+            steps = np.array([0.1 * (rewards[i] + discount * f[1] - f[0])])
+            reference.td_update(
+                base, expected[row : row + 1], trace_expected[one], states[one], steps, 0.38
+            )
+    assert theta == pytest.approx(expected, rel=0, abs=1e-12)
+    target, weights = theta.copy(), rng.normal(size=3)
+    kernels.add_features(target, rows, states, weights, base.layout)
+    np.add.at(theta, rows, weights[:, None] * base.features(states))
+    assert target == pytest.approx(theta, rel=0, abs=1e-12)

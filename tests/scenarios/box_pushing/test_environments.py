@@ -23,8 +23,12 @@ from nested_agents.scenarios.box_pushing.pictures.rendering import SIDES
 PARALLEL = [WheelsEnv, RobotsEnv]
 SETTINGS = [
     BoxPushingSettings(action_repeat=2),
-    BoxPushingSettings(robots=3, robot="three-wheel", start="hard", state_space="paper", action_repeat=2),
-    BoxPushingSettings(failures=(SeizedSettings(wheels=("robot1.*",), episode=1),), action_repeat=2),
+    BoxPushingSettings(
+        robots=3, robot="three-wheel", start="hard", state_space="paper", action_repeat=2
+    ),
+    BoxPushingSettings(
+        failures=(SeizedSettings(wheels=("robot1.*",), episode=1),), action_repeat=2
+    ),
 ]
 
 

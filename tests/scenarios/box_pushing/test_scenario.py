@@ -1,12 +1,17 @@
 """The box-pushing scenario: episodes, their ends, and any number of robots."""
 
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from nested_agents.core.loop import control_loop, policy_seed
+from nested_agents.core.protocols import DrawnScenario, ExactlyPredictedScenario, measures_of
 from nested_agents.core.settings import BatchTDSettings, Decision, SelfModelSettings
 from nested_agents.core.team import Team
-from nested_agents.scenarios import BoxPushing, BoxPushingSettings
+from nested_agents.scenarios import SCENARIOS, BoxPushing, BoxPushingSettings
 from nested_agents.topologies import build, parse
 
 
@@ -84,3 +89,46 @@ def test_a_team_finds_out_that_a_wheel_has_seized() -> None:
     found, nominal = team.self_model.effects[0][0, :4], scenario.nominal_effects[0][0, :4]
     assert abs(found[0]) < 0.3 * nominal[0]
     assert (found[1:] > 0.5 * nominal[1:]).all()
+
+
+def test_it_is_registered_and_its_settings_need_no_physics() -> None:
+    assert SCENARIOS.model("box-pushing") is BoxPushingSettings
+    assert isinstance(SCENARIOS.parsed("box-pushing").build(), BoxPushing)
+    code = "import sys, nested_agents.scenarios.box_pushing.config\n"
+    code += "assert not {'numba', 'Box2D', 'shapely', 'scipy'} & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_what_an_episode_is_told_by() -> None:
+    scenario = with_box_at(0.97, BoxPushingSettings())
+    assert [measure.name for measure in measures_of(scenario)] == [
+        "success", "stopped_at_goal", "final_distance_m", "final_orientation_rad",
+        "contact_fraction",
+    ]  # fmt: skip
+    assert not scenario.measure()["stopped_at_goal"]
+    scenario = with_box_at(0.7, BoxPushingSettings())
+    info = scenario.step(np.full(4, 3)).info
+    assert info["stopped_at_goal"] is False
+    assert info["orientation_error_rad"] == abs(info["orientation_rad"])
+    assert info["contact_fraction"] == np.mean(info["contact_time"])
+
+
+def test_the_role_of_an_agent_is_its_wheel() -> None:
+    assert BoxPushing(BoxPushingSettings()).roles == ("left", "right", "left", "right")
+
+
+def test_it_can_be_recorded_drawn_and_predicted_exactly(tmp_path: Path) -> None:
+    scenario = BoxPushing(BoxPushingSettings(hold=4, belief={"load": 2.0}))
+    assert isinstance(scenario, DrawnScenario)
+    assert isinstance(scenario, ExactlyPredictedScenario)
+    exact = scenario.with_exact_prediction().settings
+    assert (exact.predictor, exact.lookahead, exact.hold) == ("exact", 4, 4)
+    assert BoxPushingSettings.model_validate(exact.model_dump()) == exact
+    scenario.reset(0)
+    frames = [scenario.measure(), scenario.step(np.zeros(4, int)).info]
+    recording = {name: np.stack([f[name] for f in frames]) for name in scenario.recorded}
+    constants = scenario.constants_of_episode()
+    assert set(constants) == {"goal_pose", "dt", "robot", "box", "infrared"}
+    recording |= {name: np.array(value) for name, value in constants.items()}
+    scenario.animate(recording, tmp_path / "episode.gif")
+    assert (tmp_path / "episode.gif").stat().st_size > 1000

@@ -4,24 +4,29 @@ import random
 import re
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from nested_agents.core.protocols import Blocks, Scenario
+from nested_agents import View, state_variable
+from nested_agents.core.protocols import SUCCESS, Blocks, Measure, Scenario, Transition
 from nested_agents.core.robot_agents import per_robot
 from nested_agents.core.single_agent import SingleAgent
-from nested_agents.core.spaces import StateSpace
+from nested_agents.core.spaces import ActionSet, StateSpace, Variable
 from nested_agents.scenarios import BoxPushing, BoxPushingSettings
 from nested_agents.scenarios.box_pushing.config import (
     DelayedSettings,
     NoisySettings,
     SeizedSettings,
 )
+from nested_agents.scenarios.box_pushing.states.variables import StateVariable
 from nested_agents.scenarios.checking.checker import CHECKS, ScenarioError, check_scenario
+from nested_agents.scenarios.checking.frames import random_actions
 from nested_agents.scenarios.checking.predictions import fault_of_prediction
+from nested_agents.scenarios.checking.sensing import fault_of_exact
 from nested_agents.scenarios.line_up import LEAD, LineUp, LineUpPrediction, LineUpSettings
 from nested_agents.studies.cli.main import main
 
@@ -55,6 +60,47 @@ def test_sound_scenarios_pass(factory: Callable[[], Scenario]) -> None:
 
 def test_a_made_up_scenario_passes(line_world: Any) -> None:
     assert check_scenario(lambda: line_world(2, 2)) == tuple(CHECKS)
+
+
+class Bare:
+    """A scenario with nothing but what it must have, and a reward for each agent."""
+
+    agents = ("a", "b")
+    action_set = ActionSet()
+    state_space = StateSpace("bare", (Variable("place", "m", -9.0, 9.0),))
+
+    def reset(self, seed: Any, episode: int = 0) -> Any:
+        self.places = np.random.default_rng(seed).normal(size=(2, 1))
+        return self.places
+
+    def step(self, joint_action: Any) -> Transition:
+        self.places = self.after(joint_action)
+        return Transition(self.places, self.places[:, 0], False, False, {})
+
+    def after(self, joint_action: Any) -> Any:
+        return self.places + 0.1 * joint_action[..., None]
+
+    def predict(self) -> Any:
+        return BarePrediction(self.places)
+
+
+class BarePrediction:
+    def __init__(self, places: Any) -> None:
+        self.places = places
+
+    def states(self, agent: int, joint_actions: Any) -> Any:
+        return self.places[agent] + 0.1 * joint_actions[:, agent, None]
+
+
+def test_what_a_scenario_need_not_have_is_not_asked_for() -> None:
+    assert check_scenario(Bare) == tuple(CHECKS)
+
+
+def test_a_variable_with_a_hidden_state_is_sensed_otherwise_than_predicted() -> None:
+    scenario: Any = perceiving(stale)()
+    actions = random_actions(scenario, 5, 0)
+    fault = fault_of_exact(scenario.with_exact_prediction(), 0, 0, actions)
+    assert re.match(r"stale of agent \d is \d, predicted \d, at step 1 of seed 0", fault or "")
 
 
 # The faults, each a small change of a sound scenario.
@@ -217,7 +263,51 @@ def rowed(**changes: Any) -> Callable[[], Scenario]:
     return tables(lambda blocks: replace(blocks, **changes))
 
 
+def declared(**members: Any) -> Callable[[], Scenario]:
+    """Return a factory of line-ups that declare other members."""
+
+    def changed(self: Any, *args: Any) -> None:
+        LineUp.__init__(self, LineUpSettings())
+        for name, value in members.items():
+            setattr(self, name, value)
+
+    return line(__init__=changed)
+
+
+def off_by(distance: float, *, together: bool = False) -> Callable[[], Scenario]:
+    """Return a factory of line-ups that predict other places, of all agents at once or of each."""
+
+    class Changed(LineUpPrediction):
+        def states_of_all(self, joint_actions: Any) -> Any:
+            return super().states_of_all(joint_actions) + (distance if together else 0.0)
+
+    def predict(self: Any) -> Any:
+        return Changed(LineUp.predict(self)._places + (0.0 if together else distance))
+
+    return line(predict=predict)
+
+
+@state_variable("m", 0.0, 1.1)
+def per_period(view: View, robot: int) -> Any:
+    """Mean something else where several periods are looked ahead."""
+    return view.distance / view.periods
+
+
+times = count()
+
+
+@state_variable("1", 0.0, 1000.0)
+def stale(view: View, robot: int) -> Any:
+    """Depend on how often it was asked for."""
+    return np.full(len(view.box), float(next(times) % 7))
+
+
+def perceiving(variable: StateVariable) -> Callable[[], Scenario]:
+    return BoxPushingSettings(robots=1, state_space=("gap", variable)).build  # type: ignore[arg-type]
+
+
 BLOCKS = "predictions: blocks of agent 1: "
+SENSED = "sensed and predicted: "
 
 FAULTS: dict[str, tuple[Callable[[], Scenario], str]] = {
     "late noise": (line(step=late_noise), r"equal seeds: two runs with seed 0 differ at step 2"),
@@ -294,6 +384,30 @@ FAULTS: dict[str, tuple[Callable[[], Scenario], str]] = {
     "listed own": (rowed(own=[[0.0]]), BLOCKS + "own is list, must be an array of floats"),
     "flat own": (rowed(own=np.zeros(4)), BLOCKS + r"own of shape \(4,\), must have 2 axes"),
     "NaN own": (rowed(own=np.full((4, 1), np.nan)), BLOCKS + "own is not finite"),
+    "equal measures": (declared(measures=(SUCCESS, SUCCESS)), "measures: names .* distinct"),
+    "no source": (
+        declared(measures=(Measure("speed", "speed", source="velocity"),)),
+        "measures: speed: info has no 'velocity', it has: places, distance_m,",
+    ),
+    "many numbers": (
+        declared(measures=(Measure("where", "place", source="places"),)),
+        "measures: where: info.'places'. must be one number",
+    ),
+    "nothing to record": (declared(recorded=("speeds",)), "measures: recorded is 'speeds', which"),
+    "few roles": (declared(roles=("cart",)), "form: roles .* one for each of the 2 agents"),
+    "predicted elsewhere": (
+        off_by(1e-3),
+        SENSED + r"distance of agent 0 is \S+, predicted \S+, at step 1 of seed 0",
+    ),
+    "all together elsewhere": (
+        off_by(1e-3, together=True),
+        "predictions: states_of_all and states differ in distance of agent 0",
+    ),
+    "several periods": (
+        perceiving(per_period),
+        SENSED + r"per_period of agent 0 is \S+, predicted \S+, at step 1 of seed 0, at rest",
+    ),
+    "hidden state": (perceiving(stale), "equal seeds: two runs with seed 0 differ"),
     "no scenario": (lambda: object(), "form: object lacks agents, .*predict"),  # type: ignore[dict-item,return-value]
 }
 

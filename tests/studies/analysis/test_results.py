@@ -3,14 +3,14 @@
 from dataclasses import replace
 from pathlib import Path
 
-from made_up import SPEC, TRIALS, measure
+from made_up import MEASURES, SPEC, TRIALS, measure
 
 from nested_agents.studies.analysis.results import read
 from nested_agents.studies.store.store import Store
 
 
 def test_phases_numbers_and_usage_are_read_by_condition(tmp_path: Path) -> None:
-    with Store.create(tmp_path / "study", SPEC) as store:
+    with Store.create(tmp_path / "study", SPEC, MEASURES) as store:
         for trial in TRIALS[:-1]:
             result = measure(trial)
             further = tuple(

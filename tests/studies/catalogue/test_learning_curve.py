@@ -3,18 +3,20 @@ import io
 import numpy as np
 import pytest
 
-from nested_agents.studies.analysis.results import MEASURES, Results
+from nested_agents.core.protocols import SUCCESS, Measure
+from nested_agents.scenarios.box_pushing.scenario import MEASURES
+from nested_agents.studies.analysis.results import Results
 from nested_agents.studies.analysis.statistics import Estimate
 from nested_agents.studies.analysis.summary import interval, two_figures
 from nested_agents.studies.catalogue.learning_curve import draw
-from nested_agents.studies.catalogue.learning_curve.analysis import METRICS, analyse
+from nested_agents.studies.catalogue.learning_curve.analysis import analyse, metrics_of
 from nested_agents.studies.presentation.figures import save
-from nested_agents.studies.presentation.row_formats import TITLES, write_rows
-from nested_agents.studies.trials.episodes import COLUMNS
+from nested_agents.studies.presentation.row_formats import write_rows
 
 
 def arrays(seeds, episodes, success):
-    values = {name: np.tile(np.arange(episodes, dtype=float), (seeds, 1)) for name in MEASURES}
+    names = ("steps", *(measure.name for measure in MEASURES))
+    values = {name: np.tile(np.arange(episodes, dtype=float), (seeds, 1)) for name in names}
     success = np.broadcast_to(success, (seeds, episodes)).astype(int)
     return values | {"success": success, "stopped_at_goal": success}
 
@@ -23,7 +25,7 @@ def made_up(seeds=4, episodes=12):
     learns = arrays(seeds, episodes, np.arange(episodes) >= 6)
     never = arrays(seeds, episodes, 0)
     greedy = {"learns": arrays(seeds, 3, 1), "never": arrays(seeds, 3, 0)}
-    return Results({"learns": learns, "never": never}, greedy)
+    return Results({"learns": learns, "never": never}, greedy, measures=MEASURES)
 
 
 def test_the_table_takes_the_ends_of_training_and_the_evaluation():
@@ -32,10 +34,14 @@ def test_the_table_takes_the_ends_of_training_and_the_evaluation():
     values = {title: float(e.value) for title, e in learns.estimates.items()}
     assert values["success first 5"] == 0.0
     assert values["success last 5"] == 1.0
-    assert values["success greedy"] == 1.0
-    assert values["distance [m]"] == np.mean([7, 8, 9, 10, 11])
+    assert values["evaluation success"] == 1.0
+    assert values["final distance [m]"] == np.mean([7, 8, 9, 10, 11])
     assert float(never.estimates["success last 5"].value) == 0.0
-    assert list(learns.estimates) == [metric.title for metric in METRICS]
+    assert list(learns.estimates) == [
+        "success first 5", "success last 5", "evaluation success", "stopped at goal, evaluation",
+        "evaluation steps", "final distance [m]", "final orientation error [rad]",
+        "time in contact",
+    ]  # fmt: skip
 
 
 def test_curves_have_a_point_for_every_episode():
@@ -46,9 +52,9 @@ def test_curves_have_a_point_for_every_episode():
 
 
 def test_few_episodes_no_evaluation_and_one_seed_are_no_trouble(tmp_path):
-    results = Results({"alone": arrays(1, 2, 1)}, {})
+    results = Results({"alone": arrays(1, 2, 1)}, {}, measures=MEASURES)
     analysis = analyse(results)
-    assert "success greedy" not in analysis.table[0].estimates
+    assert "evaluation success" not in analysis.table[0].estimates
     assert np.isnan(analysis.curves["alone"]["success"].low).all()
     assert len(save(draw(analysis), tmp_path)) == 2
 
@@ -86,9 +92,24 @@ def test_an_unknown_interval_is_a_dash():
 def test_no_rows_are_still_a_table(form):
     expected = {"table": "seed  return\n", "csv": "seed,return\n", "json": "[]\n"}
     file = io.StringIO()
-    write_rows(["seed", "return"], [], form, file)
+    write_rows(["seed", "return"], [], [], form, file)
     assert file.getvalue() == expected[form]
 
 
-def test_the_table_of_rows_has_a_title_for_every_measure():
-    assert list(TITLES) == ["seed", *COLUMNS[1:]]
+@pytest.mark.parametrize("further", range(6))
+def test_there_is_a_panel_for_every_number(further, tmp_path):
+    numbers = [Measure(f"x{k}", f"quantity {k}", "m") for k in range(further)]
+    measures = (SUCCESS, *numbers, Measure("calm", "calm", is_rate=True))
+    training = {"only": {m.name: np.ones((2, 3)) for m in measures}}
+    analysis = analyse(Results(training, {}, measures=measures))
+    assert [m.name for m in analysis.followed] == ["success", *(m.name for m in numbers)]
+    figure = draw(analysis)["learning-curves"]
+    shown = [axes for axes in figure.axes if axes.get_visible()]
+    assert [axes.get_title(loc="left") for axes in shown] == [m.heading for m in analysis.followed]
+    assert sum(bool(axes.get_xlabel()) for axes in shown) == min(2, len(shown))
+
+
+def test_success_alone_makes_a_table():
+    assert [metric.title for metric in metrics_of((SUCCESS,))] == [
+        "success first 5", "success last 5", "evaluation success", "evaluation steps",
+    ]  # fmt: skip

@@ -5,12 +5,12 @@ from made_up_results import shapes
 
 from nested_agents.studies.analysis.results import Results
 from nested_agents.studies.catalogue.shapes import analysis as module
-from nested_agents.studies.catalogue.shapes import draw
+from nested_agents.studies.catalogue.shapes import check, draw
 from nested_agents.studies.catalogue.shapes.analysis import analyse, least_ratio, measure
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.trial import check, run_trial, trials_of
+from nested_agents.studies.trials.trial import run_trial, trials_of
 
 CHANCES = {"circle": 0.95, "hexagon": 0.9, "L": 0.3}
 

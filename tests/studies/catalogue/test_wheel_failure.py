@@ -7,7 +7,7 @@ from made_up_results import wheel_failure
 
 from nested_agents.studies.analysis.results import Results
 from nested_agents.studies.catalogue.wheel_failure import analysis as module
-from nested_agents.studies.catalogue.wheel_failure import draw
+from nested_agents.studies.catalogue.wheel_failure import check, draw
 from nested_agents.studies.catalogue.wheel_failure.analysis import (
     KEPT,
     Course,
@@ -17,7 +17,7 @@ from nested_agents.studies.catalogue.wheel_failure.analysis import (
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.trial import Session, check, run_trial, trials_of
+from nested_agents.studies.trials.trial import Session, run_trial, trials_of
 
 ENDS = {
     "4 wheels, seized": {"nothing": 0.05, "weights": 0.4, "self-model": 0.7, "both": 0.95},

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from made_up_results import ablation, arrays, scaling, shapes, wheel_failure
 
+from nested_agents.scenarios.box_pushing.scenario import MEASURES
 from nested_agents.studies import STUDIES
 from nested_agents.studies.analysis import published
 from nested_agents.studies.analysis.results import Results
@@ -20,7 +21,8 @@ from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.trial import check
 
-ROOT = Path(claims.__file__).parent
+QUICK = Path(claims.__file__).parent / "quick"
+CATALOGUE = QUICK.parents[1] / "catalogue"
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "claims.md"
 
 
@@ -57,7 +59,8 @@ def curves(default: float, paper: float, greedy: float) -> Results:
     training["default"]["contact_fraction"][:, :5] -= 0.5 * default - 0.3
     evaluation = {c: arrays(chance[-5:], rng) for c, chance in chances.items()}
     phases = {"training": training, "evaluation": evaluation}
-    return Results(training, evaluation, phases, dict.fromkeys(chances, tuple(range(20))))
+    seeds = dict.fromkeys(chances, tuple(range(20)))
+    return Results(training, evaluation, phases, seeds, measures=MEASURES)
 
 
 def orders(chances: list[float]) -> Results:
@@ -110,10 +113,16 @@ def test_few_seeds_decide_nothing() -> None:
     assert finding.verdict == "not decided"
 
 
+def spec_of(study: str, folder: Path | None = None) -> Spec:
+    """The spec of a study as it comes with it, or as it stands in a folder."""
+    name = STUDIES[study].rpartition(".")[2]
+    return Spec.load((folder or CATALOGUE / name) / f"{name}.toml")
+
+
 def test_claims_name_studies_and_conditions_that_their_specs_have() -> None:
     for study in claims.STUDIES_OF_CLAIMS:
-        for folder in (ROOT, ROOT / "quick"):
-            spec = Spec.load(folder / f"{STUDIES[study]}.toml")
+        for folder in (None, QUICK):
+            spec = spec_of(study, folder)
             assert spec.study == study
             labels = {condition.label for condition in spec.conditions()}
             wanted = {
@@ -122,14 +131,14 @@ def test_claims_name_studies_and_conditions_that_their_specs_have() -> None:
                 "wheel-failure": {f"{f}, enabled={e}" for f in FAULTS for e in ("true", "false")},
             }.get(study, set())
             assert wanted <= labels
-            if folder.name == "quick":
+            if folder is QUICK:
                 check(spec)
 
 
 def test_published_results_give_the_table_that_the_run_gave() -> None:
     results = everything(good=True)
     again = {
-        study: published.loads(published.dumps(Spec.load(ROOT / f"{STUDIES[study]}.toml"), found))
+        study: published.loads(published.dumps(spec_of(study), found))
         for study, found in results.items()
     }
     assert [p.spec.study for p in again.values()] == list(results)
@@ -153,9 +162,9 @@ def test_results_of_another_version_are_told(tmp_path: Path, capsys, monkeypatch
     old = claims.PUBLISHED / "chain-order.json"
     monkeypatch.setattr(published, "RESULTS_VERSION", 99)
     assert main(["table", str(old)]) == 0
-    assert "chain-order.json: results of version 3, this is version 99" in capsys.readouterr().err
+    assert "chain-order.json: results of version 4, this is version 99" in capsys.readouterr().err
     assert main(["claims", "--format", "markdown"]) == 0
-    assert "chain-order: results of version 3, this is version 99" in capsys.readouterr().err
+    assert "chain-order: results of version 4, this is version 99" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

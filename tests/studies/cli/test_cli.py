@@ -23,7 +23,6 @@ from nested_agents.studies.cli.running import run_and_show
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.spec.toml import dumps
 from nested_agents.studies.store.store import DATABASE
-from nested_agents.studies.trials.trial import measures_of_spec
 
 PROGRAM = Path(made_up.__file__).with_name("made_up_cli.py")
 
@@ -33,7 +32,7 @@ def run_here(measure, *arguments):
     out, err = io.StringIO(), io.StringIO()
     with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
         patch.setattr(learning_curve, "measure", measure)
-        patch.setattr(studies_run, "check", measures_of_spec)
+        patch.setattr(studies_run, "check", lambda spec: made_up.MEASURES)
         patch.setenv("COLUMNS", "80")
         status = main([str(argument) for argument in arguments])
     return status, out.getvalue(), err.getvalue()
@@ -238,7 +237,7 @@ def test_a_replay_of_the_first_and_the_last_episode_is_drawn_once(tmp_path, monk
         sys.modules, "nested_agents.scenarios.box_pushing.pictures.rendering", rendering
     )
     monkeypatch.setattr(learning_curve, "measure", made_up.measure)
-    monkeypatch.setattr(studies_run, "check", measures_of_spec)
+    monkeypatch.setattr(studies_run, "check", lambda spec: made_up.MEASURES)
     for _ in range(2):
         assert run_and_show(made_up.SPEC, tmp_path, jobs=2, replay=True) == 0
     assert len(drawn) == 2

@@ -5,6 +5,7 @@ import sqlite3
 import numpy as np
 import pytest
 
+from nested_agents.scenarios.box_pushing.scenario import MEASURES
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.explain import policy as explain_policy
 from nested_agents.studies.explain import team as explain
@@ -39,7 +40,7 @@ SPEC = Spec.of(
 def study(tmp_path_factory):
     """Finished are all conditions but the last."""
     directory = tmp_path_factory.mktemp("study") / "out"
-    with Store.create(directory, SPEC) as store:
+    with Store.create(directory, SPEC, MEASURES) as store:
         for trial in trials_of(SPEC)[:3]:
             store.save(trial, run_trial(trial), 1.0)
     return directory
@@ -136,7 +137,7 @@ def test_a_topology_file_that_has_changed_since(tmp_path, capsys):
     file.write_text("def mine(agents, groups): return list(zip(agents, agents[1:]))")
     spec = Spec.of({"seeds": [3], "episodes": 1, "steps": 1, "topology": f"{file}:mine"})
     (trial,) = trials_of(spec)
-    with Store.create(tmp_path / "out", spec) as store:
+    with Store.create(tmp_path / "out", spec, MEASURES) as store:
         store.save(trial, run_trial(trial), 1.0)
     file.write_text("def mine(agents, groups): return []")
     status, said = run(capsys, tmp_path / "out")
@@ -149,7 +150,7 @@ def test_an_agent_for_each_robot(tmp_path, capsys):
     one = {"overrides": (), "topology": {"kind": "per-robot"}, "evaluation": 0, "episodes": 2}
     spec = Spec.of({**SPEC.table(), **one})
     (trial,) = trials_of(spec)
-    with Store.create(tmp_path, spec) as store:
+    with Store.create(tmp_path, spec, MEASURES) as store:
         store.save(trial, run_trial(trial), 1.0)
     status, said = run(capsys, tmp_path)
     assert status == 0

@@ -22,7 +22,7 @@ def study(tmp_path_factory):
     """Seven trials that are done, one that failed."""
     directory = tmp_path_factory.mktemp("study") / "out"
     *done, last = trials_of(SPEC)
-    with Store.create(directory, SPEC) as store:
+    with Store.create(directory, SPEC, made_up.MEASURES) as store:
         for trial in done:
             result = made_up.measure(trial)
             result.numbers["messages"] = trial.seed + 0.5
@@ -122,17 +122,21 @@ def test_a_file_in_the_way_of_the_folder_is_one_line(study, tmp_path, capsys):
 
 
 def test_json_gives_the_table_that_the_study_gives(study, tmp_path, capsys):
-    columns = ["--columns", "success greedy", "contact"]
+    columns = ["--columns", "evaluation success", "time in contact"]
     assert main(["table", str(study), "--format", "markdown", *columns]) == 0
     of_study = capsys.readouterr().out
-    assert of_study.startswith("| condition | seeds | success greedy | contact |\n| --- |")
+    assert of_study.startswith(
+        "| condition | seeds | evaluation success | time in contact |\n| --- |"
+    )
     assert main(["export", str(study), "--out", str(tmp_path), "--format", "json"]) == 0
     path = Path(capsys.readouterr().out.strip())
     assert path == tmp_path / "results.json"
     assert main(["table", str(path), "--format", "markdown", *columns]) == 0
     assert capsys.readouterr().out == of_study
+    assert main(["table", str(study)]) == 0
+    of_study = capsys.readouterr().out
     assert main(["table", str(path)]) == 0
-    assert "distance" not in capsys.readouterr().out
+    assert capsys.readouterr().out == of_study
 
 
 @pytest.mark.parametrize("form", ["table", "latex", "csv"])

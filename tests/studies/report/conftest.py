@@ -1,5 +1,6 @@
 """A study with recordings that can be drawn, kept in a store without any simulation."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import made_up
@@ -49,12 +50,12 @@ def recording(steps: int = STEPS) -> dict[str, np.ndarray]:
 
 def keep(directory: Path, spec: Spec = SPEC, *, done: int = 6, failed: int = 0) -> Path:
     """Keep a study of which some trials are done, and some of the next ones failed."""
-    with Store.create(directory, spec) as store:
+    with Store.create(directory, spec, made_up.MEASURES) as store:
         for i, trial in enumerate(trials_of(spec)):
             if i < done:
                 result = made_up.measure(trial)
                 kept = dict.fromkeys(trial.recorded.values(), recording(STEPS + i))
-                result = type(result)(result.rows, kept, result.seconds)
+                result = replace(result, recordings=kept)
                 store.save(trial, result, 1.0)
             elif i < done + failed:
                 store.fail(trial, ERROR)

@@ -134,7 +134,7 @@ def test_copies_can_be_read_elsewhere(page):
     page.get_by_role("status").get_by_text("Copied.").wait_for()
     rows = list(csv.DictReader(io.StringIO(clipboard(page))))
     assert [row["condition"] for row in rows] == ["default", "frozen"]
-    assert all(0 <= float(row["success greedy"]) <= 1 for row in rows)
+    assert all(0 <= float(row["evaluation success"]) <= 1 for row in rows)
     page.get_by_role("button", name="Copy as LaTeX").click()
     page.wait_for_function("async () => (await navigator.clipboard.readText()).includes('tabular')")
     lines = [line for line in clipboard(page).splitlines() if line.endswith(r"\\")]

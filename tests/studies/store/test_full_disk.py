@@ -11,7 +11,6 @@ from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.toml import dumps
 from nested_agents.studies.store.store import Store
-from nested_agents.studies.trials.trial import measures_of_spec
 from nested_agents.studies.workers.worker import attempt
 
 
@@ -76,7 +75,7 @@ def test_a_full_disk_stops_a_study_with_one_line_and_costs_nothing(
     disk, tmp_path, monkeypatch, capsys
 ):
     monkeypatch.setattr(learning_curve, "measure", made_up.measure)
-    monkeypatch.setattr(studies_run, "check", measures_of_spec)
+    monkeypatch.setattr(studies_run, "check", lambda spec: made_up.MEASURES)
     monkeypatch.setattr(studies_run, "start_workers", lambda *_: contextlib.nullcontext(Here()))
     # Figures are no results: without them the disk need not be larger.
     monkeypatch.setattr(learning_curve, "draw", lambda analysis: {})

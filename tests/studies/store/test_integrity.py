@@ -13,7 +13,7 @@ from nested_agents.studies.store.store import DATABASE, Store
 
 def finish(directory):
     """Run what is left; return what had to be said and how many trials ran."""
-    with Store.create(directory, made_up.SPEC) as store:
+    with Store.create(directory, made_up.SPEC, made_up.MEASURES) as store:
         pending = store.pending(made_up.TRIALS)
         for trial in pending:
             store.save(trial, made_up.measure(trial), 1.5)
@@ -130,7 +130,7 @@ def test_another_study_is_refused_even_if_the_database_is_damaged(study):
     other = made_up.Spec.of(made_up.SPEC.table() | {"episodes": 9})
     with (
         pytest.raises(SpecError, match="holds another study: episodes = 4 there, 9 here"),
-        Store.create(study, other),
+        Store.create(study, other, made_up.MEASURES),
     ):
         pass
     assert {p: p.read_bytes() for p in study.rglob("*") if p.is_file()} == before
@@ -152,7 +152,10 @@ def test_a_database_that_may_not_be_read_is_not_damaged(study, monkeypatch):
         raise error
 
     monkeypatch.setattr(sqlite3, "connect", locked)
-    with pytest.raises(SpecError, match=r"database is locked$"), Store.create(study, made_up.SPEC):
+    with (
+        pytest.raises(SpecError, match=r"database is locked$"),
+        Store.create(study, made_up.SPEC, made_up.MEASURES),
+    ):
         pass
     assert not list(study.glob("*.damaged-*"))
 
@@ -179,7 +182,7 @@ def test_a_database_that_is_no_study_is_left_alone(tmp_path):
         connection.execute("CREATE TABLE precious (x)")
     before = (tmp_path / DATABASE).read_bytes()
     refused = pytest.raises(SpecError, match="is a database, but no study")
-    with refused, Store.create(tmp_path, made_up.SPEC):
+    with refused, Store.create(tmp_path, made_up.SPEC, made_up.MEASURES):
         pass
     assert (tmp_path / DATABASE).read_bytes() == before
     assert {path.name for path in tmp_path.iterdir()} <= {DATABASE, ".lock"}

@@ -11,6 +11,8 @@ from nested_agents.studies.store import store as store_module
 from nested_agents.studies.store.store import DATABASE, SPEC_FILE, Store
 from nested_agents.studies.trials.trial import RESULTS_VERSION, trials_of
 
+NAMES = [measure.name for measure in made_up.MEASURES]
+
 
 def changed(**changes):
     return Spec.of(made_up.SPEC.table() | changes)
@@ -19,7 +21,7 @@ def changed(**changes):
 @pytest.fixture
 def finished(tmp_path):
     directory = tmp_path / "study"
-    with Store.create(directory, made_up.SPEC) as store:
+    with Store.create(directory, made_up.SPEC, made_up.MEASURES) as store:
         for trial in made_up.TRIALS:
             store.save(trial, made_up.measure(trial), 1.5)
     return directory
@@ -31,7 +33,7 @@ def test_what_was_saved_is_read_back_digit_by_digit(finished):
         assert store.spec() == made_up.SPEC
         for trial in made_up.TRIALS:
             result = made_up.measure(trial)
-            expected = [tuple(row) for row in result.rows if row.phase == "training"]
+            expected = [row.flat(NAMES) for row in result.rows if row.phase == "training"]
             head = (trial.condition, trial.condition, trial.seed)
             assert [row[3:] for row in rows if row[:3] == head] == expected
             recording = store.recording(trial, "last")
@@ -44,7 +46,7 @@ def test_what_was_saved_is_read_back_digit_by_digit(finished):
 
 
 def test_rows_are_in_order_whatever_the_order_of_arrival(tmp_path, finished):
-    with Store.create(tmp_path / "other", made_up.SPEC) as other:
+    with Store.create(tmp_path / "other", made_up.SPEC, made_up.MEASURES) as other:
         for trial in reversed(made_up.TRIALS):
             other.save(trial, made_up.measure(trial), 9.0)
         with Store.open(finished) as store:
@@ -52,7 +54,7 @@ def test_rows_are_in_order_whatever_the_order_of_arrival(tmp_path, finished):
 
 
 def test_recordings_are_equal_bytes(tmp_path, finished):
-    with Store.create(tmp_path / "other", made_up.SPEC) as other:
+    with Store.create(tmp_path / "other", made_up.SPEC, made_up.MEASURES) as other:
         other.save(made_up.TRIALS[0], made_up.measure(made_up.TRIALS[0]), 9.0)
     name = f"recordings/{made_up.TRIALS[0].identity}.npz"
     assert (tmp_path / "other" / name).read_bytes() == (finished / name).read_bytes()
@@ -66,14 +68,14 @@ def test_another_tool_reads_it_with_one_query(finished):
 
 
 def test_the_database_is_written_through(finished):
-    with Store.create(finished, made_up.SPEC) as store:
+    with Store.create(finished, made_up.SPEC, made_up.MEASURES) as store:
         assert store._db.execute("PRAGMA journal_mode").fetchone() == ("wal",)
         assert store._db.execute("PRAGMA synchronous").fetchone() == (2,)
 
 
 def test_a_saved_trial_replaces_what_was_there(finished):
     trial = made_up.TRIALS[0]
-    with Store.create(finished, made_up.SPEC) as store:
+    with Store.create(finished, made_up.SPEC, made_up.MEASURES) as store:
         before = store.rows()
         store.save(trial, made_up.measure(trial), 1.0)
         assert store.rows() == before
@@ -98,7 +100,7 @@ def test_a_damaged_recording_is_run_again(finished, damage):
     else:
         content[len(content) // 2] ^= 4
         path.write_bytes(content)
-    with Store.create(finished, made_up.SPEC) as store:
+    with Store.create(finished, made_up.SPEC, made_up.MEASURES) as store:
         assert store.pending(made_up.TRIALS) == [made_up.TRIALS[2]]
 
 
@@ -118,7 +120,7 @@ def test_a_recording_that_cannot_be_read_is_named(finished):
 
 def test_seeds_may_be_added(finished):
     more = changed(seeds=5)
-    with Store.create(finished, more) as store:
+    with Store.create(finished, more, made_up.MEASURES) as store:
         left = store.pending(trials_of(more))
         assert {trial.seed for trial in left} == {3, 4}
         assert store.spec() == more
@@ -138,7 +140,10 @@ def test_seeds_may_be_added(finished):
 )
 def test_another_study_is_refused_and_nothing_changed(finished, changes, said):
     before = {p: p.read_bytes() for p in finished.rglob("*") if p.is_file()}
-    with pytest.raises(SpecError) as caught, Store.create(finished, changed(**changes)):
+    with (
+        pytest.raises(SpecError) as caught,
+        Store.create(finished, changed(**changes), made_up.MEASURES),
+    ):
         pass
     assert said in str(caught.value)
     assert "use another directory" in str(caught.value)
@@ -150,16 +155,16 @@ def test_results_of_another_version_are_refused(finished, monkeypatch):
     said = f"holds results of version {RESULTS_VERSION}, this is version 99"
     with (
         pytest.raises(SpecError, match=said),
-        Store.create(finished, made_up.SPEC),
+        Store.create(finished, made_up.SPEC, made_up.MEASURES),
     ):
         pass
 
 
 def test_two_writers_at_a_time_are_refused(finished):
     with (
-        Store.create(finished, made_up.SPEC),
+        Store.create(finished, made_up.SPEC, made_up.MEASURES),
         pytest.raises(SpecError, match="another process is writing"),
-        Store.create(finished, made_up.SPEC),
+        Store.create(finished, made_up.SPEC, made_up.MEASURES),
     ):
         pass
 
@@ -170,14 +175,14 @@ def test_another_study_that_came_first_is_not_overwritten(tmp_path, monkeypatch)
     def late(lock, directory):
         with monkeypatch.context() as patch:
             patch.setattr(store_module, "_take", take)
-            with Store.create(directory, other):
+            with Store.create(directory, other, made_up.MEASURES):
                 pass
         take(lock, directory)
 
     monkeypatch.setattr(store_module, "_take", late)
     with (
         pytest.raises(SpecError, match="holds another study"),
-        Store.create(tmp_path, made_up.SPEC),
+        Store.create(tmp_path, made_up.SPEC, made_up.MEASURES),
     ):
         pass
     with Store.open(tmp_path) as store:
@@ -185,7 +190,10 @@ def test_another_study_that_came_first_is_not_overwritten(tmp_path, monkeypatch)
 
 
 def test_one_reads_while_another_writes(finished):
-    with Store.create(finished, made_up.SPEC) as writer, Store.open(finished) as reader:
+    with (
+        Store.create(finished, made_up.SPEC, made_up.MEASURES) as writer,
+        Store.open(finished) as reader,
+    ):
         writer.fail(made_up.TRIALS[0], "Traceback")
         assert reader.counts() == {"done": 5, "failed": 1}
 
@@ -193,7 +201,7 @@ def test_one_reads_while_another_writes(finished):
 def test_a_run_killed_before_it_noted_its_spec_is_begun_anew(tmp_path):
     sqlite3.connect(tmp_path / DATABASE).close()
     (tmp_path / DATABASE).touch()
-    with Store.create(tmp_path, made_up.SPEC) as store:
+    with Store.create(tmp_path, made_up.SPEC, made_up.MEASURES) as store:
         assert store.pending(made_up.TRIALS) == list(made_up.TRIALS)
 
 
@@ -209,26 +217,35 @@ def test_what_is_no_study_is_named(tmp_path, content):
 def test_a_file_in_the_way_is_named(tmp_path):
     (tmp_path / "file").touch()
     for directory in (tmp_path / "file", tmp_path / "file" / "below"):
-        with pytest.raises(SpecError, match="file"), Store.create(directory, made_up.SPEC):
+        with (
+            pytest.raises(SpecError, match="file"),
+            Store.create(directory, made_up.SPEC, made_up.MEASURES),
+        ):
             pass
 
 
 def test_a_users_own_spec_is_neither_overwritten_nor_refused(tmp_path):
     (tmp_path / SPEC_FILE).write_text("# mine\nseeds = 2\n")
-    with Store.create(tmp_path, Spec.of({"seeds": 2})):
+    with Store.create(tmp_path, Spec.of({"seeds": 2}), made_up.MEASURES):
         pass
     assert (tmp_path / SPEC_FILE).read_text().startswith("# mine")
     other = tmp_path / "other"
     other.mkdir()
     shutil.copy(tmp_path / SPEC_FILE, other)
-    with pytest.raises(SpecError, match="in the way"), Store.create(other, made_up.SPEC):
+    with (
+        pytest.raises(SpecError, match="in the way"),
+        Store.create(other, made_up.SPEC, made_up.MEASURES),
+    ):
         pass
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="the superuser may write anywhere")
 def test_an_unwritable_directory_is_named(tmp_path):
     tmp_path.chmod(0o500)
-    with pytest.raises(SpecError, match="Permission denied"), Store.create(tmp_path, made_up.SPEC):
+    with (
+        pytest.raises(SpecError, match="Permission denied"),
+        Store.create(tmp_path, made_up.SPEC, made_up.MEASURES),
+    ):
         pass
 
 
@@ -236,7 +253,7 @@ def test_a_full_disk_is_one_line_and_keeps_what_was_there(finished, monkeypatch)
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    with Store.create(finished, made_up.SPEC) as store:
+    with Store.create(finished, made_up.SPEC, made_up.MEASURES) as store:
         before = store.rows()
         monkeypatch.setattr(os, "fsync", full)
         with pytest.raises(OSError, match="No space left"):

@@ -1,13 +1,15 @@
 import numpy as np
 import pytest
 
-from nested_agents.core.protocols import Transition
-from nested_agents.studies.trials.episodes import EpisodeMeter, EpisodeRecorder
+from nested_agents.core.protocols import SUCCESS, Measure, Transition
+from nested_agents.scenarios.box_pushing.scenario import MEASURES
+from nested_agents.studies.trials.episodes import EpisodeMeter, EpisodeRecorder, EpisodeRow
 
 
 def transition(reward=0.5, terminated=False, **info):
     measured = {
-        "distance_m": 0.3, "orientation_rad": -0.2, "contact_time": np.array([0.5, 1.0]),
+        "distance_m": 0.3, "orientation_error_rad": 0.2, "contact_fraction": 0.75,
+        "stopped_at_goal": False,
         "robot_poses": np.zeros((2, 3)), "box_pose": np.ones(3), "goal_pose": np.ones(3),
         "wheel_speeds": np.zeros(4), "contact": np.array([True, False]),
         "failed": np.zeros(4, dtype=bool),
@@ -16,40 +18,96 @@ def transition(reward=0.5, terminated=False, **info):
 
 
 def test_an_episode_is_summed_up_by_hand():
-    meter = EpisodeMeter("training", 3)
-    last = transition(0.25, terminated=True, contact_time=np.array([0.0, 0.5]))
+    meter = EpisodeMeter("training", 3, MEASURES)
+    last = transition(0.25, terminated=True, contact_fraction=0.25)
     for step in (transition(0.5), last):
         meter.add(step)
-    row = meter.row(last)
-    assert row[:3] == ("training", 3, 2)
-    assert (row.success, row.stopped_at_goal) == (True, False)
-    assert (row.final_distance_m, row.final_orientation_rad) == (0.3, 0.2)
-    assert (row.contact_fraction, row.return_) == (0.5, 0.75)
+    assert meter.row() == EpisodeRow(
+        "training", 3, 2,
+        {
+            "success": True, "stopped_at_goal": False, "final_distance_m": 0.3,
+            "final_orientation_rad": 0.2, "contact_fraction": 0.5,
+        },
+        0.75,
+    )  # fmt: skip
 
 
 def test_stopping_at_the_goal_is_what_the_scenario_says():
-    last = transition(terminated=True, stopped_at_goal=True)
-    meter = EpisodeMeter("training", 0)
-    meter.add(last)
-    assert meter.row(last).stopped_at_goal is True
+    meter = EpisodeMeter("training", 0, MEASURES)
+    meter.add(transition(terminated=True, stopped_at_goal=True))
+    assert meter.row().measures["stopped_at_goal"] is True
+
+
+@pytest.mark.parametrize(
+    ("gathering", "is_rate", "expected"),
+    [("last", False, -1.0), ("mean", False, -1.5), ("sum", False, -4.5), ("max", False, -0.5),
+     ("max", True, True), ("last", True, True)],
+)  # fmt: skip
+def test_the_steps_of_an_episode_make_one_number(gathering, is_rate, expected):
+    measure = Measure("x", "x", source="here", gathering=gathering, is_rate=is_rate)
+    meter = EpisodeMeter("training", 0, [measure])
+    for value in (-0.5, -3.0, np.float64(-1.0)):
+        meter.add(transition(here=value))
+    (value,) = meter.row().measures.values()
+    assert value == expected
+    assert type(value) is type(expected)
+
+
+def test_agents_that_are_rewarded_one_by_one_return_their_mean():
+    meter = EpisodeMeter("training", 0, [SUCCESS])
+    for _ in range(2):
+        meter.add(transition(np.array([1.0, 2.0])))
+    assert meter.row().return_ == 3.0
+
+
+@pytest.mark.parametrize(
+    ("source", "said"),
+    [
+        ("nowhere", "measure 'x': its source 'nowhere' is not in the info of a step"),
+        ("box_pose", "measure 'x': its source 'box_pose' must be one number at every step"),
+    ],
+)
+def test_what_a_measure_is_not_taken_from_is_told(source, said):
+    meter = EpisodeMeter("training", 0, [Measure("x", "x", source=source)])
+    with pytest.raises(ValueError, match=said) as caught:
+        meter.add(transition())
+    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("what", [{"reward": np.nan}, {"distance_m": np.inf}])
 def test_what_is_not_finite_fails_the_trial(what):
-    last = transition(**what)
-    meter = EpisodeMeter("training", 4)
-    meter.add(last)
+    meter = EpisodeMeter("training", 4, MEASURES)
+    meter.add(transition(**what))
     with pytest.raises(FloatingPointError, match=r"= (nan|inf) in training episode 4"):
-        meter.row(last)
+        meter.row()
+
+
+class Recorded:
+    """What a recorder asks of a scenario."""
+
+    recorded = ("box_pose", "contact")
+
+    def measure(self):
+        return transition().info
+
+    def constants_of_episode(self):
+        return {"dt": 0.5, "box": "square"}
 
 
 def test_frames_are_copies():
-    opening = transition().info
-    recorder = EpisodeRecorder(opening)
+    recorder = EpisodeRecorder(Recorded())
     step = transition()
     recorder.add(step)
     step.info["box_pose"][:] = 9.0
-    recording = recorder.recording(dt=0.5, box="square")
+    recording = recorder.recording()
+    assert list(recording) == ["box_pose", "contact", "reward", "dt", "box"]
     assert (recording["box_pose"] == 1.0).all()
     assert recording["box_pose"].shape == (2, 3)
     assert float(recording["dt"]) == 0.5
+
+
+def test_rewards_of_each_agent_are_recorded_one_by_one():
+    recorder = EpisodeRecorder(Recorded())
+    for _ in range(3):
+        recorder.add(transition(np.array([1.0, 2.0])))
+    assert recorder.recording()["reward"].shape == (3, 2)

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from nested_agents.scenarios.box_pushing.config import InfraredSettings
+from nested_agents.scenarios.box_pushing.scenario import RECORDED
 from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials import trial as trial_module
-from nested_agents.studies.trials.episodes import RECORDED
 from nested_agents.studies.trials.trial import check, run_trial, trials_of
 
 SHORT = {"seeds": [7], "episodes": 2, "steps": 6, "evaluation": 1}
@@ -50,9 +50,9 @@ def test_rows_are_training_then_evaluation(result):
     ]  # fmt: skip
     for row in result.rows:
         assert 1 <= row.steps <= 6
-        assert 0.0 <= row.contact_fraction <= 1.0
-        assert 0.0 <= row.final_orientation_rad <= np.pi
-        assert row.final_distance_m > 0.0
+        assert 0.0 <= row.measures["contact_fraction"] <= 1.0
+        assert 0.0 <= row.measures["final_orientation_rad"] <= np.pi
+        assert row.measures["final_distance_m"] > 0.0
 
 
 def test_conditions_of_equal_seed_meet_equal_worlds(result):
@@ -80,7 +80,7 @@ def test_a_recording_has_a_frame_for_every_step_and_the_beginning(result):
     assert infrared == InfraredSettings()
     assert float(recording["dt"]) == pytest.approx(0.512)
     final = np.hypot(*(recording["box_pose"][-1] - recording["goal_pose"])[:2])
-    assert final == pytest.approx(result.rows[1].final_distance_m)
+    assert final == pytest.approx(result.rows[1].measures["final_distance_m"])
 
 
 def test_one_episode_is_recorded_once():
@@ -95,9 +95,9 @@ def test_time_is_split(result):
 def test_success_ends_the_episode_and_says_whether_the_box_stayed():
     # A tolerance that every start is within.
     result = run_trial(only(scenario={"tolerance": 10.0}))
-    assert [(row.steps, row.success, row.stopped_at_goal) for row in result.rows] == [
-        (1, True, True)
-    ] * 3
+    ends = [(row.measures["success"], row.measures["stopped_at_goal"]) for row in result.rows]
+    assert ends == [(True, True)] * 3
+    assert {row.steps for row in result.rows} == {1}
 
 
 def test_a_team_with_self_models_is_measured_too():

@@ -17,7 +17,6 @@ from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.toml import dumps
 from nested_agents.studies.store.store import Store
-from nested_agents.studies.trials.trial import measures_of_spec
 from nested_agents.studies.workers import dask as dask_workers
 from nested_agents.studies.workers.dask import DaskWorkers
 from nested_agents.studies.workers.runner import ATTEMPTS, run_trials
@@ -128,7 +127,7 @@ def run(tmp_path, *arguments):
 @pytest.fixture
 def made_up_results(monkeypatch):
     monkeypatch.setattr(learning_curve, "measure", made_up.measure)
-    monkeypatch.setattr(studies_run, "check", measures_of_spec)
+    monkeypatch.setattr(studies_run, "check", lambda spec: made_up.MEASURES)
 
 
 @pytest.mark.usefixtures("made_up_results")

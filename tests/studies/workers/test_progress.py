@@ -14,7 +14,7 @@ from nested_agents.studies.workers.progress import _estimate, progress
 @pytest.fixture
 def study(tmp_path):
     """Four of six trials are done: both conditions, seeds 0 and 1; each took 2 s or 4 s."""
-    with Store.create(tmp_path, made_up.SPEC) as store:
+    with Store.create(tmp_path, made_up.SPEC, made_up.MEASURES) as store:
         for trial in made_up.TRIALS[:4]:
             store.save(trial, made_up.measure(trial), 2.0 if trial.condition == "default" else 4.0)
     return tmp_path
@@ -32,7 +32,7 @@ def test_between_two_runs_everything_unfinished_is_left(study):
 
 
 def test_what_a_run_has_handed_out_is_running(study):
-    with Store.create(study, made_up.SPEC) as store, Running(study, 3) as running:
+    with Store.create(study, made_up.SPEC, made_up.MEASURES) as store, Running(study, 3) as running:
         assert look(study).seconds == {}
         running.begin(made_up.TRIALS[5])
         now = read(study)
@@ -58,7 +58,7 @@ def test_a_mark_that_outlived_its_process_is_passed_over(study):
 
 @pytest.mark.parametrize("content", ["", "{", "[]", '{"begun": 3}'])
 def test_a_mark_that_cannot_be_read_does_no_harm(study, content):
-    with Store.create(study, made_up.SPEC):
+    with Store.create(study, made_up.SPEC, made_up.MEASURES):
         (study / MARK).write_text(content)
         assert read(study).done == 4
 
@@ -66,12 +66,12 @@ def test_a_mark_that_cannot_be_read_does_no_harm(study, content):
 def test_looking_does_not_keep_a_run_from_beginning(study):
     for _ in range(200):
         look(study)
-        with Store.create(study, made_up.SPEC):
+        with Store.create(study, made_up.SPEC, made_up.MEASURES):
             pass
 
 
 def test_failed_and_damaged_trials_are_counted_once(study, capsys):
-    with Store.create(study, made_up.SPEC) as store:
+    with Store.create(study, made_up.SPEC, made_up.MEASURES) as store:
         store.fail(made_up.TRIALS[4], "Traceback\nRuntimeError: a wheel came off\n")
     path = study / "recordings" / f"{made_up.TRIALS[0].identity}.npz"
     path.write_bytes(b"PK")
@@ -115,7 +115,7 @@ def test_a_topology_that_is_drawn_otherwise_is_told(tmp_path, capsys):
     source = tmp_path / "mine.py"
     source.write_text("def line(agents, groups):\n    return list(zip(agents, agents[1:]))\n")
     spec = Spec.of(made_up.SPEC.table() | {"topology": f"{source}:line"})
-    with Store.create(tmp_path / "out", spec):
+    with Store.create(tmp_path / "out", spec, made_up.MEASURES):
         pass
     assert main(["status", str(tmp_path / "out")]) == 0
     assert "nothing can be added" not in capsys.readouterr().out

@@ -97,3 +97,14 @@ def test_mean_twists_invert_driving_an_arc() -> None:
     after = before + np.append(chord, turn * seconds)
     found = mean_twists(before, after, seconds)
     np.testing.assert_allclose(found, [[ahead, 0.0, turn]], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "settings", [{}, {"state_space": "paper"}, {"robots": 1}, {"predictor": "exact"}], ids=str
+)
+def test_the_states_of_all_agents_are_those_of_each(settings: dict) -> None:
+    scenario = moving(**settings)
+    n = len(scenario.agents)
+    joint = np.random.default_rng(0).integers(4, size=(20, n))
+    expected = np.stack([scenario.predict().states(agent, joint) for agent in range(n)])
+    np.testing.assert_array_equal(scenario.predict().states_of_all(joint), expected)

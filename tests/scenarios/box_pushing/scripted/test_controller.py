@@ -61,3 +61,14 @@ def test_it_remembers_nothing() -> None:
         fresh = ScriptedController(scenario.world.robots, scenario.box)
         np.testing.assert_array_equal(fresh.act(measured), action)
         scenario.step(action)
+
+
+def test_of_many_robots_not_every_joint_action_is_tried() -> None:
+    scenario = BoxPushingSettings(robots=16, start="easy").build()
+    scenario.reset(0)
+    controller = ScriptedController(scenario.world.robots, scenario.box)
+    situation = scenario.measure()
+    poses, box, goal = (situation[k] for k in ("robot_poses", "box_pose", "goal_pose"))
+    side, slots = controller._plan(poses, box, goal)
+    chosen = controller._push(poses, box, goal, situation["wheel_speeds"], side, slots)
+    assert len(chosen) == 16  # 16 ** 16 overflows to 0

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from nested_agents.core.sources import Sources
 from nested_agents.scenarios import BoxPushing, BoxPushingSettings
 from nested_agents.scenarios.box_pushing.states.kernels import COMPILED, Columns, angle_of
 from nested_agents.scenarios.box_pushing.states.state_spaces import (
@@ -14,7 +15,7 @@ from nested_agents.scenarios.box_pushing.states.state_spaces import (
     listed,
     state_space_for,
 )
-from nested_agents.scenarios.box_pushing.states.variables import STATE_VARIABLES
+from nested_agents.scenarios.box_pushing.states.variables import STATE_VARIABLES, found
 from nested_agents.scenarios.box_pushing.states.view import View, wrap
 
 GOAL = np.array([1.0, 0.0, 0.0])
@@ -148,7 +149,7 @@ def test_angles_are_exact_to_the_last_bits(x: float, y: float) -> None:
 @pytest.mark.parametrize(
     ("names", "complaint"),
     [
-        (("gap", "mass"), "scenario.state_space: 'mass': did you mean 'miss'. known: approach, "),
+        (("gap", "mass"), "scenario.state_space: 'mass': .*known: approach, "),
         (("gap", "gap"), r"scenario.state_space = \['gap', 'gap'\]: variables must be distinct"),
         ((), "at least one"),
     ],
@@ -160,5 +161,101 @@ def test_lists_that_make_no_state_space_are_refused(names: tuple[str, ...], comp
 
 def test_a_state_space_may_be_listed() -> None:
     scenario = BoxPushing(BoxPushingSettings(state_space=("gap", "cross_track_error")))
-    assert [v.name for v in scenario.state_space.variables] == ["wheel_speed", "gap", "cross_track_error"]
+    assert [v.name for v in scenario.state_space.variables] == [
+        "wheel_speed",
+        "gap",
+        "cross_track_error",
+    ]
     assert scenario.reset(0).shape == (4, 3)
+
+
+def test_columns_are_those_of_names_that_the_kernel_knows() -> None:
+    assert set(COMPILED) == set(STATE_VARIABLES.built_in)
+    assert all(found(name).variable.name == name for name in COMPILED)
+    with pytest.raises(AssertionError, match="not all of them are compiled"):
+        Columns(["gap", "_COURSE"])
+
+
+MINE = """
+import numpy as np
+from nested_agents import state_variable
+
+@state_variable("rad", -np.pi, np.pi, periodic=True)
+def face(view, robot):
+    return np.remainder(view.course - view.box[:, 2] + np.pi, 2 * np.pi) - np.pi
+
+@state_variable("m", 0.0, 0.5)
+def gap(view, robot):
+    return view.gaps[:, robot] + 1.0
+
+number = 3
+"""
+
+
+def test_variables_of_users_stand_beside_compiled_ones() -> None:
+    with Sources(texts={"mine.py": MINE}).active():
+        names = ("mine.py:face", "cross_track_error", "mine.py:gap")
+        scenario = BoxPushing(BoxPushingSettings(state_space=names))
+    space = scenario.state_space
+    assert [v.name for v in space.shared] == ["face", "cross_track_error", "gap"]
+    assert scenario.bounds[1:].tolist() == [[-pi, pi], [-np.inf, np.inf], [-np.inf, np.inf]]
+    sensed = scenario.reset(0)
+    plain = BoxPushing(BoxPushingSettings(state_space=("gap", "cross_track_error")))
+    expected = plain.reset(0)
+    np.testing.assert_array_equal(sensed[:, 2:], expected[:, [2, 1]] + [0.0, 1.0])
+    joint = np.random.default_rng(0).integers(4, size=(70, 4))
+    for agent in range(4):
+        predicted = scenario.predict().states(agent, joint)
+        expected = plain.predict().states(agent, joint)
+        np.testing.assert_array_equal(predicted[:, 2:], expected[:, [2, 1]] + [0.0, 1.0])
+        assert (np.abs(predicted[:, 1]) <= pi).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "complaint"),
+    [
+        (
+            "mine.py:number",
+            "scenario.state_space: 'mine.py:number': is no state variable, but a int",
+        ),
+        ("mine.py:nothing", "scenario.state_space: 'mine.py:nothing': .* has no 'nothing'"),
+        ("other.py:gap", "scenario.state_space: 'other.py:gap': "),
+        ("gapp", "scenario.state_space: 'gapp': did you mean 'gap'?"),
+    ],
+)
+def test_what_is_no_state_variable_is_refused_in_one_line(name: str, complaint: str) -> None:
+    sources = Sources(texts={"mine.py": MINE})
+    with sources.active(), pytest.raises(ValueError, match=complaint) as error:
+        BoxPushing(BoxPushingSettings(state_space=(name,)))
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("returned", "complaint"),
+    [
+        ("view.box", r"state variable 'wrong': shape \(\d+, 3\), must be \(\d+,\)"),
+        ("1.0", r"state variable 'wrong': shape \(\), must be \(\d+,\)"),
+        ("view.distance + np.nan", "'wrong': not all of its values are finite numbers"),
+        ("view.distance.astype(str)", "not all of its values are finite numbers"),
+        ("np.add(view.box, 1.0, out=view.box)", "read-only"),
+        ("np.add(view.goal, 1.0, out=view.goal)", "read-only"),
+        ("np.add(view.distance, 1.0, out=view.distance)", "read-only"),
+    ],
+)
+def test_what_functions_of_users_return_is_checked(returned: str, complaint: str) -> None:
+    text = f"""
+import numpy as np
+from nested_agents import state_variable
+
+@state_variable("m", 0.0, 1.0)
+def wrong(view, robot):
+    return {returned}
+"""
+    with Sources(texts={"wrong.py": text}).active():
+        space = listed("own", "gap", "wrong.py:wrong")
+    poses = np.random.default_rng(0).normal(size=(5, 2, 3))
+    seen = View(poses, poses[:, 0].copy(), np.abs(poses[:, :, 0]), GOAL, 1.0, 1.0)
+    for compute in (lambda: space.shared(seen, 0), lambda: space.shared_of(seen, [0, 1])):
+        with pytest.raises(ValueError, match=complaint) as error:
+            compute()
+        assert "\n" not in str(error.value)

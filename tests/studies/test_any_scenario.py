@@ -1,0 +1,233 @@
+"""A scenario with measures of its own, from a trial to tables and figures; no box anywhere."""
+
+import csv
+import io
+import json
+from contextlib import redirect_stdout
+
+import numpy as np
+import pytest
+
+from nested_agents import scenarios
+from nested_agents.core.protocols import SUCCESS, Measure, groups_of
+from nested_agents.scenarios.line_up import LineUp
+from nested_agents.studies.analysis import published
+from nested_agents.studies.analysis.results import read
+from nested_agents.studies.catalogue import scaling
+from nested_agents.studies.catalogue.study import load_study
+from nested_agents.studies.cli import conduct
+from nested_agents.studies.cli.main import main
+from nested_agents.studies.presentation.tables import tabulate
+from nested_agents.studies.report.replays import replays
+from nested_agents.studies.spec.errors import SpecError
+from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.store.store import Store
+from nested_agents.studies.trials import trial as trial_module
+from nested_agents.studies.trials.trial import check, measures_of_spec, run_trial, trials_of
+
+SPREAD = Measure("spread_m", "greatest spread of the carts", "m", "spread_m", "max", "lower")
+LEVEL = Measure("level", "ever level", source="level", gathering="max", is_rate=True)
+ODD = Measure('far "off"', "distance", "m", "distance_m", "mean")
+SPEC = Spec.of(
+    {"seeds": 2, "episodes": 3, "steps": 4, "evaluation": 2, "sweep": {"scenario.robots": [1, 2]}}
+)
+
+
+class Carts(LineUp):
+    """Carts that tell how far they spread; single ones can do no such thing."""
+
+    def __init__(self, carts: int) -> None:
+        super().__init__(carts)
+        self.measures = (SPREAD, LEVEL, SUCCESS, ODD) if carts > 1 else ()
+
+    def measure(self):
+        spread = super().measure()["spread_m"]
+        return {**super().measure(), "level": spread < 0.3}
+
+
+@pytest.fixture
+def carts(monkeypatch):
+    """Every study is one of carts, as many as its spec has robots."""
+    monkeypatch.setattr(scenarios, "build", lambda settings: Carts(settings.robots))
+
+
+@pytest.fixture
+def study(carts, tmp_path):
+    """A study of two scenarios whose measures differ, run and kept."""
+    directory = tmp_path / "study"
+    with Store.create(directory, SPEC, check(SPEC)) as store:
+        for trial in trials_of(SPEC):
+            store.save(trial, run_trial(trial), 1.0)
+    return directory
+
+
+def said(*arguments):
+    out = io.StringIO()
+    with redirect_stdout(out):
+        assert main([str(argument) for argument in arguments]) == 0
+    return out.getvalue()
+
+
+def test_a_trial_measures_what_its_scenario_declares(carts):
+    one, two = trials_of(SPEC)[:2]
+    assert run_trial(one).measures == (SUCCESS,)
+    result = run_trial(two)
+    assert result.measures == (SUCCESS, SPREAD, LEVEL, ODD)
+    assert result.recordings == {}
+    for row in result.rows:
+        assert list(row.measures) == ["success", "spread_m", "level", 'far "off"']
+        assert row.measures["level"] is (row.measures["spread_m"] < 0.3 or row.measures["level"])
+        assert row.measures['far "off"'] > 0.0
+
+
+def test_a_study_knows_its_measures_without_its_scenarios(study, monkeypatch):
+    monkeypatch.setattr(scenarios, "build", None)
+    with Store.open(study) as store:
+        assert store.measures() == (SUCCESS, SPREAD, LEVEL, ODD)
+        results = read(store)
+    assert results.measures == (SUCCESS, SPREAD, LEVEL, ODD)
+    assert list(results.training["1"]) == ["steps", "success", "return"]
+    assert list(results.training["2"]) == [
+        "steps", "success", "spread_m", "level", 'far "off"', "return",
+    ]  # fmt: skip
+    assert results.training["2"]["spread_m"].shape == (2, 3)
+    assert results.evaluation["2"]["level"].dtype == int
+
+
+def test_rows_in_every_form(study, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    rows = list(csv.DictReader(io.StringIO(said("results", study, "--format", "csv"))))
+    assert list(rows[0]) == [
+        "condition", "scenario.robots", "seed", "phase", "episode", "steps", "success",
+        "spread_m", "level", 'far "off"', "return",
+    ]  # fmt: skip
+    assert {row["spread_m"] for row in rows if row["condition"] == "1"} == {""}
+    assert {row["level"] for row in rows if row["condition"] == "2"} <= {"0", "1"}
+    items = json.loads(said("results", study, "--format", "json"))
+    assert {item["level"] for item in items if item["condition"] == "1"} == {None}
+    assert all(type(item["level"]) is bool for item in items if item["condition"] == "2")
+    lines = said("results", study).splitlines()
+    assert "greatest" in lines[0]
+    assert max(map(len, lines)) <= 80
+    monkeypatch.setenv("COLUMNS", "40")
+    narrow = said("results", study).splitlines()
+    assert max(map(len, narrow)) <= 40
+    assert narrow[-2] == 'no room for spread_m, level, far "off":'
+
+
+def test_files_hold_what_is_missing_as_missing(study, tmp_path):
+    pytest.importorskip("pyarrow")
+    from pyarrow import parquet
+
+    said("export", study, "--out", tmp_path, "--format", "parquet")
+    table = parquet.read_table(tmp_path / "episodes.parquet")
+    assert str(table.schema.field("level").type) == "bool"
+    by_condition = dict(
+        zip(table["condition"].to_pylist(), table["level"].to_pylist(), strict=True)
+    )
+    assert by_condition["1"] is None
+    assert by_condition["2"] is not None
+
+
+def test_the_learning_curve_and_its_publication(study):
+    with Store.open(study) as store:
+        results = read(store)
+        again = published.loads(published.dumps(store.spec(), results)).results
+    learning = load_study("learning-curve")
+    analysis = learning.analyse(results)
+    assert tabulate(analysis.table).titles == (
+        "success first 5", "success last 5", "evaluation success", "evaluation steps",
+        "ever level, evaluation", "greatest spread of the carts [m]", "distance [m]",
+    )  # fmt: skip
+    (figure,) = learning.draw(analysis).values()
+    shown = [axes.get_title(loc="left") for axes in figure.axes if axes.get_visible()]
+    assert shown == ["success", "greatest spread of the carts [m]", "distance [m]"]
+    assert again.measures == results.measures
+    assert (again.training["2"]["level"] == results.training["2"]["level"]).all()
+    once, twice = (tabulate(learning.analyse(r).table).markdown for r in (results, again))
+    assert once == twice
+
+
+@pytest.mark.parametrize("name", ["ablation", "chain-order"])
+def test_studies_of_success_need_no_more(study, name):
+    with Store.open(study) as store:
+        results = read(store)
+    assert len(load_study(name).analyse(results).table) == 2
+
+
+def test_scaling_leaves_out_contact(carts, tmp_path):
+    spec = Spec.of(SPEC.table() | {"study": "scaling"})
+    with Store.create(tmp_path, spec, check(spec)) as store:
+        for trial in trials_of(spec):
+            result = scaling.measure(trial)
+            assert result.numbers["robots"] == trial.settings.scenario.robots
+            assert "all_touching" not in result.numbers
+            store.save(trial, result, 1.0)
+        analysis = scaling.analyse(read(store))
+    assert "all touch" not in analysis.table[0].estimates
+    assert list(scaling.draw(analysis)) == ["scaling"]
+
+
+def test_shapes_leaves_out_contact(carts):
+    shapes = load_study("shapes")
+    elsewhere = {"study": "shapes", "evaluations": {"other": {"box": "circle"}}}
+    (trial, *_) = trials_of(Spec.of(SPEC.table() | elsewhere))
+    result = shapes.measure(trial)
+    assert result.numbers == {}
+    assert {row.phase for row in result.rows} == {"training", "evaluation", "evaluation:other"}
+
+
+def test_what_is_not_recorded_is_not_replayed(study, capsys):
+    trial = trials_of(SPEC)[0]
+    with Store.open(study) as store:
+        (remark,) = replays(store, trials_of(SPEC)).remarks
+        assert conduct._replay(store, trial) == []
+    assert remark == "Not shown, as the scenario records no episodes: 1; 2: seeds 0, 1."
+    assert "no replay: Carts does not draw its episodes" in capsys.readouterr().err
+
+
+def test_a_study_whose_scenarios_now_tell_something_else_is_not_continued(study):
+    changed = (SUCCESS, SPREAD)
+    with pytest.raises(SpecError, match="use another directory"):
+        Store.create(study, SPEC, changed).__enter__()
+    with Store.create(study, SPEC, measures_of_spec(SPEC)) as store:
+        assert store.pending(trials_of(SPEC)) == []
+
+
+def test_a_result_with_another_measure_is_no_result_of_the_study(carts, tmp_path):
+    result = run_trial(trials_of(SPEC)[1])
+    with (
+        Store.create(tmp_path, SPEC, (SUCCESS,)) as store,
+        pytest.raises(ValueError, match="spread_m"),
+    ):
+        store.save(trials_of(SPEC)[1], result, 1.0)
+
+
+def test_a_measure_that_two_scenarios_mean_otherwise_is_refused(carts, monkeypatch):
+    def build(settings):
+        made = Carts(settings.robots)
+        made.measures = (Measure("far", "far", "m" if settings.robots > 1 else "km"),)
+        return made
+
+    monkeypatch.setattr(scenarios, "build", build)
+    for function in (check, measures_of_spec):
+        with pytest.raises(SpecError, match="measure 'far': is declared as"):
+            function(SPEC)
+
+
+def test_results_of_an_older_version_are_not_read(study, monkeypatch):
+    import sqlite3
+
+    with sqlite3.connect(study / "results.sqlite") as db:
+        db.execute("UPDATE meta SET value = '3' WHERE key = 'results_version'")
+    with Store.open(study) as store, pytest.raises(SpecError, match="holds results of version 3"):
+        read(store)
+
+
+def test_the_world_is_asked_and_not_what_agents_see_of_it(carts):
+    spec = Spec.of(SPEC.table() | {"topology": {"kind": "single-agent"}})
+    session = trial_module.Session(trials_of(spec)[1])
+    assert session.scenario is not session.world
+    assert len(groups_of(session.world)) == 2
+    session.train(1)
+    assert np.isfinite(session.result().rows[0].measures["spread_m"])
