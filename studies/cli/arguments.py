@@ -111,7 +111,8 @@ def complaint(error: click.UsageError) -> str:
     """Return one line on what is wrong with the arguments: which, its value, what is allowed."""
     help_of = f"see {error.ctx.command_path} --help" if error.ctx else "see --help"
     if isinstance(error, click.NoSuchOption) and error.ctx:
-        return f"{error.option_name}: unknown option; {closest(error.option_name, _options(error.ctx))}"
+        name = error.option_name
+        return f"{name}: unknown option; {closest(name, _options(error.ctx))}"
     if isinstance(error, click.BadParameter) and error.param:
         name = _name(error.param)
         is_missing = isinstance(error, click.MissingParameter)

@@ -30,7 +30,8 @@ def export(store: Store, folder: Path, form: Form, *, overwrite: bool = False) -
         Where to write ``episodes`` and ``trials``, or with JSON ``results``; made if it does not
         exist.
     form
-        Of the files, and their suffix; JSON is the form of `nested_agents.studies.analysis.published`.
+        Of the files, and their suffix; JSON is the form of
+        `nested_agents.studies.analysis.published`.
     overwrite
         Whether files of these names may be replaced.
 

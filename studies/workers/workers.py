@@ -50,7 +50,9 @@ def check_jobs(jobs: int) -> None:
 
 
 @contextmanager
-def start_workers(backend: Backend, jobs: int | None, address: str | None, trials: int) -> Iterator[Workers]:
+def start_workers(
+    backend: Backend, jobs: int | None, address: str | None, trials: int
+) -> Iterator[Workers]:
     """Start workers, which end with the context, or connect to those of a cluster.
 
     Parameters

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
-from click.core import ParameterSource
 
 from ..arguments import Choice, Command, Several, Text, Whole
 from . import options
@@ -34,27 +33,16 @@ MOST_AGENTS = 10_000
     default=("chain",),
     help="One or more topologies as in a spec: chain teams tree:2 ...",
 )
-@click.option(
-    "--rules", type=Whole(), metavar="N", default=5**7, help="|S|, rules of one agent."
-)
+@click.option("--rules", type=Whole(), metavar="N", default=5**7, help="|S|, rules of one agent.")
 @click.option("--actions", type=Whole(), metavar="N", default=4, help="|A|, actions of one agent.")
 @click.option(
-    "--iterations", type=Whole(), metavar="N", default=450, help="L, iterations (steps) of an epoch."
-)
-@click.option(
-    "--measured/--no-measured", help="Also count and time steps of the running system."
-)
-@click.option(
-    "--learning/--no-learning",
-    help="Instead, let a chain and the single agent learn the same small task, for 1 to 3 agents, "
-    "and print what they learn beside what they cost. Takes some minutes.",
-)
-@click.option(
-    "--jobs",
+    "--iterations",
     type=Whole(),
     metavar="N",
-    help="Worker processes, for --learning; one for every core unless said otherwise.",
+    default=450,
+    help="L, iterations (steps) of an epoch.",
 )
+@click.option("--measured/--no-measured", help="Also count and time steps of the running system.")
 @click.option(
     "--format",
     "form",
@@ -63,17 +51,13 @@ MOST_AGENTS = 10_000
     help="How to print it.",
 )
 @options.plot
-@click.pass_context
 def command(
-    context: click.Context,
     agents: str,
     topology: tuple[str, ...],
     rules: int,
     actions: int,
     iterations: int,
     measured: bool,
-    learning: bool,
-    jobs: int | None,
     form: Form,
     plot: Path | None,
 ) -> int:
@@ -82,17 +66,8 @@ def command(
     from ...cost.cost import MOST_OPERATIONS, cost_rows
     from ...cost.table import written
     from ...spec.errors import SpecError
-    from ...workers.worker import CORES
-    from ...workers.workers import check_jobs
     from ..display import say
 
-    if jobs is not None:
-        check_jobs(jobs)
-    if learning:
-        for name in ("agents", "topology", "rules", "actions", "iterations", "measured"):
-            if context.get_parameter_source(name) is not ParameterSource.DEFAULT:
-                raise SpecError(f"--{name}: is not for --learning, which measures a fixed task")
-        return _learning(jobs or CORES, form, plot)
     try:
         problem = Problem(rules, actions, iterations)
         rows = list(cost_rows(topology, numbers(agents), problem, measured=measured))
@@ -108,26 +83,6 @@ def command(
             f"nothing was measured: every step would take more than {MOST_OPERATIONS:,} rule "
             "evaluations, about a second"
         )
-    return 0
-
-
-def _learning(jobs: int, form: Form, plot: Path | None) -> int:
-    from ...cost.single_agent import compare
-    from ...cost.single_agent_report import draw, table
-    from ...presentation.figures import check_suffix
-    from ...spec.errors import SpecError
-
-    if form != "table":
-        raise SpecError(f"--format {form}: with --learning, allowed: table")
-    if plot is not None:
-        try:
-            check_suffix(plot)
-        except ValueError as error:
-            raise SpecError(str(error)) from None
-    contests = compare(jobs=jobs)
-    if plot is not None:
-        draw(contests, plot)
-    print(table(contests))
     return 0
 
 

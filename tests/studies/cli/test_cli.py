@@ -113,8 +113,8 @@ def test_help_and_version_import_little(line, modules):
 def test_every_command_has_a_module_and_a_line_of_help(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     assert main([]) == 0
-    listed = [line.split()[0] for line in capsys.readouterr().out.partition("Commands:")[2].splitlines()
-              if line.startswith("  ")]  # fmt: skip
+    lines = capsys.readouterr().out.partition("Commands:\n")[2].splitlines()
+    listed = [line.split()[0] for line in lines if line]
     assert listed[: len(COMMANDS)] == list(COMMANDS)
     modules = {path.stem for path in Path(commands.__file__).parent.glob("*.py")}
     assert modules - {"__init__", "options"} == set(COMMANDS)
@@ -279,8 +279,6 @@ BAD = {
     "check {spec} --steps 0": "error: --steps 0: must be at least 2",
     "claims --jobs 0": "error: --jobs: needs --out",
     "claims --jobs 0 --out x": "error: --jobs 0: must be at least 1",
-    "cost --jobs 0": "error: --jobs 0: must be at least 1",
-    "cost --learning --measured": "error: --measured: is not for --learning",
     "cost --topology ''": "error: --topology '': must not be empty",
     "run {spec} --out {spec}": "spec.toml: ",
     "run {spec} --out /proc/nowhere/x": "/proc/nowhere",
@@ -305,8 +303,7 @@ BAD = {
 def test_an_interrupt_while_starting_up_is_silent(delay):
     """From when Python has begun to run the program; before that the interrupt is not ours."""
     program = (
-        "print(flush=True); import sys; from nested_agents.__main__ import main; "
-        "sys.exit(main())"
+        "print(flush=True); import sys; from nested_agents.__main__ import main; sys.exit(main())"
     )
     process = subprocess.Popen(
         [sys.executable, "-c", program, "presets", "paper"], stdout=subprocess.PIPE,
