@@ -53,7 +53,7 @@ class Whole(click.ParamType):
             self.fail(f"{quote(value)}: must be a whole number", param, ctx)
 
 
-class Choice(click.Choice):  # type: ignore[type-arg]
+class Choice(click.Choice):
     """One of some words."""
 
     def get_invalid_choice_message(self, value: Any, ctx: click.Context | None) -> str:
@@ -65,7 +65,7 @@ class Several(click.Option):
     """An option that takes one value or more, and may be given again for further ones."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
-        super().__init__(*args, multiple=True, **kwargs)
+        super().__init__(*args, **{**kwargs, "multiple": True})
 
     def takes(self, value: str) -> bool:
         """Tell whether an argument is one more value."""

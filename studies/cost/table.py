@@ -160,7 +160,7 @@ def _measured_cells(measured: Measured | None) -> list[str]:
     m = measured
     counts = (m.joint_actions_formula, m.joint_actions, m.rule_evaluations, m.weight_updates)
     amounts = (1e3 * (m.deciding + m.learning), m.memory / 2**20)
-    return [*map(number, counts), *(f"{a:.3g}" if a < 1000 else f"{a:,.0f}" for a in amounts)]
+    return [*map(scientific, counts), *(f"{a:.3g}" if a < 1000 else f"{a:,.0f}" for a in amounts)]
 
 
 def _interval(estimate: Estimate) -> str:

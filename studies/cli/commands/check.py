@@ -78,7 +78,8 @@ def _cases(source: str, changes: tuple[str, ...]) -> Iterator[Case]:
         if settings not in seen:
             seen.add(settings)
             # Played are the first episode and those in which failures begin.
-            episodes = sorted({0, *(failure.episode for failure in settings.failures)})
+            failures = getattr(settings, "failures", ())
+            episodes = sorted({0, *(failure.episode for failure in failures)})
             try:
                 settings.build()
             except ValueError as error:

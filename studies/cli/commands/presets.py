@@ -32,5 +32,11 @@ def _list() -> None:
 
     left, width = max(map(len, PRESETS)) + 2, get_terminal_size().columns
     for key, preset in PRESETS.items():
-        indents = {"initial_indent": f"{key:<{left}}", "subsequent_indent": " " * left}
-        print(fill(preset.summary, width, **indents))
+        print(
+            fill(
+                preset.summary,
+                width,
+                initial_indent=f"{key:<{left}}",
+                subsequent_indent=" " * left,
+            )
+        )

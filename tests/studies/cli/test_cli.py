@@ -138,7 +138,7 @@ def test_a_study_from_spec_to_figures(study):
 def test_it_fits_a_terminal_of_80_columns(study):
     _, (_, out, _) = study
     table = out.split("\n\n")[0].splitlines()
-    assert len(table) == 2 + 2 * 2
+    assert len(table) == 5 + 2 * 2
     assert max(map(len, table)) <= 80
 
 
@@ -157,7 +157,7 @@ def test_results_in_every_form(study, capsys):
         assert bool(int(row["success"])) is item["success"]
     table = results(directory, "table", "--phase", "evaluation", capsys=capsys)
     lines = table.splitlines()
-    assert len(lines) == 2 + 2 * (2 + 3 * 2)
+    assert len(lines) == 3 + 2 * (2 + 3 * 2)
     assert [line for line in lines if "evaluation" in line] == [
         "default, evaluation", "frozen, evaluation",
     ]  # fmt: skip
@@ -301,9 +301,9 @@ BAD = {
 
 @pytest.mark.parametrize("delay", [0.02, 0.05, 0.1, 0.2, 0.3])
 def test_an_interrupt_while_starting_up_is_silent(delay):
-    """From when Python has begun to run the program; before that the interrupt is not ours."""
+    """From when `main` is called; what Python does before is not ours."""
     program = (
-        "print(flush=True); import sys; from nested_agents.__main__ import main; sys.exit(main())"
+        "import sys; from nested_agents.__main__ import main; print(flush=True); sys.exit(main())"
     )
     process = subprocess.Popen(
         [sys.executable, "-c", program, "presets", "paper"], stdout=subprocess.PIPE,
