@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from nested_agents.core.arrays import FloatArray, IntArray
-from nested_agents.core.learners import TDLambda
+from nested_agents.core.learners.td import TDLambda
 
 from .situations import Situation
 
@@ -25,8 +25,8 @@ CHUNK = 1
 class Baselines:
     """The same decision and update by other means; theta and traces are copies.
 
-    Only for exact enumeration with others ``observed`` or ``mean`` over a chain, and rule bases
-    of one term over all variables.
+    Only for exact enumeration with teammates ``empirical`` or ``uniform`` over a chain, and rule
+    bases of one term over all variables.
     """
 
     def __init__(self, situation: Situation) -> None:
@@ -41,8 +41,8 @@ class Baselines:
         counts = [p.size for p in self.rules.partitions]
         self.own_rules = int(np.prod(counts[: self.rules.n_own]))
 
-    def codes(self, agent: int, joint: IntArray) -> IntArray:
-        """Return the joint-action codes ``(A ** free,)`` that `agent` tries."""
+    def indices(self, agent: int, joint: IntArray) -> IntArray:
+        """Return the joint-action indices ``(A ** free,)`` that `agent` tries."""
         free = len(joint) - agent
         return int(joint[:agent] @ self.places[:agent]) + np.arange(self.n_actions**free)
 
@@ -51,28 +51,29 @@ class Baselines:
         joint = np.full(len(self.theta), self.situation.scenario.action_set.neutral)
         self._features: dict[int, FloatArray] = {}
         for i in range(len(joint)):
-            values = getattr(self, value_of)(i, self.codes(i, joint))
+            values = getattr(self, value_of)(i, self.indices(i, joint))
             joint[i] = int(values.reshape(self.n_actions, -1).mean(axis=1).argmax())
         return joint
 
-    def literal(self, agent: int, codes: IntArray) -> FloatArray:
+    def literal(self, agent: int, indices: IntArray) -> FloatArray:
         """Value joint actions by explicit feature vectors."""
         blocks, theta = self.blocks[agent], self.theta[agent]
-        states = blocks.states(codes)
+        states = blocks.states(indices)
         parts = [
-            self.rules.features(states[c : c + CHUNK]) @ theta for c in range(0, len(codes), CHUNK)
+            self.rules.features(states[c : c + CHUNK]) @ theta
+            for c in range(0, len(indices), CHUNK)
         ]
         return np.concatenate(parts)
 
-    def factorised(self, agent: int, codes: IntArray) -> FloatArray:
+    def factorised(self, agent: int, indices: IntArray) -> FloatArray:
         """Value joint actions by one matrix product per agent and one inner product each."""
         blocks, theta = self.blocks[agent], self.theta[agent].reshape(self.own_rules, -1)
         partial = self._product(blocks.own, 0) @ theta
         key = blocks.divisor
         if key not in self._features:
             self._features[key] = self._product(blocks.shared, self.rules.n_own)
-        local = codes // blocks.divisor % len(blocks.own_rows)
-        features = self._features[key][blocks.shared_rows[codes]]
+        local = indices // blocks.divisor % len(blocks.own_rows)
+        features = self._features[key][blocks.shared_rows[indices]]
         return np.einsum("cs,cs->c", partial[blocks.own_rows[local]], features)
 
     def _product(self, states: FloatArray, first: int) -> FloatArray:

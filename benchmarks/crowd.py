@@ -10,9 +10,10 @@ import argparse
 from itertools import pairwise
 from pathlib import Path
 
+from nested_agents.core.decision import Decision
 from nested_agents.core.hierarchy import Hierarchy
+from nested_agents.core.learners.td import TDLambdaSettings
 from nested_agents.core.loop import control_loop, policy_seed, world_seed
-from nested_agents.core.settings import Decision, TDLambdaSettings
 from nested_agents.core.team import Team
 from nested_agents.scenarios import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.pictures.rendering import snapshot
@@ -30,7 +31,7 @@ def main() -> None:
     settings = BoxPushingSettings(robots=options.robots)
     scenario = settings.build()
     hierarchy = Hierarchy(scenario.agents, list(pairwise(scenario.agents)))
-    learner = TDLambdaSettings(step_size=0.05, decision=Decision(others="mean"))
+    learner = TDLambdaSettings(step_size=0.05, decision=Decision(teammates="uniform"))
     team = Team.build(learner, scenario, hierarchy, policy_seed(options.seed))
     watch, steps = Stopwatch(), 0
     scenario.reset(world_seed(options.seed, 0), 0)

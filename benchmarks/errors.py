@@ -6,7 +6,7 @@ after taking off their common shift, in units of their spread under exact enumer
 actions do not differ are left out. Regret is by how much the action taken is worse than the best,
 in the same units.
 
-Beyond `LARGEST_EXACT` agents the reference is the mean of `REPLICATES` Latin hypercubes, drawn
+Beyond `LARGEST_EXACT` agents the reference is the mean of `REPLICATES` large samples, drawn
 independently of each other and of what is measured; its row gives its standard error in place of
 an error (the greatest of the actions', common shift taken off).
 """
@@ -24,17 +24,19 @@ from rich.console import Console
 from rich.table import Table
 
 from nested_agents.core.arrays import FloatArray
-from nested_agents.core.evaluators import (
+from nested_agents.core.decision import Decision
+from nested_agents.core.evaluators.additive import Extremes, Moments
+from nested_agents.core.evaluators.evaluator import (
+    DecisionProblem,
+    Deliberation,
     Evaluator,
-    ExactEnumeration,
-    Extremes,
-    LatinHypercube,
-    Moments,
-    Sampling,
+    Teammates,
 )
+from nested_agents.core.evaluators.exact import ExactEnumeration
+from nested_agents.core.evaluators.sampling import Sampling, SamplingSettings
 from nested_agents.core.hierarchy import Hierarchy
+from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.loop import control_loop, policy_seed
-from nested_agents.core.settings import BatchTDSettings, Decision
 from nested_agents.core.team import Team
 from nested_agents.scenarios import BoxPushingSettings
 
@@ -47,9 +49,9 @@ TRAINING, EVERY = 3, 4
 NEGLIGIBLE_SPREAD = 1e-9
 LARGEST_EXACT = 8
 """Agents up to which there is exact enumeration to compare with."""
-REPLICATES = 16
-BUDGET, SMALL_BUDGET = Decision().budget, 8192
-"""Of the Latin hypercubes: the default, and one too small for all that eight agents can do."""
+REPLICATES, SAMPLES = 16, 1024
+"""Samples that are taken for exact beyond, and the joint actions in each."""
+TEAMMATES: tuple[Teammates, ...] = ("empirical", "best-response")
 SCENARIOS: dict[str, dict[str, Any]] = {
     "default": {},
     "1 period": {"state_space": "paper", "action_repeat": 1, "prediction_horizon": 1},
@@ -57,21 +59,24 @@ SCENARIOS: dict[str, dict[str, Any]] = {
 
 
 def errors(
-    others: Any, scenario_settings: dict[str, Any], steps: int, seeds: int
+    teammates: Teammates, scenario_settings: dict[str, Any], steps: int, seeds: int
 ) -> dict[str, FloatArray]:
     """Return per evaluator ``(cases, 2)`` errors and regrets."""
     scenario = BoxPushingSettings(**scenario_settings).build()
     hierarchy = Hierarchy(scenario.agents, list(pairwise(scenario.agents)))
     n, neutral = len(scenario.agents), scenario.action_set.neutral
-    decision = Decision(evaluator="sampling", samples=8, others=others)
+    decision = Decision(evaluator=SamplingSettings(samples=8), teammates=teammates)
     found: dict[str, list[tuple[float, float]]] = {}
     for seed in range(FIRST_SEED, FIRST_SEED + seeds):
         team = Team.build(
             BatchTDSettings(decision=decision), scenario, hierarchy, policy_seed(seed)
         )
         rules = team.learner.rules  # type: ignore[attr-defined]
-        common = (rules, hierarchy, len(scenario.action_set), "value", others, 0.95)
-        references, evaluators = _evaluators(scenario.groups, n, others, common)
+        problem = DecisionProblem(
+            rules, hierarchy, len(scenario.action_set), scenario.groups, scenario.superposes,
+            "value", teammates, 0.95,
+        )  # fmt: skip
+        references, evaluators = _evaluators(problem)
         rng = np.random.default_rng(seed)
         frequencies = rng.dirichlet(np.full(4, 3.0), size=n)
         for record in control_loop(scenario, team, episodes=TRAINING + 1, steps=steps, seed=seed):
@@ -81,8 +86,8 @@ def errors(
             for agent in range(n):
                 known = np.full(n, neutral)
                 known[:agent] = record.joint_action[:agent]
-                given = (agent, known, team.learner.theta[agent], prediction, frequencies, rng)
-                drawn = np.array([reference.values(*given) for reference in references])
+                asked = Deliberation(agent, known, prediction, team.learner.theta, frequencies, rng)
+                drawn = np.array([reference.values(asked) for reference in references])
                 exact = drawn.mean(axis=0)
                 spread = np.ptp(exact)
                 if spread < NEGLIGIBLE_SPREAD:
@@ -92,7 +97,7 @@ def errors(
                     off = drawn.std(axis=0, ddof=1).max() / np.sqrt(len(drawn))
                     found.setdefault("reference", []).append((off / spread, 0.0))
                 for name, evaluator in evaluators.items():
-                    approximate = evaluator.values(*given)
+                    approximate = evaluator.values(asked)
                     off = approximate - exact
                     error = np.abs(off - off.mean()).max()
                     regret = exact.max() - exact[approximate.argmax()]
@@ -101,32 +106,26 @@ def errors(
 
 
 def _evaluators(
-    groups: tuple[tuple[int, ...], ...], n: int, others: str, common: tuple[Any, ...]
+    problem: DecisionProblem,
 ) -> tuple[list[Evaluator], dict[str, Evaluator]]:
     """Return what is taken for exact, and what is measured."""
     references: list[Evaluator]
-    if n <= LARGEST_EXACT:
-        references = [ExactEnumeration(*common)]
+    if len(problem.hierarchy) <= LARGEST_EXACT:
+        references = [ExactEnumeration(problem)]
     else:
-        references = [LatinHypercube(groups, BUDGET, *common) for _ in range(REPLICATES)]
-    summed = Extremes if others == "max" else Moments
-    evaluators: dict[str, Evaluator] = {
-        "sampling": Sampling(64, *common),
-        summed.name: summed(groups, *common),
-        "latin-hypercube": LatinHypercube(groups, BUDGET, *common),
-    }
-    if n >= LARGEST_EXACT:
-        evaluators[f"budget {SMALL_BUDGET}"] = LatinHypercube(groups, SMALL_BUDGET, *common)
-    return references, evaluators
+        references = [Sampling(SAMPLES, problem) for _ in range(REPLICATES)]
+    additive = Extremes if problem.teammates == "best-response" else Moments
+    return references, {"sampling": Sampling(64, problem), additive.name: additive(problem)}
 
 
 def times(n_agents: int, budget: float = 3.0) -> dict[str, float]:
     """Return what a decision takes with each evaluator [ms], prediction included; order 1."""
-    kinds = {name: {"evaluator": name} for name in ("sampling", "moments", "latin-hypercube")}
-    kinds[f"budget {SMALL_BUDGET}"] = {"evaluator": "latin-hypercube", "budget": SMALL_BUDGET}
+    kinds = {name: {"evaluator": name} for name in ("sampling", "moments")}
     if n_agents <= LARGEST_EXACT:
         kinds["exact"] = {"evaluator": "exact"}
-    moments = {name: situation(n_agents, ADDITIVE, kind).foresee for name, kind in kinds.items()}
+    moments = {
+        name: situation(n_agents, ADDITIVE, kind).predict_and_act for name, kind in kinds.items()
+    }
     taken = paired(moments, budget=budget, clock=time.thread_time)
     return {name: 1e3 * taken.median(name) for name in moments}
 
@@ -140,19 +139,19 @@ def main() -> None:
     parser.add_argument("--times", type=int, nargs="*", default=[8, 16, 64, 128], metavar="AGENTS")
     options = parser.parse_args()
     console = Console(width=80)
-    heads = ("scenario", "n", "others", "evaluator", "median", "90 %", "99 %", "regret", "of")
+    heads = ("scenario", "n", "teammates", "evaluator", "median", "90 %", "99 %", "regret", "of")
     table = Table(*heads, box=SIMPLE, padding=(0, 1, 0, 0))
     for name, settings in SCENARIOS.items():
         for robots in options.robots:
-            for others in ("observed", "max"):
-                if 2 * robots > LARGEST_EXACT and (settings or others == "max"):
+            for teammates in TEAMMATES:
+                if 2 * robots > LARGEST_EXACT and (settings or teammates == "best-response"):
                     continue
                 asked = {**settings, "robots": robots}
-                found = errors(others, asked, options.steps, options.seeds)
+                found = errors(teammates, asked, options.steps, options.seeds)
                 for evaluator, rows in found.items():
                     quantiles = [f"{np.quantile(rows[:, 0], q):.1g}" for q in (0.5, 0.9, 0.99)]
                     table.add_row(
-                        name, str(2 * robots), others, evaluator, *quantiles,
+                        name, str(2 * robots), teammates, evaluator, *quantiles,
                         f"{rows[:, 1].mean():.1g}", str(len(rows)),
                     )  # fmt: skip
     console.print(table)

@@ -32,7 +32,7 @@ LARGEST_FACTORISED = 8
 def steps(kind: str, n_agents: int, budget: float) -> Row:
     """Time decision + update by exact enumeration against the baselines.
 
-    The tables of predicted states are common to all and not timed; "foresee" is prediction and
+    The tables of predicted states are common to all and not timed; "predict" is prediction and
     decision together.
 
     Raises
@@ -41,7 +41,7 @@ def steps(kind: str, n_agents: int, budget: float) -> Row:
         If the values of the three differ: they would not be timed doing the same.
     """
     moment = situation(n_agents, RULE_BASES[kind], {"evaluator": "exact"})
-    candidates = {"ours": moment.step, "decide": moment.act, "foresee": moment.foresee}
+    candidates = {"ours": moment.step, "decide": moment.act, "predict": moment.predict_and_act}
     baselines = None
     if kind != "order 1":
         baselines = Baselines(moment)
@@ -59,7 +59,7 @@ def steps(kind: str, n_agents: int, budget: float) -> Row:
         "joint_actions": moment.joint_actions,
         "ours_us": 1e6 * ours,
         "decide_ns_per_joint_action": 1e9 * times.median("decide") / moment.joint_actions,
-        "foresee_ns_per_joint_action": 1e9 * times.median("foresee") / moment.joint_actions,
+        "predict_ns_per_joint_action": 1e9 * times.median("predict") / moment.joint_actions,
         "literal_ratio": times.ratio("literal", "ours") if "literal" in candidates else None,
         "factorised_ratio": (
             times.ratio("factorised", "ours") if "factorised" in candidates else None
@@ -74,11 +74,13 @@ def _check(moment: Situation, baselines: Baselines) -> None:
     rng = np.random.default_rng(0)
     last = len(moment.scenario.agents) - 1
     for agent in {0, last}:
-        codes = rng.choice(baselines.codes(agent, np.zeros(last + 1, dtype=np.int64)), 8)
-        literal = baselines.literal(agent, codes)
+        indices = rng.choice(baselines.indices(agent, np.zeros(last + 1, dtype=np.int64)), 8)
+        literal = baselines.literal(agent, indices)
         baselines._features = {}
-        ours = baselines.rules.block_values(baselines.theta[agent], baselines.blocks[agent], codes)
-        for name, values in (("ours", ours), ("factorised", baselines.factorised(agent, codes))):
+        ours = baselines.rules.block_values(
+            baselines.theta[agent], baselines.blocks[agent], indices
+        )
+        for name, values in (("ours", ours), ("factorised", baselines.factorised(agent, indices))):
             if np.abs(values - literal).max() > 1e-5 * np.abs(literal).max():
                 raise ArithmeticError(f"{name} and literal values differ at agent {agent}")
 
@@ -90,7 +92,7 @@ def large(kind: str, n_agents: int, budget: float) -> Row:
     times = paired(
         {
             "simulate": lambda: moment.scenario.step(neutral),
-            "foresee": moment.foresee,
+            "predict": moment.predict_and_act,
             "learn": moment.learn,
         },
         budget=budget,

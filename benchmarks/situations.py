@@ -8,13 +8,12 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from pydantic import TypeAdapter
 
 from nested_agents.core.arrays import FloatArray, IntArray
 from nested_agents.core.hierarchy import Hierarchy
-from nested_agents.core.learners import TDLambda
+from nested_agents.core.learners import LEARNERS
+from nested_agents.core.learners.td import TDLambda
 from nested_agents.core.protocols import Prediction
-from nested_agents.core.settings import Learner as LearnerSettings
 from nested_agents.core.team import Team
 from nested_agents.scenarios import BoxPushing, BoxPushingSettings
 
@@ -59,7 +58,7 @@ class Situation:
         """Decide greedily in the moment, from the tables that the prediction already holds."""
         return self.team.act(self.prediction, explore=False)
 
-    def foresee(self) -> IntArray:
+    def predict_and_act(self) -> IntArray:
         """Predict anew and decide."""
         self.prediction = self.scenario.predict()
         return self.act()
@@ -86,11 +85,10 @@ def situation(
     """Bring `n_agents` wheel agents, two to an e-puck, into the middle of an episode."""
     scenario = BoxPushingSettings(robots=n_agents // 2, state_space="paper").build()
     hierarchy = Hierarchy(scenario.agents, list(pairwise(scenario.agents)))
-    settings = TypeAdapter(LearnerSettings).validate_python(
+    settings = LEARNERS.model("td-lambda").model_validate(
         {
-            "kind": "td-lambda",
             "rule_base": dict(rule_base),
-            "decision": {"others": "observed", **(decision or {})},
+            "decision": {"teammates": "empirical", **(decision or {})},
         }
     )
     team = Team.build(settings, scenario, hierarchy, np.random.SeedSequence(seed))

@@ -15,11 +15,11 @@ STEPS = {
     "literal_ratio": "literal\n/ours", "factorised_ratio": "factor.\n/ours",
     "streaming_ratio": "ours/\nstream",
     "decide_ns_per_joint_action": "decide\n\\[ns/ja]",
-    "foresee_ns_per_joint_action": "+predict\n\\[ns/ja]", "bytes_per_agent": "kB/\nagent",
+    "predict_ns_per_joint_action": "+predict\n\\[ns/ja]", "bytes_per_agent": "kB/\nagent",
 }  # fmt: skip
 LARGE = {
     "rule_base": "rules", "agents": "n", "evaluator": "evaluator", "simulate_ms": "world\n\\[ms]",
-    "foresee_ms": "decide\n\\[ms]", "learn_ms": "learn\n\\[ms]", "total_ms": "step\n\\[ms]",
+    "predict_ms": "decide\n\\[ms]", "learn_ms": "learn\n\\[ms]", "total_ms": "step\n\\[ms]",
     "us_per_agent": "agent\n\\[us]", "bytes_per_agent": "kB/\nagent",
 }  # fmt: skip
 

@@ -84,12 +84,18 @@ def control_loop(
         Number of the first episode: a run can be continued with a restored team.
     learn
         Whether the team explores and learns, or is evaluated greedily.
+
+    Raises
+    ------
+    ValueError
+        If the scenario does not predict what the team decides by, see `Team.check`.
     """
     for episode in range(first_episode, first_episode + episodes):
         states = scenario.reset(world_seed(seed, episode), episode)
         if learn:
             team.begin_episode()
         prediction = team.predict(scenario)
+        team.check(prediction)
         for step in range(steps):
             begin = perf_counter()
             joint_action = team.act(prediction, explore=learn)

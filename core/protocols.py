@@ -1,10 +1,10 @@
 """What a learner may know of the world: the protocols that a scenario and its predictor fulfil.
 
 Conventions. ``n`` agents, ``d`` state variables, ``A`` actions. A joint action is an integer array
-``(n,)`` in agent order. Its *code* is that array read as a number in base ``A``, the first agent
-being the most significant digit; tables over all joint actions are indexed by code. Groups are
-blocks of consecutive agents that move one body (the wheels of a robot); the digits of one group
-read as a number are its *local code*.
+``(n,)`` in agent order. Its *joint-action index* is that array read as a number in base ``A``, the
+first agent being the most significant digit; tables of all joint actions are in the order of this
+index. Groups are blocks of consecutive agents that move one body (the wheels of a robot); the
+digits of one group read as a number are its *robot-action index*.
 """
 
 from __future__ import annotations
@@ -31,20 +31,20 @@ class Blocks:
     Attributes
     ----------
     own
-        ``(K, n_own)`` own variables, one row per local code of the agent's group of ``w`` agents;
-        fewer with `own_rows`, or if there are no own variables: then one row will do.
+        ``(K, n_own)`` own variables, one row per robot-action index of the agent's group of ``w``
+        agents; fewer with `own_rows`, or if there are no own variables: then one row will do.
     shared
-        ``(R, d - n_own)`` shared variables, one row per joint-action code; fewer with
+        ``(R, d - n_own)`` shared variables, one row per joint-action index; fewer with
         `shared_rows`.
     divisor
-        ``A`` to the power of the number of agents behind the group: the local code of joint-action
-        code ``c`` is ``c // divisor % A ** w``.
+        ``A`` to the power of the number of agents behind the group: the robot-action index of
+        joint-action index ``c`` is ``c // divisor % A ** w``.
     own_rows, shared_rows
-        The row of `own` of every local code ``(A ** w,)``, and of `shared` of every joint-action
-        code ``(A ** n,)``, where several codes lead to one; empty: each code has its row.
+        The row of `own` of every robot-action index ``(A ** w,)``, and of `shared` of every
+        joint-action index ``(A ** n,)``, where several lead to one; empty: each has its row.
     alone
         Whether own variables are those that the group would reach alone, which is an approximation
-        where others matter to them. If not, the blocks give for every code exactly what
+        where others matter to them. If not, the blocks give for every index exactly what
         `Prediction.states` gives; if so, of the shared variables only.
 
     Compiled kernels read the tables without looking at their sizes.
@@ -58,11 +58,11 @@ class Blocks:
     shared_rows: IntArray = field(default_factory=_no_rows)
     alone: bool = False
 
-    def states(self, codes: IntArray) -> FloatArray:
-        """Return the next states ``(m, d)`` of joint-action codes ``(m,)``."""
-        local = codes // self.divisor % (len(self.own_rows) or len(self.own))
+    def states(self, indices: IntArray) -> FloatArray:
+        """Return the next states ``(m, d)`` of joint-action indices ``(m,)``."""
+        local = indices // self.divisor % (len(self.own_rows) or len(self.own))
         own = self.own[self.own_rows[local] if len(self.own_rows) else local]
-        shared = self.shared[self.shared_rows[codes] if len(self.shared_rows) else codes]
+        shared = self.shared[self.shared_rows[indices] if len(self.shared_rows) else indices]
         return np.concatenate([own, shared], axis=1)
 
 
@@ -186,7 +186,7 @@ class Measure:
 
 
 SUCCESS = Measure("success", "success", source="terminated", better="higher", is_rate=True)
-"""Whether the episode ended with the task solved: what is taken for success unless said otherwise."""
+"""Whether the episode ended with the task solved: success, unless a scenario says otherwise."""
 
 
 @runtime_checkable
@@ -298,17 +298,17 @@ class ExactlyPredictedScenario(Scenario, Protocol):
 class Superposition(Protocol):
     """A prediction to first order: groups move what they share by contributions that add up.
 
-    ``G`` groups, ``L`` local codes of the largest, ``k`` components of what is shared.
+    ``G`` groups, ``L`` robot-action indices of the largest, ``k`` components of what is shared.
     """
 
     @property
     def contributions(self) -> FloatArray:
-        """``(G, L, k)`` what each local code of each group contributes to the sum."""
+        """``(G, L, k)`` what each robot-action index of each group contributes to the sum."""
         ...
 
     @property
     def alike(self) -> IntArray:
-        """``(G, L)`` the first local code of the group that comes to the same as this one."""
+        """``(G, L)`` the first robot-action index of the group that comes to the same."""
         ...
 
     def states(
@@ -321,11 +321,11 @@ class Superposition(Protocol):
         agent
             Whose states.
         local
-            ``(m,)`` local code of its own group.
+            ``(m,)`` robot-action index of its own group.
         sums
             ``(m, k)`` contributions of all groups, added up.
         shares
-            ``(G, L)`` probabilities of the local codes of the other groups.
+            ``(G, L)`` probabilities of the robot-action indices of the other groups.
         """
         ...
 

@@ -112,11 +112,12 @@ class Registry:
         if place is None:
             raise ValueError(f"{closest(name, self.names())}, or one of your own as file.py:NAME")
         try:
-            return located(place)
+            found = located(place)
         except Exception as error:
             if name in self.built_in:
                 raise
-            raise ValueError(f"cannot be loaded: {type(error).__name__}: {error}") from None
+            raise ValueError(f"cannot be loaded: {sources.told(error)}") from None
+        return found
 
     def reference_to(self, thing: Any) -> str:
         """Return the name of an object: the registered one, or where it is defined.
@@ -208,7 +209,7 @@ class SettingsRegistry(Registry):
             raise ValueError(f"the settings of a {self.kind} must inherit {base}")
         if not callable(thing):
             raise ValueError(f"is no {self.kind}, but a {type(thing).__name__}")
-        model: Any = create_model(
+        model = create_model(
             own.__qualname__,
             __base__=own,
             __module__=own.__module__,
@@ -220,7 +221,7 @@ class SettingsRegistry(Registry):
             def build(settings: Settings, *given: Any) -> Any:
                 return thing(settings, *given) if has_own else thing(*given)
 
-            model.build = build
+            model.build = build  # type: ignore[attr-defined]
         return cast(type[Settings], model)
 
     def parsed(self, text: str) -> Settings:
@@ -284,6 +285,6 @@ class Plugged:
 
 
 def _relative(path: str) -> str:
-    """Return a path as it is written from the working directory, if it is below."""
+    """Return a path as it is written from the working directory."""
     here, there = os.path.realpath(os.getcwd()), os.path.realpath(path)
     return os.path.relpath(there, here) if there.startswith(here + os.sep) else there

@@ -1,9 +1,9 @@
 """One agent per robot: the mapping that the paper's one agent per wheel stands against (X-B).
 
 `RobotAgents` shows a scenario as one whose agents drive whole robots. An agent's action is a
-robot-action index: the actions of all its wheels at once. Its state is the own variables of all its wheels and
-the variables that they share; everything else of this package works on it unchanged. Joint actions
-keep their indices, as the digits of a robot's wheels read as one.
+robot-action index: the actions of all its wheels at once. Its state is the own variables of all its
+wheels and the variables that they share; everything else of this package works on it unchanged.
+Joint actions keep their indices, as the digits of a robot's wheels read as one.
 """
 
 from __future__ import annotations

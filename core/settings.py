@@ -1,7 +1,7 @@
 """What all settings share, and the numbers that they hold.
 
-Settings are the tables of a spec. Each model refuses unknown keys and values outside the stated ranges
-when it is built; every field is documented beside it, with its unit.
+Settings are the tables of a spec. Each model refuses unknown keys and values outside the stated
+ranges when it is built; every field is documented beside it, with its unit.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Files of users: read once, kept as text, and run wherever a trial runs.
 
-A spec names what a user wrote as ``"arm.py:Arm"``, relative to the spec. The text of the file is kept
-with the study and travels to workers, so that nothing else is needed to continue, explain or report
-the study elsewhere. What a file means is its syntax tree: comments and layout do not count.
+A spec names what a user wrote as ``"arm.py:Arm"``, relative to the spec. The text of the file is
+kept with the study and travels to workers, so that nothing else is needed to continue, explain or
+report the study elsewhere. What a file means is its syntax tree: comments and layout do not count.
 
 Names are resolved by the `Sources` that are *active*, see `Sources.active`; outside of any study
 these are the files below the working directory.
@@ -153,7 +153,7 @@ class Sources:
             exec(compile(text, module.__file__, "exec"), module.__dict__)
         except (Exception, SystemExit) as error:
             del sys.modules[key]
-            raise ValueError(f"{name} cannot be run: {type(error).__name__}: {error}") from None
+            raise ValueError(f"{name} cannot be run: {told(error)}") from None
         return module
 
 
@@ -233,10 +233,21 @@ def meaning(text: str, name: str) -> str:
         If it is no Python.
     """
     try:
-        tree = ast.dump(ast.parse(text))
+        tree = ast.dump(ast.parse(text, name))
     except (SyntaxError, ValueError, RecursionError) as error:
-        raise ValueError(f"{name} cannot be run: {type(error).__name__}: {error}") from None
+        raise ValueError(f"{name} cannot be run: {told(error)}") from None
     return _sha256(tree)
+
+
+def told(error: BaseException) -> str:
+    r"""Return what an exception says, in one line.
+
+    Examples
+    --------
+    >>> told(ValueError("two\nlines"))
+    'ValueError: two lines'
+    """
+    return f"{type(error).__name__}: {' '.join(str(error).split())}"
 
 
 def _sha256(text: str) -> str:

@@ -323,8 +323,8 @@ def rows_of(scenario: Scenario, *, shared: bool) -> IntArray:
     Examples
     --------
     >>> from types import SimpleNamespace
-    >>> pair = SimpleNamespace(agents=("a.left", "a.right", "b.left"), roles=("left", "right", "left"))
-    >>> rows_of(pair, shared=True).tolist(), rows_of(pair, shared=False).tolist()
+    >>> three = SimpleNamespace(agents=("a.left", "a.right", "b.left"), roles=("l", "r", "l"))
+    >>> rows_of(three, shared=True).tolist(), rows_of(three, shared=False).tolist()
     ([0, 1, 0], [0, 1, 2])
     """
     if not shared:

@@ -136,7 +136,8 @@ def wrong_arrows(graph: nx.DiGraph) -> list[str]:
     found = []
     for module, imported, line in graph.edges(data="line"):
         rooms = [name.split(".")[2] for name in (module, imported) if name.count(".") > 1]
-        if len(rooms) == 2 and all(n.startswith("nested_agents.studies.") for n in (module, imported)):
+        inside = [n.startswith("nested_agents.studies.") for n in (module, imported)]
+        if len(rooms) == 2 and all(inside):
             place, target = map(STUDIES.index, rooms)
             if target > place:
                 found.append(f"{module}:{line} imports {imported}; {rooms[0]} is below {rooms[1]}")

@@ -34,10 +34,7 @@ def read_graph(path: str) -> nx.DiGraph:
         raise ValueError(f"{path}: suffix must be .graphml or .json")
     text = sources.active().text(path)
     try:
-        if suffix == ".graphml":
-            graph = nx.parse_graphml(text)
-        else:
-            graph = _graph_of(json.loads(text))
+        graph = nx.parse_graphml(text) if suffix == ".graphml" else _graph_of(json.loads(text))
     except (ValueError, KeyError, TypeError, SyntaxError, nx.NetworkXException) as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise ValueError(f"{path} holds no graph: {reason}") from None

@@ -6,9 +6,9 @@ enumerated; for the other groups
 
 - `Moments` (teammates uniform or empirical) takes the sum as a random variable, of which mean and
   covariance suffice: f is averaged over sigma points (Julier and Uhlmann 2004) that have the same.
-- `Extremes` (teammates best response) takes the greatest f over the mean sum and the sums that lie farthest
-  out in one of 26 directions (k = 3): in a given direction every group's best is independent of the
-  others, so that these joint actions are found without search.
+- `Extremes` (teammates best response) takes the greatest f over the mean sum and the sums that lie
+  farthest out in one of 26 directions (k = 3): in a given direction every group's best is
+  independent of the others, so that these joint actions are found without search.
 """
 
 from __future__ import annotations

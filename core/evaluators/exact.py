@@ -81,7 +81,7 @@ class ExactEnumeration(Aggregation):
         tabulated = bool(self._tried) and hasattr(deliberation.prediction, "blocks")
         if tabulated and problem.rule == "value":
             tried = self._tried[agent]
-            self.count(tried.codes.size)
+            self.count(tried.indices.size)
             empirical = problem.teammates == "empirical"
             return self.rules.enumerate(
                 deliberation.own_weights,
@@ -107,7 +107,7 @@ class ExactEnumeration(Aggregation):
         """Value ``(A, m)`` each own action with each joint action below, by rewards too."""
         prediction = cast(TabulatedPrediction, deliberation.prediction)
         tried = self._tried[deliberation.agent]
-        indices = (tried.codes + int(deliberation.joint_action @ tried.places)).ravel()
+        indices = (tried.indices + int(deliberation.joint_action @ tried.places)).ravel()
         self.count(len(indices))
         rewards, values = prediction.reward_table()[indices], None
         if self.problem.rule != "reward":

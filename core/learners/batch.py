@@ -2,9 +2,9 @@
 
 After every episode, and during long ones, several times over: give every after-state s in memory a
 target, and find the weights that minimise the squared errors of f plus ``ridge`` times the squared
-weights. Batch TD(lambda) aims at the lambda-return of what followed. Targets are clipped to the range
-that discounted sums of the rewards seen so far can reach: no extrapolation can run away. Agents that
-share weights share the regression: the experience of all of them is pooled.
+weights. Batch TD(lambda) aims at the lambda-return of what followed. Targets are clipped to the
+range that discounted sums of the rewards seen so far can reach: no extrapolation can run away.
+Agents that share weights share the regression: the experience of all of them is pooled.
 """
 
 from __future__ import annotations

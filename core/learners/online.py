@@ -36,7 +36,7 @@ class Online(ABC):
         self._rewards: FloatArray = np.zeros(len(rows))
 
     def of_agents(self, weights: FloatArray) -> FloatArray:
-        """Return the row of every agent ``(n, n_rules)``: the weights themselves if each has one."""
+        """Return the row of every agent ``(n, n_rules)``, no copy if each has its own."""
         return weights if len(weights) == len(self.rows) else weights[self.rows]
 
     def begin_episode(self) -> None:

@@ -68,11 +68,12 @@ class TDLambda(Online):
             lengths = self.rules.squared_lengths(states)
         self.rules.td_update(
             self.weights, self.rows, self.trace, self.reach, states,
-            states if entered is None else entered, rewards, 0.0 if entered is None else self.discount, self.settings.step_size, lengths,
+            states if entered is None else entered, rewards,
+            0.0 if entered is None else self.discount, self.settings.step_size, lengths,
             self.discount * self.settings.trace_decay,
         )  # fmt: skip
         if self.settings.averaging > 1:
             self.updates += 1.0
-            share = 1.0 / min(float(self.updates), self.settings.averaging)
-            self.theta += share * (self.weights - self.theta)
+            rate = 1.0 / min(float(self.updates), self.settings.averaging)
+            self.theta += rate * (self.weights - self.theta)
         return self.theta.size

@@ -18,9 +18,11 @@ def values(rules: RuleBase, theta: FloatArray, states: FloatArray) -> FloatArray
     return rules.features(states) @ theta
 
 
-def block_values(rules: RuleBase, theta: FloatArray, blocks: Blocks, codes: IntArray) -> FloatArray:
-    """Return f of joint-action codes, every next state written out."""
-    return values(rules, theta, blocks.states(codes))
+def block_values(
+    rules: RuleBase, theta: FloatArray, blocks: Blocks, indices: IntArray
+) -> FloatArray:
+    """Return f of joint-action indices, every next state written out."""
+    return values(rules, theta, blocks.states(indices))
 
 
 def td_update(

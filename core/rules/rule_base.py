@@ -128,7 +128,9 @@ class RuleBase:
         return cls(partitions, list(dict.fromkeys(terms)), space.n_own, settings.precision)
 
     def features(self, states: FloatArray) -> FloatArray:
-        """Return phi ``(m, n_rules)`` of states ``(m, d)`` explicitly: the twin of every kernel.
+        """Return phi ``(m, n_rules)`` of states ``(m, d)`` explicitly.
+
+        The reference implementation of every kernel rests on it.
 
         Raises
         ------
@@ -238,8 +240,8 @@ class RuleBase:
         strengths = self.features(states)
         return np.broadcast_to(np.arange(self.n_rules), strengths.shape), strengths
 
-    def block_values(self, theta: FloatArray, blocks: Blocks, codes: IntArray) -> FloatArray:
-        """Return f ``(len(codes),)`` of the next states that joint-action `codes` lead to.
+    def block_values(self, theta: FloatArray, blocks: Blocks, indices: IntArray) -> FloatArray:
+        """Return f ``(len(indices),)`` of the next states that joint-action `indices` lead to.
 
         The own part of theta is contracted once per distinct own block, or the few active rules
         are looked up; the feature vector of a joint action is never built. Blocks are trusted, as
@@ -252,7 +254,7 @@ class RuleBase:
         """
         self._check_theta(theta)
         none = np.zeros(0, dtype=np.int64)
-        tried = kernels.Tried(np.ascontiguousarray(codes)[:, None], none, none)
+        tried = kernels.Tried(np.ascontiguousarray(indices)[:, None], none, none)
         return self.enumerate(theta, blocks, tried, none, np.zeros((0, 0)))
 
     def enumerate(
@@ -261,7 +263,7 @@ class RuleBase:
         blocks: Blocks,
         tried: kernels.Tried,
         joint_action: IntArray,
-        chances: FloatArray,
+        probabilities: FloatArray,
     ) -> FloatArray:
         """Return the value ``(A,)`` of each own action over the joint actions `tried`.
 
@@ -278,13 +280,13 @@ class RuleBase:
             Which ones.
         joint_action
             ``(n,)`` actions of the agents that are given.
-        chances
+        probabilities
             ``(n, A)`` probabilities of the actions of the agents below, to average over; with
             ``(0, 0)`` the maximum is taken.
         """
         return self._enumerate(
             theta, blocks.own, blocks.own_rows, blocks.shared, blocks.shared_rows, blocks.divisor,
-            tried.codes, tried.places, tried.below, joint_action, chances, self.layout,
+            tried.indices, tried.places, tried.below, joint_action, probabilities, self.layout,
         )  # fmt: skip
 
     def _check_states(self, states: FloatArray) -> None:

@@ -66,7 +66,8 @@ def extent(outline: Outline) -> str:
     )
     return (
         f"{count(len(outline.columns), 'condition')} × {count(len(outline.seeds), 'seed')}, each "
-        f"{count(outline.episodes, 'training episode')} of up to {count(outline.steps, 'step')}{after}"
+        f"{count(outline.episodes, 'training episode')} of up to "
+        f"{count(outline.steps, 'step')}{after}"
     )
 
 

@@ -107,7 +107,8 @@ def study_checksum(db: sqlite3.Connection) -> str:
 def trial_checksum(db: sqlite3.Connection, identity: str) -> str:
     """Return the SHA-256 of all rows of a trial."""
     queries = (
-        "SELECT identity, condition, seed, state, recording_sha256, code FROM trials WHERE identity = ?",
+        "SELECT identity, condition, seed, state, recording_sha256, code FROM trials"
+        " WHERE identity = ?",
         "SELECT * FROM episodes WHERE identity = ? ORDER BY phase, episode",
         "SELECT * FROM seconds WHERE identity = ?",
         "SELECT * FROM numbers WHERE identity = ? ORDER BY name",

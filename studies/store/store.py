@@ -212,8 +212,8 @@ class Store:
             return None
         more = f" and {len(modules) - 1} more" if len(modules) > 1 else ""
         return (
-            f"{self.directory}: its results are of other code: {modules[0]}{more} has changed since; "
-            "--accept-code goes on with it"
+            f"{self.directory}: its results are of other code: {modules[0]}{more} has changed "
+            "since; --accept-code goes on with it"
         )
 
     def measures(self) -> tuple[Measure, ...]:

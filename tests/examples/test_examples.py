@@ -26,31 +26,6 @@ def test_ppo(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
     assert [line.split(":")[0] for line in lines] == ["before training", "after 1024 steps"]
 
 
-def test_the_documented_prediction_errors_are_those_of_the_example() -> None:
-    example = runpy.run_path(str(EXAMPLES / "prediction_errors.py"), run_name="example")
-    count, means = example["errors"](box="square")
-    row = "| ".join(f"{mean:.1f} " for mean in means)
-    documented = (EXAMPLES.parent / "docs" / "predictors.md").read_text(encoding="utf-8")
-    assert f"| square | {count} | {row}|" in documented
-
-
-def test_calibrated_constants_foresee_as_well_as_the_right_ones() -> None:
-    example = runpy.run_path(str(EXAMPLES / "calibration.py"), run_name="example")
-    found, errors = example["calibrated"]("e-puck", "too soft", 3)
-    believed, calibrated, right = errors[20:].mean(axis=0)
-    assert calibrated < 1.2 * right < 0.3 * believed
-    assert abs(found[-1] - 1.0).max() < 0.3
-
-
-def test_the_documented_free_motion_is_that_of_the_example(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    runpy.run_path(str(EXAMPLES / "free_motion.py"), run_name="__main__")
-    documented = (EXAMPLES.parent / "docs" / "worlds.md").read_text(encoding="utf-8")
-    for line in capsys.readouterr().out.splitlines():
-        assert line in documented
-
-
 def test_picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "push.png"
     monkeypatch.setattr("sys.argv", ["picture.py", str(path)])

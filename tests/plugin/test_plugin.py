@@ -102,7 +102,9 @@ from nested_agents.scenarios import SCENARIOS
 from nested_agents.scenarios.box_pushing.states.variables import STATE_VARIABLES
 from nested_agents.studies import STUDIES
 from nested_agents.topologies import TOPOLOGIES
-for registry in (EVALUATORS, EXPLORATIONS, LEARNERS, SCENARIOS, STATE_VARIABLES, STUDIES, TOPOLOGIES):
+for registry in (
+    EVALUATORS, EXPLORATIONS, LEARNERS, SCENARIOS, STATE_VARIABLES, STUDIES, TOPOLOGIES
+):
     print(registry.group, *registry.installed())
 """
     path = os.pathsep.join([str(installed), str(ROOT)])

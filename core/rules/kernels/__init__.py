@@ -1,8 +1,8 @@
 """Compiled kernels of the rule base: the same numbers as the NumPy definitions, fast.
 
-Every kernel has a plain-NumPy reference implementation: firing strengths in `core.rules.fuzzy`, features in
-`RuleBase.features`, values and temporal differences in `core.rules.reference`. Nothing is
-compiled on import; each kernel is compiled at its first call and cached on disk.
+Every kernel has a plain-NumPy reference implementation: firing strengths in `core.rules.fuzzy`,
+features in `RuleBase.features`, values and temporal differences in `core.rules.reference`. Nothing
+is compiled on import; each kernel is compiled at its first call and cached on disk.
 
 The dense kernels leave out rules if all of them that share all but the last two variables come to
 less than `NEGLIGIBLE`: firing strengths sum to one, so that a value of the paper's rule base, with

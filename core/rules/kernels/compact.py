@@ -132,19 +132,19 @@ def active_compact(states: FloatArray, packed: Packed) -> tuple[IntArray, FloatA
 
 @njit(cache=True)
 def looked_up(  # type: ignore[no-untyped-def]
-    theta, own, own_rows, shared, shared_rows, divisor: int, codes: IntArray, lay: Layout
+    theta, own, own_rows, shared, shared_rows, divisor: int, indices: IntArray, lay: Layout
 ) -> FloatArray:
-    """Return f of joint-action codes from block tables: every active rule is looked up."""
+    """Return f of joint-action indices from block tables: every active rule is looked up."""
     n_local = len(own_rows) if len(own_rows) else len(own)
-    out = np.empty(len(codes))
+    out = np.empty(len(indices))
     functions, room = _room(lay)
     # The own block with which a shared one was last valued, and the value.
     known = np.full(len(shared) if len(shared_rows) else 0, -1)
     memory, last = np.empty(len(known)), -1
-    for c in range(len(codes)):
-        local = codes[c] // divisor % n_local
+    for c in range(len(indices)):
+        local = indices[c] // divisor % n_local
         mine = own_rows[local] if len(own_rows) else local
-        row = shared_rows[codes[c]] if len(shared_rows) else codes[c]
+        row = shared_rows[indices[c]] if len(shared_rows) else indices[c]
         if len(known) and known[row] == mine:
             out[c] = memory[row]
             continue
@@ -166,12 +166,12 @@ def _add(target, row, weight) -> None:  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def contracted(  # type: ignore[no-untyped-def]
-    theta, own, own_rows, shared, shared_rows, divisor: int, codes: IntArray, lay: Layout
+    theta, own, own_rows, shared, shared_rows, divisor: int, indices: IntArray, lay: Layout
 ) -> FloatArray:
     """Return what `looked_up` does: the active own rules are summed up once per own block."""
     functions, room = _room(lay)
     rules, strengths = room
-    used, slot_of, row_of, wanted = pairs(own, own_rows, shared, shared_rows, divisor, codes)
+    used, slot_of, row_of, wanted = pairs(own, own_rows, shared, shared_rows, divisor, indices)
     partial = np.zeros((len(used), total_width(lay)), theta.dtype)
     for b in range(len(used)):
         _pairs_of(own[used[b]], 0, lay, functions)
@@ -197,7 +197,7 @@ def contracted(  # type: ignore[no-untyped-def]
                     for c in range(size):
                         values[b, row] += strengths[c] * partial[b, start + rules[c]]
             start += lay.shared_sizes[t]
-    out = np.empty(len(codes))
-    for c in range(len(codes)):
+    out = np.empty(len(indices))
+    for c in range(len(indices)):
         out[c] = values[slot_of[c], row_of[c]]
     return out

@@ -95,14 +95,14 @@ def values_dense(theta: FloatArray, states: FloatArray, packed: Packed) -> Float
 
 @njit(cache=True)
 def folded(  # type: ignore[no-untyped-def]
-    theta, own, own_rows, shared, shared_rows, divisor: int, codes: IntArray, lay: Layout
+    theta, own, own_rows, shared, shared_rows, divisor: int, indices: IntArray, lay: Layout
 ) -> FloatArray:
-    """Return f of joint-action codes from block tables, all membership functions active.
+    """Return f of joint-action indices from block tables, all membership functions active.
 
     Contracts theta with each own block that occurs, once; each distinct pair of own and shared
-    block is then folded, once, whatever the number of codes that lead to it.
+    block is then folded, once, whatever the number of indices that lead to it.
     """
-    used, slot_of, row_of, wanted = pairs(own, own_rows, shared, shared_rows, divisor, codes)
+    used, slot_of, row_of, wanted = pairs(own, own_rows, shared, shared_rows, divisor, indices)
     count, n_rows = wanted.shape
     met = np.empty(n_rows, np.int64)  # rows of shared blocks that occur
     n_met = 0
@@ -128,7 +128,7 @@ def folded(  # type: ignore[no-untyped-def]
                 for i in range(lane):
                     values[b, rows[i]] = found[i]
                 lane = 0
-    out = np.empty(len(codes))
-    for c in range(len(codes)):
+    out = np.empty(len(indices))
+    for c in range(len(indices)):
         out[c] = values[slot_of[c], row_of[c]]
     return out

@@ -21,22 +21,22 @@ class Tried(NamedTuple):
 
     Attributes
     ----------
-    codes
-        ``(A, m)`` codes of own action and joint action of the agents below, the first of which
+    indices
+        ``(A, m)`` indices of own action and joint action of the agents below, the first of which
         varies most slowly; the others take action 0.
     places
-        ``(n,)`` what an action of each of these others adds to a code, 0 for the rest.
+        ``(n,)`` what an action of each of these others adds to an index, 0 for the rest.
     below
         ``(k,)`` the agents below.
     """
 
-    codes: IntArray
+    indices: IntArray
     places: IntArray
     below: IntArray
 
 
 @njit(cache=True)
-def _codes(tried, places, joint_action):  # type: ignore[no-untyped-def]
+def _indices(tried, places, joint_action):  # type: ignore[no-untyped-def]
     given = 0
     for i in range(len(joint_action)):
         given += places[i] * joint_action[i]
@@ -44,27 +44,27 @@ def _codes(tried, places, joint_action):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _gather(values, n_own: int, below, chances):  # type: ignore[no-untyped-def]
-    """Return per own action the mean by chances ``(n, A)``, or the maximum if there are none."""
+def _aggregate(values, n_own: int, below, probabilities):  # type: ignore[no-untyped-def]
+    """Return per own action the mean by probability ``(n, A)``, or the maximum if none is given."""
     m = len(values) // n_own
     out = np.empty(n_own)
-    if not len(chances):
+    if not len(probabilities):
         for a in range(n_own):
             out[a] = values[a * m : (a + 1) * m].max()
         return out
-    weights, size = np.ones(m), 1
+    joint, size = np.ones(m), 1
     for agent in below:
-        n_actions = chances.shape[1]
+        n_actions = probabilities.shape[1]
         for c in range(size - 1, -1, -1):
-            weight = weights[c]
+            one = joint[c]
             for a in range(n_actions):
-                weights[c * n_actions + a] = weight * chances[agent, a]
+                joint[c * n_actions + a] = one * probabilities[agent, a]
         size *= n_actions
-    total = weights.sum()
+    total = joint.sum()
     for a in range(n_own):
         mean = 0.0
         for c in range(m):
-            mean += weights[c] * values[a * m + c]
+            mean += joint[c] * values[a * m + c]
         out[a] = mean / total
     return out
 
@@ -82,7 +82,7 @@ def _learned(theta) -> bool:  # type: ignore[no-untyped-def]
 def enumerate_looked_up(  # type: ignore[no-untyped-def]
     theta, own, own_rows, shared, shared_rows, divisor: int,
     tried: IntArray, places: IntArray, below: IntArray, joint_action: IntArray,
-    chances: FloatArray, packed: Packed,
+    probabilities: FloatArray, packed: Packed,
 ) -> FloatArray:  # fmt: skip
     """Value the own actions ``(A,)`` by looking up every active rule, triangular partitions.
 
@@ -96,7 +96,7 @@ def enumerate_looked_up(  # type: ignore[no-untyped-def]
         Which joint actions: the parts of a `Tried`.
     joint_action
         ``(n,)`` the actions that are given.
-    chances
+    probabilities
         ``(n, A)`` probabilities of the actions of the agents below, which are averaged over; none:
         the maximum is taken.
     packed
@@ -104,34 +104,34 @@ def enumerate_looked_up(  # type: ignore[no-untyped-def]
     """
     if not _learned(theta):
         return np.zeros(len(tried))
-    codes, lay = _codes(tried, places, joint_action), unpack(packed)
-    values = looked_up(theta, own, own_rows, shared, shared_rows, divisor, codes, lay)
-    return _gather(values, len(tried), below, chances)
+    indices, lay = _indices(tried, places, joint_action), unpack(packed)
+    values = looked_up(theta, own, own_rows, shared, shared_rows, divisor, indices, lay)
+    return _aggregate(values, len(tried), below, probabilities)
 
 
 @njit(cache=True)
 def enumerate_contracted(  # type: ignore[no-untyped-def]
     theta, own, own_rows, shared, shared_rows, divisor: int,
     tried: IntArray, places: IntArray, below: IntArray, joint_action: IntArray,
-    chances: FloatArray, packed: Packed,
+    probabilities: FloatArray, packed: Packed,
 ) -> FloatArray:  # fmt: skip
     """Do what `enumerate_looked_up` does, by summing up the active own rules first."""
     if not _learned(theta):
         return np.zeros(len(tried))
-    codes, lay = _codes(tried, places, joint_action), unpack(packed)
-    values = contracted(theta, own, own_rows, shared, shared_rows, divisor, codes, lay)
-    return _gather(values, len(tried), below, chances)
+    indices, lay = _indices(tried, places, joint_action), unpack(packed)
+    values = contracted(theta, own, own_rows, shared, shared_rows, divisor, indices, lay)
+    return _aggregate(values, len(tried), below, probabilities)
 
 
 @njit(cache=True)
 def enumerate_dense(  # type: ignore[no-untyped-def]
     theta, own, own_rows, shared, shared_rows, divisor: int,
     tried: IntArray, places: IntArray, below: IntArray, joint_action: IntArray,
-    chances: FloatArray, packed: Packed,
+    probabilities: FloatArray, packed: Packed,
 ) -> FloatArray:  # fmt: skip
     """Do what `enumerate_looked_up` does, for any partitions."""
     if not _learned(theta):
         return np.zeros(len(tried))
-    codes, lay = _codes(tried, places, joint_action), unpack(packed)
-    values = folded(theta, own, own_rows, shared, shared_rows, divisor, codes, lay)
-    return _gather(values, len(tried), below, chances)
+    indices, lay = _indices(tried, places, joint_action), unpack(packed)
+    values = folded(theta, own, own_rows, shared, shared_rows, divisor, indices, lay)
+    return _aggregate(values, len(tried), below, probabilities)

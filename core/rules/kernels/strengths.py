@@ -11,7 +11,7 @@ from .layout import Layout
 NEGLIGIBLE, NEGLIGIBLE_SINGLE = 1e-15, 1e-8
 """Firing strengths below this are left out of sums in which all strengths add up to one; the other
 is for weights in single precision. Of the paper's 5^7 rules that is 2e-13 and 1e-6 at most, a fifth
-and a tenth of what kernels and their twins may differ by."""
+and a tenth of what kernels and their reference implementations may differ by."""
 
 LANES, ROWS = 32, 256
 """Situations side by side: a multiple of the one, and no more than the other at a time."""

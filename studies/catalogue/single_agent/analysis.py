@@ -2,8 +2,8 @@
 
 Section VII compares the two by formula. Here both run, on the line-up task, whose joint state of
 three agents still fits: the same learner (online TD lambda, full product of sigmoid rules, decision
-by value), the same worlds. Step sizes are chosen for each contender apart, on seeds of their own, so
-that neither is handicapped by the other's; the frozen control tells learning from luck.
+by value), the same worlds. Step sizes are chosen for each contender apart, on seeds of their own,
+so that neither is handicapped by the other's; the frozen control tells learning from luck.
 """
 
 from __future__ import annotations

@@ -17,8 +17,10 @@ def analyse(results):
     """One line for every condition."""
     return Endurance(
         tuple(
-            na.Summary(c, len(arrays["steps"]), {"steps": na.bootstrap(arrays["steps"].mean(axis=1))})
-            for c, arrays in results.training.items()
+            na.Summary(
+                c, len(measures["steps"]), {"steps": na.bootstrap(measures["steps"].mean(1))}
+            )
+            for c, measures in results.training.items()
         )
     )
 

@@ -7,9 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from nested_agents.core.decision import Decision
+from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.loop import control_loop, policy_seed
 from nested_agents.core.protocols import DrawnScenario, ExactlyPredictedScenario, measures_of
-from nested_agents.core.settings import BatchTDSettings, Decision, SelfModelSettings
+from nested_agents.core.self_model import SelfModelSettings
 from nested_agents.core.team import Team
 from nested_agents.scenarios import SCENARIOS, BoxPushing, BoxPushingSettings
 from nested_agents.topologies import build, parse
@@ -118,11 +120,11 @@ def test_the_role_of_an_agent_is_its_wheel() -> None:
 
 
 def test_it_can_be_recorded_drawn_and_predicted_exactly(tmp_path: Path) -> None:
-    scenario = BoxPushing(BoxPushingSettings(hold=4, belief={"load": 2.0}))
+    scenario = BoxPushing(BoxPushingSettings(action_repeat=4, belief={"load": 2.0}))
     assert isinstance(scenario, DrawnScenario)
     assert isinstance(scenario, ExactlyPredictedScenario)
     exact = scenario.with_exact_prediction().settings
-    assert (exact.predictor, exact.lookahead, exact.hold) == ("exact", 4, 4)
+    assert (exact.predictor, exact.prediction_horizon, exact.action_repeat) == ("exact", 4, 4)
     assert BoxPushingSettings.model_validate(exact.model_dump()) == exact
     scenario.reset(0)
     frames = [scenario.measure(), scenario.step(np.zeros(4, int)).info]

@@ -70,7 +70,10 @@ def test_what_never_succeeded_has_nothing_to_recover() -> None:
     [
         ({"learner.self_model.enabled": "{}"}, ["the failure"]),
         ({"learner.self_model.enabled": "{}", "scenario.box": "circle"}, ["circle"]),
-        ({"name": "a", "scenario.action_repeat": 4, "learner.self_model.enabled": "{}"}, ["a, action_repeat=4"]),
+        (
+            {"name": "a", "scenario.action_repeat": 4, "learner.self_model.enabled": "{}"},
+            ["a, action_repeat=4"],
+        ),
         ({"name": "a", "scenario.action_repeat": "", "learner.self_model.enabled": "{}"}, ["a"]),
         ({"learner.calibration.enabled": "{}"}, None),
     ],

@@ -65,7 +65,10 @@ BAD = {
     "[[overrides]]\npreset = 'paper'": ["overrides[0].name: missing"],
     "overrides = [{name = ''}]": ["overrides[0].name = ''", "can be printed"],
     'overrides = [{name = "a\\nb"}]': ["overrides[0].name = 'a\\nb'", "can be printed"],
-    "scenario.action_repeat = 99999999999": ["scenario.action_repeat = 99999999999", "at most 10000"],
+    "scenario.action_repeat = 99999999999": [
+        "scenario.action_repeat = 99999999999",
+        "at most 10000",
+    ],
     "learner.sweeps = 99999999999": ["learner.sweeps = 99999999999", "at most 10000"],
     "overrides = [{name = 'a', larner = {}}]": ["overrides[0].larner", "did you mean 'learner'"],
     "overrides = [{name = 'a', learner = 3}]": ["overrides[0].learner = 3", "table"],

@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from nested_agents.core.calibration import CalibrationSettings
+from nested_agents.core.decision import Decision
+from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.loop import control_loop, policy_seed
 from nested_agents.core.protocols import CalibratedScenario
 from nested_agents.core.robot_agents import per_robot
-from nested_agents.core.settings import BatchTDSettings, CalibrationSettings, Decision
 from nested_agents.core.team import Team
 from nested_agents.scenarios import BoxPushing, BoxPushingSettings
 from nested_agents.scenarios.box_pushing.prediction.belief import (
@@ -19,7 +21,7 @@ from nested_agents.scenarios.box_pushing.prediction.belief import (
 from nested_agents.scenarios.box_pushing.prediction.prediction import mean_twists
 from nested_agents.scenarios.box_pushing.prediction.push import push
 from nested_agents.scenarios.box_pushing.scripted.controller import ScriptedController
-from nested_agents.topologies import arrange, parse
+from nested_agents.topologies import parse
 
 SOFT = {"stiffness": 0.5, "load": 2.0, "contact_friction": 0.5}
 STIFF = {"stiffness": 2.0, "load": 0.5, "contact_friction": 2.0}
@@ -36,7 +38,7 @@ def calibrating(world, topology="chain"):
     settings = BatchTDSettings(
         calibration=CalibrationSettings(enabled=True), decision=Decision(rule="random")
     )
-    seen, hierarchy = arrange(parse(topology), world)
+    seen, hierarchy = parse(topology).arrange(world)
     return seen, Team.build(settings, seen, hierarchy, policy_seed(0))
 
 

@@ -1,19 +1,17 @@
-"""
-How wrong predictors are
-========================
+"""How wrong predictors are: ``python -m benchmarks.prediction_errors``.
 
 A scripted controller pushes boxes of all shapes, with and without failures. After every decision
-period in contact, the poses that each predictor foresaw are held against those that came.
+period in contact, the poses that each predictor predicted are held against those that came.
 """
 
 from collections.abc import Mapping
-from dataclasses import replace
 from math import hypot, pi
 from typing import Any
 
 import numpy as np
 
 from nested_agents.scenarios import BoxPushing, BoxPushingSettings
+from nested_agents.scenarios.box_pushing.prediction.prediction import BoxPrediction
 from nested_agents.scenarios.box_pushing.prediction.predictors import push_model
 from nested_agents.scenarios.box_pushing.scripted.controller import ScriptedController
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
@@ -48,7 +46,11 @@ def errors(**scenario: Any) -> tuple[int, list[float]]:
         for _ in range(STEPS):
             before = world.measure()
             joint = controller.act(before)
-            views = [replace(world.predict(), model=m).poses(joint[None]) for m in models]
+            now = world.predict()
+            views = [
+                BoxPrediction(now.situation, model, now.premises).poses(joint[None])
+                for model in models
+            ]
             transition = world.step(joint)
             after: Mapping[str, Any] = transition.info
             if after["contact_time"].any():
@@ -84,7 +86,8 @@ def table(title: str, cases: Mapping[str, Mapping[str, Any]]) -> None:
     print()
 
 
-if __name__ == "__main__":
+def main() -> None:
+    """Print the tables."""
     table("box", {name: {"box": name} for name in BOXES})
     for robot, wheel in (("e-puck", "left"), ("four-wheel", "front-left")):
         cases = {
@@ -95,3 +98,7 @@ if __name__ == "__main__":
             for name, failure in FAILURES.items()
         }
         table(f"failure of one wheel, {robot}", cases)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,10 +1,8 @@
-"""
-What calibration finds out
-==========================
+"""What calibration finds out: ``python -m benchmarks.calibration``.
 
 Teams of the default learner begin with constants of the push that are wrong by a factor of 2 each,
 and calibrate them. Told are the constants over the right ones after so many decisions that pushed,
-and how far the box was from where it was foreseen to be: by what was believed at first, by the
+and how far the box was from where it was predicted to be: by what was believed at first, by the
 constants calibrated until then, and by the simulator's own.
 """
 
@@ -13,8 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from nested_agents.core.calibration import CalibrationSettings
+from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.loop import policy_seed, world_seed
-from nested_agents.core.settings import BatchTDSettings, CalibrationSettings, SelfModelSettings
+from nested_agents.core.self_model import SelfModelSettings
 from nested_agents.core.team import Team
 from nested_agents.scenarios import BoxPushing, BoxPushingSettings
 from nested_agents.topologies import build, parse
@@ -52,22 +52,23 @@ def calibrated(robot: str, believed: str, episodes: int) -> tuple[Any, Any]:
         for step in range(STEPS):
             joint = team.act(prediction)
             tried = np.array([np.zeros(3), team.calibration.constants, right])
-            foreseen = prediction.outcomes(joint, tried)  # type: ignore[attr-defined]
+            predicted = prediction.outcomes(joint, tried)  # type: ignore[attr-defined]
             transition = scenario.step(joint)
             team.adapt(prediction, joint, transition)
             if transition.pushed is not None and np.hypot(*transition.pushed[:2]) > 0.002:
-                off = np.hypot(*(foreseen[:, 0] - transition.pushed)[:, :2].T)
+                off = np.hypot(*(predicted[:, 0] - transition.pushed)[:, :2].T)
                 errors.append(1000 * off * scenario.settings.action_repeat * 0.064)
                 found.append(np.exp(team.calibration.constants - right))
             prediction = team.predict(scenario)
-            team.learn(transition, prediction)
+            team.learn(transition)
             if transition.terminated or transition.truncated or step == STEPS - 1:
                 break
         team.end_episode()
     return np.array(found), np.array(errors)
 
 
-if __name__ == "__main__":
+def main() -> None:
+    """Print the table."""
     print("| robot, believed | " + " | ".join(f"after {k}" for k in AFTER), end=" ")
     print("| after all | pushes | believed [mm] | calibrated [mm] | right [mm] |")
     print("|---" * (len(AFTER) + 6) + "|")
@@ -79,3 +80,7 @@ if __name__ == "__main__":
             means = " | ".join(f"{mean:.1f}" for mean in errors.mean(axis=0))
             print(f"| {robot}, {believed} | {' | '.join(cells)} | {len(found)} | {means} |")
             sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,6 +1,4 @@
-"""
-What failures do to a robot that nothing hinders
-================================================
+"""What failures do to a robot that nothing hinders: ``python -m benchmarks.free_motion``.
 
 A robot is told to go ahead with its wheels at slightly different speeds, and its first wheel fails.
 Its twist after 40 control periods is held against theory: the speeds of wheels turn into a twist by
@@ -103,15 +101,16 @@ def table(robot: RobotSpec) -> None:
     for kind in (*COLUMN, "free"):
         wheel = f"robot1.{robot.wheel_names[0]}"
         failure = None if kind == "none" else {"kind": kind, "wheels": wheel}
-        seen, foreseen = found(robot, failure), expected(robot, kind)
+        seen, theory = found(robot, failure), expected(robot, kind)
         print(
-            f"| {kind} | {1000 * seen[0]:.1f} | {1000 * foreseen[0]:.1f} "
-            f"| {round(seen[2], 3) + 0.0:.3f} | {round(foreseen[2], 3) + 0.0:.3f} |"
+            f"| {kind} | {1000 * seen[0]:.1f} | {1000 * theory[0]:.1f} "
+            f"| {round(seen[2], 3) + 0.0:.3f} | {round(theory[2], 3) + 0.0:.3f} |"
         )
     print()
 
 
-if __name__ == "__main__":
+def main() -> None:
+    """Print the tables, and what delays and noise do."""
     for name in ("e-puck", "four-wheel"):
         table(ROBOTS[name])
     robot = ROBOTS["e-puck"]
@@ -125,3 +124,7 @@ if __name__ == "__main__":
     spread = 0.3 * robot.max_speed * CONTROL_PERIOD * np.sqrt(NOISY_PERIODS / len(robot.wheels))
     print(f"noisy 0.3: a way of {1000 * noisy.mean():.1f} +- {1000 * noisy.std():.1f} mm", end="; ")
     print(f"theory {1000 * NOISY_PERIODS * CONTROL_PERIOD * SPEED:.1f} +- {1000 * spread:.1f} mm")
+
+
+if __name__ == "__main__":
+    main()

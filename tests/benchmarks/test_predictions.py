@@ -1,0 +1,34 @@
+"""Tables of predictions and free motion are those of the documentation."""
+
+import runpy
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+BENCHMARKS, DOCS = ROOT / "benchmarks", ROOT / "docs"
+
+
+def test_the_documented_prediction_errors_are_those_of_the_benchmark() -> None:
+    benchmark = runpy.run_path(str(BENCHMARKS / "prediction_errors.py"), run_name="benchmark")
+    count, means = benchmark["errors"](box="square")
+    row = "| ".join(f"{mean:.1f} " for mean in means)
+    documented = (DOCS / "predictors.md").read_text(encoding="utf-8")
+    assert f"| square | {count} | {row}|" in documented
+
+
+def test_calibrated_constants_predict_as_well_as_the_right_ones() -> None:
+    benchmark = runpy.run_path(str(BENCHMARKS / "calibration.py"), run_name="benchmark")
+    found, errors = benchmark["calibrated"]("e-puck", "too soft", 3)
+    believed, calibrated, right = errors[20:].mean(axis=0)
+    assert calibrated < 1.2 * right < 0.3 * believed
+    assert abs(found[-1] - 1.0).max() < 0.3
+
+
+def test_the_documented_free_motion_is_that_of_the_benchmark(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    runpy.run_path(str(BENCHMARKS / "free_motion.py"), run_name="__main__")
+    documented = (DOCS / "worlds.md").read_text(encoding="utf-8")
+    for line in capsys.readouterr().out.splitlines():
+        assert line in documented
