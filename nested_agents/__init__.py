@@ -16,10 +16,9 @@ Two e-Pucks, their four wheels in a chain, learning by the default settings:
 """
 
 from importlib import import_module
-from importlib.metadata import version
 from typing import Any
 
-__version__: str = version("nested-agents")
+__version__: str
 
 _PLACES = {
     "ActionSet": ("core.spaces", "ActionSet"),
@@ -71,6 +70,10 @@ __all__ = ["__version__", *_PLACES]
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("nested-agents")
     if name not in _PLACES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     module, attribute = _PLACES[name]

@@ -1,6 +1,23 @@
-"""Run the command line: ``python -m nested_agents``."""
+"""Run the command line: ``nested-agents``, or ``python -m nested_agents``."""
 
-from .studies.cli.main import main
+from __future__ import annotations
+
+import os
+import signal
+
+
+def main() -> int:
+    """Run the command line and return its exit status; Ctrl-C ends even the imports in silence."""
+    is_usual = signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    if is_usual:
+        # Until a command begins there is nothing to tidy up. Some imports swallow exceptions.
+        signal.signal(signal.SIGINT, lambda *_: os._exit(130))
+    from .studies.cli.main import main as run
+
+    if is_usual:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    return run()
+
 
 if __name__ == "__main__":
     raise SystemExit(main())

@@ -28,12 +28,12 @@ class Summary:
     estimates: dict[str, Estimate]
 
 
-def number(value: float) -> str:
+def two_figures(value: float) -> str:
     """Return a number in two figures and at most two decimals, without a leading zero.
 
     Examples
     --------
-    >>> [number(x) for x in (0.975, 0.998, -0.0312, 0.0021, 12.34, 240.0)]
+    >>> [two_figures(x) for x in (0.975, 0.998, -0.0312, 0.0021, 12.34, 240.0)]
     ['.97', '1.0', '-.03', '0', '12', '240']
     """
     if np.isnan(value):
@@ -47,7 +47,20 @@ def number(value: float) -> str:
 
 
 def interval(estimate: Estimate) -> str:
-    """Return the interval of an estimate as text; a dash if it is not known."""
+    """Return the interval of an estimate as text; a dash if it is not known.
+
+    Examples
+    --------
+    >>> interval(Estimate(np.float64(0.4), np.float64(0.25), np.float64(1.0)))
+    '.25–1.0'
+    >>> interval(Estimate(np.float64(-0.6), np.float64(-0.72), np.float64(-0.53)))
+    '-.72 to -.53'
+    """
     if np.isnan(estimate.low):
         return "–"
-    return f"{number(float(estimate.low))}–{number(float(estimate.high))}"
+    return between(two_figures(float(estimate.low)), two_figures(float(estimate.high)))
+
+
+def between(low: str, high: str) -> str:
+    """Return the two bounds of an interval as one text, in which no dash meets a minus sign."""
+    return f"{low} to {high}" if "-" in (low[0], high[0]) else f"{low}–{high}"

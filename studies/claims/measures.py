@@ -19,11 +19,12 @@ from ..catalogue.chain_order.analysis import analyse as analyse_orders
 from ..catalogue.shapes.analysis import least_ratio, ratios_of
 from ..catalogue.wheel_failure.analysis import courses_of
 
-Measure = Callable[[Results], "Measured | None"]
+Compute = Callable[[Results], "Measured | None"]
+"""Computes what a claim is about from the results of a study."""
 
 LAST = slice(-5, None)
 FIRST = slice(None, 5)
-UNPLANNER = ("frozen", "random")
+UNREWARDED = ("frozen", "random")
 """Controls that know no more of the task than a learner does before its first reward."""
 PLANNER = "planner"
 """The control that has the reward function and plans by it."""
@@ -53,7 +54,7 @@ class Measured:
     note: str = ""
 
 
-def learned(condition: str, known: tuple[str, ...] = UNPLANNER) -> Measure:
+def learned(condition: str, known: tuple[str, ...] = UNREWARDED) -> Compute:
     """Return what measures success at the end of training, less that of the better control."""
 
     def outcomes(r: Results, name: str) -> np.ndarray:
@@ -80,7 +81,7 @@ def sooner_than_planned(results: Results) -> Measured | None:
     return Measured(bootstrap(own / base), len(own)) if len(own) else None
 
 
-def success(episodes: slice) -> Measure:
+def success(episodes: slice) -> Compute:
     """Return what measures the default's success in some episodes of training."""
 
     def compute(results: Results) -> Measured | None:
@@ -198,7 +199,7 @@ FAULTS = ("4 wheels, seized", "4 wheels, reversed")
 """The faults that count: feedback alone absorbs the milder ones, and two wheels leave no remedy."""
 
 
-def recovered(adapts: str) -> Measure:
+def recovered(adapts: str) -> Compute:
     """Return what measures success at the end relative to before the failure, worst fault."""
 
     def compute(results: Results) -> Measured | None:
@@ -221,7 +222,7 @@ def worst_shape(results: Results) -> Measured | None:
     return Measured(worst.estimate, worst.seeds, note=worst.condition)
 
 
-def without(condition: str) -> Measure:
+def without(condition: str) -> Compute:
     """Return what measures the evaluation success of a condition relative to the default's."""
 
     def compute(results: Results) -> Measured | None:

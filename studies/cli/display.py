@@ -19,7 +19,7 @@ from rich.progress import (
 )
 from rich.table import Table
 
-from ..presentation.tables import Table as SummaryTable
+from ..presentation.tables import SummaryTable
 from ..spec.spec import Spec
 from ..workers.runner import Outcome
 
@@ -32,14 +32,32 @@ def say(line: str) -> None:
     print(line, file=sys.stderr, flush=True)
 
 
-def announce(spec: Spec, directory: Path, jobs: int) -> None:
-    """Say what is about to be run."""
-    conditions, seeds = len(spec.conditions()), len(spec.seeds)
-    say(
-        f"{spec.study}: {count(conditions, 'condition')} x {count(seeds, 'seed')}, "
-        f"{count(spec.episodes, 'episode')} of up to {count(spec.steps, 'step')}, "
-        f"{count(jobs, 'process', 'es')}, kept in {directory}"
-    )
+class Terminal:
+    """Shows on standard error how a study goes, see `nested_agents.studies.run.Observer`."""
+
+    def announce(self, spec: Spec, directory: Path, processes: int) -> None:
+        """Say what is about to be run."""
+        conditions, seeds = len(spec.conditions()), len(spec.seeds)
+        say(
+            f"{spec.study}: {count(conditions, 'condition')} x {count(seeds, 'seed')}, "
+            f"{count(spec.episodes, 'episode')} of up to {count(spec.steps, 'step')}, "
+            f"{count(processes, 'process', 'es')}, kept in {directory}"
+        )
+
+    def note(self, line: str) -> None:
+        """Say it."""
+        say(line)
+
+    def follow(self, outcomes: Iterable[Outcome], total: int, done: int) -> None:
+        """Show how many of `total` trials are done, which have failed, and how long is left."""
+        if done:
+            say(f"{done} of {total} trials were run before")
+        if done == total:
+            return
+        if sys.stderr.isatty():
+            _follow_bar(outcomes, total, done)
+        else:
+            _follow_lines(outcomes, total, done)
 
 
 def count(number: int, what: str, plural: str = "s") -> str:
@@ -68,18 +86,6 @@ def duration(seconds: float) -> str:
     if hours < 24:
         return f"{hours} h {minutes} min"
     return f"{hours // 24} d {hours % 24} h"
-
-
-def follow(outcomes: Iterable[Outcome], total: int, done: int) -> None:
-    """Consume outcomes while showing how many of `total` trials are done and how long is left."""
-    if done:
-        say(f"{done} of {total} trials were run before")
-    if done == total:
-        return
-    if sys.stderr.isatty():
-        _follow_bar(outcomes, total, done)
-    else:
-        _follow_lines(outcomes, total, done)
 
 
 def _follow_bar(outcomes: Iterable[Outcome], total: int, done: int) -> None:

@@ -1,64 +1,91 @@
 """The command line: finds the command, runs it, and turns what went wrong into an exit status.
 
 Statuses: 0 done, 1 a trial failed, 2 something the user can mend (one line on standard error),
-130 interrupted. A command is a module in `commands` with a function `command`, whose signature and
-docstring are its options and its help, and one line in `COMMANDS`.
+130 interrupted, 141 the reader of the output has gone. A command is one line in `COMMANDS` and a
+module of that name in `commands`, which offers a click command called ``command``.
 """
 
 from __future__ import annotations
 
-import contextlib
-import io
 import os
-import re
 import sys
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from importlib import import_module
-from importlib.metadata import version
-from shutil import get_terminal_size
-from textwrap import wrap
 
+import click
+
+from ...core.registry import closest
 from ..spec.errors import SpecError
-
-COMMANDS: dict[str, str] = {
-    "demo": "demo",
-    "run": "run",
-    "table": "table",
-    "results": "results",
-    "status": "status",
-    "retry": "retry",
-    "export": "export",
-    "report": "report",
-    "explain": "explain",
-    "presets": "presets",
-    "topology": "topology",
-    "check": "check",
-    "cost": "cost",
-    "claims": "claims",
-}
-"""The module of every command by name, in the order of the help."""
+from .arguments import complaint
 
 PROGRAM = "nested-agents"
-DESCRIPTION = """How learning scales in hierarchies of fuzzy reinforcement-learning agents.
 
-To begin with: nested-agents demo
+COMMANDS: dict[str, str] = {
+    "demo": "Train two e-Pucks to push a box: table, figures and replay.",
+    "run": "Run the study of a spec, or continue it.",
+    "table": "Print what a study found: conditions against estimates.",
+    "results": "Print what every episode of a study measured.",
+    "status": "Tell how far a study is, what failed, and how long is left.",
+    "retry": "Run the failed trials of a study again.",
+    "export": "Write what a study holds as files for other programs.",
+    "report": "Write a study as one self-contained HTML file.",
+    "explain": "Explain a trained team in words and figures.",
+    "presets": "List the named starting points of a spec, or print one.",
+    "topology": "List the topologies, or show one of them.",
+    "check": "Check that scenarios keep their promises.",
+    "cost": "Print what hierarchies cost, by formula and measured.",
+    "claims": "Print the claims of the paper and what was found of each.",
+}
+"""The commands and what the help says of each; their modules are imported when asked for."""
 
-For the version: nested-agents --version"""
+
+class _Commands(click.Group):
+    """The commands, each of which is imported when it is asked for."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            return None
+        command: click.Command = import_module(f".commands.{cmd_name}", __package__).command
+        return command
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str, click.Command, list[str]]:
+        command = self.get_command(ctx, args[0])
+        if command is None:
+            raise SpecError(f"{args[0]}: unknown command; {closest(args[0], COMMANDS)}")
+        return args[0], command, args[1:]
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+
+@click.group(
+    cls=_Commands,
+    epilog=f"To begin with: {PROGRAM} demo",
+    context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
+)
+@click.version_option(None, "-V", "--version", package_name=PROGRAM, message="%(prog)s %(version)s")
+def nested_agents() -> None:
+    """How learning scales in hierarchies of fuzzy reinforcement-learning agents."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
     arguments = list(sys.argv[1:] if arguments is None else arguments)
-    if arguments in (["--version"], ["-V"]):
-        print(f"{PROGRAM} {version(PROGRAM)}")
-        return 0
     # SVG files keep names as text, in any script; PNG files have boxes for what the font lacks.
     warnings.filterwarnings("ignore", message=r"Glyph .* missing from font")
     try:
-        status = _call(arguments)
+        status = _run(arguments or ["--help"])
         sys.stdout.flush()
         return status
+    except click.UsageError as error:
+        return _complain(complaint(error))
     except SpecError as error:
         return _complain(str(error))
     except BrokenPipeError:
@@ -72,102 +99,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 130
 
 
-def _call(arguments: Sequence[str]) -> int:
-    import tyro
-
-    from .arguments import registry
-
-    commands: dict[str, Callable[..., int]] = {
-        name: import_module(f".commands.{module}", __package__).command
-        for name, module in COMMANDS.items()
-    }
-    complaint, page = io.StringIO(), _Page()
+def _run(arguments: list[str]) -> int:
+    # Not `nested_agents.main`, which has its own answers to a closed pipe and to Ctrl-C.
     try:
-        with contextlib.redirect_stderr(complaint), contextlib.redirect_stdout(page):
-            chosen = tyro.extras.subcommand_cli_from_dict(
-                {name: _deferred(command) for name, command in commands.items()},
-                prog=PROGRAM,
-                description=DESCRIPTION,
-                args=list(_separate_sets(arguments)) or ["--help"],
-                registry=registry(),
-            )
-    except SystemExit as exit_:
-        if exit_.code in (0, None):
-            print(_folded(page.getvalue()), end="")
-            return 0
-        raise SpecError(_one_line(complaint.getvalue())) from None
-    return int(chosen())
-
-
-class _Page(io.StringIO):
-    """What the parser prints, kept; styled as for the output that it is meant for."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._output = sys.stdout
-
-    @property
-    def encoding(self) -> str:  # type: ignore[override]
-        return self._output.encoding
-
-    def isatty(self) -> bool:
-        return self._output.isatty()
-
-
-def _folded(page: str) -> str:
-    """Return a help page with usage and description folded as its boxes are; else as it is."""
-    if not _plain(page).startswith("usage:"):
-        return page
-    usage, *rest = page.split("\n")
-    usage = usage.replace("{" + ",".join(COMMANDS) + "}", "COMMAND")
-    width = get_terminal_size().columns
-    lines = []
-    for line in (usage, *rest):
-        lines += [line] if len(_plain(line)) <= width else wrap(line, width)
-    return "\n".join(lines)
-
-
-def _plain(text: str) -> str:
-    """Return a text without colours."""
-    return re.sub(r"\x1b\[[0-9;]*m", "", text)
-
-
-def _deferred(command: Callable[..., int]) -> Callable[..., Callable[[], int]]:
-    """Return a function of the same signature and help that only notes its arguments.
-
-    The command then runs outside the capture of what the parser complains of.
-    """
-    from functools import partial, wraps
-
-    @wraps(command)
-    def note(*args: object, **kwargs: object) -> Callable[[], int]:
-        return partial(command, *args, **kwargs)
-
-    return note
-
-
-def _separate_sets(arguments: Sequence[str]) -> Iterator[str]:
-    """Let one ``--set`` take several assignments: each gets a ``--set`` of its own."""
-    seen = 0
-    for argument in arguments:
-        if argument == "--set":
-            seen = 1
-        elif seen == 2 and "=" in argument and not argument.startswith("-"):
-            yield "--set"
-        else:
-            seen = 2 if seen == 1 else 0
-        yield argument
-
-
-def _one_line(box: str) -> str:
-    """Reduce the parser's box to one line: what is wrong, and what was perhaps meant."""
-    lines = [line.strip("│╭╮╰╯ ") for line in _plain(box).splitlines()][1:]
-    said = " ".join("; " if line and not line.strip("─-") else line for line in lines)
-    said = re.split(r"[; ]*(For full helptext|Argument helptext|in nested-agents)", said)[0]
-    said = re.sub(r"^[; ]*Error parsing \[?(\S+?)\]?: (.*): must ", r"\1 \2: must ", said)
-    return re.sub(r" *; *(; *)*", "; ", " ".join(said.split())).strip("; ") or (
-        "the arguments are not understood; see --help"
-    )
+        with nested_agents.make_context(PROGRAM, arguments) as context:
+            return int(nested_agents.invoke(context))
+    except click.exceptions.Exit as exit_:
+        return exit_.exit_code
 
 
 def _complain(message: str) -> int:

@@ -51,12 +51,12 @@ def written(rows: Sequence[CostRow], form: Form) -> str:
         return file.getvalue().rstrip("\n")
 
 
-def number(value: int | Fraction | None) -> str:
+def scientific(value: int | Fraction | None) -> str:
     """Return a number for reading: some digits, powers of ten if it is large.
 
     Examples
     --------
-    >>> number(2457562500000), number(Fraction(5, 2)), number(None)
+    >>> scientific(2457562500000), scientific(Fraction(5, 2)), scientific(None)
     ('2.458e12', '2.5', '-')
     """
     if value is None:
@@ -111,7 +111,7 @@ def _all_digits() -> Iterator[None]:
 def _table(rows: Sequence[CostRow]) -> str:
     cells = [["n", "topology", *(title for _, title in FORMULAS)]]
     for row in rows:
-        values = (number(getattr(row, name)) for name, _ in FORMULAS)
+        values = (scientific(getattr(row, name)) for name, _ in FORMULAS)
         cells.append([str(row.agents), row.topology, *values])
     lines = [*aligned(cells, "><>>>>>"), ""]
     lines.append("Operations: nested by Eq. 18, chains by Eq. 19 and 21; single agent by Eq. 23.")
@@ -160,7 +160,7 @@ def _measured_cells(measured: Measured | None) -> list[str]:
     m = measured
     counts = (m.joint_actions_formula, m.joint_actions, m.rule_evaluations, m.weight_updates)
     amounts = (1e3 * (m.deciding + m.learning), m.memory / 2**20)
-    return [*map(number, counts), *(f"{a:.3g}" if a < 1000 else f"{a:,.0f}" for a in amounts)]
+    return [*map(scientific, counts), *(f"{a:.3g}" if a < 1000 else f"{a:,.0f}" for a in amounts)]
 
 
 def _interval(estimate: Estimate) -> str:
@@ -170,7 +170,7 @@ def _interval(estimate: Estimate) -> str:
 def _latex(rows: Sequence[CostRow]) -> str:
     """Return a tabular of the formulas and, if anything was measured, a second one of that."""
     titles = ["nested (18)", "closed form (19)", "asymptotic (21)", "single agent (23)", "ratio"]
-    formulas = [[number(getattr(row, name)) for name, _ in FORMULAS] for row in rows]
+    formulas = [[scientific(getattr(row, name)) for name, _ in FORMULAS] for row in rows]
     lines = _tabular(rows, titles, formulas)
     if any(row.measured is not None for row in rows):
         lines += ["", *_tabular(rows, MEASURED, [_measured_cells(row.measured) for row in rows])]

@@ -15,7 +15,8 @@ from ..store.durable import replacing
 from ..store.store import Store
 
 Form = Literal["csv", "parquet", "json"]
-Table = tuple[list[str], list[tuple[Any, ...]]]
+NamesAndRows = tuple[list[str], list[tuple[Any, ...]]]
+"""The names of columns, and rows of values."""
 
 
 def export(store: Store, folder: Path, form: Form, *, overwrite: bool = False) -> list[Path]:
@@ -74,7 +75,7 @@ def _writers(store: Store, form: Form) -> dict[str, Callable[[Path], None]]:
     }
 
 
-def _write_csv(table: Table, path: Path) -> None:
+def _write_csv(table: NamesAndRows, path: Path) -> None:
     names, rows = table
     with replacing(path) as file:
         text = io.TextIOWrapper(file, encoding="utf-8", newline="", write_through=True)
@@ -94,7 +95,7 @@ def _parquet_writer(rates: Set[str]) -> Any:
             f"--format parquet: {error.name} is not installed; pip install 'nested-agents[parquet]'"
         ) from None
 
-    def write(table: Table, path: Path) -> None:
+    def write(table: NamesAndRows, path: Path) -> None:
         names, rows = table
         columns = {
             n: _column([row[i] for row in rows], is_rate=n in rates) for i, n in enumerate(names)

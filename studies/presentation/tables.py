@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..analysis.statistics import Estimate
-from ..analysis.summary import Summary, interval, number
+from ..analysis.summary import Summary, between, two_figures
 from ..spec.errors import SpecError
 
 LATEX = {
@@ -23,15 +23,19 @@ MATHS_SPACE = r"\;"
 
 @dataclass(frozen=True)
 class Cell:
-    """An estimate as text: its value, and its interval or nothing."""
+    """An estimate as text: its value, and the bounds of its interval, if they are known."""
 
     value: str
-    interval: str
+    bounds: tuple[str, str] | None
 
-    def bracketed(self, between: str) -> str:
-        """Return the value, and its interval in brackets."""
-        around = f"{between}[{self.interval.replace('–', ', ')}]" if self.interval else ""
-        return self.value + around
+    @property
+    def interval(self) -> str:
+        """The interval; nothing if it is not known."""
+        return between(*self.bounds) if self.bounds else ""
+
+    def bracketed(self, space: str) -> str:
+        """Return the value and, if it is known, its interval in brackets."""
+        return f"{self.value}{space}[{', '.join(self.bounds)}]" if self.bounds else self.value
 
 
 Row = tuple[str, int, tuple[Cell | None, ...]]
@@ -39,7 +43,7 @@ Row = tuple[str, int, tuple[Cell | None, ...]]
 
 
 @dataclass(frozen=True)
-class Table:
+class SummaryTable:
     """A table in its forms.
 
     Attributes
@@ -59,7 +63,7 @@ class Table:
     markdown: str
 
 
-def tabulate(lines: Sequence[Summary], columns: Sequence[str] = ()) -> Table:
+def tabulate(lines: Sequence[Summary], columns: Sequence[str] = ()) -> SummaryTable:
     """Return the table of some summaries, whose estimates may differ in their titles.
 
     Parameters
@@ -85,14 +89,14 @@ def tabulate(lines: Sequence[Summary], columns: Sequence[str] = ()) -> Table:
         for s in lines
     )
     texts = _csv(lines, titles), _latex(titles, rows), _markdown(titles, rows)
-    return Table(titles, rows, *texts)
+    return SummaryTable(titles, rows, *texts)
 
 
 def _cell(estimate: Estimate | None) -> Cell | None:
     if estimate is None:
         return None
-    known = not np.isnan(estimate.low)
-    return Cell(number(float(estimate.value)), interval(estimate) if known else "")
+    value, low, high = map(two_figures, _ends(estimate))
+    return Cell(value, None if np.isnan(estimate.low) else (low, high))
 
 
 def _csv(lines: Sequence[Summary], titles: Sequence[str]) -> str:

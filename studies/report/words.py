@@ -9,7 +9,7 @@ from importlib.metadata import version
 
 import numpy as np
 
-from ..analysis.summary import Summary, interval, number
+from ..analysis.summary import Summary, interval, two_figures
 from ..spec.outline import Outline
 
 PACKAGES = (
@@ -133,7 +133,7 @@ overlapping: other .85 [.70–.90].'
 def _named(line: Summary, title: str, between: str = " ") -> str:
     estimate = line.estimates[title]
     around = "" if np.isnan(estimate.low) else f" [{interval(estimate)}]"
-    return f"{line.condition}{between}{number(float(estimate.value))}{around}"
+    return f"{line.condition}{between}{two_figures(float(estimate.value))}{around}"
 
 
 def versions() -> list[tuple[str, str]]:

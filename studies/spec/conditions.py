@@ -24,7 +24,7 @@ from ...scenarios import SCENARIOS
 from ...scenarios.box_pushing.config import BoxPushingSettings
 from ...topologies.config import ChainSettings, Topology, parse
 from .errors import SpecError, explain, show
-from .overlay import Table, nested, overlay
+from .overlay import TomlTable, nested, overlay
 from .presets import PRESETS
 from .renamed import now_called
 
@@ -69,7 +69,7 @@ class Override(Settings):
     """Lists of values by dotted key, for this override alone."""
 
     @property
-    def tables(self) -> Mapping[str, Table]:
+    def tables(self) -> Mapping[str, TomlTable]:
         """The tables by section."""
         return {name: dict(getattr(self, name)) for name in SECTIONS}
 
@@ -105,7 +105,7 @@ class Condition:
 
 def grid(
     preset: str,
-    tables: Mapping[str, Table],
+    tables: Mapping[str, TomlTable],
     sweep: Mapping[str, Sequence[Any]],
     overrides: Sequence[Override] = (),
     evaluations: Mapping[str, Mapping[str, Any]] | None = None,
@@ -161,7 +161,7 @@ def _points(
 
 def resolve(
     preset: str,
-    tables: Mapping[str, Table],
+    tables: Mapping[str, TomlTable],
     point: Mapping[str, Any],
     where: str = "",
     override: Override | None = None,
@@ -193,14 +193,14 @@ def _elsewhere(
     return tuple(found)
 
 
-def _validated(table: Table, where: str) -> ConditionSettings:
+def _validated(table: TomlTable, where: str) -> ConditionSettings:
     try:
         return ConditionSettings.model_validate(tuples(table), strict=True)
     except ValidationError as error:
         raise SpecError(explain(error, ConditionSettings, table) + where) from None
 
 
-def section(name: str, value: object) -> Table:
+def section(name: str, value: object) -> TomlTable:
     """Return the table of a section: from a table, a settings model, or for a topology a string.
 
     What is None in a model leaves what lies below as it is, as TOML has no word for it.

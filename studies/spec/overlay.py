@@ -17,7 +17,7 @@ from pydantic.fields import FieldInfo
 
 from ...core.registry import Plugged, SettingsRegistry
 
-Table = dict[str, Any]
+TomlTable = dict[str, Any]
 
 
 Slot = type[BaseModel] | FieldInfo | None
@@ -63,7 +63,7 @@ def field_of(model: type[BaseModel] | None, key: str) -> FieldInfo | None:
     return None if model is None else model.model_fields.get(key)
 
 
-def overlay(base: Mapping[str, Any], table: Mapping[str, Any], slot: Slot = None) -> Table:
+def overlay(base: Mapping[str, Any], table: Mapping[str, Any], slot: Slot = None) -> TomlTable:
     """Return `base` with `table` laid over it; neither is modified.
 
     Parameters
@@ -102,7 +102,7 @@ def _common_fields(first: type[BaseModel] | None, second: type[BaseModel] | None
     return set(shared.model_fields)
 
 
-def nested(key: str, value: object) -> Table:
+def nested(key: str, value: object) -> TomlTable:
     """Return the table that holds `value` at a dotted key.
 
     Examples
@@ -112,7 +112,7 @@ def nested(key: str, value: object) -> Table:
     """
     for part in reversed(key.split(".")):
         value = {part: value}
-    return typing.cast(Table, value)
+    return typing.cast(TomlTable, value)
 
 
 def flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -130,7 +130,7 @@ def flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]
             yield f"{prefix}{key}", value
 
 
-def assignment(text: str) -> Table:
+def assignment(text: str) -> TomlTable:
     """Read ``key=value`` as TOML would; a bare word as value is a string.
 
     Raises

@@ -23,7 +23,7 @@ from .. import STUDIES
 from .conditions import SECTIONS, Condition, Name, Override, grid, section, tuples
 from .errors import SpecError, explain, show
 from .objects import plain
-from .overlay import Table, assignment, flat, overlay
+from .overlay import TomlTable, assignment, flat, overlay
 from .presets import PRESETS
 
 MOST_TRIALS = 100_000
@@ -214,7 +214,7 @@ class Spec(Settings):
         """The files of users that it names."""
         return self._sources
 
-    def table(self) -> Table:
+    def table(self) -> TomlTable:
         """Return the spec as a table that `of` reads back."""
         table = _filled(self.model_dump())
         table["overrides"] = [_filled(override) for override in table.get("overrides", ())]
@@ -223,7 +223,7 @@ class Spec(Settings):
         return {key: value for key, value in table.items() if value != []}
 
 
-def _changed(table: Table, change: Table) -> Table:
+def _changed(table: TomlTable, change: TomlTable) -> TomlTable:
     """Lay a change over a table; a topology written as a string is a table from then on."""
     below = table.get("topology")
     if isinstance(below, str) and isinstance(change.get("topology"), Mapping):
@@ -231,11 +231,11 @@ def _changed(table: Table, change: Table) -> Table:
     return overlay(table, change)
 
 
-def _filled(table: Table) -> Table:
+def _filled(table: TomlTable) -> TomlTable:
     return {key: value for key, value in table.items() if value not in ({}, (), None)}
 
 
-def _read(table: Mapping[str, Any], where: str) -> Table:
+def _read(table: Mapping[str, Any], where: str) -> TomlTable:
     """Return a spec's or an override's table with its sections and sweep spelled out."""
     table = dict(table)
     for name in SECTIONS:

@@ -21,7 +21,7 @@ from distributed.comm.core import CommClosedError
 from ..spec.errors import SpecError
 from ..trials.trial import Trial
 from .interrupts import deaf
-from .worker import ONE_THREAD, Arrival, Measure, UnlikeWorkerError, attempt_alike, versions
+from .worker import ONE_THREAD, Arrival, RunTrial, UnlikeWorkerError, attempt_alike, versions
 
 CONNECT = 10.0
 """How long to try to reach a scheduler [s]."""
@@ -96,7 +96,7 @@ class DaskWorkers:
         return found if self._most is None else min(found, self._most)
 
     def arrivals(
-        self, trials: Sequence[Trial], measure: Measure, started: Callable[[Trial], None]
+        self, trials: Sequence[Trial], run_trial: RunTrial, started: Callable[[Trial], None]
     ) -> Generator[Arrival]:
         """See `Workers.arrivals`."""
         waiting, expected = iter(trials), versions()
@@ -109,7 +109,7 @@ class DaskWorkers:
                 processes = self.processes
                 for trial in islice(waiting, max(processes - len(running), 0)):
                     future = self._client.submit(
-                        attempt_alike, expected, measure, trial, pure=False
+                        attempt_alike, expected, run_trial, trial, pure=False
                     )
                     running[future] = trial
                     started(trial)

@@ -15,7 +15,7 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from ..trials.trial import Trial
 from .interrupts import deaf
-from .worker import Arrival, Measure, attempt, begin
+from .worker import Arrival, RunTrial, attempt, begin
 
 
 class LokyWorkers:
@@ -42,14 +42,14 @@ class LokyWorkers:
         self.processes = jobs
 
     def arrivals(
-        self, trials: Sequence[Trial], measure: Measure, started: Callable[[Trial], None]
+        self, trials: Sequence[Trial], run_trial: RunTrial, started: Callable[[Trial], None]
     ) -> Generator[Arrival]:
         """See `Workers.arrivals`."""
         queue = list(trials)
         while queue:
             handed = _Handed(self.processes, started)
             try:
-                with closing(self._parallel(queue, measure, handed.take)) as arriving:
+                with closing(self._parallel(queue, run_trial, handed.take)) as arriving:
                     for arrival in arriving:
                         handed.settle(arrival.trial)
                         yield arrival
@@ -60,12 +60,12 @@ class LokyWorkers:
             queue = [trial for trial in queue if trial.identity not in handed.settled]
 
     def _parallel(
-        self, trials: Sequence[Trial], measure: Measure, take: Callable[[Trial], None]
+        self, trials: Sequence[Trial], run_trial: RunTrial, take: Callable[[Trial], None]
     ) -> Generator[Arrival]:
         def tasks() -> Iterator[Any]:
             for trial in trials:
                 take(trial)
-                yield joblib.delayed(attempt)(measure, trial)
+                yield joblib.delayed(attempt)(run_trial, trial)
 
         worker = {"initializer": begin, "initargs": (os.getpid(),)}
         with joblib.parallel_config(backend="loky", inner_max_num_threads=1, **worker):

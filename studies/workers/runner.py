@@ -13,7 +13,7 @@ from ..store.running import Running
 from ..store.store import Store
 from ..trials.trial import Trial
 from .interrupts import undisturbed
-from .worker import Arrival, Measure
+from .worker import Arrival, RunTrial
 from .workers import Workers
 
 ATTEMPTS = 2
@@ -40,7 +40,7 @@ class Outcome:
 
 
 def run_trials(
-    trials: Sequence[Trial], store: Store, measure: Measure, workers: Workers
+    trials: Sequence[Trial], store: Store, run_trial: RunTrial, workers: Workers
 ) -> Generator[Outcome]:
     """Run trials in parallel; store, then yield each as it finishes.
 
@@ -52,14 +52,14 @@ def run_trials(
         The trials to run, for instance `Store.pending`.
     store
         Where results and tracebacks are kept.
-    measure
+    run_trial
         Runs one trial; a module-level function, since workers import it by name.
     workers
         Who runs them.
     """
     lost: list[Trial] = []
     with Running(store.directory, workers.processes) as running:
-        with closing(workers.arrivals(trials, measure, running.begin)) as arriving:
+        with closing(workers.arrivals(trials, run_trial, running.begin)) as arriving:
             for arrival in arriving:
                 running.end(arrival.trial)
                 if arrival.lost:
@@ -67,14 +67,14 @@ def run_trials(
                 else:
                     yield _keep(store, arrival)
         for trial in lost:
-            arrival = _alone(trial, measure, workers, running)
+            arrival = _alone(trial, run_trial, workers, running)
             running.end(trial)
             yield _keep(store, arrival)
 
 
-def _alone(trial: Trial, measure: Measure, workers: Workers, running: Running) -> Arrival:
+def _alone(trial: Trial, run_trial: RunTrial, workers: Workers, running: Running) -> Arrival:
     for _ in range(ATTEMPTS):
-        with closing(workers.arrivals([trial], measure, running.begin)) as arriving:
+        with closing(workers.arrivals([trial], run_trial, running.begin)) as arriving:
             (arrival,) = arriving
         if not arrival.lost:
             return arrival

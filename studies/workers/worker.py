@@ -28,7 +28,8 @@ PACKAGES = ("nested-agents", "numpy", "numba", "scipy", "box2d-py")
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 """What tells linear algebra to use one thread: last bits depend on their number."""
 
-Measure = Callable[["Trial"], "TrialResult"]
+RunTrial = Callable[["Trial"], "TrialResult"]
+"""Runs one trial; a module-level function, since workers import it by name."""
 
 
 class Arrival(NamedTuple):
@@ -70,18 +71,18 @@ def begin(parent: int) -> None:
     threading.Thread(target=watch, daemon=True).start()
 
 
-def attempt(measure: Measure, trial: Trial) -> Arrival:
+def attempt(run_trial: RunTrial, trial: Trial) -> Arrival:
     """Run one trial; what goes wrong is returned as text."""
     begin = time.perf_counter()
     try:
         with trial.sources.active():
-            result = measure(trial)
+            result = run_trial(trial)
     except Exception:
         return Arrival(trial, None, traceback.format_exc(), time.perf_counter() - begin)
     return Arrival(trial, result, None, time.perf_counter() - begin)
 
 
-def attempt_alike(expected: dict[str, str], measure: Measure, trial: Trial) -> Arrival:
+def attempt_alike(expected: dict[str, str], run_trial: RunTrial, trial: Trial) -> Arrival:
     """Run one trial on a worker that somebody else started, if it is as `expected`.
 
     Raises
@@ -103,7 +104,7 @@ def attempt_alike(expected: dict[str, str], measure: Measure, trial: Trial) -> A
             f"the worker {worker.address} has {worker.state.nthreads} threads, must be 1: start "
             f"dask worker with --nworkers {worker.state.nthreads} --nthreads 1"
         )
-    return attempt(measure, trial)
+    return attempt(run_trial, trial)
 
 
 def versions() -> dict[str, str]:

@@ -12,7 +12,7 @@ from typing import Literal, Protocol
 
 from ..spec.errors import SpecError
 from ..trials.trial import Trial
-from .worker import CORES, Arrival, Measure
+from .worker import CORES, Arrival, RunTrial
 
 Backend = Literal["loky", "dask"]
 """``loky``: processes of this machine. ``dask``: workers of a Dask cluster."""
@@ -27,7 +27,7 @@ class Workers(Protocol):
         ...
 
     def arrivals(
-        self, trials: Sequence[Trial], measure: Measure, started: Callable[[Trial], None]
+        self, trials: Sequence[Trial], run_trial: RunTrial, started: Callable[[Trial], None]
     ) -> Generator[Arrival]:
         """Run trials and yield what becomes of each, in whatever order; closing stops them.
 
@@ -35,7 +35,7 @@ class Workers(Protocol):
         ----------
         trials
             The trials.
-        measure
+        run_trial
             Runs one of them; a module-level function, since workers import it by name.
         started
             Called with each trial when it is handed to a worker, by any thread.
@@ -50,8 +50,10 @@ def check_jobs(jobs: int) -> None:
 
 
 @contextmanager
-def hire(backend: Backend, jobs: int | None, address: str | None, trials: int) -> Iterator[Workers]:
-    """Have workers for as long as the context lasts.
+def start_workers(
+    backend: Backend, jobs: int | None, address: str | None, trials: int
+) -> Iterator[Workers]:
+    """Start workers, which end with the context, or connect to those of a cluster.
 
     Parameters
     ----------

@@ -4,11 +4,11 @@ import sys
 
 import made_up
 
+from nested_agents.studies import run as studies_run
 from nested_agents.studies.catalogue import learning_curve
-from nested_agents.studies.cli import conduct
 from nested_agents.studies.cli.main import main
 
 if __name__ == "__main__":
     learning_curve.measure = getattr(made_up, sys.argv[1])
-    conduct.check = lambda spec: made_up.MEASURES
+    studies_run.check = lambda spec: made_up.MEASURES
     sys.exit(main(sys.argv[2:]))

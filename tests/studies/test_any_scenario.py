@@ -15,7 +15,7 @@ from nested_agents.studies.analysis import published
 from nested_agents.studies.analysis.results import read
 from nested_agents.studies.catalogue import scaling
 from nested_agents.studies.catalogue.study import load_study
-from nested_agents.studies.cli import conduct
+from nested_agents.studies.cli import running
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.presentation.tables import tabulate
 from nested_agents.studies.report.replays import replays
@@ -181,7 +181,7 @@ def test_what_is_not_recorded_is_not_replayed(study, capsys):
     trial = trials_of(SPEC)[0]
     with Store.open(study) as store:
         (remark,) = replays(store, trials_of(SPEC)).remarks
-        assert conduct._replay(store, trial) == []
+        assert running._replays(store, trial) == []
     assert remark == "Not shown, as the scenario records no episodes: 1; 2: seeds 0, 1."
     assert "no replay: Carts does not draw its episodes" in capsys.readouterr().err
 

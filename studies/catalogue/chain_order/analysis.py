@@ -24,7 +24,7 @@ from ...analysis.summary import Summary
 
 
 @dataclass(frozen=True)
-class Measure:
+class Rate:
     """What the orders are compared by: the mean of a phase's success rates."""
 
     title: str
@@ -36,9 +36,9 @@ class Measure:
         return np.asarray(success.mean(axis=1))
 
 
-MEASURES = (
-    Measure("success, all training", "training"),
-    Measure("evaluation success", "evaluation"),
+RATES = (
+    Rate("success, all training", "training"),
+    Rate("evaluation success", "evaluation"),
 )
 
 
@@ -104,7 +104,7 @@ def analyse(results: Results) -> ChainOrders:
     for condition, name in zip(conditions, names, strict=True):
         estimates = {
             m.title: rate(phase[condition]["success"])
-            for m in MEASURES
+            for m in RATES
             if condition in (phase := getattr(results, m.phase))
         }
         seeds = len(results.training[condition]["success"])
@@ -137,7 +137,7 @@ def _legend(orders: Sequence[str]) -> list[str]:
 
 def _compared(results: Results, conditions: list[str], names: list[str]) -> tuple[Comparison, ...]:
     found = []
-    for m in MEASURES if len(conditions) > 1 else ():
+    for m in RATES if len(conditions) > 1 else ():
         phase = getattr(results, m.phase)
         if any(condition not in phase for condition in conditions):
             continue

@@ -4,32 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-import tyro
+import click
 
-from .options import Changes
+from ..arguments import Command, Text, Whole
+from . import options
 
 Case = tuple[str, Callable[[], Any], list[int]]
 """What a scenario is called, a function that makes it, and the episodes to play."""
 
 
-def command(
-    source: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SPEC.toml|FILE.py:NAME")],
-    steps: int = 40,
-    set: Changes = (),
-) -> int:
+@click.command(cls=Command)
+@click.argument("source", type=Text(), metavar="SPEC.toml|FILE.py:NAME")
+@click.option(
+    "--steps",
+    type=Whole(),
+    metavar="N",
+    default=40,
+    help="Most steps of the episodes that are played for it.",
+)
+@options.changes
+def command(source: str, steps: int, changes: tuple[str, ...]) -> int:
     """Check scenarios: equal seeds, equal bits; nothing shared; finite numbers; ...
 
-    Parameters
-    ----------
-    source
-        A spec, whose conditions are checked, or a function or class in a Python file that makes a
-        scenario of one's own.
-    steps
-        Most steps of the episodes that are played for it.
-    set
-        Lay a value over the spec, as for run.
+    SPEC.toml is a spec, whose conditions are checked; FILE.py:NAME a function or class in a Python
+    file that makes a scenario of one's own.
     """
     from ....scenarios.checking.checker import LEAST_STEPS, ScenarioError, check_scenario
     from ...spec.errors import SpecError
@@ -37,7 +37,7 @@ def command(
     if steps < LEAST_STEPS:
         raise SpecError(f"--steps {steps}: must be at least {LEAST_STEPS}")
     faults = 0
-    for label, factory, episodes in _cases(source, set):
+    for label, factory, episodes in _cases(source, changes):
         try:
             passed = check_scenario(factory, steps=steps, episodes=episodes)
         except ScenarioError as error:
@@ -50,7 +50,7 @@ def command(
     return 1 if faults else 0
 
 
-def _cases(source: str, changes: Changes) -> Iterator[Case]:
+def _cases(source: str, changes: tuple[str, ...]) -> Iterator[Case]:
     """Yield what is to be checked, each scenario of a spec once."""
     from ....core.sources import active
     from ...spec.errors import SpecError
@@ -58,7 +58,7 @@ def _cases(source: str, changes: Changes) -> Iterator[Case]:
 
     if ".py:" in source or source.endswith(".py"):
         if changes:
-            raise SpecError("set: lays values over a spec, not over a Python file")
+            raise SpecError("--set: lays values over a spec, not over a Python file")
         try:
             factory = active().load(source)
         except ValueError as error:
@@ -78,7 +78,8 @@ def _cases(source: str, changes: Changes) -> Iterator[Case]:
         if settings not in seen:
             seen.add(settings)
             # Played are the first episode and those in which failures begin.
-            episodes = sorted({0, *(failure.episode for failure in settings.failures)})
+            failures = getattr(settings, "failures", ())
+            episodes = sorted({0, *(failure.episode for failure in failures)})
             try:
                 settings.build()
             except ValueError as error:

@@ -3,40 +3,51 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING
 
-import tyro
+import click
 
-from .options import MostJobs
+from ..arguments import Choice, Command, File
+from . import options
 
 if TYPE_CHECKING:
     from ...analysis.published import Published
+    from ...claims.table import Format
 
 
+@click.command(cls=Command)
+@click.option(
+    "--out",
+    type=File(),
+    metavar="DIR",
+    help="Run the studies that the claims rest on, each in a directory of its own below this one; "
+    "what has been run before is read.",
+)
+@click.option(
+    "--quick",
+    is_flag=True,
+    help="Small versions of the studies: six minutes on two cores, and wide intervals.",
+)
+@options.jobs
+@click.option(
+    "--format",
+    "form",
+    type=Choice(["table", "json", "markdown"]),
+    default="table",
+    help="How to print the table.",
+)
+@click.option(
+    "--publish",
+    type=File(),
+    metavar="DIR",
+    help="Also write the results that it rests on, as one small JSON file a study.",
+)
 def command(
-    out: Annotated[Path | None, tyro.conf.arg(metavar="DIR", help_behavior_hint="")] = None,
-    quick: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
-    jobs: MostJobs = None,
-    format: Literal["table", "json", "markdown"] = "table",
-    publish: Annotated[Path | None, tyro.conf.arg(metavar="DIR", help_behavior_hint="")] = None,
+    out: Path | None, quick: bool, jobs: int | None, form: Format, publish: Path | None
 ) -> int:
     """Print one table: each claim of the paper, its measure, the result, the verdict.
 
     Without --out the table is made from the results that come with the program.
-
-    Parameters
-    ----------
-    out
-        Run the studies that the claims rest on, each in a directory of its own below this one;
-        what has been run before is read.
-    quick
-        Small versions of the studies: six minutes on two cores, and wide intervals.
-    jobs
-        Trials at a time; one for every core unless said otherwise.
-    format
-        How to print the table.
-    publish
-        Also write the results that it rests on, as one small JSON file a study.
     """
     from ...analysis import published
     from ...claims import claims
@@ -58,7 +69,7 @@ def command(
         publish.mkdir(parents=True, exist_ok=True)
         for study, (outline, results, _) in found.items():
             published.write(publish / f"{study}.json", outline, results)
-    print_claims(claims.judge({study: p.results for study, p in found.items()}), format)
+    print_claims(claims.judge({study: p.results for study, p in found.items()}), form)
     return 0
 
 
@@ -67,16 +78,17 @@ def _run(out: Path, *, quick: bool, jobs: int | None) -> dict[str, Published]:
     from ...analysis import published
     from ...analysis.results import read
     from ...claims import claims
+    from ...run import run_study
     from ...spec.errors import SpecError
     from ...spec.spec import Spec
-    from ..conduct import carried_out
+    from ..display import Terminal
 
     found = {}
     for study in claims.STUDIES_OF_CLAIMS:
         name = study.replace("-", "_")
         folder = claims.QUICK if quick else claims.SPECS / name
         spec = Spec.load(folder / f"{name}.toml")
-        with carried_out(spec, out / study, jobs) as store:
+        with run_study(spec, out / study, jobs=jobs, observer=Terminal()) as store:
             if failed := store.failed():
                 raise SpecError(
                     f"{out / study}: {len(failed)} trials failed: nested-agents status "

@@ -3,71 +3,71 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING
 
-from .options import CORES, Figure, Jobs
+import click
+
+from ..arguments import Choice, Command, Several, Text, Whole
+from . import options
+
+if TYPE_CHECKING:
+    from ...cost.table import Form
 
 MOST_AGENTS = 10_000
 """Of one row: its integers have some fifty thousand digits."""
 
 
+@click.command(cls=Command)
+@click.option(
+    "--agents",
+    type=Text(),
+    metavar="N|RANGE",
+    default="4",
+    help="Number of agents, or a range: 4, 1:16, 2:64:2.",
+)
+@click.option(
+    "--topology",
+    cls=Several,
+    type=Text(),
+    metavar="SPEC...",
+    default=("chain",),
+    help="One or more topologies as in a spec: chain teams tree:2 ...",
+)
+@click.option("--rules", type=Whole(), metavar="N", default=5**7, help="|S|, rules of one agent.")
+@click.option("--actions", type=Whole(), metavar="N", default=4, help="|A|, actions of one agent.")
+@click.option(
+    "--iterations",
+    type=Whole(),
+    metavar="N",
+    default=450,
+    help="L, iterations (steps) of an epoch.",
+)
+@click.option("--measured/--no-measured", help="Also count and time steps of the running system.")
+@click.option(
+    "--format",
+    "form",
+    type=Choice(["table", "json", "csv", "latex"]),
+    default="table",
+    help="How to print it.",
+)
+@options.plot
 def command(
-    agents: str = "4",
-    topology: tuple[str, ...] = ("chain",),
-    rules: int = 5**7,
-    actions: int = 4,
-    iterations: int = 450,
-    measured: bool = False,
-    learning: bool = False,
-    jobs: Jobs = CORES,
-    format: Literal["table", "json", "csv", "latex"] = "table",
-    plot: Figure = None,
+    agents: str,
+    topology: tuple[str, ...],
+    rules: int,
+    actions: int,
+    iterations: int,
+    measured: bool,
+    form: Form,
+    plot: Path | None,
 ) -> int:
-    """Print the cost of hierarchies, by formula (Eq. 18-23) and, if asked, measured.
-
-    Parameters
-    ----------
-    agents
-        Number of agents, or a range: 4, 1:16, 2:64:2.
-    topology
-        One or more topologies as in a spec: chain teams tree:2 ...
-    rules
-        |S|, rules of one agent.
-    actions
-        |A|, actions of one agent.
-    iterations
-        L.
-    measured
-        Also count and time steps of the running system.
-    learning
-        Instead, let a chain and the single agent learn the same small task, for 1 to 3 agents, and
-        print what they learn beside what they cost. Takes some minutes.
-    jobs
-        Worker processes, for --learning.
-    format
-        How to print it.
-    plot
-        A figure to write: SVG, PNG or PDF by suffix.
-    """
-    from inspect import signature
-
+    """Print the cost of hierarchies, by formula (Eq. 18-23) and, if asked, measured."""
     from ....core.cost import Problem
     from ...cost.cost import MOST_OPERATIONS, cost_rows
     from ...cost.table import written
     from ...spec.errors import SpecError
-    from ...workers.workers import check_jobs
     from ..display import say
 
-    check_jobs(jobs)
-    if learning:
-        fixed = {
-            "agents": agents, "topology": topology, "rules": rules, "actions": actions,
-            "iterations": iterations, "measured": measured,
-        }  # fmt: skip
-        for name, given in fixed.items():
-            if given != signature(command).parameters[name].default:
-                raise SpecError(f"--{name}: is not for --learning, which measures a fixed task")
-        return _learning(jobs, format, plot)
     try:
         problem = Problem(rules, actions, iterations)
         rows = list(cost_rows(topology, numbers(agents), problem, measured=measured))
@@ -77,32 +77,12 @@ def command(
             draw(rows, plot)
     except ValueError as error:
         raise SpecError(str(error)) from None
-    print(written(rows, format))
+    print(written(rows, form))
     if measured and all(row.measured is None for row in rows):
         say(
             f"nothing was measured: every step would take more than {MOST_OPERATIONS:,} rule "
             "evaluations, about a second"
         )
-    return 0
-
-
-def _learning(jobs: int, format: str, plot: Path | None) -> int:
-    from ...cost.single_agent import compare
-    from ...cost.single_agent_report import draw, table
-    from ...presentation.figures import check_suffix
-    from ...spec.errors import SpecError
-
-    if format != "table":
-        raise SpecError(f"--format {format}: with --learning, allowed: table")
-    if plot is not None:
-        try:
-            check_suffix(plot)
-        except ValueError as error:
-            raise SpecError(str(error)) from None
-    contests = compare(jobs=jobs)
-    if plot is not None:
-        draw(contests, plot)
-    print(table(contests))
     return 0
 
 

@@ -3,29 +3,25 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
-import tyro
+import click
 
-from .options import CORES, Jobs
+from ..arguments import Command, File
+from . import options
 
 
-def command(
-    out: Annotated[Path, tyro.conf.arg(metavar="DIR")] = Path("nested-agents-demo"),
-    jobs: Jobs = CORES,
-    print_spec: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
-) -> int:
-    """Train two e-Pucks to push a box: table, figures and replay within minutes.
-
-    Parameters
-    ----------
-    out
-        Where to keep the study; made if it does not exist. The same command again continues it.
-    jobs
-        Worker processes; one for every core unless said otherwise.
-    print_spec
-        Print the spec that would be run, and stop.
-    """
+@click.command(cls=Command)
+@click.option(
+    "--out",
+    type=File(),
+    metavar="DIR",
+    default="nested-agents-demo",
+    help="Where to keep the study; made if it does not exist. The same command again continues it.",
+)
+@options.jobs
+@click.option("--print-spec", is_flag=True, help="Print the spec that would be run, and stop.")
+def command(out: Path, jobs: int | None, print_spec: bool) -> int:
+    """Train two e-Pucks to push a box: table, figures and replay within minutes."""
     text = (Path(__file__).parents[2] / "catalogue/learning_curve/demo.toml").read_text(
         encoding="utf-8"
     )
@@ -33,6 +29,6 @@ def command(
         print(text, end="")
         return 0
     from ...spec.spec import Spec
-    from ..conduct import conduct
+    from ..running import run_and_show
 
-    return conduct(Spec.parse(text), out, jobs, replay=True)
+    return run_and_show(Spec.parse(text), out, jobs=jobs, replay=True)

@@ -2,30 +2,30 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from pathlib import Path
 
-import tyro
+import click
 
-from .options import Directory
+from ..arguments import Command, Text, Whole
+from . import options
 
 
-def command(
-    directory: Directory,
-    condition: Annotated[str | None, tyro.conf.arg(metavar="LABEL", help_behavior_hint="")] = None,
-    seed: Annotated[int | None, tyro.conf.arg(metavar="SEED", help_behavior_hint="")] = None,
-) -> int:
+@click.command(cls=Command)
+@options.directory
+@click.option(
+    "--condition",
+    type=Text(),
+    metavar="LABEL",
+    help="Label of the condition; the first one unless said otherwise.",
+)
+@click.option(
+    "--seed", type=Whole(), metavar="SEED", help="The seed; the first one unless said otherwise."
+)
+def command(directory: Path, condition: str | None, seed: int | None) -> int:
     """Explain a trained team: its rules in words, its policy around the box, its self-model.
 
-    Training is run again for it, which takes seconds, and must give the episodes that are kept.
-
-    Parameters
-    ----------
-    directory
-        Where the study is kept. Text and figures go into its folder explain.
-    condition
-        Label of the condition; the first one unless said otherwise.
-    seed
-        The seed; the first one unless said otherwise.
+    DIR is where the study is kept. Text and figures go into its folder explain. Training is run
+    again for it, which takes seconds, and must give the episodes that are kept.
     """
     from ...explain import team as explain
     from ...explain.figures import draw

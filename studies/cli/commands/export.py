@@ -3,41 +3,45 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING
 
-import tyro
+import click
 
-from .options import Directory
+from ..arguments import Choice, Command, File
+from . import options
+
+if TYPE_CHECKING:
+    from ...presentation.export import Form
 
 
-def command(
-    directory: Directory,
-    format: Literal["csv", "parquet", "json"] = "csv",
-    out: Annotated[Path | None, tyro.conf.arg(metavar="PATH", help_behavior_hint="")] = None,
-    overwrite: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
-) -> int:
+@click.command(cls=Command)
+@options.directory
+@click.option(
+    "--format",
+    "form",
+    type=Choice(["csv", "parquet", "json"]),
+    default="csv",
+    help="Of the files; parquet needs the extra nested-agents[parquet]. Distances and returns are "
+    "left out of json.",
+)
+@click.option(
+    "--out",
+    type=File(),
+    metavar="PATH",
+    help="Folder of the files; export in the study's own unless said otherwise.",
+)
+@click.option("--overwrite", is_flag=True, help="Replace files that are there.")
+def command(directory: Path, form: Form, out: Path | None, overwrite: bool) -> int:
     """Write one file with a row for every episode, and one with a row for every trial.
 
-    JSON is one small file of spec, seeds and rounded measures, fit to be published with a paper;
-    `nested-agents table` reads it.
-
-    Parameters
-    ----------
-    directory
-        Where the study is kept.
-    format
-        Of the files; parquet needs the extra nested-agents[parquet]. Distances and returns are
-        left out of json.
-    out
-        Folder of the files; export in the study's own unless said otherwise.
-    overwrite
-        Replace files that are there.
+    DIR is where the study is kept. JSON is one small file of spec, seeds and rounded measures, fit
+    to be published with a paper; `nested-agents table` reads it.
     """
     from ...presentation.export import export
     from ...store.store import Store
 
     with Store.open(directory) as store:
         folder = directory / "export" if out is None else out
-        for path in export(store, folder, format, overwrite=overwrite):
+        for path in export(store, folder, form, overwrite=overwrite):
             print(path)
     return 0

@@ -1,34 +1,58 @@
-"""Options that several commands share."""
+"""Arguments and options that several commands share."""
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated, Literal
+import click
 
-import tyro
+from ..arguments import Assignments, Choice, File, Text, Whole
 
-from ...workers.worker import CORES as CORES
+directory = click.argument("directory", type=File(), metavar="DIR")
+"""An existing study."""
 
-Directory = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR")]
-"""An existing study, as argument."""
-
-Jobs = Annotated[int, tyro.conf.arg(metavar="N")]
+jobs = click.option(
+    "--jobs",
+    type=Whole(),
+    metavar="N",
+    help="Trials at a time; one for every core unless said otherwise.",
+)
 """Number of worker processes."""
 
-MostJobs = Annotated[int | None, tyro.conf.arg(metavar="N", help_behavior_hint="")]
-"""The same where their number may be left to the backend."""
+backend = click.option(
+    "--backend",
+    type=Choice(["loky", "dask"]),
+    default="loky",
+    help="Who runs the trials: loky, processes of this machine, or dask, workers of a Dask cluster "
+    "(extra nested-agents[dask]). The results are the same.",
+)
+"""Kind of workers, see `nested_agents.studies.workers.workers`."""
 
-Number = Annotated[int | None, tyro.conf.arg(help_behavior_hint="")]
-"""A number that has no default, or one that its help tells."""
-
-Figure = Annotated[Path | None, tyro.conf.arg(metavar="PATH", help_behavior_hint="")]
-"""A picture to write."""
-
-Backend = Literal["loky", "dask"]
-"""Kind of workers; named here, since importing `nested_agents.studies.workers` delays the help."""
-
-Address = Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT", help_behavior_hint="")]
+address = click.option(
+    "--address",
+    type=Text(),
+    metavar="tcp://HOST:PORT",
+    help="Of the scheduler of a running Dask cluster, all of whose workers are used unless --jobs "
+    "says otherwise. If missing, a cluster is started here.",
+)
 """Of a Dask scheduler."""
 
-Changes = Annotated[tyro.conf.UseAppendAction[tuple[str, ...]], tyro.conf.arg(metavar="KEY=VALUE")]
+accept_code = click.option(
+    "--accept-code",
+    is_flag=True,
+    help="Go on with a study although the installed code that computes it has changed since.",
+)
+"""Whether results of two versions of the code may stand side by side."""
+
+changes = click.option(
+    "--set",
+    "changes",
+    cls=Assignments,
+    type=Text(),
+    metavar="KEY=VALUE...",
+    help='Lay values over the spec: --set learner.ridge=1 "seeds=[3, 5]". May be repeated.',
+)
 """Assignments laid over a spec, see `nested_agents.studies.spec.overlay.assignment`."""
+
+plot = click.option(
+    "--plot", type=File(), metavar="PATH", help="A figure to write: SVG, PNG or PDF by suffix."
+)
+"""A picture to write."""

@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
-import tyro
+import click
 
-from .options import Directory
+from ..arguments import Command, File
+from . import options
 
 
-def command(
-    directory: Directory,
-    out: Annotated[Path | None, tyro.conf.arg(metavar="FILE.html", help_behavior_hint="")] = None,
-) -> int:
+@click.command(cls=Command)
+@options.directory
+@click.option(
+    "--out",
+    type=File(),
+    metavar="FILE.html",
+    help="Where to write; report.html in the study's directory unless said otherwise.",
+)
+def command(directory: Path, out: Path | None) -> int:
     """Write a study as one self-contained HTML file: verdict, table, figures, replays, spec.
 
-    Parameters
-    ----------
-    directory
-        Where the study is kept; it may be unfinished.
-    out
-        Where to write; report.html in the study's directory unless said otherwise.
+    DIR is where the study is kept; it may be unfinished.
     """
     from ...report.page import page
     from ...spec.errors import SpecError

@@ -2,26 +2,37 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-from .options import Directory
+import click
+
+from ..arguments import Choice, Command
+from . import options
+
+if TYPE_CHECKING:
+    from ...presentation.row_formats import Format
 
 
-def command(
-    directory: Directory,
-    format: Literal["table", "csv", "json"] = "table",
-    phase: Literal["training", "evaluation"] = "training",
-) -> int:
+@click.command(cls=Command)
+@options.directory
+@click.option(
+    "--format",
+    "form",
+    type=Choice(["table", "csv", "json"]),
+    default="table",
+    help="How to print the rows; CSV and JSON hold every digit, and a column for every swept key.",
+)
+@click.option(
+    "--phase",
+    type=Choice(["training", "evaluation"]),
+    default="training",
+    help="The episodes of training, or those of the greedy evaluation after it.",
+)
+def command(directory: Path, form: Format, phase: str) -> int:
     """Print one row per trial and episode, as a table, CSV or JSON.
 
-    Parameters
-    ----------
-    directory
-        Where the study is kept.
-    format
-        How to print the rows; CSV and JSON hold every digit, and a column for every swept key.
-    phase
-        The episodes of training, or those of the greedy evaluation after it.
+    DIR is where the study is kept.
     """
     import sys
 
@@ -32,5 +43,5 @@ def command(
         store.verify()
         measures = store.measures()
         names, rows = store.rows(phase)
-    write_rows(names, rows, measures, format, sys.stdout)
+    write_rows(names, rows, measures, form, sys.stdout)
     return 0

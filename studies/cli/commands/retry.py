@@ -2,45 +2,40 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-import tyro
+import click
 
-from .options import Address, Backend, Directory, MostJobs
+from ..arguments import Command
+from . import options
+
+if TYPE_CHECKING:
+    from ...workers.workers import Backend
 
 
+@click.command(cls=Command)
+@options.directory
+@options.jobs
+@options.backend
+@options.address
+@options.accept_code
 def command(
-    directory: Directory,
-    jobs: MostJobs = None,
-    backend: Backend = "loky",
-    address: Address = None,
-    accept_code: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    directory: Path, jobs: int | None, backend: Backend, address: str | None, accept_code: bool
 ) -> int:
     """Run the failed trials of a study again, and whatever is left of it.
 
-    Parameters
-    ----------
-    directory
-        Where the study is kept.
-    jobs
-        Trials at a time; one for every core, or for every worker at the address.
-    backend
-        Who runs them: loky, processes of this machine, or dask, workers of a Dask cluster (extra
-        nested-agents[dask]). The results are the same.
-    address
-        Of the scheduler of a running Dask cluster; if missing, one is started here.
-    accept_code
-        Go on with a study although the installed code that computes it has changed since.
+    DIR is where the study is kept.
     """
     from ...store.store import Store
-    from ..conduct import conduct
+    from ..running import run_and_show
 
     with Store.open(directory) as store:
         spec = store.spec()
-    return conduct(
+    return run_and_show(
         spec,
         directory,
-        jobs,
+        jobs=jobs,
         backend=backend,
         address=address,
         retry_failed=True,

@@ -3,46 +3,53 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING
 
-import tyro
+import click
 
-from .options import Address, Backend, Changes, MostJobs
+from ..arguments import Command, File
+from . import options
+
+if TYPE_CHECKING:
+    from ...workers.workers import Backend
 
 
+@click.command(cls=Command)
+@click.argument("spec", type=File(), metavar="SPEC.toml")
+@click.option(
+    "--out",
+    type=File(),
+    metavar="DIR",
+    required=True,
+    help="Where to keep the study; made if it does not exist. Every trial is kept the moment it "
+    "finishes, so interrupting costs only those that are running.",
+)
+@options.jobs
+@options.backend
+@options.address
+@options.accept_code
+@options.changes
 def command(
-    spec: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="SPEC.toml")],
-    out: Annotated[Path, tyro.conf.arg(metavar="DIR")],
-    jobs: MostJobs = None,
-    backend: Backend = "loky",
-    address: Address = None,
-    accept_code: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
-    set: Changes = (),
+    spec: Path,
+    out: Path,
+    jobs: int | None,
+    backend: Backend,
+    address: str | None,
+    accept_code: bool,
+    changes: tuple[str, ...],
 ) -> int:
     """Run the study of a spec; the same command again continues it.
 
-    Parameters
-    ----------
-    spec
-        What to run; `nested-agents demo --print-spec` prints an example.
-    out
-        Where to keep the study; made if it does not exist. Every trial is kept the moment it
-        finishes, so interrupting costs only those that are running.
-    jobs
-        Trials at a time; one for every core, or for every worker at the address.
-    backend
-        Who runs them: loky, processes of this machine, or dask, workers of a Dask cluster (extra
-        nested-agents[dask]). The results are the same.
-    address
-        Of the scheduler of a running Dask cluster; if missing, one is started here.
-    accept_code
-        Go on with a study although the installed code that computes it has changed since.
-    set
-        Lay a value over the spec: --set learner.ridge=1 --set "seeds=[3, 5]". May be repeated.
+    SPEC.toml says what to run; `nested-agents demo --print-spec` prints an example.
     """
     from ...spec.spec import Spec
-    from ..conduct import conduct
+    from ..running import run_and_show
 
-    return conduct(
-        Spec.load(spec, set), out, jobs, backend=backend, address=address, accept_code=accept_code
+    return run_and_show(
+        Spec.load(spec, changes),
+        out,
+        jobs=jobs,
+        backend=backend,
+        address=address,
+        accept_code=accept_code,
     )

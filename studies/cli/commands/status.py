@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from .options import Directory
+from pathlib import Path
+
+import click
+
+from ..arguments import Command
+from . import options
 
 
-def command(directory: Directory) -> int:
+@click.command(cls=Command)
+@options.directory
+def command(directory: Path) -> int:
     """Tell how many trials are done, running, failed (with the reason) and left, and for how long.
 
-    Parameters
-    ----------
-    directory
-        Where the study is kept.
+    DIR is where the study is kept.
     """
     from ...store.store import Store
     from ...workers.progress import progress

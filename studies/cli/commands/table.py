@@ -3,28 +3,33 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
 
-import tyro
+import click
+
+from ..arguments import Choice, Command, File, Several, Text
 
 
-def command(
-    source: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="DIR|FILE.json")],
-    columns: Annotated[
-        tuple[str, ...], tyro.conf.arg(metavar="TITLE [TITLE ...]", help_behavior_hint="")
-    ] = (),
-    format: Literal["table", "markdown", "latex", "csv"] = "table",
-) -> int:
+@click.command(cls=Command)
+@click.argument("source", type=File(), metavar="DIR|FILE.json")
+@click.option(
+    "--columns",
+    cls=Several,
+    type=Text(),
+    metavar="TITLE...",
+    help="Headings of the columns to print, in this order; all unless said otherwise.",
+)
+@click.option(
+    "--format",
+    "form",
+    type=Choice(["table", "markdown", "latex", "csv"]),
+    default="table",
+    help="How to print the table; CSV holds every digit.",
+)
+def command(source: Path, columns: tuple[str, ...], form: str) -> int:
     """Print conditions against estimates with their 95 % intervals, as at the end of a run.
 
-    Parameters
-    ----------
-    source
-        Where a study is kept, or a file of its results that `export --format json` has written.
-    columns
-        Headings of the columns to print, in this order; all unless said otherwise.
-    format
-        How to print the table; CSV holds every digit.
+    DIR is where a study is kept, FILE.json a file of its results that `export --format json` has
+    written.
     """
     from ....core.sources import Sources
     from ...analysis import published
@@ -46,8 +51,8 @@ def command(
             outline, results, sources = store.outline(), read(store), store.sources()
     with sources.active():
         found = tabulate(load_study(outline.study).analyse(results).table, columns)
-    if format == "table":
+    if form == "table":
         print_table(found)
     else:
-        print(getattr(found, format), end="")
+        print(getattr(found, form), end="")
     return 0

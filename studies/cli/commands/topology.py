@@ -2,47 +2,62 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-import tyro
+import click
 
-from .options import Figure, Number
+from ..arguments import Choice, Command, Text, Whole
+from . import options
+
+if TYPE_CHECKING:
+    from ....topologies.view import Form
 
 
+@click.command(cls=Command)
+@click.argument("action", type=Choice(["list", "show"]), metavar="list|show")
+@click.argument("topology", type=Text(), metavar="[SPEC]", required=False)
+@click.option(
+    "--agents",
+    type=Whole(),
+    metavar="N",
+    help="Number of agents; default: those that the topology names, else robots times wheels, "
+    "else 4.",
+)
+@click.option(
+    "--robots",
+    type=Whole(),
+    metavar="N",
+    help="Number of robots, whose agents are consecutive.",
+)
+@click.option(
+    "--wheels",
+    type=Whole(),
+    metavar="N",
+    help="Wheels (agents) of a robot; default: 2 if the number of agents is even, else 1.",
+)
+@click.option("--actions", type=Whole(), metavar="N", default=4, help="Actions of each agent.")
+@click.option(
+    "--format",
+    "form",
+    type=Choice(["table", "json"]),
+    default="table",
+    help="How to print it.",
+)
+@options.plot
 def command(
-    action: Annotated[Literal["list", "show"], tyro.conf.Positional],
-    topology: Annotated[
-        str | None,
-        tyro.conf.Positional,
-        tyro.conf.arg(metavar="[SPEC]", help_behavior_hint=""),
-    ] = None,
-    agents: Number = None,
-    robots: Number = None,
-    wheels: Number = None,
-    actions: int = 4,
-    format: Literal["table", "json"] = "table",
-    plot: Figure = None,
+    action: str,
+    topology: str | None,
+    agents: int | None,
+    robots: int | None,
+    wheels: int | None,
+    actions: int,
+    form: Form,
+    plot: Path | None,
 ) -> int:
     """List the topologies, or show one of them: edges, order of decision, who sees whom, cost.
 
-    Parameters
-    ----------
-    action
-        What to do.
-    topology
-        A topology as in a spec: chain:reversed, tree:2, file.py:function, graph.json, ...
-    agents
-        Number of agents; default: those that the topology names, else robots times wheels, else 4.
-    robots
-        Number of robots, whose agents are consecutive.
-    wheels
-        Wheels (agents) of a robot; default: 2 if the number of agents is even, else 1.
-    actions
-        Actions of each agent.
-    format
-        How to print it.
-    plot
-        A picture to write: SVG, PNG or PDF by suffix.
+    SPEC is a topology as in a spec: chain:reversed, tree:2, file.py:function, graph.json, ...
     """
     from ....topologies.view import kinds, printed, view
     from ...spec.errors import SpecError
@@ -56,14 +71,14 @@ def command(
             ):  # fmt: skip
                 if given is not None:
                     raise SpecError(f"topology list {option} {given}: is for topology show")
-            print(kinds(format))
+            print(kinds(form))
         elif topology is None:
             raise SpecError("topology show: SPEC is missing; see nested-agents topology list")
         else:
             shown = view(topology, agents, robots, wheels, actions)
             if plot is not None:
                 shown.draw(plot)
-            print(printed(shown, format))
+            print(printed(shown, form))
     except ValueError as error:
         raise SpecError(str(error)) from None
     return 0

@@ -7,7 +7,7 @@ from nested_agents.core.protocols import SUCCESS, Measure
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
 from nested_agents.studies.analysis.results import Results
 from nested_agents.studies.analysis.statistics import Estimate
-from nested_agents.studies.analysis.summary import interval, number
+from nested_agents.studies.analysis.summary import interval, two_figures
 from nested_agents.studies.catalogue.learning_curve import draw
 from nested_agents.studies.catalogue.learning_curve.analysis import analyse, metrics_of
 from nested_agents.studies.presentation.figures import save
@@ -84,7 +84,8 @@ def test_every_condition_is_in_the_legend(tmp_path):
 def test_an_unknown_interval_is_a_dash():
     assert interval(Estimate(*map(np.asarray, (0.5, np.nan, np.nan)))) == "–"
     assert interval(Estimate(*map(np.asarray, (0.5, 0.25, 1.0)))) == ".25–1.0"
-    assert number(float("nan")) == "?"
+    assert interval(Estimate(*map(np.asarray, (-0.6, -0.72, -0.53)))) == "-.72 to -.53"
+    assert two_figures(float("nan")) == "?"
 
 
 @pytest.mark.parametrize("form", ["table", "csv", "json"])

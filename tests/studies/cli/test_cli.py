@@ -15,9 +15,11 @@ from types import ModuleType
 import made_up
 import pytest
 
+from nested_agents.studies import run as studies_run
 from nested_agents.studies.catalogue import learning_curve
-from nested_agents.studies.cli import conduct
+from nested_agents.studies.cli import commands
 from nested_agents.studies.cli.main import COMMANDS, main
+from nested_agents.studies.cli.running import run_and_show
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.spec.toml import dumps
 from nested_agents.studies.store.store import DATABASE
@@ -30,7 +32,7 @@ def run_here(measure, *arguments):
     out, err = io.StringIO(), io.StringIO()
     with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
         patch.setattr(learning_curve, "measure", measure)
-        patch.setattr(conduct, "check", lambda spec: made_up.MEASURES)
+        patch.setattr(studies_run, "check", lambda spec: made_up.MEASURES)
         patch.setenv("COLUMNS", "80")
         status = main([str(argument) for argument in arguments])
     return status, out.getvalue(), err.getvalue()
@@ -89,20 +91,33 @@ def test_help(command, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     assert main([*command.split(), "--help"]) == 0
     out = capsys.readouterr().out
-    assert "usage: nested-agents" in out
-    assert "Parameters" not in out
-    assert "{None}" not in out
+    assert out.startswith(" ".join(["Usage: nested-agents", *command.split(), "[OPTIONS]"]))
+    assert "-h, --help" in out
     assert max(map(len, out.splitlines())) <= 80
 
 
-def test_help_says_what_there_is_and_imports_little(capsys):
+@pytest.mark.parametrize(
+    ("line", "modules"), [(["--help"], []), (["--version"], []), (["cost", "--help"], ["cost"])]
+)
+def test_help_and_version_import_little(line, modules):
     program = (
-        "import sys; from nested_agents.studies.cli.main import main; main(['--help']); "
-        "print({'numpy', 'numba', 'joblib', 'matplotlib'} & set(sys.modules), file=sys.stderr)"
+        "import sys; from nested_agents.__main__ import main; main(); "
+        "heavy = {'numpy', 'numba', 'joblib', 'matplotlib', 'scipy'} & set(sys.modules); "
+        "commands = {m.rpartition('.')[2] for m in sys.modules if '.cli.commands.' in m}; "
+        "print(sorted(heavy | (commands - {'options'})), file=sys.stderr)"
     )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
-    assert (done.returncode, done.stderr) == (0, "set()\n")
-    assert all(name in done.stdout for name in COMMANDS)
+    done = subprocess.run([sys.executable, "-c", program, *line], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, f"{modules}\n")
+
+
+def test_every_command_has_a_module_and_a_line_of_help(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    assert main([]) == 0
+    lines = capsys.readouterr().out.partition("Commands:\n")[2].splitlines()
+    listed = [line.split()[0] for line in lines if line]
+    assert listed[: len(COMMANDS)] == list(COMMANDS)
+    modules = {path.stem for path in Path(commands.__file__).parent.glob("*.py")}
+    assert modules - {"__init__", "options"} == set(COMMANDS)
 
 
 def test_version(capsys):
@@ -222,9 +237,9 @@ def test_a_replay_of_the_first_and_the_last_episode_is_drawn_once(tmp_path, monk
         sys.modules, "nested_agents.scenarios.box_pushing.pictures.rendering", rendering
     )
     monkeypatch.setattr(learning_curve, "measure", made_up.measure)
-    monkeypatch.setattr(conduct, "check", lambda spec: made_up.MEASURES)
+    monkeypatch.setattr(studies_run, "check", lambda spec: made_up.MEASURES)
     for _ in range(2):
-        assert conduct.conduct(made_up.SPEC, tmp_path, 2, replay=True) == 0
+        assert run_and_show(made_up.SPEC, tmp_path, jobs=2, replay=True) == 0
     assert len(drawn) == 2
     assert sorted(p.name for p in (tmp_path / "replay").iterdir()) == [
         "first-episode.gif", "last-episode.gif",
@@ -233,7 +248,7 @@ def test_a_replay_of_the_first_and_the_last_episode_is_drawn_once(tmp_path, monk
 
 def test_the_replay_of_one_episode_is_of_the_last(tmp_path):
     spec = Spec.of({"seeds": 1, "episodes": 1, "steps": 2, "evaluation": 0})
-    assert conduct.conduct(spec, tmp_path, 1, replay=True) == 0
+    assert run_and_show(spec, tmp_path, jobs=1, replay=True) == 0
     assert [p.name for p in (tmp_path / "replay").iterdir()] == ["last-episode.gif"]
 
 
@@ -264,22 +279,50 @@ BAD = {
     "check {spec} --steps 0": "error: --steps 0: must be at least 2",
     "claims --jobs 0": "error: --jobs: needs --out",
     "claims --jobs 0 --out x": "error: --jobs 0: must be at least 1",
-    "cost --jobs 0": "error: --jobs 0: must be at least 1",
-    "cost --learning --measured": "error: --measured: is not for --learning",
     "cost --topology ''": "error: --topology '': must not be empty",
     "run {spec} --out {spec}": "spec.toml: ",
     "run {spec} --out /proc/nowhere/x": "/proc/nowhere",
-    "run {spec}": "--out",
-    "run": "SPEC",
+    "run {spec}": "error: --out: is missing; see nested-agents run --help",
+    "run": "error: SPEC.toml: is missing; see nested-agents run --help",
+    "run {spec} --out": "'--out' requires an argument; see nested-agents run --help",
+    "demo --out --print-spec": "error: --out --print-spec: is an option; a value must come first",
     "results nowhere": "nowhere: holds no study",
-    "results nowhere --format xml": "'xml'",
+    "results nowhere --format xml": "error: --format xml: known: csv, json, table",
+    "results nowhere --format jsn": "error: --format jsn: did you mean 'json'? known: csv, json",
     "status nowhere": "nowhere: holds no study",
     "retry nowhere": "nowhere: holds no study",
     "presets papr": "did you mean 'paper'",
-    "rum": "rum",
-    "demo --job 3": "--job",
-    "demo extra": "extra",
+    "rum": "error: rum: unknown command; did you mean 'run'? known: check, claims",
+    "--versio": "error: --versio: unknown option; did you mean '--version'?",
+    "demo --job 3": "error: --job: unknown option; did you mean '--jobs'? known: --help, --jobs",
+    "demo extra": "unexpected extra argument (extra); see nested-agents demo --help",
 }
+
+
+@pytest.mark.parametrize("delay", [0.02, 0.05, 0.1, 0.2, 0.3])
+def test_an_interrupt_while_starting_up_is_silent(delay):
+    """From when `main` is called; what Python does before is not ours."""
+    program = (
+        "import sys; from nested_agents.__main__ import main; print(flush=True); sys.exit(main())"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", program, "presets", "paper"], stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE, text=True, preexec_fn=heeding_interrupts,
+    )  # fmt: skip
+    assert process.stdout is not None
+    process.stdout.readline()
+    time.sleep(delay)
+    process.send_signal(signal.SIGINT)
+    status, _, err = finish(process)
+    assert (status, err) in ((130, ""), (0, ""))
+
+
+def test_several_values_of_one_option_and_of_repeated_ones(spec_file, capsys):
+    first, second = "episodes=-1", "learner.ridge=-2"
+    for line in (["--set", first, second], ["--set", first, "--set", second]):
+        for order in ([*line, str(spec_file)], [str(spec_file), *line]):
+            assert main(["check", *order]) == 2
+            assert "episodes = -1" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("line", BAD)

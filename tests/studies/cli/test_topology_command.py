@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from nested_agents.studies.cli.main import main
-from nested_agents.topologies import KINDS, arrange, parse
+from nested_agents.topologies import TOPOLOGIES, parse
 from nested_agents.topologies.view import readable, team_of
 
 
@@ -25,9 +25,13 @@ def said(capsys: pytest.CaptureFixture[str]):
 def test_list_names_every_kind(said) -> None:
     status, out, _ = said("list")
     assert status == 0
-    assert all(any(line.startswith(kind) for line in out.splitlines()) for kind in KINDS)
+    assert all(
+        any(line.startswith(kind) for line in out.splitlines()) for kind in TOPOLOGIES.built_in
+    )
     assert max(map(len, out.splitlines())) <= 80
-    assert [row["kind"] for row in json.loads(said("list", "--format", "json")[1])] == list(KINDS)
+    assert [row["kind"] for row in json.loads(said("list", "--format", "json")[1])] == list(
+        TOPOLOGIES.built_in
+    )
 
 
 def test_show_as_json(said) -> None:
@@ -90,7 +94,7 @@ def test_robots_are_shown_as_a_chain(
 
 def test_robots_are_shown_as_they_are_arranged(said, line_world) -> None:
     world = line_world(2, 2)
-    scenario, hierarchy = arrange(parse("per-robot"), world)
+    scenario, hierarchy = parse("per-robot").arrange(world)
     shown = json.loads(said("show", "per-robot", "--agents", "4", "--format", "json")[1])
     assert len(shown["agents"]) == len(scenario.agents)
     assert shown["depth"] == hierarchy.depth
@@ -106,7 +110,7 @@ def test_a_plot_is_written(said, tmp_path: Path) -> None:
     ("arguments", "message"),
     [
         (("show",), "SPEC is missing"),
-        (("draw",), "invalid choice 'draw'"),
+        (("draw",), "list|show draw: known: list, show"),
         (("list", "chain"), "topology list chain: takes no SPEC"),
         (("list", "--agents", "3"), "topology list --agents 3: is for topology show"),
         (("show", "chain:"), "topology 'chain:': order must be written a,b,c, received ''"),

@@ -6,8 +6,8 @@ from contextlib import contextmanager
 import made_up
 import pytest
 
+from nested_agents.studies import run as studies_run
 from nested_agents.studies.catalogue import learning_curve
-from nested_agents.studies.cli import conduct
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.toml import dumps
 from nested_agents.studies.store.store import Store
@@ -75,8 +75,8 @@ def test_a_full_disk_stops_a_study_with_one_line_and_costs_nothing(
     disk, tmp_path, monkeypatch, capsys
 ):
     monkeypatch.setattr(learning_curve, "measure", made_up.measure)
-    monkeypatch.setattr(conduct, "check", lambda spec: made_up.MEASURES)
-    monkeypatch.setattr(conduct, "hire", lambda *_: contextlib.nullcontext(Here()))
+    monkeypatch.setattr(studies_run, "check", lambda spec: made_up.MEASURES)
+    monkeypatch.setattr(studies_run, "start_workers", lambda *_: contextlib.nullcontext(Here()))
     # Figures are no results: without them the disk need not be larger.
     monkeypatch.setattr(learning_curve, "draw", lambda analysis: {})
     spec = tmp_path / "spec.toml"

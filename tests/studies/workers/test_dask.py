@@ -11,8 +11,8 @@ from pathlib import Path
 import made_up
 import pytest
 
+from nested_agents.studies import run as studies_run
 from nested_agents.studies.catalogue import learning_curve
-from nested_agents.studies.cli import conduct
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.toml import dumps
@@ -127,7 +127,7 @@ def run(tmp_path, *arguments):
 @pytest.fixture
 def made_up_results(monkeypatch):
     monkeypatch.setattr(learning_curve, "measure", made_up.measure)
-    monkeypatch.setattr(conduct, "check", lambda spec: made_up.MEASURES)
+    monkeypatch.setattr(studies_run, "check", lambda spec: made_up.MEASURES)
 
 
 @pytest.mark.usefixtures("made_up_results")

@@ -12,7 +12,7 @@ from joblib.externals.loky import get_reusable_executor
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.workers.loky import LokyWorkers
 from nested_agents.studies.workers.runner import ATTEMPTS, run_trials
-from nested_agents.studies.workers.workers import hire
+from nested_agents.studies.workers.workers import start_workers
 
 
 def content(store):
@@ -147,5 +147,5 @@ def test_never_more_trials_are_said_to_run_than_there_are_processes():
 
 @pytest.mark.parametrize(("jobs", "trials", "expected"), [(512, 3, 3), (1, 3, 1), (2, 0, 1)])
 def test_no_more_workers_than_trials(jobs, trials, expected):
-    with hire("loky", jobs, None, trials) as workers:
+    with start_workers("loky", jobs, None, trials) as workers:
         assert workers.processes == expected
