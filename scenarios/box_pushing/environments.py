@@ -305,7 +305,7 @@ class BoxPushingEnv(gymnasium.Env):
         """Return observation, reward, terminated, truncated and info after an action ``(n,)``."""
         transition, truncated = self.game.step(np.asarray(action, dtype=np.int64))
         seen, info = self.seat.observe(transition.states), self.game.info(transition.info)
-        return seen, transition.reward, transition.terminated, truncated, info
+        return seen, float(transition.reward), transition.terminated, truncated, info
 
     def render(self) -> Any:
         """Return a picture ``(height, width, 3)`` of the present, or show it."""

@@ -15,6 +15,7 @@ from matplotlib.path import Path as Outline
 from matplotlib.ticker import MultipleLocator
 
 from ...core.arrays import FloatArray
+from ...scenarios.box_pushing.config import BoxPushingSettings
 from ...scenarios.box_pushing.world.boxes import BoxSpec, box_for
 from ...scenarios.box_pushing.world.robots import robot_for
 from ..presentation.figures import COLOURS, SETTINGS, STYLES
@@ -124,6 +125,7 @@ def _pairs(found: Explained) -> Figure:
 
 def _policy(found: Explained, fields: list[Field]) -> Figure:
     settings = found.trial.settings.scenario
+    assert isinstance(settings, BoxPushingSettings)  # no other scenario has fields
     box, robot = box_for(settings.box, settings.robots), robot_for(settings.robot)
     columns = min(2, len(fields))
     rows = ceil(len(fields) / columns)

@@ -118,7 +118,7 @@ def _moved(
     """Return way and turn after the team's decision with a robot at a pose."""
     placed = robots.copy()
     placed[robot] = pose
-    here = replace(prediction, situation=replace(situation, robots=placed))
+    here = BoxPrediction(replace(situation, robots=placed), prediction.model, prediction.premises)
     view = here.poses(team.act(here, explore=False)[None])
     after = view.robots[0, robot]
     return (after - pose)[:2], float(wrap(after[2:] - pose[2:])[0])

@@ -42,7 +42,7 @@ def text(found: Explained, agents: int | None = None) -> Iterator[str]:
         )
         yield ""
         yield from explain_policy.table(found.fields)
-        left = trial.settings.scenario.robots - len(found.fields)
+        left = len(found.fields[0].others) + 1 - len(found.fields)
         if left:
             yield f"{left} more robots are not shown."
     yield ""

@@ -49,5 +49,12 @@ class Outline:
         """
         seeds = table["seeds"]
         seeds = range(seeds) if isinstance(seeds, int) else seeds
-        length = (int(table[name]) for name in ("episodes", "steps", "evaluation"))
-        return cls(str(table["study"]), tuple(map(int, seeds)), *length, columns, table)
+        return cls(
+            study=str(table["study"]),
+            seeds=tuple(map(int, seeds)),
+            episodes=int(table["episodes"]),
+            steps=int(table["steps"]),
+            evaluation=int(table["evaluation"]),
+            columns=columns,
+            table=table,
+        )

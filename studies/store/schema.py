@@ -71,7 +71,7 @@ def prepare(
         WHERE t.state = 'done' ORDER BY c.position, t.seed, e.phase DESC, e.episode"""
     )
     db.execute("DELETE FROM planned")
-    planned = [
+    planned: list[tuple[object, ...]] = [
         (i, t.identity, t.condition, t.seed, json.dumps(t.recorded))
         for i, t in enumerate(trials_of(spec))
     ]

@@ -45,7 +45,7 @@ class Screen:
         """Take in a step."""
         for name, frames in self._frames.items():
             frames.append(np.array(transition.info[name]))
-        self._rewards.append(transition.reward)
+        self._rewards.append(float(transition.reward))
         if self.mode == "human":
             self._show()
 
