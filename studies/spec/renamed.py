@@ -29,9 +29,9 @@ VALUES = {
 """By key and value of earlier versions, the present value."""
 
 GONE = {
-    ("learner.kind", "fitted-value"): "is no more: batch-td learns as much in a tenth of the time",
+    ("learner.kind", "fitted-value"): "is no more: batch-td learns as much in far less time",
     ("learner.decision.evaluator", "latin-hypercube"): (
-        "is no more: sampling does as well in less time"
+        "is no more: take exact up to eight agents, sampling beyond"
     ),
 }
 """What is no more, and what to use instead."""
@@ -52,9 +52,11 @@ def now_called(path: str, value: object = None) -> str | None:
         key = path[at:] if at >= 0 else ""
         if value is None and key in KEYS:
             return f"is now called {KEYS[key]!r}"
-        for place in (key, key.removesuffix(".kind")):
-            if (place, value) in GONE:
-                return GONE[place, value]  # type: ignore[index]
-            if (place, value) in VALUES:
-                return f"is now called {VALUES[place, value]!r}"  # type: ignore[index]
+        if not isinstance(value, str):
+            continue
+        for place in ((key, value), (key.removesuffix(".kind"), value)):
+            if place in GONE:
+                return GONE[place]
+            if place in VALUES:
+                return f"is now called {VALUES[place]!r}"
     return None

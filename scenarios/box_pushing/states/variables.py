@@ -78,9 +78,7 @@ def state_variable(
 
     Parameters are those of `nested_agents.core.spaces.Variable`. What the function is given is
     read-only. Built-in variables are compiled for prediction: with one of its seven shared
-    variables written as here, the decision of a team of two e-Pucks took 263 us in place of 196 us
-    (medians of processor time over the same 600 situations, in turns; the ratio was 1.32 to 1.38
-    in seven runs).
+    variables written as here, the decision of a team of two e-Pucks takes about a third longer.
 
     Examples
     --------
