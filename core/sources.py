@@ -38,6 +38,9 @@ class Sources:
         Where names are relative to; none: only what `texts` hold is known.
     texts
         Files that are known already, by name.
+    study
+        Directory of a study, whose copies stand in for files that are not there any more;
+        none: `folder`.
 
     Examples
     --------
@@ -48,9 +51,15 @@ class Sources:
     True
     """
 
-    def __init__(self, folder: Path | None = None, texts: Mapping[str, str] | None = None) -> None:
+    def __init__(
+        self,
+        folder: Path | None = None,
+        texts: Mapping[str, str] | None = None,
+        study: Path | None = None,
+    ) -> None:
         self.folder = folder
         self._texts = dict(texts or {})
+        self._study = study or folder
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Sources) and self._texts == other._texts
@@ -124,8 +133,9 @@ class Sources:
         if self.folder is None:
             raise ValueError(f"{name}: is not among the files kept with the study")
         path = self.folder / name
-        if not path.exists() and (kept := self.folder / FOLDER / kept_name(name)).exists():
-            path = kept
+        if not path.exists() and self._study is not None:
+            kept = self._study / FOLDER / kept_name(name)
+            path = kept if kept.exists() else path
         try:
             content = path.read_bytes()
         except OSError as error:
@@ -133,9 +143,18 @@ class Sources:
         if len(content) > MOST_BYTES:
             raise ValueError(f"{name}: {len(content)} bytes, allowed: {MOST_BYTES} or fewer")
         try:
-            return content.decode("utf-8-sig").replace("\r\n", "\n")
+            text = content.decode("utf-8-sig").replace("\r\n", "\n")
         except UnicodeDecodeError:
             raise ValueError(f"{name}: is not UTF-8 text") from None
+        for other in imported(text) - {"nested_agents"} if name.endswith(".py") else ():
+            if any(
+                (path.parent / place).exists() for place in (f"{other}.py", f"{other}/__init__.py")
+            ):
+                raise ValueError(
+                    f"{name}: imports {other}, which stands beside it; a study keeps single files: "
+                    "put both in one, or install what is shared as a package"
+                )
+        return text
 
     def _module(self, name: str) -> ModuleType:
         text = self.text(name)
@@ -237,6 +256,23 @@ def meaning(text: str, name: str) -> str:
     except (SyntaxError, ValueError, RecursionError) as error:
         raise ValueError(f"{name} cannot be run: {told(error)}") from None
     return _sha256(tree)
+
+
+def imported(text: str) -> set[str]:
+    """Return the top-level names of all modules that Python text imports; none if it is no Python.
+
+    Examples
+    --------
+    >>> sorted(imported("import numpy.linalg; from tank import Tank"))
+    ['numpy', 'tank']
+    """
+    try:
+        nodes = list(ast.walk(ast.parse(text)))
+    except (SyntaxError, ValueError, RecursionError):
+        return set()
+    names = {alias.name for n in nodes if isinstance(n, ast.Import) for alias in n.names}
+    names |= {n.module or "" for n in nodes if isinstance(n, ast.ImportFrom) and not n.level}
+    return {name.partition(".")[0] for name in names}
 
 
 def told(error: BaseException) -> str:

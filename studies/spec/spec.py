@@ -157,8 +157,10 @@ class Spec(Settings):
         return spec
 
     @classmethod
-    def load(cls, path: Path, changes: Iterable[str] = ()) -> Spec:
+    def load(cls, path: Path, changes: Iterable[str] = (), study: Path | None = None) -> Spec:
         """Read a TOML file and lay ``key=value`` changes over it.
+
+        Files of users are looked for beside it, then among the copies of a study.
 
         Raises
         ------
@@ -171,7 +173,7 @@ class Spec(Settings):
             raise SpecError(f"{path}: {error.strerror or error}") from None
         except UnicodeDecodeError:
             raise SpecError(f"{path}: is not UTF-8 text") from None
-        return cls.parse(text, changes, str(path), path.parent)
+        return cls.parse(text, changes, str(path), path.parent, study)
 
     @classmethod
     def parse(
@@ -180,10 +182,11 @@ class Spec(Settings):
         changes: Iterable[str] = (),
         source: str = "spec",
         folder: Path = Path(),
+        study: Path | None = None,
     ) -> Spec:
         """Read TOML text and lay ``key=value`` changes over it; see `load`.
 
-        Files that it names are below `folder`.
+        Files that it names are below `folder`; for those that are gone, copies of a study stand in.
         """
         try:
             table = tomllib.loads(text)
@@ -196,7 +199,7 @@ class Spec(Settings):
                 table = _changed(table, assignment(change))
             except ValueError as error:
                 raise SpecError(f"--set {change}: {error}") from None
-        return cls.of(table, Sources(folder))
+        return cls.of(table, Sources(folder, study=study))
 
     @property
     def n_conditions(self) -> int:

@@ -98,3 +98,24 @@ def test_names_are_resolved_by_the_active_sources(
     with Sources(texts={"arm.py": TEXT}).active():
         assert active().load("arm.py:LINKS") == 3
     assert active().load("arm.py:LINKS") == 7
+
+
+def test_the_copy_of_a_study_stands_in_for_a_file_that_is_gone(tmp_path: Path) -> None:
+    copies = tmp_path / "out" / "sources"
+    copies.mkdir(parents=True)
+    (copies / "links.py").write_text("LINKS = 3")
+    assert Sources(tmp_path, study=tmp_path / "out").load("links.py:LINKS") == 3
+    (tmp_path / "links.py").write_text("LINKS = 4")
+    assert Sources(tmp_path, study=tmp_path / "out").load("links.py:LINKS") == 4
+
+
+@pytest.mark.parametrize("beside", ["shared.py", "shared/__init__.py"])
+def test_a_file_that_needs_another_one_is_refused(tmp_path: Path, beside: str) -> None:
+    (tmp_path / "links.py").write_text(
+        "def links():\n    from shared import LINKS\n    return LINKS"
+    )
+    Sources(tmp_path).load("links.py:links")  # installed, for all that can be known
+    (tmp_path / beside).parent.mkdir(exist_ok=True)
+    (tmp_path / beside).write_text("LINKS = 3")
+    with pytest.raises(ValueError, match=r"links\.py: imports shared, which stands beside it"):
+        Sources(tmp_path).load("links.py:links")

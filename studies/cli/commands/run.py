@@ -46,7 +46,7 @@ def command(
     from ..running import run_and_show
 
     return run_and_show(
-        Spec.load(spec, changes),
+        Spec.load(spec, changes, study=out),
         out,
         jobs=jobs,
         backend=backend,
