@@ -26,7 +26,7 @@ from pydantic_core import PydanticCustomError, core_schema
 
 from . import sources
 from .places import located
-from .settings import Settings
+from .settings import Settings, tuples
 
 
 def closest(name: object, known: Iterable[str]) -> str:
@@ -86,9 +86,7 @@ class Registry:
         for point in entry_points(group=self.group):
             known = self.built_in.get(point.name) or found.get(point.name)
             if known is not None and known != point.value:
-                raise ValueError(
-                    f"{self.kind} {point.name!r} is offered twice: {known}, {point.value}"
-                )
+                raise ValueError(f"{point.name!r} is offered twice: {known}, {point.value}")
             found[point.name] = point.value
         return found
 
@@ -281,7 +279,7 @@ class Plugged:
             raise PydanticCustomError(
                 "plugged_kind", cast(Any, "{said}"), {"said": str(error)}
             ) from None
-        return model.model_validate(dict(value), strict=True, context=info.context)
+        return model.model_validate(tuples(value), strict=True, context=info.context)
 
 
 def _relative(path: str) -> str:

@@ -6,6 +6,7 @@ ranges when it is built; every field is documented beside it, with its unit.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -44,3 +45,12 @@ class ScenarioSettings(Settings):
     def onset(self) -> int | None:
         """Episode in which something is scheduled to change, such as a failure; none: never."""
         return None
+
+
+def tuples(value: Any) -> Any:
+    """Return `value` with every list in it as a tuple, which strict validation asks for."""
+    if isinstance(value, Mapping):
+        return {key: tuples(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return tuple(tuples(inner) for inner in value)
+    return value

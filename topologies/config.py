@@ -52,7 +52,7 @@ class TopologySettings(Settings):
 
     def build(self, agents: Sequence[str], groups: Groups) -> Any:
         """Return the graph over named agents, given by group too."""
-        raise ValueError(f"topology {self.kind!r} is no hierarchy of {len(agents)} agents")
+        raise ValueError(f"is no hierarchy of {len(agents)} agents; see `arrange`")
 
     def arrange(self, scenario: Scenario) -> tuple[Scenario, Hierarchy]:
         """Return a scenario and the hierarchy of its agents.

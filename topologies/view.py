@@ -32,7 +32,7 @@ MOST_AGENTS = 1000
 
 
 @dataclass(frozen=True)
-class Team:
+class Crew:
     """Agents by name, and their groups: what a topology is built over."""
 
     agents: tuple[str, ...]
@@ -40,7 +40,7 @@ class Team:
 
 
 @dataclass(frozen=True)
-class View:
+class HierarchyView:
     """A topology over agents.
 
     Attributes
@@ -75,7 +75,7 @@ class View:
 
 def view(
     text: str, agents: int | None, robots: int | None, wheels: int | None, actions: int
-) -> View:
+) -> HierarchyView:
     """Build the topology written as `text`, over as many agents as asked for.
 
     Raises
@@ -89,15 +89,15 @@ def view(
     team = team_of(agents, robots, wheels, named_by(settings))
     if isinstance(settings, SingleAgentSettings):
         single = Hierarchy(["single"], [])
-        return View(text, single, ((0,),), (actions ** len(team.agents),))
+        return HierarchyView(text, single, ((0,),), (actions ** len(team.agents),))
     if isinstance(settings, PerRobotSettings):
         return _of_robots(text, team, actions)
     hierarchy = build(settings, team.agents, team.groups)
     tries = tuple(actions ** (1 + count) for count in below_counts(hierarchy))
-    return View(text, hierarchy, team.groups, tries)
+    return HierarchyView(text, hierarchy, team.groups, tries)
 
 
-def _of_robots(text: str, team: Team, actions: int) -> View:
+def _of_robots(text: str, team: Crew, actions: int) -> HierarchyView:
     """Return the view of one agent per robot, which tries the joint actions of all its wheels."""
     own = actions ** len(team.groups[0])
     if own > MOST_ACTIONS:
@@ -108,7 +108,7 @@ def _of_robots(text: str, team: Team, actions: int) -> View:
     robots = tuple(robot_of(team.agents[wheels[0]]) for wheels in team.groups)
     hierarchy = Hierarchy(robots, builders.chain(robots).edges)
     tries = tuple(own ** (1 + count) for count in below_counts(hierarchy))
-    return View(text, hierarchy, tuple((r,) for r in range(len(robots))), tries)
+    return HierarchyView(text, hierarchy, tuple((r,) for r in range(len(robots))), tries)
 
 
 def named_by(settings: TopologySettings) -> tuple[str, ...]:
@@ -127,7 +127,7 @@ def named_by(settings: TopologySettings) -> tuple[str, ...]:
 
 def team_of(
     agents: int | None, robots: int | None, wheels: int | None, named: Sequence[str] = ()
-) -> Team:
+) -> Crew:
     """Return agents and groups for the numbers asked for.
 
     Agents are named ``robot1.left``, ``robot1.right`` for two wheels, ``robot1.wheel1`` for more,
@@ -165,7 +165,7 @@ def team_of(
         if len(named) != n:
             raise ValueError(f"the topology names {len(named)} agents, {n} are asked for")
         own = tuple(named)
-    return Team(own, groups)
+    return Crew(own, groups)
 
 
 def kinds(form: Form) -> str:
@@ -193,7 +193,7 @@ def kinds(form: Form) -> str:
     return "\n".join(lines)
 
 
-def printed(shown: View, form: Form) -> str:
+def printed(shown: HierarchyView, form: Form) -> str:
     """Return a view for printing."""
     hierarchy = shown.hierarchy
     names, n = hierarchy.agents, len(hierarchy)

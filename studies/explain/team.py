@@ -106,8 +106,11 @@ def _explained(store: Store, trial: Trial) -> Explained:
     taken = [explain_rules.take_apart(rules, theta) for theta in team.learner.theta]
     parts = tuple(taken[row] for row in team.rows)
     fields: list[Field] | str
-    if not isinstance(scenario, BoxPushing):
+    world = trial.settings.scenario.build()
+    if not isinstance(world, BoxPushing):
         fields = "the scenario has no robots around a box"
+    elif not isinstance(scenario, BoxPushing):
+        fields = "its agents are no wheels"
     elif team.evaluator is None:
         fields = "actions are drawn at random"
     else:
@@ -116,8 +119,7 @@ def _explained(store: Store, trial: Trial) -> Explained:
         except ValueError as error:
             fields = str(error)
     variables = scenario.state_space.variables
-    wheels = trial.settings.scenario.build().agents
-    return Explained(trial, scenario.agents, wheels, rules, variables, parts, fields, bodies)
+    return Explained(trial, scenario.agents, world.agents, rules, variables, parts, fields, bodies)
 
 
 def _trained(store: Store, trial: Trial) -> tuple[Team, Scenario, Bodies | None]:

@@ -19,7 +19,7 @@ from pydantic import AfterValidator, Field, ValidationError
 from ...core.learners import LEARNERS, LearnerSettings
 from ...core.learners.batch import BatchTDSettings
 from ...core.registry import Plugged, closest
-from ...core.settings import ScenarioSettings, Settings
+from ...core.settings import ScenarioSettings, Settings, tuples
 from ...scenarios import SCENARIOS
 from ...scenarios.box_pushing.config import BoxPushingSettings
 from ...topologies.config import ChainSettings, Topology, parse
@@ -243,15 +243,6 @@ def label(point: Mapping[str, Any], name: str = "") -> str:
         value = _brief(point[key])
         parts.append(value if key == "preset" else f"{shown}={value}")
     return ", ".join(parts)
-
-
-def tuples(value: Any) -> Any:
-    """Return `value` with every list in it as a tuple, which strict validation asks for."""
-    if isinstance(value, Mapping):
-        return {key: tuples(inner) for key, inner in value.items()}
-    if isinstance(value, list | tuple):
-        return tuple(tuples(inner) for inner in value)
-    return value
 
 
 def _brief(value: object) -> str:

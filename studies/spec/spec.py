@@ -17,10 +17,10 @@ from typing import Annotated, Any
 from pydantic import Field, PrivateAttr, ValidationError, field_validator
 
 from ...core.registry import closest
-from ...core.settings import Settings
+from ...core.settings import Settings, tuples
 from ...core.sources import Sources, is_reference, named
 from .. import STUDIES
-from .conditions import SECTIONS, Condition, Name, Override, grid, section, tuples
+from .conditions import SECTIONS, Condition, Name, Override, grid, section
 from .errors import SpecError, explain, show
 from .objects import plain
 from .overlay import TomlTable, assignment, flat, overlay
@@ -211,6 +211,10 @@ class Spec(Settings):
     def conditions(self) -> tuple[Condition, ...]:
         """Return the conditions in the order of the overrides and sweeps."""
         return self._conditions
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Spec:
+        """Return a spec with some fields changed, and the conditions that then follow."""
+        return Spec.of({**self.table(), **(update or {})}, self.sources)
 
     @property
     def sources(self) -> Sources:

@@ -275,7 +275,11 @@ class Session:
         Recorded are, of the trial's own team, the episodes of `Trial.recorded`. Every step is shown
         to `observe`.
         """
-        is_recorded = team is None and isinstance(self.world, RecordedScenario)
+        is_recorded = (
+            team is None
+            and isinstance(self.world, RecordedScenario)
+            and len(self.world.recorded) > 0
+        )
         kept = self.trial.recorded if is_recorded else {}
         trained = self.team if team is None else team
         measures = measures_of(self.world)

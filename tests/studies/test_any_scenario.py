@@ -8,9 +8,9 @@ from contextlib import redirect_stdout
 import numpy as np
 import pytest
 
-from nested_agents import scenarios
 from nested_agents.core.protocols import SUCCESS, Measure, groups_of
-from nested_agents.scenarios.line_up import LineUp
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
+from nested_agents.scenarios.line_up import LineUp, LineUpSettings
 from nested_agents.studies.analysis import published
 from nested_agents.studies.analysis.results import read
 from nested_agents.studies.catalogue import scaling
@@ -34,10 +34,12 @@ SPEC = Spec.of(
 
 
 class Carts(LineUp):
-    """Carts that tell how far they spread; single ones can do no such thing."""
+    """Carts that tell how far they spread, which single ones cannot; they are not recorded."""
+
+    recorded = ()
 
     def __init__(self, carts: int) -> None:
-        super().__init__(carts)
+        super().__init__(LineUpSettings(carts=carts))
         self.measures = (SPREAD, LEVEL, SUCCESS, ODD) if carts > 1 else ()
 
     def measure(self):
@@ -48,7 +50,7 @@ class Carts(LineUp):
 @pytest.fixture
 def carts(monkeypatch):
     """Every study is one of carts, as many as its spec has robots."""
-    monkeypatch.setattr(scenarios, "build", lambda settings: Carts(settings.robots))
+    monkeypatch.setattr(BoxPushingSettings, "build", lambda settings: Carts(settings.robots))
 
 
 @pytest.fixture
@@ -81,7 +83,7 @@ def test_a_trial_measures_what_its_scenario_declares(carts):
 
 
 def test_a_study_knows_its_measures_without_its_scenarios(study, monkeypatch):
-    monkeypatch.setattr(scenarios, "build", None)
+    monkeypatch.setattr(BoxPushingSettings, "build", None)
     with Store.open(study) as store:
         assert store.measures() == (SUCCESS, SPREAD, LEVEL, ODD)
         results = read(store)
@@ -132,7 +134,7 @@ def test_files_hold_what_is_missing_as_missing(study, tmp_path):
 def test_the_learning_curve_and_its_publication(study):
     with Store.open(study) as store:
         results = read(store)
-        again = published.loads(published.dumps(store.spec(), results)).results
+        again = published.loads(published.dumps(store.outline(), results)).results
     learning = load_study("learning-curve")
     analysis = learning.analyse(results)
     assert tabulate(analysis.table).titles == (
@@ -209,7 +211,7 @@ def test_a_measure_that_two_scenarios_mean_otherwise_is_refused(carts, monkeypat
         made.measures = (Measure("far", "far", "m" if settings.robots > 1 else "km"),)
         return made
 
-    monkeypatch.setattr(scenarios, "build", build)
+    monkeypatch.setattr(BoxPushingSettings, "build", build)
     for function in (check, measures_of_spec):
         with pytest.raises(SpecError, match="measure 'far': is declared as"):
             function(SPEC)

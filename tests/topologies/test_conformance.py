@@ -10,19 +10,23 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
+from nested_agents.core.decision import Decision
+from nested_agents.core.evaluators.evaluator import Deliberation
 from nested_agents.core.hierarchy import Hierarchy
+from nested_agents.core.learners.td import TDLambdaSettings
 from nested_agents.core.loop import control_loop, policy_seed
-from nested_agents.core.settings import Decision, RuleBaseSettings, TDLambdaSettings
+from nested_agents.core.rules.settings import RuleBaseSettings
 from nested_agents.core.team import Team
 from nested_agents.scenarios.line_up import LineUp, LineUpSettings
-from nested_agents.topologies import BUILDERS, KINDS, Topology, arrange, build
+from nested_agents.topologies import TOPOLOGIES, Topology, build, parse
 
 ADAPTER = TypeAdapter(Topology)
 SIZES = (2, 4, 6, 8)
+KINDS = [*sorted(TOPOLOGIES.built_in.keys() - {"single-agent", "per-robot"}), "pairs.py:pairs"]
 LEARNER = TDLambdaSettings(
     step_size=0.1,
     rule_base=RuleBaseSettings(order=1),
-    decision=Decision(others="mean", evaluator="exact"),
+    decision=Decision(teammates="uniform", evaluator="exact"),
 )
 
 
@@ -33,8 +37,9 @@ def required(kind: str, agents: tuple[str, ...], folder: Path) -> dict[str, obje
     tables: dict[str, dict[str, object]] = {
         "edges": {"edges": [agents[:2]], "alone": agents[2:]},
         "file": {"path": str(folder / "all.json")},
-        "python": {"source": f"{folder / 'pairs.py'}:pairs"},
     }
+    if kind == "pairs.py:pairs":
+        return {"kind": f"{folder}/{kind}"}
     return {"kind": kind, **tables.get(kind, {})}
 
 
@@ -42,7 +47,7 @@ def pairs(n: int) -> tuple[tuple[int, ...], ...]:
     return tuple((i, i + 1) for i in range(0, n, 2))
 
 
-@pytest.fixture(params=[(kind, n) for kind in BUILDERS if kind != "package" for n in SIZES],
+@pytest.fixture(params=[(kind, n) for kind in KINDS for n in SIZES],
                 ids=lambda p: f"{p[0]}-{p[1]}")  # fmt: skip
 def case(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[LineUp, Hierarchy]:
     kind, n = request.param
@@ -78,10 +83,10 @@ def test_it_acts_learns_saves_and_loads(case: tuple[LineUp, Hierarchy], tmp_path
     assert team.evaluator is not None
     assert team.evaluator.counts.joint_actions == 4 * hierarchy.joint_actions(4)
     team.save(tmp_path / "team.npz")
-    twin = team_of(scenario, hierarchy)
-    twin.load(tmp_path / "team.npz")
-    assert steps(scenario, twin, 2) == steps(scenario, team, 2)
-    assert (twin.learner.theta == team.learner.theta).all()
+    other = team_of(scenario, hierarchy)
+    other.load(tmp_path / "team.npz")
+    assert steps(scenario, other, 2) == steps(scenario, team, 2)
+    assert (other.learner.theta == team.learner.theta).all()
 
 
 def test_listing_the_agents_otherwise_changes_nothing_but_the_order(
@@ -121,27 +126,21 @@ def decided_values(team: Team, theta: np.ndarray, prediction) -> np.ndarray:
     n = len(team.hierarchy)
     assert team.evaluator is not None
     neutral = np.full(n, team.action_set.neutral)
-    frequencies = np.full((n, 4), 0.25)
-    rng = np.random.default_rng(0)
-    return np.array(
-        [
-            team.evaluator.values(i, neutral, theta[i], prediction, frequencies, rng)
-            for i in range(n)
-        ]
-    )
+    known = prediction, theta, np.full((n, 4), 0.25), np.random.default_rng(0)
+    return np.array([team.evaluator.values(Deliberation(i, neutral, *known)) for i in range(n)])
 
 
 @pytest.mark.parametrize("n", [2, 4])
 def test_the_single_agent_acts_learns_saves_and_loads(n: int, tmp_path: Path) -> None:
-    scenario, hierarchy = arrange(KINDS["single-agent"](), LineUp(LineUpSettings(carts=n)))
+    scenario, hierarchy = parse("single-agent").arrange(LineUp(LineUpSettings(carts=n)))
     team = Team.build(LEARNER, scenario, hierarchy, policy_seed(0))
     joint_actions = steps(scenario, team)
     assert max(map(max, joint_actions)) < 4**n
     assert np.abs(team.learner.theta).sum() > 0
     team.save(tmp_path / "team.npz")
-    twin = Team.build(LEARNER, scenario, hierarchy, policy_seed(1))
-    twin.load(tmp_path / "team.npz")
-    assert steps(scenario, twin, 2) == steps(scenario, team, 2)
+    other = Team.build(LEARNER, scenario, hierarchy, policy_seed(1))
+    other.load(tmp_path / "team.npz")
+    assert steps(scenario, other, 2) == steps(scenario, team, 2)
 
 
 class Told(LineUp):

@@ -18,6 +18,7 @@ from nested_agents.studies.claims.claims import CLAIMS, AtLeast, AtMost, Within,
 from nested_agents.studies.claims.measures import Measured
 from nested_agents.studies.claims.table import markdown, print_claims
 from nested_agents.studies.cli.main import main
+from nested_agents.studies.spec.outline import Outline
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.trial import check
 
@@ -138,13 +139,13 @@ def test_claims_name_studies_and_conditions_that_their_specs_have() -> None:
 def test_published_results_give_the_table_that_the_run_gave() -> None:
     results = everything(good=True)
     again = {
-        study: published.loads(published.dumps(spec_of(study), found))
+        study: published.loads(published.dumps(Outline.of(spec_of(study)), found))
         for study, found in results.items()
     }
-    assert [p.spec.study for p in again.values()] == list(results)
+    assert [p.outline.study for p in again.values()] == list(results)
     once = {study: p.results for study, p in again.items()}
     twice = {
-        study: published.loads(published.dumps(p.spec, p.results)).results
+        study: published.loads(published.dumps(p.outline, p.results)).results
         for study, p in again.items()
     }
     assert markdown(judge(once)) == markdown(judge(twice))

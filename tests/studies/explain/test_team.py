@@ -140,9 +140,8 @@ def test_a_topology_file_that_has_changed_since(tmp_path, capsys):
     with Store.create(tmp_path / "out", spec, MEASURES) as store:
         store.save(trial, run_trial(trial), 1.0)
     file.write_text("def mine(agents, groups): return []")
-    status, said = run(capsys, tmp_path / "out")
-    assert status == 2
-    assert "has changed: its digest is" in said.err.splitlines()[-1]
+    status, _ = run(capsys, tmp_path / "out")
+    assert status == 0  # by the study's own copy
 
 
 @pytest.mark.slow

@@ -28,7 +28,7 @@ def test_a_finished_study_has_everything(finished):
     ]  # fmt: skip
     assert "All 6 trials are done." in html
     assert "evaluation success: highest is" in html
-    assert "preset = [&#34;default&#34;, &#34;frozen&#34;]" in html
+    assert "preset = [\n    &#34;default&#34;,\n    &#34;frozen&#34;,\n]" in html
     assert len(html) < 500_000
 
 

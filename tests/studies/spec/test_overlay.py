@@ -1,5 +1,6 @@
 import pytest
 
+from nested_agents.scenarios.box_pushing.config import Failure
 from nested_agents.studies.spec.conditions import ConditionSettings
 from nested_agents.studies.spec.overlay import (
     assignment,
@@ -48,8 +49,8 @@ def test_an_unknown_kind_is_left_for_validation_to_refuse():
 
 
 def test_every_member_of_a_union_has_a_kind():
-    kinds = [kind_of(model) for model in models_of(LEARNER)]
-    assert "batch-td" in kinds
+    kinds = [kind_of(model) for model in models_of(Failure)]
+    assert "seized" in kinds
     assert len(set(kinds)) == len(kinds)
     assert None not in kinds
 

@@ -46,7 +46,8 @@ BAD = {
     "learner.rigde = 3": ["learner.rigde = 3", "did you mean 'ridge'", "batch-td"],
     "learner.ridge = -1": ["learner.ridge = -1", "greater than 0"],
     "learner = {kind = 'frozen', ridge = 3}": ["learner.ridge = 3", "unknown key", "frozen"],
-    "learner.exploration = 'paper'": ["learner.exploration = 'paper'", "table"],
+    "learner.exploration = 3": ["learner.exploration = 3", "table"],
+    "learner.sweeps = 3": ["learner.sweeps = 3", "regression_iterations"],
     "learner.rule_base.order = 1.5": ["learner.rule_base.order = 1.5", "whole number"],
     "learner.rule_base.products = [['a'], 'b']": ["learner.rule_base.products[1] = 'b'", "list"],
     "sweep = 3": ["sweep = 3", "table"],
@@ -69,7 +70,7 @@ BAD = {
         "scenario.action_repeat = 99999999999",
         "at most 10000",
     ],
-    "learner.sweeps = 99999999999": ["learner.sweeps = 99999999999", "at most 10000"],
+    "learner.regression_iterations = 99999999999": ["iterations = 99999999999", "at most 10000"],
     "overrides = [{name = 'a', larner = {}}]": ["overrides[0].larner", "did you mean 'learner'"],
     "overrides = [{name = 'a', learner = 3}]": ["overrides[0].learner = 3", "table"],
     "overrides = [{name = 'a', topology = 'chan'}]": ["'chan'", "overrides[0]", "'chain'"],
@@ -174,8 +175,8 @@ def test_a_topology_may_be_a_string_and_changed_by_key():
 def test_changes_are_laid_over_the_file_in_order(tmp_path):
     path = tmp_path / "spec.toml"
     path.write_text("episodes = 3\nlearner.ridge = 2")
-    spec = Spec.load(path, ["episodes=4", "learner.sweeps=5", "episodes=6"])
-    assert (spec.episodes, dict(spec.learner)) == (6, {"ridge": 2, "sweeps": 5})
+    spec = Spec.load(path, ["episodes=4", "learner.regression_iterations=5", "episodes=6"])
+    assert (spec.episodes, dict(spec.learner)) == (6, {"ridge": 2, "regression_iterations": 5})
 
 
 def test_a_change_that_is_none_is_named():
@@ -270,7 +271,7 @@ def test_evaluations_are_laid_over_the_scenario_of_every_condition():
 
 
 def test_a_section_may_be_a_settings_model():
-    from nested_agents.core.settings import TDLambdaSettings
+    from nested_agents.core.learners.td import TDLambdaSettings
 
     spec = Spec.of({"overrides": [{"name": "online", "learner": TDLambdaSettings(step_size=0.1)}]})
     assert spec.conditions()[0].settings.learner == TDLambdaSettings(step_size=0.1)

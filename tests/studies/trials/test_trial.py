@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from nested_agents.scenarios.box_pushing.config import InfraredSettings
-from nested_agents.scenarios.box_pushing.scenario import RECORDED
+from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials import trial as trial_module
@@ -67,7 +67,7 @@ def test_conditions_of_equal_seed_meet_equal_worlds(result):
 def test_a_recording_has_a_frame_for_every_step_and_the_beginning(result):
     recording = result.recordings["last"]
     steps = result.rows[1].steps
-    assert all(len(recording[name]) == steps + 1 for name in RECORDED)
+    assert all(len(recording[name]) == steps + 1 for name in BoxPushing.recorded)
     assert recording["reward"].shape == (steps,)
     assert recording["robot_poses"].shape == (steps + 1, 2, 3)
     assert recording["contact"].dtype == bool

@@ -4,7 +4,6 @@ import made_up
 import pytest
 
 from nested_agents.studies.cli.main import main
-from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store import store as store_module
 from nested_agents.studies.store.running import LOCK, MARK, Running, look
 from nested_agents.studies.store.store import Store
@@ -109,16 +108,3 @@ def test_what_another_version_has_done_is_done(study, monkeypatch, capsys):
 )
 def test_the_time_left(means, left, running, processes, expected):
     assert _estimate(means, left, running, processes) == expected
-
-
-def test_a_topology_that_is_drawn_otherwise_is_told(tmp_path, capsys):
-    source = tmp_path / "mine.py"
-    source.write_text("def line(agents, groups):\n    return list(zip(agents, agents[1:]))\n")
-    spec = Spec.of(made_up.SPEC.table() | {"topology": f"{source}:line"})
-    with Store.create(tmp_path / "out", spec, made_up.MEASURES):
-        pass
-    assert main(["status", str(tmp_path / "out")]) == 0
-    assert "nothing can be added" not in capsys.readouterr().out
-    source.write_text("def line(agents, groups):\n    return []\n")
-    assert main(["status", str(tmp_path / "out")]) == 0
-    assert "mine.py:line': has changed: its digest is" in capsys.readouterr().out

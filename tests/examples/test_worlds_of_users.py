@@ -1,0 +1,70 @@
+"""The tank and the arm as studies: from their files alone, through kill -9, on Dask, moved away."""
+
+import os
+import shutil
+import signal
+import sqlite3
+import subprocess
+import sys
+import time
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+pytestmark = pytest.mark.slow
+
+
+def command(*arguments: str, cwd: Path) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-m", "nested_agents", *arguments],
+        cwd=cwd, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        text=True, start_new_session=True,
+    )  # fmt: skip
+
+
+def call(*arguments: str, cwd: Path) -> str:
+    process = command(*arguments, cwd=cwd)
+    out, err = process.communicate(timeout=250)
+    assert process.returncode == 0, err
+    return out
+
+
+def rows(study: Path) -> list[tuple]:
+    with closing(sqlite3.connect(study / "results.sqlite")) as db:
+        return db.execute("SELECT * FROM results").fetchall()
+
+
+@pytest.mark.parametrize(
+    ("name", "measure", "change"),
+    [("tank", "missing_l", "scenario.pumps=2"), ("arm", "final_distance", "scenario.links=2")],
+)
+def test_a_world_from_a_file(name: str, measure: str, change: str, tmp_path: Path) -> None:
+    for suffix in ("py", "toml"):
+        shutil.copy(EXAMPLES / f"{name}.{suffix}", tmp_path)
+    short = ["--set", "seeds=3", "episodes=6", "steps=30", "evaluation=2", change]
+    run = ["run", f"{name}.toml", *short, "--jobs", "1", "--out"]
+    call(*run, "whole", cwd=tmp_path)
+    header, *cells = call("results", "whole", "--format", "csv", cwd=tmp_path).splitlines()
+    assert measure in header.split(",")
+    assert len(cells) == 2 * 3 * 6
+
+    killed = command(*run, "killed", cwd=tmp_path)
+    database = tmp_path / "killed" / "results.sqlite"
+    until = time.monotonic() + 120
+    while time.monotonic() < until and not (database.exists() and rows(database.parent)):
+        time.sleep(0.05)
+    os.killpg(killed.pid, signal.SIGKILL)
+    killed.communicate()
+    (tmp_path / f"{name}.py").rename(tmp_path / "moved.py")
+    call(*run, "killed", cwd=tmp_path)
+    assert rows(tmp_path / "killed") == rows(tmp_path / "whole")
+    for what in ("explain", "report", "table"):
+        call(what, "killed", cwd=tmp_path)
+    page = (tmp_path / "killed" / "report.html").read_text(encoding="utf-8")
+    assert measure.replace("final_", "").partition("_")[0] in page
+
+    (tmp_path / "moved.py").rename(tmp_path / f"{name}.py")
+    call(*run, "cluster", "--backend", "dask", cwd=tmp_path)
+    assert rows(tmp_path / "cluster") == rows(tmp_path / "whole")
