@@ -92,7 +92,7 @@ def test_a_name_that_is_offered_twice_is_refused(
     numbers = Registry("number", {"pi": "math:pi"})
     for k, name in enumerate(names):
         offered.append(EntryPoint(name, f"mine:{name}{k}", "nested_agents.numbers"))
-    with pytest.raises(ValueError, match=rf"^number '{names[0]}' is offered twice: \S+, mine:"):
+    with pytest.raises(ValueError, match=rf"^'{names[0]}' is offered twice: \S+, mine:"):
         numbers.names()
 
 
