@@ -1,14 +1,16 @@
 """The installed code that computes results: an edit of it is noticed, and told.
 
-Every module on which a trial's numbers depend has a digest of its text, to see at once whether it
-may have changed, and one of its syntax tree, to see whether it has: comments and layout do not
-count.
+Every module on which a trial's numbers depend, of this package and of those that offer things to
+it, has a digest of its text, to see at once whether it may have changed, and one of its syntax
+tree, to see whether it has: comments and layout do not count.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from importlib.metadata import entry_points
+from importlib.util import find_spec
 from pathlib import Path
 
 from ...core.sources import meaning
@@ -17,30 +19,42 @@ PACKAGE = Path(__file__).parents[2]
 """Where the package is installed."""
 COMPUTING = ("core", "topologies", "scenarios", "studies/trials", "studies/catalogue")
 """Folders whose modules compute results."""
-SILENT = (
-    "checking",
-    "pictures",
-    "scripted",
-    "environments.py",
-    "figure.py",
-    "view.py",
-    "drawing.py",
-)
+SILENT = ("checking", "pictures", "scripted", "environments.py", "figure.py", "drawing.py")
 """Parts of them that do not."""
+GROUPS = "nested_agents."
+"""With what the names of entry-point groups begin under which packages offer things."""
 
 Code = dict[str, tuple[str, str]]
 """By module, digests of its text and of its syntax tree."""
 
 
 def modules() -> dict[str, str]:
-    """Return the text of every module that computes results, by its path in the package."""
+    """Return the text of every module that computes results, by its path in its package."""
     found = {}
     for folder in COMPUTING:
         for path in sorted((PACKAGE / folder).rglob("*.py")):
             name = path.relative_to(PACKAGE).as_posix()
             if not set(name.split("/")) & set(SILENT):
                 found[name] = path.read_text(encoding="utf-8")
+    for root in _offering():
+        for path in sorted(root.rglob("*.py")) if root.is_dir() else [root]:
+            found[path.relative_to(root.parent).as_posix()] = path.read_text(encoding="utf-8")
     return found
+
+
+def _offering() -> Iterator[Path]:
+    """Yield the folders, or files, of installed packages that offer things to studies."""
+    points = entry_points()
+    groups = [group for group in points.groups if group.startswith(GROUPS)]
+    modules = {p.module.partition(".")[0] for g in groups for p in points.select(group=g)}
+    for name in sorted(modules - {__name__.partition(".")[0]}):
+        try:
+            spec = find_spec(name)
+        except (ImportError, ValueError):
+            continue  # what cannot be found is told when it is asked for
+        if spec is not None and spec.origin is not None and spec.origin.endswith(".py"):
+            origin = Path(spec.origin)
+            yield origin.parent if origin.name == "__init__.py" else origin
 
 
 def present() -> Code:
