@@ -69,10 +69,10 @@ def choose(store: Store, condition: str | None, seed: int | None) -> Trial:
     Raises
     ------
     SpecError
-        If there is no such trial, it has not finished, or other code made the results.
+        If there is no such trial, it has not finished, or its results are of another version.
     """
-    if (outdated := store.outdated()) is not None:
-        raise SpecError(f"{outdated.partition(';')[0]}: it would train another team")
+    if (other := store.other_version()) is not None:
+        raise SpecError(f"{other}: it would train another team")
     spec = store.spec()
     conditions = [c.label for c in spec.conditions()]
     condition = conditions[0] if condition is None else condition

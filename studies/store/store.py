@@ -203,23 +203,32 @@ class Store:
         return int(self._db.execute(query).fetchone()[0])
 
     def outdated(self) -> str | None:
-        """Return why this version would not go on with the study, in one line; None if it would."""
-        if (version := self.meta("results_version")) != str(RESULTS_VERSION):
-            return f"{self._version(version)}; use another directory"
+        """Return why this code would not go on with the study, in one line; None if it would."""
+        if (other := self.other_version()) is not None:
+            return f"{other}; use another directory"
         known = {name: (text, tree) for name, (text, tree) in self._table("code").items()}
         modules = code.changed(known)
         if not modules:
             return None
-        more = f" and {len(modules) - 1} more" if len(modules) > 1 else ""
+        more = f" and {len(modules) - 1} more have" if len(modules) > 1 else " has"
         return (
-            f"{self.directory}: its results are of other code: {modules[0]}{more} has changed "
+            f"{self.directory}: its results are of other code: {modules[0]}{more} changed "
             "since; --accept-code goes on with it"
+        )
+
+    def other_version(self) -> str | None:
+        """Return of which version the results are, in one line, if they are not of this one."""
+        if (version := self.meta("results_version")) == str(RESULTS_VERSION):
+            return None
+        return (
+            f"{self.directory}: holds results of version {version}, this is version "
+            f"{RESULTS_VERSION}"
         )
 
     def measures(self) -> tuple[Measure, ...]:
         """Return what the study measures of its episodes, of any condition."""
-        if (version := self.meta("results_version")) != str(RESULTS_VERSION):
-            raise SpecError(f"{self._version(version)}; run it again to read it")
+        if (other := self.other_version()) is not None:
+            raise SpecError(f"{other}; run it again to read it")
         try:
             return measures_from(json.loads(self.meta("measures")))
         except (ValueError, TypeError):
@@ -227,16 +236,10 @@ class Store:
                 f"{self.directory / DATABASE}: is damaged: measures cannot be read"
             ) from None
 
-    def _version(self, version: str) -> str:
-        return (
-            f"{self.directory}: holds results of version {version}, this is version "
-            f"{RESULTS_VERSION}"
-        )
-
     def refusal(self, given: _Given) -> str | None:
         """Return why a spec may not be run here by this version, in one line; None if it may."""
         outdated = self.outdated()
-        is_other = self.meta("results_version") != str(RESULTS_VERSION)
+        is_other = self.other_version() is not None
         if is_other or (outdated is not None and not given.accept_code):
             return outdated
         if found := difference(self.spec(), self._table("conditions"), given.spec):
