@@ -97,6 +97,8 @@ def disturb(backend: str, kills: int, seed: int, folder: Path) -> Tally:
                     tally.kept += len(before)
                     tally.lost += len(before - after)
             status = process.wait()
+            if status == 2:
+                raise RuntimeError(f"{directory}: {' '.join(map(str, command))} was refused")
             if status == 1:
                 with Store.open(directory) as store:
                     tally.failed += len(store.failed())
