@@ -158,7 +158,8 @@ class Measure:
     unit
         In words of the SI, ``"1"`` for a pure number.
     source
-        Where it is taken from at every step: a key of `Transition.info`, or ``terminated``.
+        Where it is taken from at every step: a key of `Transition.info`, or ``terminated``; empty:
+        the key of its own name.
     gathering
         How the steps of an episode make one number: their ``last``, ``mean``, ``sum`` or ``max``.
     better
@@ -174,6 +175,10 @@ class Measure:
     gathering: Literal["last", "mean", "sum", "max"] = "last"
     better: Literal["higher", "lower"] | None = None
     is_rate: bool = False
+
+    def __post_init__(self) -> None:
+        """Take it from the key of its own name, if no other is given."""
+        object.__setattr__(self, "source", self.source or self.name)
 
     @property
     def heading(self) -> str:

@@ -187,7 +187,7 @@ def _measures(of: Examination) -> str | None:
     opening(scenario, of.seeds[0], of.episodes[0])
     info = scenario.step(of.actions(scenario, of.seeds[0])[0]).info
     for measure in measures:
-        source = measure.source or measure.name
+        source = measure.source
         if source != "terminated" and source not in info:
             return f"{measure.name}: info has no {source!r}, it has: {', '.join(info)}"
         if source != "terminated" and np.ndim(info[source]):

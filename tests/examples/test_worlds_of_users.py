@@ -32,8 +32,15 @@ def call(*arguments: str, cwd: Path) -> str:
 
 
 def rows(study: Path) -> list[tuple]:
-    with closing(sqlite3.connect(study / "results.sqlite")) as db:
+    with closing(sqlite3.connect(f"file:{study}/results.sqlite?mode=ro", uri=True)) as db:
         return db.execute("SELECT * FROM results").fetchall()
+
+
+def has_begun(study: Path) -> bool:
+    try:
+        return bool(rows(study))
+    except sqlite3.OperationalError:  # no database yet, or no tables in it
+        return False
 
 
 @pytest.mark.parametrize(
@@ -51,9 +58,8 @@ def test_a_world_from_a_file(name: str, measure: str, change: str, tmp_path: Pat
     assert len(cells) == 2 * 3 * 6
 
     killed = command(*run, "killed", cwd=tmp_path)
-    database = tmp_path / "killed" / "results.sqlite"
     until = time.monotonic() + 120
-    while time.monotonic() < until and not (database.exists() and rows(database.parent)):
+    while time.monotonic() < until and not has_begun(tmp_path / "killed"):
         time.sleep(0.05)
     os.killpg(killed.pid, signal.SIGKILL)
     killed.communicate()

@@ -109,7 +109,7 @@ def test_what_the_user_can_mend(arguments, complaint, finished, tmp_path, capsys
     assert list(tmp_path.iterdir()) == []
 
 
-SPECS = sorted(Path(studies.__file__).parent.glob("*.toml"))
+SPECS = sorted((Path(studies.__file__).parent / "catalogue").rglob("*.toml"))
 
 
 @pytest.mark.parametrize("path", SPECS, ids=[path.stem for path in SPECS])
