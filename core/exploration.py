@@ -15,7 +15,7 @@ from pydantic import Field
 
 from .arrays import FloatArray
 from .registry import SettingsRegistry
-from .settings import Fraction, NonNegative, Settings
+from .settings import Fraction, NonNegative, Positive, Settings
 
 
 def boltzmann(values: FloatArray, temperature: float) -> FloatArray:
@@ -147,13 +147,17 @@ class EpsilonDecreasingBoltzmann:
 class BurstExploration(ExplorationSettings):
     """Random actions that are held for a while, at a rate that falls from episode to episode.
 
-    The fraction of explorative decisions in episode ``k`` is ``max(floor, rate * decay ** k)``.
+    The fraction of explorative decisions of an agent in episode ``k`` is ``max(floor, rate * decay
+    ** k)``, and at most `team_limit` divided by the number of agents.
     """
 
     kind: Literal["burst"] = "burst"
     rate: Fraction = 0.3
     decay: Fraction = 0.75
     floor: Fraction = 0.02
+    team_limit: Positive | None = None
+    """Agents that explore at a time, at most, in the mean: in a large team somebody else disturbs
+    always; none: no limit."""
     length: Annotated[float, Field(ge=1)] = 4.0
     """Mean number of decisions for which a random action is repeated."""
 
@@ -167,6 +171,8 @@ class Bursts:
 
     def __init__(self, settings: BurstExploration, n_agents: int) -> None:
         self.settings = settings
+        limit = settings.team_limit
+        self._most = 1.0 if limit is None else min(1.0, limit / n_agents)
         # The episode, then per agent: decisions left in its burst, the action held.
         self.memory: FloatArray = np.zeros(1 + 2 * n_agents)
         self.memory[0] = -1.0
@@ -175,7 +181,7 @@ class Bursts:
     def rate(self) -> float:
         """Fraction of decisions that are explorative in this episode."""
         s = self.settings
-        return max(s.floor, s.rate * s.decay ** max(0.0, self.memory[0]))
+        return min(self._most, max(s.floor, s.rate * s.decay ** max(0.0, self.memory[0])))
 
     def begin_episode(self) -> None:
         """Count the episode and end every burst."""

@@ -135,6 +135,7 @@ class Team:
                 decision.rule,
                 decision.teammates,
                 settings.discount,
+                decision.value_of,
             )
             evaluator = decision.evaluator.build(problem)
         return cls(

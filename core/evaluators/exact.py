@@ -79,7 +79,8 @@ class ExactEnumeration(Aggregation):
         """Return the value ``(A,)`` of each action of the deciding agent."""
         agent, problem = deliberation.agent, self.problem
         tabulated = bool(self._tried) and hasattr(deliberation.prediction, "blocks")
-        if tabulated and problem.rule == "value":
+        own = len(self.concerned[agent]) == 1
+        if tabulated and own and problem.rule == "value":
             tried = self._tried[agent]
             self.count(tried.indices.size)
             empirical = problem.teammates == "empirical"
@@ -91,8 +92,8 @@ class ExactEnumeration(Aggregation):
                 deliberation.frequencies if empirical else self._expected,
             )
         below, combined = self.hierarchy.below(agent), self._below[agent]
-        if self.indifferent(deliberation.own_weights):
-            self.count(self.n_actions * len(combined))
+        if self.indifferent(deliberation):
+            self.count(self.n_actions * len(combined) * len(self.concerned[agent]))
             return np.zeros(self.n_actions)
         probabilities = None
         if problem.teammates == "empirical":
@@ -104,13 +105,18 @@ class ExactEnumeration(Aggregation):
         return self.aggregate(table, probabilities)
 
     def _by_tables(self, deliberation: Deliberation) -> FloatArray:
-        """Value ``(A, m)`` each own action with each joint action below, by rewards too."""
+        """Value ``(A, m)`` each own action with each joint action below, by anything."""
         prediction = cast(TabulatedPrediction, deliberation.prediction)
-        tried = self._tried[deliberation.agent]
+        tried, concerned = self._tried[deliberation.agent], self.concerned[deliberation.agent]
         indices = (tried.indices + int(deliberation.joint_action @ tried.places)).ravel()
-        self.count(len(indices))
-        rewards, values = prediction.reward_table()[indices], None
+        self.count(len(indices) * len(concerned))
+        rewards = values = None
+        if self.problem.rule != "value":
+            rewards = prediction.reward_table()[indices]
         if self.problem.rule != "reward":
-            blocks = prediction.blocks(deliberation.agent)
-            values = self.rules.block_values(deliberation.own_weights, blocks, indices)
+            of_each = [
+                self.rules.block_values(deliberation.weights[i], prediction.blocks(i), indices)
+                for i in concerned
+            ]
+            values = of_each[0] if len(of_each) == 1 else np.mean(of_each, axis=0)
         return self.combine(rewards, values).reshape(self.n_actions, -1)

@@ -115,7 +115,7 @@ class BoxPushing:
         self._belief = PushBelief.of(self._model, robots, settings.belief.stiffness)
         self._premises = Premises(
             self._belief, self._space, self.action_set, settings.speed_increment, self._limits,
-            self._task, self.infrared, settings.period,
+            self._task, self.infrared, self.box.outline, settings.period,
             settings.prediction_horizon * CONTROL_PERIOD,
         )  # fmt: skip
         self._goal: FloatArray = np.zeros(3)
@@ -198,7 +198,10 @@ class BoxPushing:
             np.array([measured["orientation_rad"]]),
             self.world.contact[None],
             readings[None],
-        )
+        )[0]
+        paid: float | FloatArray = float(gained[0])
+        if self.settings.reward.of == "robot":
+            paid = np.repeat(gained, [len(group) for group in self.groups])
         sensed = perf_counter()
         if terminated:
             measured["stopped_at_goal"] = self._stays()
@@ -206,9 +209,7 @@ class BoxPushing:
         self._save()
         measured["seconds"] = {"physics": moved - begin, "sensors": sensed - moved}
         truncated = not terminated and measured["distance_m"] > self.settings.termination_radius
-        return Transition(
-            states, float(gained[0]), terminated, truncated, measured, motions, pushed
-        )
+        return Transition(states, paid, terminated, truncated, measured, motions, pushed)
 
     @property
     def nominal_effects(self) -> tuple[FloatArray, ...]:
@@ -328,7 +329,10 @@ class BoxPushing:
         `before` is the distance of the box from the goal one decision period ago [m].
         """
         world, poses = self.world, self.world.robot_poses
-        view = View(poses[None], world.box_pose[None], world.gaps[None], self._goal, before, 1.0)
+        view = View(
+            poses[None], world.box_pose[None], world.gaps[None], self._goal, before, 1.0,
+            self.box.outline,
+        )  # fmt: skip
         rows = []
         for r, group in enumerate(self.groups):
             shared = self._space.shared(view, r)[0]
