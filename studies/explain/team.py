@@ -25,7 +25,8 @@ from ...scenarios.box_pushing.scenario import BoxPushing
 from ..spec.errors import SpecError
 from ..store.store import Store
 from ..trials.measures import columns
-from ..trials.trial import Session, Trial, trials_of
+from ..trials.session import Session
+from ..trials.trial import Trial, trials_of
 from . import policy as explain_policy
 from . import rules as explain_rules
 from .body import Bodies

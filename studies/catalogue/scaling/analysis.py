@@ -24,7 +24,8 @@ from ...analysis.results import Results
 from ...analysis.statistics import Estimate, bootstrap, rate
 from ...analysis.summary import Summary
 from ...trials.contact import ContactShares
-from ...trials.trial import Session, Trial, TrialResult
+from ...trials.session import Session
+from ...trials.trial import Trial, TrialResult
 
 COLUMNS = (
     "success", "evaluation success", "all touch",

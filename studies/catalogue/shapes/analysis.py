@@ -21,7 +21,8 @@ from ...analysis.summary import Summary
 from ...spec.errors import SpecError
 from ...spec.spec import Spec
 from ...trials.contact import ContactShares
-from ...trials.trial import Session, Trial, TrialResult
+from ...trials.session import Session
+from ...trials.trial import Trial, TrialResult
 
 TRAINED = "trained on"
 """How the box of training is called among the others."""
