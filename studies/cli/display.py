@@ -20,6 +20,7 @@ from rich.progress import (
 from rich.table import Table
 
 from ..presentation.tables import SummaryTable
+from ..spec.outline import Outline
 from ..spec.spec import Spec
 from ..workers.runner import Outcome
 
@@ -40,7 +41,7 @@ class Terminal:
         conditions, seeds = len(spec.conditions()), len(spec.seeds)
         say(
             f"{spec.study}: {count(conditions, 'condition')} x {count(seeds, 'seed')}, "
-            f"{count(spec.episodes, 'episode')} of up to {count(spec.steps, 'step')}, "
+            f"{Outline.of(spec).lengths} of up to {count(spec.steps, 'step')}, "
             f"{count(processes, 'process', 'es')}, kept in {directory}"
         )
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from .curriculum import lengths
 from .spec import Spec
 
 
@@ -32,6 +33,13 @@ class Outline:
     evaluation: int
     columns: Mapping[str, Mapping[str, Any]]
     table: Mapping[str, Any]
+
+    @property
+    def lengths(self) -> str:
+        """Episodes of training, stage by stage, in words; of the last one if conditions differ."""
+        differ = any("curriculum" in override for override in self.table.get("overrides", ()))
+        stages = () if differ else self.table.get("curriculum", ())
+        return lengths([int(stage["episodes"]) for stage in stages], self.episodes)
 
     @classmethod
     def of(cls, spec: Spec) -> Outline:

@@ -5,14 +5,26 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from ...core.loop import StepRecord, control_loop, world_seed
-from ...core.protocols import Measure, RecordedScenario, Scenario, measures_of
+from ...core.protocols import Measure, RecordedScenario, measures_of
+from ...core.settings import ScenarioSettings
 from ...core.team import Team
-from .episodes import EpisodeMeter, EpisodeRecorder, EpisodeRow, Recording, Stopwatch
+from .episodes import (
+    ELSEWHERE,
+    STAGE,
+    EpisodeMeter,
+    EpisodeRecorder,
+    EpisodeRow,
+    Recording,
+    Stopwatch,
+)
 from .measures import joined
-from .trial import Trial, TrialResult, arranged
+from .trial import Arrangement, Trial, TrialResult, arrange
 
 EVALUATION_WORLDS = 10**6
 """Number of the first evaluation episode's world: after any training, and the same for all."""
+
+CURRICULUM_WORLDS = 2 * 10**6
+"""The same of the first episode of a curriculum."""
 
 Observer = Callable[[StepRecord], None]
 """Is shown every step of some episodes, as it is done."""
@@ -38,8 +50,9 @@ class Session:
 
     def __init__(self, trial: Trial) -> None:
         self.trial = trial
-        self.world = trial.settings.scenario.build()
-        self.scenario, self.team = arranged(trial.settings, self.world, trial.seed)
+        self._own = arrange(trial.settings, trial.seed)
+        self.world, self.scenario, self.team = self._own
+        self._stages = trial.curriculum  # those that the team has not gone through
         self.deciding: list[float] = []
         """Seconds of every decision in training."""
         self._rows: list[EpisodeRow] = []
@@ -58,9 +71,10 @@ class Session:
     ) -> None:
         """Let the team (or another one, whose time is not counted) explore, learn, be measured.
 
-        Recorded are, of the trial's own team, the episodes of `Trial.recorded`. Every step is shown
-        to `observe`.
+        Before its first episode the team goes through the trial's curriculum. Recorded are, of the
+        trial's own team, the episodes of `Trial.recorded`. Every step is shown to `observe`.
         """
+        self._go_through_curriculum()
         is_recorded = (
             team is None
             and isinstance(self.world, RecordedScenario)
@@ -84,35 +98,58 @@ class Session:
 
     def evaluate(self, observe: Observer | None = None) -> None:
         """Let the team act greedily on worlds of no training, and show every step to `observe`."""
-        self._evaluate(self.scenario, measures_of(self.world), "evaluation", observe)
+        self._go_through_curriculum()
+        self._evaluate(self._own, "evaluation", observe)
 
     def evaluate_elsewhere(self, observers: Mapping[str, Observer] | None = None) -> None:
         """Evaluate in each of the trial's `evaluations`, whatever the others are.
 
-        The steps of each are shown to the observer of its name, if there is one.
+        The same agents are the same team; others take over what it has learned. The steps of each
+        are shown to the observer of its name, if there is one.
         """
+        self._go_through_curriculum()
         state = self.team.rng.bit_generator.state
         for name, settings in self.trial.evaluations:
             self.team.rng.bit_generator.state = state
-            world = settings.build()
-            scenario, _ = self.trial.settings.topology.arrange(world)
-            measures = measures_of(world)
-            self._measures = joined((self._measures, measures))
+            there = self._elsewhere(settings)
+            there = there.with_trained(self._own, self.trial.settings.learner)
             observe = (observers or {}).get(name)
-            self._evaluate(scenario, measures, f"evaluation:{name}", observe)
+            self._evaluate(there, f"{ELSEWHERE}{name}", observe)
 
-    def _evaluate(
-        self,
-        scenario: Scenario,
-        measures: Sequence[Measure],
-        phase: str,
-        observe: Observer | None,
-    ) -> None:
+    def _elsewhere(self, scenario: ScenarioSettings) -> Arrangement:
+        """Return another world with its untrained team, and note what is measured there."""
+        settings = self.trial.settings.model_copy(update={"scenario": scenario})
+        there = arrange(settings, self.trial.seed)
+        self._measures = joined((self._measures, measures_of(there.world)))
+        return there
+
+    def _go_through_curriculum(self) -> None:
+        """Train team after team in the stages that are left; the trial's own takes over at last."""
+        stages, self._stages = self._stages, ()
+        reached: Arrangement | None = None
+        done = 0
+        for stage in stages:
+            there = self._elsewhere(stage.scenario)
+            if reached is not None:
+                there.take_over(reached, self.trial.settings.learner)
+            steps = control_loop(
+                there.scenario, there.team, episodes=stage.episodes, steps=self.trial.steps,
+                seed=self.trial.seed, first_world=CURRICULUM_WORLDS + done,
+            )  # fmt: skip
+            measures = measures_of(there.world)
+            for _ in self._measured(steps, f"{STAGE}{stage.name}", measures, first=-done):
+                pass
+            reached, done = there, done + stage.episodes
+        if reached is not None:
+            self._own.take_over(reached, self.trial.settings.learner)
+
+    def _evaluate(self, there: Arrangement, phase: str, observe: Observer | None) -> None:
         steps = control_loop(
-            scenario, self.team, episodes=self.trial.evaluation,
+            there.scenario, there.team, episodes=self.trial.evaluation,
             steps=self.trial.steps, seed=self.trial.seed, first_episode=EVALUATION_WORLDS,
             learn=False,
         )  # fmt: skip
+        measures = measures_of(there.world)
         for _ in self._measured(steps, phase, measures, observe, EVALUATION_WORLDS):
             pass
 
@@ -121,12 +158,12 @@ class Session:
         steps: Iterator[StepRecord],
         phase: str,
         measures: Sequence[Measure],
-        observe: Observer | None,
+        observe: Observer | None = None,
         first: int = 0,
     ) -> Iterator[StepRecord]:
         """Yield the steps of episodes, show them to `observe`, and keep the row of each episode.
 
-        Episodes are numbered in their rows from `first` on.
+        The number of an episode in its row is counted from `first`.
         """
         for record in steps:
             if record.step == 0:
@@ -151,7 +188,7 @@ class Session:
 
 
 def run_trial(trial: Trial) -> TrialResult:
-    """Train a team from scratch, evaluate it greedily, and return what was measured.
+    """Train a team from nothing, evaluate it greedily, and return what was measured.
 
     World and policy draw from separate streams, so conditions of equal seed meet equal worlds.
     """

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
+from ...core.arrays import IntArray
+from ...core.learners import LearnerSettings
 from ...core.loop import policy_seed
 from ...core.protocols import Measure, Scenario, measures_of
 from ...core.settings import ScenarioSettings
 from ...core.sources import Sources, named
-from ...core.team import Team
-from ..spec.conditions import ConditionSettings
+from ...core.team import Team, carried_rows
+from ..spec.conditions import Condition, ConditionSettings
+from ..spec.curriculum import Stage, lengths
 from ..spec.errors import SpecError
 from ..spec.spec import Spec
 from .episodes import EpisodeRow, Recording
@@ -22,6 +26,8 @@ from .measures import joined
 
 RESULTS_VERSION = 4
 """Raise it when the code changes so that the same trial gives other results."""
+PLAIN = ("study", "condition", "seed", "episodes", "steps", "evaluation")
+"""What of a trial any process can read as it is."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +46,8 @@ class Trial:
         As in `Spec`.
     evaluations
         Names and scenarios in which the trained team is evaluated beside its own.
+    curriculum
+        Stages that the team is trained in before its own scenario.
     sources
         The files of users that it names; what they mean is part of its identity.
     """
@@ -52,14 +60,18 @@ class Trial:
     steps: int
     evaluation: int
     evaluations: tuple[tuple[str, ScenarioSettings], ...] = ()
+    curriculum: tuple[Stage, ...] = ()
     sources: Sources = field(default_factory=Sources, compare=False)
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Settings of a user's thing are of a class that only its file can make again.
-        elsewhere = [(name, scenario.model_dump()) for name, scenario in self.evaluations]
-        content = (self.study, self.condition, self.settings.model_dump(), self.seed)
-        length = (self.episodes, self.steps, self.evaluation)
-        return _revived, (self.sources, *content, *length, elsewhere)
+        content = {
+            **{name: getattr(self, name) for name in PLAIN},
+            "settings": self.settings.model_dump(),
+            "evaluations": [(name, scenario.model_dump()) for name, scenario in self.evaluations],
+            "curriculum": [(s.name, s.episodes, s.scenario.model_dump()) for s in self.curriculum],
+        }
+        return _revived, (self.sources, content)
 
     @cached_property
     def identity(self) -> str:
@@ -77,10 +89,17 @@ class Trial:
             content["evaluations"] = [
                 [name, scenario.model_dump(mode="json")] for name, scenario in self.evaluations
             ]
+        if self.curriculum:
+            content["curriculum"] = [stage.table() for stage in self.curriculum]
         if files := sorted(named([self.study, content])):
             content["sources"] = {name: self.sources.digest(name) for name in files}
         text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
         return hashlib.sha256(text.encode()).hexdigest()[:32]
+
+    @property
+    def lengths(self) -> str:
+        """Its episodes of training, stage by stage, in words."""
+        return lengths([stage.episodes for stage in self.curriculum], self.episodes)
 
     @property
     def recorded(self) -> dict[int, str]:
@@ -137,6 +156,7 @@ def trials_of(spec: Spec) -> tuple[Trial, ...]:
             steps=spec.steps,
             evaluation=spec.evaluation,
             evaluations=condition.evaluations,
+            curriculum=condition.curriculum,
             sources=spec.sources,
         )
         for seed in spec.seeds
@@ -144,21 +164,63 @@ def trials_of(spec: Spec) -> tuple[Trial, ...]:
     )
 
 
-def build(settings: ConditionSettings, seed: int) -> tuple[Scenario, Team]:
-    """Return the scenario and the untrained team of a condition.
+class Arrangement(NamedTuple):
+    """A world and those who act in it."""
+
+    world: Scenario
+    """As the settings describe it."""
+    scenario: Scenario
+    """The same as the agents see it, which may be as one agent."""
+    team: Team
+    """The agents."""
+
+    def take_over(self, former: Arrangement, settings: LearnerSettings) -> None:
+        """Let the team begin where that of another world ended.
+
+        Raises
+        ------
+        ValueError
+            If it cannot, see `carried_rows` and `Team.take_over`; one line.
+        """
+        self.team.take_over(former.team, self._rows(former, settings))
+
+    def with_trained(self, former: Arrangement, settings: LearnerSettings) -> Arrangement:
+        """Return it with the team that was trained in another world: to be evaluated, not to learn.
+
+        That is the former team itself if the agents are the same, else one that takes over.
+
+        Raises
+        ------
+        ValueError
+            As `take_over`.
+        """
+        rows = self._rows(former, settings)
+        if self.scenario.agents == former.scenario.agents:
+            return self._replace(team=former.team)
+        self.team.take_over(former.team, rows)
+        return self
+
+    def _rows(self, former: Arrangement, settings: LearnerSettings) -> IntArray:
+        return carried_rows(former.scenario, self.scenario, shared=settings.weights == "role")
+
+
+def arrange(settings: ConditionSettings, seed: int) -> Arrangement:
+    """Return the world of a condition and its untrained team.
 
     Raises
     ------
     ValueError
         If the settings do not fit together; one line.
     """
-    return arranged(settings, settings.scenario.build(), seed)
-
-
-def arranged(settings: ConditionSettings, world: Scenario, seed: int) -> tuple[Scenario, Team]:
-    """Return a world as its agents see it, which may be as one agent, and their untrained team."""
+    world = settings.scenario.build()
     scenario, hierarchy = settings.topology.arrange(world)
-    return scenario, Team.build(settings.learner, scenario, hierarchy, policy_seed(seed))
+    team = Team.build(settings.learner, scenario, hierarchy, policy_seed(seed))
+    return Arrangement(world, scenario, team)
+
+
+def build(settings: ConditionSettings, seed: int) -> tuple[Scenario, Team]:
+    """Return the scenario and the untrained team of a condition; see `arrange`."""
+    return arrange(settings, seed)[1:]
 
 
 def check(spec: Spec) -> tuple[Measure, ...]:
@@ -174,54 +236,74 @@ def check(spec: Spec) -> tuple[Measure, ...]:
     with spec.sources.active():
         for condition in conditions:
             where = f" (condition {condition.label!r})" if len(conditions) > 1 else ""
-            world, scenario = _built(condition.settings, where)
-            found.append(measures_of(world))
-            for name, elsewhere in condition.evaluations:
-                settings = condition.settings.model_copy(update={"scenario": elsewhere})
-                world, other = _built(settings, f" (evaluation {name!r}){where}")
-                _check_alike(name, scenario, other, where)
-                found.append(measures_of(world))
+            found += [measures_of(world) for world in _worlds(condition, where)]
     return joined(found, conditions[0].columns)
 
 
-def _built(settings: ConditionSettings, where: str) -> tuple[Scenario, Scenario]:
-    """Return a condition's world, and the same as its agents see it."""
+def _worlds(condition: Condition, where: str) -> Iterator[Scenario]:
+    """Yield a condition's own world and those of its stages and evaluations, if all can be built.
+
+    Raises
+    ------
+    SpecError
+        If one cannot be, or what is learned in one means nothing in the next.
+    """
+    settings = condition.settings
+    own = _built(settings, where)
+    yield own.world
+    reached: Arrangement | None = None
+    for stage in condition.curriculum:
+        there = _built(_changed(settings, stage.scenario), f" (stage {stage.name!r}){where}")
+        yield there.world
+        if reached is not None:
+            with _naming(f"curriculum.{stage.name}", where):
+                there.take_over(reached, settings.learner)
+        reached = there
+    if reached is not None:
+        with _naming("curriculum", where):
+            own.take_over(reached, settings.learner)
+    for name, scenario in condition.evaluations:
+        there = _built(_changed(settings, scenario), f" (evaluation {name!r}){where}")
+        yield there.world
+        with _naming(f"evaluations.{name}", where):
+            there.with_trained(own, settings.learner)
+
+
+def _changed(settings: ConditionSettings, scenario: ScenarioSettings) -> ConditionSettings:
+    return settings.model_copy(update={"scenario": scenario})
+
+
+def _built(settings: ConditionSettings, where: str) -> Arrangement:
     try:
-        world = settings.scenario.build()
-        scenario, team = arranged(settings, world, 0)
+        found = arrange(settings, 0)
         if settings.learner.decision.rule != "value":
-            scenario.reset(0)
-            team.check(scenario.predict())
+            found.scenario.reset(0)
+            found.team.check(found.scenario.predict())
     except ValueError as error:
         raise SpecError(f"{error}{where}") from None
-    return world, scenario
+    return found
 
 
-def _check_alike(name: str, scenario: Scenario, other: Scenario, where: str) -> None:
-    if (other.agents, other.state_space) != (scenario.agents, scenario.state_space):
-        raise SpecError(
-            f"evaluations.{name}: a team trained with {len(scenario.agents)} agents over "
-            f"{scenario.state_space.name!r} cannot act with {len(other.agents)} over "
-            f"{other.state_space.name!r}{where}"
-        )
+@contextmanager
+def _naming(key: str, where: str) -> Iterator[None]:
+    try:
+        yield
+    except ValueError as error:
+        raise SpecError(f"{key}: {error}{where}") from None
 
 
-def _revived(
-    sources: Sources,
-    study: str,
-    condition: str,
-    settings: dict[str, Any],
-    seed: int,
-    episodes: int,
-    steps: int,
-    evaluation: int,
-    elsewhere: list[tuple[str, dict[str, Any]]],
-) -> Trial:
+def _revived(sources: Sources, content: dict[str, Any]) -> Trial:
     """Return a trial that was pickled, its settings made again by its files."""
+
+    def scenario(table: dict[str, Any]) -> ScenarioSettings:
+        return ConditionSettings.model_validate({"scenario": table}, strict=True).scenario
+
     with sources.active():
-        own = ConditionSettings.model_validate(settings, strict=True)
-        evaluations = tuple(
-            (name, ConditionSettings.model_validate({"scenario": s}, strict=True).scenario)
-            for name, s in elsewhere
-        )
-    return Trial(study, condition, own, seed, episodes, steps, evaluation, evaluations, sources)
+        made = {
+            "settings": ConditionSettings.model_validate(content["settings"], strict=True),
+            "evaluations": tuple((name, scenario(s)) for name, s in content["evaluations"]),
+            "curriculum": tuple(
+                Stage(name, episodes, scenario(s)) for name, episodes, s in content["curriculum"]
+            ),
+        }
+    return Trial(**{**content, **made}, sources=sources)
