@@ -6,7 +6,7 @@ own: what a sweep or an override says of it holds in the stages, too, unless the
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any, NamedTuple
 
 from pydantic import AfterValidator, Field
@@ -60,11 +60,20 @@ class Stage(NamedTuple):
         return {**self._asdict(), "scenario": self.scenario.model_dump(mode="json")}
 
 
-def lengths(stages: Sequence[int], episodes: int) -> str:
-    """Return the episodes of stages and of the training after them in words.
+def lengths(curricula: Iterable[Sequence[int]], episodes: int) -> str:
+    """Return in words the episodes of training, stage by stage, that there are.
 
-    >>> lengths([10, 6], 8), lengths([], 8), lengths([], 1)
-    ('10 + 6 + 8 episodes', '8 episodes', '1 episode')
+    Parameters
+    ----------
+    curricula
+        Of every condition, the episodes of its stages.
+    episodes
+        Those after them.
+
+    Examples
+    --------
+    >>> lengths([[10, 6], [10, 6]], 8), lengths([[10, 6], []], 8), lengths([[]], 1)
+    ('10 + 6 + 8 episodes', '10 + 6 + 8 or 8 episodes', '1 episode')
     """
-    numbers = [*stages, episodes]
-    return f"{' + '.join(map(str, numbers))} episode{'' if numbers == [1] else 's'}"
+    told = dict.fromkeys(" + ".join(map(str, [*stages, episodes])) for stages in curricula)
+    return f"{' or '.join(told)} episode{'' if list(told) == ['1'] else 's'}"

@@ -36,10 +36,10 @@ class Outline:
 
     @property
     def lengths(self) -> str:
-        """Episodes of training, stage by stage, in words; of the last one if conditions differ."""
-        differ = any("curriculum" in override for override in self.table.get("overrides", ()))
-        stages = () if differ else self.table.get("curriculum", ())
-        return lengths([int(stage["episodes"]) for stage in stages], self.episodes)
+        """Episodes of training, stage by stage, in words."""
+        common = self.table.get("curriculum", ())
+        curricula = [o.get("curriculum", common) for o in self.table.get("overrides", [{}])]
+        return lengths(([s["episodes"] for s in stages] for stages in curricula), self.episodes)
 
     @classmethod
     def of(cls, spec: Spec) -> Outline:

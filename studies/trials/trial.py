@@ -99,7 +99,7 @@ class Trial:
     @property
     def lengths(self) -> str:
         """Its episodes of training, stage by stage, in words."""
-        return lengths([stage.episodes for stage in self.curriculum], self.episodes)
+        return lengths([[stage.episodes for stage in self.curriculum]], self.episodes)
 
     @property
     def recorded(self) -> dict[int, str]:

@@ -10,6 +10,7 @@ from nested_agents.studies.catalogue.study import load_study
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.presentation.tables import tabulate
 from nested_agents.studies.report import words
+from nested_agents.studies.spec.outline import Outline
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.session import run_trial
@@ -27,7 +28,7 @@ SPEC = Spec.of(
             {"name": "two", "episodes": 2, "scenario": {"carts": 2}},
             {"name": "three", "episodes": 1, "scenario": {"carts": 3}},
         ],
-        "evaluations": {"eight": {"carts": 8}},
+        "evaluations": {"six": {"carts": 6}, "eight": {"carts": 8}},
     }
 )
 
@@ -56,7 +57,8 @@ def test_stages_are_kept_in_the_order_in_which_they_were_trained(study):
         (0, "training", 0), (0, "training", 1), (0, "training", 2),
     ]  # fmt: skip
     assert phases == [
-        "training", "evaluation", "training:two", "training:three", "evaluation:eight",
+        "training", "evaluation", "training:two", "training:three", "evaluation:six",
+        "evaluation:eight",
     ]  # fmt: skip
 
 
@@ -65,10 +67,10 @@ def test_learning_curves_are_of_the_condition_itself_and_tables_tell_all_evaluat
         results = read(store)
     (condition,) = results.training
     assert results.training[condition]["success"].shape == (2, 3)
-    assert list(results.elsewhere(condition)) == ["eight"]
+    assert list(results.elsewhere(condition)) == ["six", "eight"]
     analysis = load_study("learning-curve").analyse(results)
     titles = tabulate(analysis.table).titles
-    assert titles[2:4] == ("evaluation success", "success, eight")
+    assert titles[2:5] == ("evaluation success", "success, six", "success, eight")
 
 
 def test_the_rows_of_any_phase_can_be_asked_for(study, capsys):
@@ -84,9 +86,17 @@ def test_a_team_is_trained_again_through_its_stages_to_be_explained(study, capsy
     assert text.startswith("default, seed 0: the team after 2 + 1 + 3 episodes")
 
 
+def test_the_lengths_of_several_curricula_are_told():
+    stages = [{"name": "more", "episodes": 9}]
+    overrides = [{"name": "a"}, {"name": "b", "curriculum": stages}]
+    assert Outline.of(SPEC.model_copy(update={"overrides": overrides})).lengths == (
+        "2 + 1 + 3 or 9 + 3 episodes"
+    )
+
+
 def test_extent(study):
     with Store.open(study) as store:
         assert words.extent(store.outline()) == (
             "1 condition × 2 seeds, each 2 + 1 + 3 training episodes of up to 4 steps, "
-            "2 evaluation episodes after them and as many in another scenario"
+            "2 evaluation episodes after them and as many in each of 2 other scenarios"
         )
