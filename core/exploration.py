@@ -8,7 +8,7 @@ resting wheel lead to the same state).
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Protocol
+from typing import Annotated, Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 from pydantic import Field
@@ -50,6 +50,15 @@ class Explorer(Protocol):
 
     def advance(self) -> None:
         """Note that all agents have decided this step."""
+
+
+@runtime_checkable
+class SuccessorExplorer(Protocol):
+    """An explorer that can go on from where one of the same kind ended with other agents."""
+
+    def take_over(self, former: Any) -> None:
+        """Go on from an explorer of the same settings, between two episodes."""
+        ...
 
 
 class ExplorationSettings(Settings):
@@ -129,6 +138,10 @@ class EpsilonDecreasingBoltzmann:
         if self.settings.clock == "episode":
             self.memory[0] = 0.0
 
+    def take_over(self, former: EpsilonDecreasingBoltzmann) -> None:
+        """Go on with the clock."""
+        self.memory[:] = former.memory
+
     def advance(self) -> None:
         """Let the clock tick."""
         self.memory[0] += 1.0
@@ -187,6 +200,10 @@ class Bursts:
         """Count the episode and end every burst."""
         self.memory[0] += 1.0
         self.memory[1:] = 0.0
+
+    def take_over(self, former: Bursts) -> None:
+        """Go on counting episodes; bursts end with an episode."""
+        self.memory[0] = former.memory[0]
 
     def advance(self) -> None:
         """Bursts run down in `choose`."""
