@@ -39,8 +39,9 @@ LEVER = 0.43
 """Lever of the half of a team that pushes to turn the box, as a fraction of the side's half."""
 MISSED = 0.04, 0.015
 """By how much the box would miss the goal [m] for a second side to be called for, and kept."""
-ENOUGH = 0.8
-"""Fraction of the robots that must stand behind their sides for the pushing to begin."""
+ENOUGH = 0.6
+"""Fraction of the robots of a side that must stand behind it for the pushing to begin: a third of
+them can move the box."""
 SWEEPS = 2
 """Best responses of each robot to all others."""
 SPEEDS = 1.0, 0.5, 0.0
@@ -116,7 +117,9 @@ class Crowd:
         )
         tables = [drivers.next(r, speeds[w][None]) for r, w in enumerate(drivers.wheels)]
         moves = any(after[0, k].any() for (after, _), k in zip(tables, local, strict=True))
-        if stands.mean() >= ENOUGH or not (moves or speeds.any()):
+        teams = [team for team in (plan.second, ~plan.second) if team.any()]
+        ready = all(stands[team].mean() >= ENOUGH for team in teams)
+        if ready or not (moves or speeds.any()):
             twists = np.array([table[0] for _, table in tables])
             local = self._push(robots, box, goal, plan, twists, local, stands)
         return [int(k) for k in local]
@@ -146,7 +149,7 @@ class Crowd:
         if other is None:
             return one
         two = self._both(robots, box, course, error, side, other)
-        there = (self._stands(robots, box, two) & two.second).sum() > 0.5 * two.second.sum()
+        there = self._stands(robots, box, two)[two.second].mean() > 0.25
         missed = distance * sin(min(max(beyond - CONE, 0.0), pi / 2))
         return two if missed > MISSED[int(there)] else one
 
