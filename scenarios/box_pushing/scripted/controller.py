@@ -4,7 +4,8 @@ It picks a side at which to push the box towards the goal, gives every robot a s
 the robots that are not at their slot there (a short search over sequences of actions of one robot,
 around the box and clear of the others), and once all are, pushes: it tries the joint actions on the
 push predictor and takes the one after which the box is nearest to the goal and best aligned, with
-the robots still at their slots. It knows the whole situation and remembers nothing.
+the robots still at their slots. Three robots and more push a convex box in another way, see
+`box_pushing.scripted.crowd`. It knows the whole situation and remembers nothing.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ from .routes import paths
 from .sides import SPREAD, Side, behind, is_concave, sides_of
 
 CROWD = 3
-"""Robots from which on a convex box with sides is pushed as by a `Crowd`."""
+"""Robots, all alike, from which on a convex box with sides is pushed as by a `Crowd`."""
 WIDEST_JOINT = 300
 """Joint actions tried at once; above, robots choose in turn."""
 
@@ -80,7 +81,8 @@ class ScriptedController:
         )
         self._sides = sides_of(box, len(robots), float(self._radii.max()) + CLEARANCE)
         self._hollow = is_concave(box)
-        crowded = len(self.robots) >= CROWD and self._sides and not self._hollow
+        alike = len(set(self.robots)) == 1
+        crowded = len(self.robots) >= CROWD and alike and self._sides and not self._hollow
         self._crowd = (
             Crowd(self.robots, box, self._model, self._drivers, self._sides) if crowded else None
         )
