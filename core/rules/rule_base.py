@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import combinations
+from math import prod
 from typing import Literal
 
 import numpy as np
@@ -25,6 +26,9 @@ from ..spaces import StateSpace
 from . import kernels
 from .fuzzy import Partition
 from .settings import RuleBaseSettings
+
+MOST_RULES = 2**63 - 1
+"""Rules that can be numbered."""
 
 
 class RuleBase:
@@ -75,10 +79,10 @@ class RuleBase:
         self.terms = tuple(terms)
         self.n_own = n_own
         self.common = frozenset(common)
-        self.sizes = tuple(
-            int(np.prod([self.partitions[j].size for j in term])) for term in self.terms
-        )
+        self.sizes = tuple(prod(self.partitions[j].size for j in term) for term in self.terms)
         self.n_rules = sum(self.sizes)
+        if self.n_rules > MOST_RULES:
+            raise ValueError(f"rule base: {self.n_rules} rules, allowed {MOST_RULES} at most")
         self.layout = kernels.layout(self.partitions, self.terms, n_own)
         lay = kernels.unpack.py_func(self.layout)
         self.n_parts = int(lay.row_sizes @ lay.part_sizes)

@@ -158,8 +158,9 @@ class BoxSettings(Settings):
     """Coefficient of friction with the ground."""
     contact_friction: NonNegative = 0.3
     """Coefficient of friction with robots."""
-    grows: bool = False
-    """Whether it grows with the number of robots, as the boxes known by name do."""
+    grows: bool | Literal["width"] = False
+    """Whether it grows with the number of robots, as the boxes known by name do; or along its
+    ``width`` only, the side behind which robots start."""
 
 
 class WheelSettings(Settings):
@@ -247,6 +248,9 @@ class BoxPushingSettings(ScenarioSettings):
     infrared: InfraredSettings = InfraredSettings()
     start: Literal["easy", "medium", "hard"] = "medium"
     """Start distribution."""
+    scaling: Literal["fixed", "similar"] = "fixed"
+    """Whether the box's distance to the goal, `tolerance`, `termination_radius` and the reward's r1
+    stay as they are whatever the number of robots, or are in units of the box and grow with it."""
     failures: tuple[Failure, ...] = ()
     """Failures of wheels, as ``[[scenario.failures]]`` tables."""
     state_space: Literal["paper", "relational", "pose", "crowd"] | tuple[str, ...] = "relational"
