@@ -17,7 +17,7 @@ The number of joint actions tried grows linearly with the number of bodies.
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -44,6 +44,16 @@ class BestResponseSettings(EvaluatorSettings):
     def build(self, problem: DecisionProblem) -> BestResponse:
         """Return the evaluator of a team."""
         return BestResponse(problem)
+
+
+class _Known(NamedTuple):
+    """What the agents of one body have last been found to be able to bring about."""
+
+    concerned: IntArray
+    plan: IntArray
+    free: tuple[int, ...]
+    tried: IntArray
+    found: FloatArray
 
 
 class BestResponse(Aggregation):
@@ -80,6 +90,7 @@ class BestResponse(Aggregation):
         ]
         self._prediction: Prediction | None = None
         self._plans: dict[int, IntArray] = {}
+        self._known: _Known | None = None
 
     def values(self, deliberation: Deliberation) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent."""
@@ -88,7 +99,7 @@ class BestResponse(Aggregation):
             return np.zeros(self.n_actions)
         first = agent == self.hierarchy.order[0]
         if first or deliberation.prediction is not self._prediction:
-            self._prediction, self._plans = deliberation.prediction, {}
+            self._prediction, self._plans, self._known = deliberation.prediction, {}, None
         context = self._context[agent]
         if context not in self._plans:
             self._plans[context] = self._planned(deliberation)
@@ -96,13 +107,33 @@ class BestResponse(Aggregation):
         decided = [i for i in range(len(plan)) if i not in self._free[agent]]
         plan[decided] = deliberation.joint_action[decided]
         free = tuple(i for i in self._free[agent] if self._group_of[i] == self._group_of[agent])
-        tried = combinations(free, self.n_actions)
-        found = self.worth(deliberation, _with(plan, free, tried))
+        tried, found = self._valued(deliberation, plan, free)
         best = np.full(self.n_actions, -np.inf)
         np.maximum.at(best, tried[:, free.index(agent)], found)
         # What its body does is kept in the plan; what it takes in the end, the next one is told.
         plan[list(free)] = tried[greatest(found, deliberation.rng)]
         return best
+
+    def _valued(
+        self, deliberation: Deliberation, plan: IntArray, free: tuple[int, ...]
+    ) -> tuple[IntArray, FloatArray]:
+        """Return the actions ``(m, k)`` of the free agents of a body, and what each is worth.
+
+        The second agent of a body finds what the first one did, if their interest is the same.
+        """
+        known, concerned = self._known, self.concerned[deliberation.agent]
+        if known is not None and known.concerned is concerned and set(free) < set(known.free):
+            others = [i for i in range(len(plan)) if i not in known.free]
+            if (known.plan[others] == plan[others]).all():
+                places = [known.free.index(i) for i in free]
+                decided = [k for k in range(len(known.free)) if k not in places]
+                told = plan[[known.free[k] for k in decided]]
+                same = (known.tried[:, decided] == told).all(axis=1)
+                return known.tried[same][:, places], known.found[same]
+        tried = combinations(free, self.n_actions)
+        found = self.worth(deliberation, _with(plan, free, tried))
+        self._known = _Known(concerned, plan.copy(), free, tried, found)
+        return tried, found
 
     def _planned(self, deliberation: Deliberation) -> IntArray:
         """Return a plan ``(n,)`` for the agent and those below it."""

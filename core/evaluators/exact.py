@@ -61,6 +61,7 @@ class ExactEnumeration(Aggregation):
         uniform = problem.teammates == "uniform"
         self._expected = np.full((n, a), 1.0 / a) if uniform else np.zeros((0, 0))
         self._tried: list[Tried] = []
+        self._means: tuple[tuple[object, ...], FloatArray] | None = None
         if self.hierarchy.joint_actions(a) >= a**n:
             places = a ** np.arange(n - 1, -1, -1, dtype=np.int64)
             self._tried = [self._tried_by(i, places) for i in range(n)]
@@ -114,9 +115,18 @@ class ExactEnumeration(Aggregation):
         if self.problem.rule != "value":
             rewards = prediction.reward_table()[indices]
         if self.problem.rule != "reward":
-            of_each = [
-                self.rules.block_values(deliberation.weights[i], prediction.blocks(i), indices)
-                for i in concerned
-            ]
-            values = of_each[0] if len(of_each) == 1 else np.mean(of_each, axis=0)
+            values = self._mean(deliberation, concerned)[indices]
         return self.combine(rewards, values).reshape(self.n_actions, -1)
+
+    def _mean(self, deliberation: Deliberation, concerned: IntArray) -> FloatArray:
+        """Return the mean value ``(A ** n,)`` of all joint actions, once for a whole decision."""
+        prediction, weights = deliberation.prediction, deliberation.weights
+        of = prediction, weights, concerned
+        if self._means is None or any(a is not b for a, b in zip(self._means[0], of, strict=True)):
+            tables = cast(TabulatedPrediction, prediction)
+            indices = np.arange(self.n_actions ** len(weights))
+            values = [
+                self.rules.block_values(weights[i], tables.blocks(i), indices) for i in concerned
+            ]
+            self._means = of, np.mean(values, axis=0)
+        return self._means[1]

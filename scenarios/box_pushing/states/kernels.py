@@ -24,20 +24,19 @@ _EXACT = {"contract", "nsz"}
 
 COMPILED = (
     "gap", "box_bearing", "side", "others_gap", "push_bearing", "cross_track_error",
-    "box_distance", "approach", "box_turn", "bend", "face_bearing", "face_side", "others_away",
+    "box_distance", "approach", "box_turn", "bend", "face_bearing", "others_away",
     "contact_push_bearing", "contact_cross_track_error",
 )  # fmt: skip
 """The built-in variables that are computed here, each in a row of scratch of its own."""
 (
     GAP, BEARING, SIDE, OTHERS, PUSH, CROSS_TRACK, DISTANCE, APPROACH, TURN, BEND, FACE_BEARING,
-    FACE_SIDE, AWAY_OTHERS, CONTACT_PUSH, CONTACT_CROSS_TRACK,
+    AWAY_OTHERS, CONTACT_PUSH, CONTACT_CROSS_TRACK,
 ) = range(len(COMPILED))  # fmt: skip
 # Rows of what several variables need; no column can name them.
 _COURSE, _X, _Y, _WEIGHT, _SQUARE, _NEAR_X, _NEAR_Y, _INSIDE = range(
     len(COMPILED), len(COMPILED) + 8
 )
 _ROWS = len(COMPILED) + 8
-_OF_FACE = (FACE_BEARING, FACE_SIDE)
 _OF_CONTACT = (CONTACT_PUSH, CONTACT_CROSS_TRACK)
 
 
@@ -58,7 +57,7 @@ class Columns:
     def __init__(self, names: Sequence[str]) -> None:
         assert set(names) <= set(COMPILED), f"{list(names)}: not all of them are compiled"
         self.rows: IntArray = np.array([COMPILED.index(name) for name in names], dtype=np.int64)
-        self._of_face = bool(np.isin(self.rows, _OF_FACE).any())
+        self._of_face = bool((self.rows == FACE_BEARING).any())
         self._of_contact = bool(np.isin(self.rows, _OF_CONTACT).any())
 
     def of(self, view: View, robots: Sequence[int]) -> FloatArray:
@@ -190,7 +189,7 @@ def _of_robot(robot, gap, box, first, count, work):  # type: ignore[no-untyped-d
 
 @njit(cache=True, error_model="numpy", fastmath=_EXACT)
 def _of_face(robot, box, edges, first, count, work):  # type: ignore[no-untyped-def]
-    """Write which face of the box is next to a robot, and the bearing of the way into it.
+    """Write the bearing of the way into the face of the box that is next to a robot.
 
     As `View.inward`: the direction to the nearest point from outside, away from it from inside.
     Rounding moves that point along the same line.
@@ -236,7 +235,6 @@ def _of_face(robot, box, edges, first, count, work):  # type: ignore[no-untyped-
             sign * work[_NEAR_X * LANES + k], sign * work[_NEAR_Y * LANES + k]
         )
         work[FACE_BEARING * LANES + k] = wrapped(inward - psi[k])
-        work[FACE_SIDE * LANES + k] = wrapped(inward - work[_COURSE * LANES + k])
 
 
 @njit(cache=True, error_model="numpy", fastmath=_EXACT)
@@ -283,7 +281,7 @@ def _relational(  # type: ignore[no-untyped-def]
     columns
         Rows of scratch of variables, see `Columns`.
     of_face, of_contact
-        Whether some are of those that `_of_face` and `_of_contact_push` write.
+        Whether some are what `_of_face` and `_of_contact_push` write.
     """
     m = box.shape[1]
     out, work = np.empty((len(wanted), m, len(columns))), np.empty(_ROWS * LANES)

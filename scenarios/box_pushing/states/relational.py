@@ -112,12 +112,6 @@ def face_bearing(view: View, robot: int) -> FloatArray:
     return wrap(view.inward(robot) - view.robots[:, robot, 2])
 
 
-@_angle(SIDES, ("far left", "left", "behind", "right", "far right"))
-def face_side(view: View, robot: int) -> FloatArray:
-    """Which face of the box is nearest, as seen along the course to the goal."""
-    return wrap(view.inward(robot) - view.course)
-
-
 @state_variable(
     "1", 0.0, 1.0, centres=(0.0, 0.25, 0.5, 0.75, 1.0),
     labels=("none", "some", "half", "most", "all"),

@@ -174,7 +174,7 @@ _PUSHING = (
 _PUSHING_TOGETHER = (
     "gap",
     "face_bearing",
-    "face_side",
+    "side",
     "others_away",
     "contact_push_bearing",
     "contact_cross_track_error",

@@ -111,7 +111,7 @@ STATE_VARIABLES = Registry(
         name: f"{_PLACE}:{name}"
         for name in (
             "gap", "box_bearing", "side", "others_gap", "push_bearing", "cross_track_error",
-            "box_distance", "approach", "box_turn", "bend", "face_bearing", "face_side",
+            "box_distance", "approach", "box_turn", "bend", "face_bearing",
             "others_away", "contact_push_bearing", "contact_cross_track_error",
         )
     },

@@ -66,7 +66,6 @@ def test_variables_of_crowds_by_hand() -> None:
     situation = view([[*low, 0.1], [0.0, 0.9, -pi / 2]], [0.0, 0.0, 0.3], [0.0, 0.77])
     first = dict(zip(VARIABLES, EVERY.shared(situation, 0)[0], strict=True))
     assert first["face_bearing"] == pytest.approx(0.2)
-    assert first["face_side"] == pytest.approx(0.3)
     assert first["others_away"] == 1.0
     second = dict(zip(VARIABLES, EVERY.shared(situation, 1)[0], strict=True))
     assert second["others_away"] == 0.0
