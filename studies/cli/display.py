@@ -140,6 +140,8 @@ def print_table(found: SummaryTable) -> None:
         )
     Console().print(table)
     print("\nMeans over seeds, and below them their 95 % intervals.")
+    if found.remark:
+        print(found.remark)
 
 
 def print_places(directory: Path, figures: Sequence[Path], replays: Sequence[Path]) -> None:

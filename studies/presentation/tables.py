@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..analysis.statistics import Estimate
+from ..analysis.statistics import FEW, Estimate
 from ..analysis.summary import Summary, between, two_figures
 from ..spec.errors import SpecError
 
@@ -61,6 +61,13 @@ class SummaryTable:
     csv: str
     latex: str
     markdown: str
+
+    @property
+    def remark(self) -> str:
+        """What must be said of intervals of few seeds, if there are any; else nothing."""
+        if all(seeds >= FEW for _, seeds, _ in self.rows):
+            return ""
+        return f"Means of fewer than {FEW} seeds have Student's intervals, rates Wilson's."
 
 
 def tabulate(lines: Sequence[Summary], columns: Sequence[str] = ()) -> SummaryTable:

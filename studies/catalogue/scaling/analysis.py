@@ -175,7 +175,7 @@ def analyse(results: Results) -> Scaling:
             evaluation = rate(results.evaluation[condition]["success"])
             values = {"success": values.pop("success"), "evaluation success": evaluation} | values
         if "all_touching" in numbers:
-            values["all touch"] = bootstrap(numbers["all_touching"])
+            values["all touch"] = bootstrap(numbers["all_touching"], bounds=(0, 1))
         agents, passed = (int(numbers[n][0]) for n in ("agents", "messages"))
         evaluator = _without_robots(condition, sizes)
         period = float(numbers["period_s"][0]) if "period_s" in numbers else None

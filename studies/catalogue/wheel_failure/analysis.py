@@ -270,7 +270,7 @@ def _gains(courses: tuple[Course, ...]) -> tuple[Difference, ...]:
             c.end.mean(axis=1)[[c.seeds.index(seed) for seed in shared]] for c in (course, base)
         ]
         raw = paired_permutation(*ends)
-        found.append((course, len(shared), bootstrap(ends[0] - ends[1]), raw))
+        found.append((course, len(shared), bootstrap(ends[0] - ends[1], bounds=(-1, 1)), raw))
     adjusted = holm([raw for *_, raw in found])
     return tuple(
         Difference(f"{course.fault}, {course.adapts}", "end", seeds, estimate, float(p))

@@ -249,7 +249,7 @@ def test_an_unreadable_copy_of_the_spec_is_written_anew(study):
 def test_damage_does_not_read_as_a_slip_of_the_pen(study):
     (study / DATABASE).write_bytes(b"no database at all")
     (study / SPEC_FILE).write_text('preset = "fefault"\n')
-    with pytest.raises(SpecError, match="is no spec, and .* beside it is damaged"):
+    with pytest.raises(SpecError, match=r"is no spec, and .* beside it is damaged"):
         finish(study)
 
 
