@@ -97,7 +97,7 @@ class Reading:
 
     def sources(self) -> Sources:
         """Return the files of users that the study names, as they were when it began."""
-        return Sources(None, self._table("sources"))
+        return Sources(None, self._table("sources"), brought_by=str(self.directory))
 
     def settings(self) -> dict[str, Any]:
         """Return the settings of each condition by label, as they were when it began."""

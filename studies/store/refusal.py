@@ -58,7 +58,7 @@ def examine(directory: Path, given: Given) -> str | None:
 def is_copy(path: Path, spec: Spec) -> bool:
     """Tell whether a file holds a spec; what the spec names of users' files is not read again."""
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
+        table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
         return Spec.of(table, spec.sources) == spec
     except (OSError, ValueError, RecursionError):
         return False

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 @options.backend
 @options.address
 @options.accept_code
+@options.trust
 @options.changes
 def command(
     spec: Path,
@@ -36,6 +37,7 @@ def command(
     backend: Backend,
     address: str | None,
     accept_code: bool,
+    trust: bool,
     changes: tuple[str, ...],
 ) -> int:
     """Run the study of a spec; the same command again continues it.
@@ -44,7 +46,10 @@ def command(
     """
     from ...spec.spec import Spec
     from ..running import run_and_show
+    from ..trusting import trust_files
 
+    if trust and out.exists():
+        trust_files(out)
     return run_and_show(
         Spec.load(spec, changes, study=out),
         out,
