@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,6 +11,7 @@ import numpy as np
 from ..analysis.statistics import FEW, Estimate
 from ..analysis.summary import Summary, between, two_figures
 from ..spec.errors import SpecError
+from .csv_text import write_csv
 
 LATEX = {
     "\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_",
@@ -108,16 +108,16 @@ def _cell(estimate: Estimate | None) -> Cell | None:
 
 def _csv(lines: Sequence[Summary], titles: Sequence[str]) -> str:
     file = io.StringIO()
-    writer = csv.writer(file, lineterminator="\n")
     ends = [f"{title}{end}" for title in titles for end in ("", " low", " high")]
-    writer.writerow(["condition", "seeds", *ends])
+    rows = []
     for line in lines:
         values: list[object] = [line.condition, line.seeds]
         for title in titles:
             estimate = line.estimates.get(title)
             numbers = (np.nan,) * 3 if estimate is None else _ends(estimate)
             values += ["" if np.isnan(value) else repr(value) for value in numbers]
-        writer.writerow(values)
+        rows.append(values)
+    write_csv(file, ["condition", "seeds", *ends], rows)
     return file.getvalue()
 
 
