@@ -30,6 +30,9 @@ FEW = 8
 SPREAD = {"mean": 1.0, "iqm": 1.1, "median": 1.26}
 """Standard deviation of each statistic of few normal values, over that of their mean."""
 
+NOT_NEGATIVE = (0.0, np.inf)
+"""The bounds of times, sizes and numbers of things, see `bootstrap`."""
+
 ALIKE = 2.0
 """Failures that `rate` supposes beside those seen. With seeds of which one in twenty never learns,
 and .99 succeed of the others' episodes, intervals of 10 to 30 seeds and 10 episodes then cover the

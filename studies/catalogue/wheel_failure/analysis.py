@@ -26,7 +26,7 @@ from ....core.team import Team
 from ...analysis.comparison import Array, Difference
 from ...analysis.paired_tests import holm, paired_permutation
 from ...analysis.results import Arrays, Results
-from ...analysis.statistics import Estimate, bootstrap, rate, rates
+from ...analysis.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, rates
 from ...analysis.summary import Summary
 from ...spec.conditions import label
 from ...spec.errors import SpecError
@@ -249,8 +249,8 @@ def _summary(course: Course) -> Summary:
     if course.before.any():  # else there is nothing to lose or to come back to
         estimates |= {
             "recovered": rate(recovered[:, None]),
-            "episodes": bootstrap(episodes),
-            "steps": bootstrap(steps),
+            "episodes": bootstrap(episodes, bounds=NOT_NEGATIVE),
+            "steps": bootstrap(steps, bounds=NOT_NEGATIVE),
             "cumulative loss": bootstrap(course.lost),
         }
     return Summary(f"{course.fault}: {course.adapts}", len(course.success), estimates)
