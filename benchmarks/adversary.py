@@ -2,8 +2,10 @@
 
 Three campaigns, each drawn from a seed:
 
-- *kills*: a study and its workers are killed at random moments, the same command continues, and
-  what it ends with must be equal byte by byte, see `benchmarks.crashes`;
+- *kills*: the command that runs a study is killed (SIGKILL) at a random moment, the same command
+  continues, and what it ends with must be equal byte by byte. Trials run in the process of the
+  command and take no time, so that a hundred kills do not take an hour; `benchmarks.crashes` kills
+  real workers;
 - *flips*: one bit of one file of a finished study is flipped. Commands that read must print what
   they printed before, or name the file; a run must end with the rows and recordings of the sound
   study. A file may also be cut short or be a folder;
@@ -20,30 +22,34 @@ import contextlib
 import io
 import json
 import math
+import os
 import random
+import re
 import shutil
+import signal
 import sys
 import tempfile
 import time
 import traceback
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator, Sequence
 from pathlib import Path
 
 from nested_agents.scenarios.box_pushing.world.boxes import BoxSpec
+from nested_agents.studies import run as studies_run
 from nested_agents.studies.cli.main import main as command_line
 from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.spec.toml import dumps
 from nested_agents.studies.store import durable
 from nested_agents.studies.store.running import LOCK
 from nested_agents.studies.store.store import DATABASE, Store
 from nested_agents.studies.trials.trial import Trial, TrialResult, check, run_trial, trials_of
-
-from .crashes import disturb
+from nested_agents.studies.workers.worker import Arrival, RunTrial
 
 SPEC = Spec.of(
-    {"seeds": 2, "episodes": 2, "steps": 10, "evaluation": 1,
+    {"seeds": 5, "episodes": 2, "steps": 10, "evaluation": 1,
      "sweep": {"preset": ["default", "frozen"]}}
 )  # fmt: skip
 SLOW = 10.0
@@ -131,13 +137,97 @@ class Adversary:
         shutil.copytree(self.sound, self.study)
 
 
+class Here:
+    """Workers that are this process; trials are those that an adversary has run before."""
+
+    processes = 1
+
+    def __init__(self, adversary: Adversary) -> None:
+        self.adversary = adversary
+
+    def arrivals(
+        self, trials: Sequence[Trial], run_trial: RunTrial, started: Callable[[Trial], None]
+    ) -> Generator[Arrival]:
+        """See `nested_agents.studies.workers.workers.Workers.arrivals`."""
+        for trial in trials:
+            started(trial)
+            time.sleep(0.08)
+            yield Arrival(trial, self.adversary.result(trial), None, 1.0)
+
+
+def kills(number: int, rng: random.Random, folder: Path) -> Counter[str]:
+    """Kill the command that runs a study, again and again; return what happened."""
+    adversary, tally = Adversary(folder, rng), Counter[str]()
+    spec = folder / "spec.toml"
+    spec.write_text(dumps(SPEC.table()))
+    studies_run.start_workers = (  # in the children too, which are copies of this process
+        lambda *_: contextlib.nullcontext(Here(adversary))
+    )
+    begin = time.monotonic()
+    assert _wait(_child(["run", str(spec), "--out", str(folder / "timed")])) == 0
+    whole = time.monotonic() - begin
+    while tally["kills"] < number:
+        directory = folder / str(tally["studies"])
+        tally["studies"] += 1
+        kept: set[str] = set()
+        while True:
+            child = _child(["run", str(spec), "--out", str(directory)])
+            if tally["kills"] < number and rng.random() < 0.8:
+                time.sleep(rng.uniform(0.0, whole))
+                os.kill(child, signal.SIGKILL)
+            status = _wait(child)
+            now = _kept(directory)
+            tally["lost trials"] += len(kept - now)
+            kept = now
+            if status == -signal.SIGKILL:
+                tally["kills"] += 1
+                tally["kills with trials kept, and others left"] += (
+                    0 < len(kept) < len(adversary.trials)
+                )
+            else:
+                tally["refused"] += status != 0
+                break
+        equal = adversary.content(directory) == adversary.expected
+        tally["studies: equal" if equal else "studies: unequal"] += 1
+    return tally
+
+
+def _child(line: list[str]) -> int:
+    """Begin a command in a copy of this process; return its number."""
+    child = os.fork()
+    if child == 0:
+        with open(os.devnull, "w") as nowhere:
+            os.dup2(nowhere.fileno(), 1)
+            os.dup2(nowhere.fileno(), 2)
+        os._exit(command_line(line))
+    return child
+
+
+def _wait(child: int) -> int:
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+
+
+def _kept(directory: Path) -> set[str]:
+    """Return the identities of the trials that are kept, and sound."""
+    try:
+        with Store.open(directory) as store:
+            store.verify()
+            names, rows = store.trials()
+            return {row[names.index("identity")] for row in rows}
+    except SpecError as error:
+        if re.search("holds no study", str(error)):
+            return set()  # killed before the study was noted
+        raise
+
+
 def flips(number: int, rng: random.Random, folder: Path) -> Counter[str]:
     """Flip bits one by one, read the study, and mend it every fourth time; return what happened."""
     adversary, tally = Adversary(folder, rng), Counter[str]()
     for attempt in range(number):
+        tally["flips"] += 1
         path = adversary.damage()
         lines = adversary.lines()
-        for line in (lines[0], lines[1], rng.choice(lines[2:])):
+        for line in lines if attempt % 10 == 0 else lines[:2]:
             tally["reads"] += 1
             tally[_read(adversary, line, path)] += 1
         if attempt % 4 == 0:
@@ -195,11 +285,11 @@ def obstacles(rng: random.Random, folder: Path) -> Counter[str]:
 
 def hostile(number: int, rng: random.Random, folder: Path) -> Counter[str]:
     """Offer specs, topologies and polygons in turn; return what became of them."""
-    makers = {"spec": _specs(rng), "topology": _topologies(rng), "polygon": _polygons(rng)}
+    makers = {"specs": _specs(rng), "topologies": _topologies(rng), "polygons": _polygons(rng)}
     tally = Counter[str]()
     for attempt in range(number):
         kind = list(makers)[attempt % 3]
-        tally[f"{kind}s"] += 1
+        tally[kind] += 1
         attack = next(makers[kind])
         begin = time.monotonic()
         with warnings.catch_warnings(record=True) as warned:
@@ -353,12 +443,15 @@ def _area(ring: list[list[float]]) -> float:
     return sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(ring, following, strict=True)) / 2
 
 
-GOOD = {"reads", "runs", "equal", "told", "run: equal", "specs", "topologys", "polygons"}
+ATTEMPTS = ("kills", "flips", "reads", "runs", "studies", "specs", "topologies", "polygons")
+FINE = (
+    "equal", "told", "run: equal", "studies: equal", "kills with trials kept, and others left",
+    "accepted", "refused in one line",
+)  # fmt: skip
 
 
 def _failures(tally: Counter[str]) -> int:
-    fine = ("accepted", "refused in one line")
-    return sum(n for name, n in tally.items() if name not in GOOD and not name.endswith(fine))
+    return sum(n for name, n in tally.items() if name not in ATTEMPTS and not name.endswith(FINE))
 
 
 def main() -> int:
@@ -370,43 +463,28 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=20)
     options = parser.parse_args()
     durable.os.fsync = lambda _: None  # type: ignore[attr-defined]  # no power fails here
-    begin, failed = time.monotonic(), 0
+    campaigns: dict[str, Callable[[random.Random, Path], Counter[str]]] = {
+        "flipped bits": lambda rng, folder: flips(options.flips, rng, folder),
+        "files cut short, folders in their place": obstacles,
+        "hostile input": lambda rng, folder: hostile(options.hostile, rng, folder),
+        "kill -9": lambda rng, folder: kills(options.kills, rng, folder),
+    }
+    begin, failed = time.process_time(), 0
     print("| attack | attempts | what became of them | failures |\n|---|---|---|---|")
     with tempfile.TemporaryDirectory() as name:
-        campaigns: dict[str, Callable[[Path], Counter[str]]] = {
-            "flipped bits": lambda f: flips(options.flips, random.Random(options.seed), f),
-            "cuts, folders for files": lambda f: obstacles(random.Random(options.seed), f),
-            "hostile input": lambda f: hostile(options.hostile, random.Random(options.seed), f),
-        }
-        for title, campaign in campaigns.items():
-            folder = Path(name) / title.replace(" ", "-").replace(",", "")
+        for number, (title, campaign) in enumerate(campaigns.items()):
+            folder = Path(name) / str(number)
             folder.mkdir()
-            tally = campaign(folder)
+            tally = campaign(random.Random(options.seed), folder)
             failed += _failures(tally)
-            attempts = options.flips if title == "flipped bits" else None
-            _row(title, tally, attempts)
-        if options.kills:
-            folder = Path(name) / "kills"
-            folder.mkdir()
-            found = disturb("loky", options.kills, options.seed, folder)
-            failed += found.lost + found.unequal
-            print(
-                f"| kills -9 | {found.kills.total()} ({found.kills['process']} processes, "
-                f"{found.kills['worker']} workers) | {found.studies} studies, the command begun "
-                f"{found.runs} times, {found.lost} trials lost | {found.lost + found.unequal} |"
+            tried = ", ".join(f"{tally[what]} {what}" for what in ATTEMPTS if tally[what])
+            became = ", ".join(
+                f"{what} {n}" for what, n in sorted(tally.items()) if what not in ATTEMPTS
             )
-    print(f"\nseed {options.seed}, {time.monotonic() - begin:.0f} s, {failed} failures")
+            print(f"| {title} | {tried} | {became} | {_failures(tally)} |", flush=True)
+    print(f"\nseed {options.seed}, {time.process_time() - begin:.0f} s of processor time, ", end="")
+    print(f"{failed} failures")
     return 1 if failed else 0
-
-
-def _row(title: str, tally: Counter[str], attempts: int | None) -> None:
-    counts = {"reads", "runs", "specs", "topologys", "polygons"}
-    tried = {name.replace("ys", "ies"): n for name, n in tally.items() if name in counts}
-    shown = ", ".join(f"{n} {name}" for name, n in tried.items())
-    if attempts is not None:
-        shown = f"{attempts}: {shown}"
-    became = ", ".join(f"{name} {n}" for name, n in sorted(tally.items()) if name not in counts)
-    print(f"| {title} | {shown} | {became} | {_failures(tally)} |", flush=True)
 
 
 if __name__ == "__main__":

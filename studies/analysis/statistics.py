@@ -77,7 +77,9 @@ def bootstrap(
     resamples, seed
         Number of resamples, and the seed that draws them.
     bounds
-        The least and the greatest value that there can be, beyond which no interval reaches.
+        The least and the greatest value that there can be, beyond which no interval reaches. If
+        both are finite and all runs have one of them, the interval is as wide as Wilson's for a
+        rate of 0 or 1.
 
     Raises
     ------
@@ -101,14 +103,28 @@ def bootstrap(
         return Estimate(value, np.full_like(value, np.nan), np.full_like(value, np.nan))
     if sum(map(len, arrays)) < FEW:
         half = _student(arrays, level) * SPREAD[statistic]
-        return Estimate(value, np.clip(value - half, *bounds), np.clip(value + half, *bounds))
+        return _bounded(value, value - half, value + half, bounds, level, sum(map(len, arrays)))
     rng = np.random.default_rng(seed)
     drawn = [array[rng.integers(len(array), size=(resamples, len(array)))] for array in arrays]
     # (resamples, n_runs) or (resamples, n_runs, n_points): runs last for the statistic.
     samples = np.moveaxis(np.concatenate(drawn, axis=1), 1, -1)
     tail = _tail(level, samples.shape[-1])
     low, high = np.quantile(compute(samples), [tail, 1.0 - tail], axis=0)
-    return Estimate(value, np.clip(low, *bounds), np.clip(high, *bounds))
+    return _bounded(value, low, high, bounds, level, samples.shape[-1])
+
+
+def _bounded(
+    value: Array, low: Array, high: Array, bounds: tuple[float, float], level: float, n_runs: int
+) -> Estimate:
+    """Return an estimate whose interval ends at the bounds, but is no point there."""
+    least, greatest = bounds
+    low, high = np.clip(low, *bounds), np.clip(high, *bounds)
+    if np.isfinite(greatest - least):
+        z = stats.norm.ppf(0.5 + level / 2.0)
+        reach = (greatest - least) * z**2 / (n_runs + z**2)
+        low = np.where(value >= greatest, np.minimum(low, greatest - reach), low)
+        high = np.where(value <= least, np.maximum(high, least + reach), high)
+    return Estimate(value, low, high)
 
 
 def _student(strata: list[Array], level: float) -> Array:

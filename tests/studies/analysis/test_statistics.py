@@ -106,8 +106,17 @@ def test_few_runs_have_students_interval_by_hand():
     assert bounded.low == pytest.approx(29 / 30 - 4.302653 / 30, abs=1e-6)
 
 
+@pytest.mark.parametrize("runs", [2, 5, 8, 30])
+def test_what_all_runs_have_in_full_is_not_certain(runs):
+    for value in (0.0, 1.0):
+        estimate = bootstrap(np.full(runs, value), bounds=(0.0, 1.0))
+        wilson = rate(np.full((runs, 1), value))
+        assert (estimate.low, estimate.high) == pytest.approx((wilson.low, wilson.high))
+    assert bootstrap(np.ones(runs)).low == 1.0  # a number of bytes, say
+
+
 def test_few_runs_of_two_strata_have_welchs_degrees_of_freedom():
-    one, other = np.array([1.0, 2.0, 4.0]), np.array([0.0, 5.0, 9.0, 1.0])[:3]
+    one, other = np.array([1.0, 2.0, 4.0]), np.array([0.0, 5.0, 9.0])
     estimate = bootstrap(one, other)
     test = stats.ttest_ind(one, -other, equal_var=False).confidence_interval(0.95)
     assert estimate.low == pytest.approx(test.low / 2.0)
