@@ -150,6 +150,9 @@ def _by_identity(
     return groupby(db.execute(query, values), itemgetter(0))
 
 
+ENCODER = json.JSONEncoder(check_circular=False, default=repr)
+"""Writes rows as text. A flipped type makes bytes of a text: hence the default."""
+
+
 def _sha256(content: object) -> str:
-    # default: a flipped type makes bytes of a text
-    return hashlib.sha256(json.dumps(content, default=repr).encode()).hexdigest()
+    return hashlib.sha256(ENCODER.encode(content).encode()).hexdigest()

@@ -181,9 +181,8 @@ def test_specs_of_other_systems_mean_the_same(change, spec_file, whole, tmp_path
 
 def test_text_in_csv_is_no_formula(tmp_path, capsys):
     labels = ["=cmd|' /C calc'!A0", "+1+1", "-2+3", "@SUM(A1)", "sound", "-0.5"]
-    spec = made_up.Spec.of(
-        {"seeds": 2, "episodes": 1, "evaluation": 0, "overrides": [{"name": n} for n in labels]}
-    )
+    overrides = [{"name": n, "learner": {"ridge": i}} for i, n in enumerate(labels, 1)]
+    spec = made_up.Spec.of({"seeds": 2, "episodes": 1, "evaluation": 0, "overrides": overrides})
     with Store.create(tmp_path / "study", spec, made_up.MEASURES) as store:
         for trial in made_up.trials_of(spec):
             store.save(trial, made_up.measure(trial), 1.0)

@@ -14,7 +14,7 @@ RUN = """
 import json
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.trial import run_trial, trials_of
-spec = Spec.of({"seeds": 1, "episodes": 1, "steps": 3, "evaluation": 1,
+spec = Spec.of({"seeds": 1, "episodes": 1, "steps": 2, "evaluation": 1,
                 "sweep": {"preset": ["default", "random"]}})
 rows = [row for trial in trials_of(spec) for row in run_trial(trial).rows]
 print(json.dumps([[row.steps, *map(float, row.measures.values()), row.return_] for row in rows]))
