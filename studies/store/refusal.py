@@ -97,6 +97,12 @@ def _of_study(store: Reading, given: Given) -> str | None:
         # What the files mean is the same: those of the spec in hand are run, not the kept ones.
         old = store.spec(given.spec.sources)
         found = difference(old, store.settings(), given.spec)
+    copy = store.directory / SPEC_FILE
+    if found is not None and is_copy(copy, given.spec):
+        return (
+            f"{copy}: is not the spec of the study beside it: {found}; if you did not edit it, it "
+            f"is damaged: nested-agents retry {store.directory} goes on by the database"
+        )
     if found is not None:
         return f"{store.directory}: holds another study: {found}"
     return _other_measures(store, given.measures)

@@ -329,3 +329,16 @@ def test_studies_begun_before_there_was_a_ledger_can_be_read_and_continued(study
     change(study, "DELETE FROM checksums WHERE rowid = 1")
     with pytest.raises(SpecError, match="not hold as many trials"), Store.open(study):
         pass
+
+
+@pytest.mark.parametrize(
+    ("before", "after"), [("default", "fefault"), ("episodes = 4", "episodes = 5"), ("=", "5")]
+)
+def test_a_damaged_copy_of_the_spec_is_no_other_study(study, before, after, capsys):
+    path = study / SPEC_FILE
+    path.write_text(path.read_text().replace(before, after, 1))
+    assert main(["run", str(path), "--out", str(study)]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert f"{path}" in error
+    assert f"it is damaged: nested-agents retry {study} goes on by the database" in error
