@@ -457,18 +457,24 @@ def _failures(tally: Counter[str]) -> int:
 def main() -> int:
     """Attack, print the table; 1 if anything failed."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.adversary", description=__doc__)
-    parser.add_argument("--kills", type=int, default=100, metavar="N")
-    parser.add_argument("--flips", type=int, default=2000, metavar="N")
-    parser.add_argument("--hostile", type=int, default=600, metavar="N")
+    parser.add_argument("--kills", type=int, default=100, metavar="N", help="0: none")
+    parser.add_argument("--flips", type=int, default=2000, metavar="N", help="0: none")
+    parser.add_argument("--hostile", type=int, default=600, metavar="N", help="0: none")
     parser.add_argument("--seed", type=int, default=20)
     options = parser.parse_args()
     durable.os.fsync = lambda _: None  # type: ignore[attr-defined]  # no power fails here
     campaigns: dict[str, Callable[[random.Random, Path], Counter[str]]] = {
+        "kill -9": lambda rng, folder: kills(options.kills, rng, folder),
         "flipped bits": lambda rng, folder: flips(options.flips, rng, folder),
         "files cut short, folders in their place": obstacles,
         "hostile input": lambda rng, folder: hostile(options.hostile, rng, folder),
-        "kill -9": lambda rng, folder: kills(options.kills, rng, folder),
     }
+    if not options.kills:
+        del campaigns["kill -9"]
+    if not options.flips:
+        del campaigns["flipped bits"], campaigns["files cut short, folders in their place"]
+    if not options.hostile:
+        del campaigns["hostile input"]
     begin, failed = time.process_time(), 0
     print("| attack | attempts | what became of them | failures |\n|---|---|---|---|")
     with tempfile.TemporaryDirectory() as name:
