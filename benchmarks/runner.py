@@ -26,13 +26,8 @@ from joblib.externals.loky import get_reusable_executor
 
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.store import Store
-from nested_agents.studies.trials.trial import (
-    Trial,
-    TrialResult,
-    measures_of_spec,
-    run_trial,
-    trials_of,
-)
+from nested_agents.studies.trials.session import run_trial
+from nested_agents.studies.trials.trial import Trial, TrialResult, check, trials_of
 from nested_agents.studies.workers.loky import LokyWorkers
 from nested_agents.studies.workers.runner import run_trials
 
@@ -68,7 +63,7 @@ def measure(spec: Spec, jobs: int) -> Round:
     """Run the trials of a spec with warm workers."""
     trials = trials_of(spec)
     warm = [replace(trial, seed=10**6 + i) for i, trial in enumerate(trials[: 2 * jobs])]
-    measures = measures_of_spec(spec)
+    measures = check(spec)
     with tempfile.TemporaryDirectory() as folder:
         workers = LokyWorkers(jobs)
         with Store.create(Path(folder) / "warm", spec, measures) as store:

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from .evaluators import EVALUATORS, EvaluatorSettings
 from .evaluators.auto import AutoSettings
-from .evaluators.evaluator import Teammates
+from .evaluators.evaluator import Teammates, ValueOf
 from .registry import Plugged
 from .settings import Settings
 
@@ -20,5 +20,8 @@ class Decision(Settings):
     teammates: Teammates = "best-response"
     """What the agents below are expected to do: the best for this agent, anything with equal
     probability, or what they were seen to do so far (the paper's "stochastically observing")."""
+    value_of: ValueOf = "own"
+    """Whose value decides: the agent's own; the mean of its own and those of the agents below it;
+    or the mean of all agents'."""
     evaluator: Annotated[EvaluatorSettings, Plugged(EVALUATORS, EVALUATORS.parsed)] = AutoSettings()
     """Which joint actions of the agents below are tried: the name of an evaluator, or its table."""

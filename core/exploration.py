@@ -8,14 +8,14 @@ resting wheel lead to the same state).
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Protocol
+from typing import Annotated, Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 from pydantic import Field
 
 from .arrays import FloatArray
 from .registry import SettingsRegistry
-from .settings import Fraction, NonNegative, Settings
+from .settings import Fraction, NonNegative, Positive, Settings
 
 
 def boltzmann(values: FloatArray, temperature: float) -> FloatArray:
@@ -50,6 +50,15 @@ class Explorer(Protocol):
 
     def advance(self) -> None:
         """Note that all agents have decided this step."""
+
+
+@runtime_checkable
+class SuccessorExplorer(Protocol):
+    """An explorer that can go on from where one of the same kind ended with other agents."""
+
+    def take_over(self, former: Any) -> None:
+        """Go on from an explorer of the same settings, between two episodes."""
+        ...
 
 
 class ExplorationSettings(Settings):
@@ -129,6 +138,10 @@ class EpsilonDecreasingBoltzmann:
         if self.settings.clock == "episode":
             self.memory[0] = 0.0
 
+    def take_over(self, former: EpsilonDecreasingBoltzmann) -> None:
+        """Go on with the clock."""
+        self.memory[:] = former.memory
+
     def advance(self) -> None:
         """Let the clock tick."""
         self.memory[0] += 1.0
@@ -147,13 +160,17 @@ class EpsilonDecreasingBoltzmann:
 class BurstExploration(ExplorationSettings):
     """Random actions that are held for a while, at a rate that falls from episode to episode.
 
-    The fraction of explorative decisions in episode ``k`` is ``max(floor, rate * decay ** k)``.
+    The fraction of explorative decisions of an agent in episode ``k`` is ``max(floor, rate * decay
+    ** k)``, and at most `team_limit` divided by the number of agents.
     """
 
     kind: Literal["burst"] = "burst"
     rate: Fraction = 0.3
     decay: Fraction = 0.75
     floor: Fraction = 0.02
+    team_limit: Positive | None = None
+    """Agents that explore at a time, at most, in the mean: in a large team somebody else disturbs
+    always; none: no limit."""
     length: Annotated[float, Field(ge=1)] = 4.0
     """Mean number of decisions for which a random action is repeated."""
 
@@ -167,6 +184,8 @@ class Bursts:
 
     def __init__(self, settings: BurstExploration, n_agents: int) -> None:
         self.settings = settings
+        limit = settings.team_limit
+        self._most = 1.0 if limit is None else min(1.0, limit / n_agents)
         # The episode, then per agent: decisions left in its burst, the action held.
         self.memory: FloatArray = np.zeros(1 + 2 * n_agents)
         self.memory[0] = -1.0
@@ -175,12 +194,16 @@ class Bursts:
     def rate(self) -> float:
         """Fraction of decisions that are explorative in this episode."""
         s = self.settings
-        return max(s.floor, s.rate * s.decay ** max(0.0, self.memory[0]))
+        return min(self._most, max(s.floor, s.rate * s.decay ** max(0.0, self.memory[0])))
 
     def begin_episode(self) -> None:
         """Count the episode and end every burst."""
         self.memory[0] += 1.0
         self.memory[1:] = 0.0
+
+    def take_over(self, former: Bursts) -> None:
+        """Go on counting episodes; bursts end with an episode."""
+        self.memory[0] = former.memory[0]
 
     def advance(self) -> None:
         """Bursts run down in `choose`."""

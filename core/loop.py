@@ -68,6 +68,7 @@ def control_loop(
     steps: int,
     seed: int,
     first_episode: int = 0,
+    first_world: int | None = None,
     learn: bool = True,
 ) -> Iterator[StepRecord]:
     """Run episodes and yield every step.
@@ -82,6 +83,8 @@ def control_loop(
         Seed of the worlds, see `world_seed`.
     first_episode
         Number of the first episode: a run can be continued with a restored team.
+    first_world
+        Number of its world, see `world_seed`; None: the same.
     learn
         Whether the team explores and learns, or is evaluated greedily.
 
@@ -90,8 +93,10 @@ def control_loop(
     ValueError
         If the scenario does not predict what the team decides by, see `Team.check`.
     """
-    for episode in range(first_episode, first_episode + episodes):
-        states = scenario.reset(world_seed(seed, episode), episode)
+    first_world = first_episode if first_world is None else first_world
+    for k in range(episodes):
+        episode = first_episode + k
+        states = scenario.reset(world_seed(seed, first_world + k), episode)
         if learn:
             team.begin_episode()
         prediction = team.predict(scenario)

@@ -96,8 +96,9 @@ class TeamPrediction(Prediction, Protocol):
 
 def states_of_all(prediction: Prediction, joint_actions: IntArray) -> FloatArray:
     """Return the next states ``(n, m, d)`` of all agents for joint actions ``(m, n)``."""
-    if isinstance(prediction, TeamPrediction):
-        return prediction.states_of_all(joint_actions)
+    if hasattr(prediction, "states_of_all"):  # of a `TeamPrediction`; the test is quicker
+        found: FloatArray = prediction.states_of_all(joint_actions)
+        return found
     return np.stack([prediction.states(i, joint_actions) for i in range(joint_actions.shape[1])])
 
 

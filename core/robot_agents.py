@@ -16,7 +16,6 @@ from typing import cast
 import numpy as np
 
 from .arrays import FloatArray, IntArray
-from .forwarding import view_of
 from .protocols import (
     Blocks,
     CalibratedPrediction,
@@ -146,8 +145,7 @@ def per_robot(scenario: Scenario) -> RobotAgents:
     """Return a scenario as one of one agent per robot."""
     embodied = isinstance(scenario, EmbodiedScenario)
     kind = EmbodiedRobotAgents if embodied else RobotAgents
-    found: RobotAgents = view_of(kind, scenario)(scenario)
-    return found
+    return kind(scenario)
 
 
 class RobotPrediction:

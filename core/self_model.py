@@ -71,7 +71,8 @@ class SelfModel:
 
     def __init__(self, settings: SelfModelSettings, nominal: Sequence[FloatArray]) -> None:
         self.settings = settings
-        self.effects = tuple(np.array(effect, dtype=float) for effect in nominal)
+        self._nominal = tuple(np.array(effect, dtype=float) for effect in nominal)
+        self.effects = tuple(effect.copy() for effect in self._nominal)
         # A turning rate is measured in units of the nominal robot's own turning per wheel speed.
         self._units = tuple(
             np.array([1.0, 1.0, max(1.0, float(np.abs(effect[2]).max()))]) for effect in nominal
@@ -133,6 +134,13 @@ class SelfModel:
         for name, own in self._remembered.items():
             for r, array in enumerate(own):
                 array[:] = arrays[f"{name}{r}"]
+
+    def take_over(self, former: SelfModel) -> None:
+        """Go on from what another one has learned, if its bodies are built alike; else anew."""
+        if len(self._nominal) == len(former._nominal) and all(
+            map(np.array_equal, self._nominal, former._nominal)
+        ):
+            self.restore(former.arrays())
 
     @property
     def _remembered(self) -> dict[str, tuple[FloatArray, ...]]:

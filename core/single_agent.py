@@ -14,7 +14,6 @@ from typing import cast
 import numpy as np
 
 from .arrays import FloatArray, IntArray
-from .forwarding import view_of
 from .protocols import (
     Blocks,
     Prediction,
@@ -82,12 +81,6 @@ class SingleAgent:
         rewarded = hasattr(prediction, "rewards")
         kind = RewardedSingleAgentPrediction if rewarded else SingleAgentPrediction
         return kind(prediction, self._joint)
-
-
-def single_agent(scenario: Scenario) -> SingleAgent:
-    """Return a scenario as that of one agent."""
-    found: SingleAgent = view_of(SingleAgent, scenario)(scenario)
-    return found
 
 
 class SingleAgentPrediction:

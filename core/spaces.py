@@ -81,6 +81,9 @@ class StateSpace:
         The variables, the own ones leading.
     n_own
         How many leading variables depend on the actions of the agent's own group only.
+    common
+        Names of shared variables that are the same for all agents: what they are worth to a team
+        is found once.
 
     Examples
     --------
@@ -92,6 +95,7 @@ class StateSpace:
     name: str
     variables: tuple[Variable, ...]
     n_own: int = 0
+    common: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         names = [v.name for v in self.variables]
@@ -101,6 +105,11 @@ class StateSpace:
             raise ValueError(
                 f"state space {self.name!r}: n_own = {self.n_own}, allowed 0 to {len(names)}"
             )
+        for name in self.common:
+            if name not in names[self.n_own :]:
+                raise ValueError(
+                    f"state space {self.name!r}: common variable {name!r} is none of the shared"
+                )
 
     @property
     def n_variables(self) -> int:

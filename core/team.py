@@ -11,9 +11,9 @@ import numpy as np
 from .arrays import FloatArray, IntArray
 from .calibration import Calibration
 from .evaluators.evaluator import DecisionProblem, Deliberation, Evaluator
-from .exploration import Explorer, Greedy
+from .exploration import Explorer, Greedy, SuccessorExplorer
 from .hierarchy import Hierarchy
-from .learners.learner import Learner, LearnerSettings
+from .learners.learner import Learner, LearnerSettings, SuccessorLearner
 from .protocols import (
     CalibratedPrediction,
     CalibratedScenario,
@@ -135,6 +135,7 @@ class Team:
                 decision.rule,
                 decision.teammates,
                 settings.discount,
+                decision.value_of,
             )
             evaluator = decision.evaluator.build(problem)
         return cls(
@@ -247,6 +248,41 @@ class Team:
         if self.evaluator is not None:
             self.evaluator.counts.weight_updates += updates
 
+    def take_over(self, former: Team, rows: IntArray) -> None:
+        """Begin where the team of another scenario ended, between two episodes.
+
+        It goes on with its weights and experience, with how often agents of each row were seen to
+        take each action, with its exploration and its random numbers; with self-model and
+        calibration if the bodies are alike, which otherwise begin anew.
+
+        Parameters
+        ----------
+        former
+            A team of the same settings.
+        rows
+            ``(n_rows,)`` the row of its weights that each row goes on from, see `carried_rows`.
+
+        Raises
+        ------
+        ValueError
+            If the learner or the exploration knows no way; one line.
+        """
+        learner, explorer = self.learner, self.explorer
+        if not isinstance(learner, SuccessorLearner):
+            raise ValueError(f"learner.kind: {_no_successor(learner)}")
+        if not isinstance(explorer, SuccessorExplorer):
+            raise ValueError(f"learner.exploration.kind: {_no_successor(explorer)}")
+        learner.take_over(former.learner, rows)
+        explorer.take_over(former.explorer)
+        self.rng.bit_generator.state = former.rng.bit_generator.state
+        self._seen = np.stack(
+            [former._seen[former.rows == rows[row]].mean(axis=0) for row in self.rows]
+        )
+        if self.self_model is not None and former.self_model is not None:
+            self.self_model.take_over(former.self_model)
+        if self.calibration is not None and former.calibration is not None:
+            self.calibration.take_over(former.calibration)
+
     def save(self, path: Path | str) -> None:
         """Write everything that the team remembers to an ``.npz`` file: arrays only."""
         with open(path, "wb") as file:
@@ -327,8 +363,57 @@ def rows_of(scenario: Scenario, *, shared: bool) -> IntArray:
     >>> rows_of(three, shared=True).tolist(), rows_of(three, shared=False).tolist()
     ([0, 1, 0], [0, 1, 2])
     """
-    if not shared:
-        return np.arange(len(scenario.agents))
-    roles = roles_of(scenario)
-    names = list(dict.fromkeys(roles))
-    return np.array([names.index(role) for role in roles])
+    owners = roles_of(scenario) if shared else tuple(scenario.agents)
+    names = list(dict.fromkeys(owners))
+    return np.array([names.index(owner) for owner in owners])
+
+
+def carried_rows(former: Scenario, scenario: Scenario, *, shared: bool) -> IntArray:
+    """Return the row of weights of a scenario's team that each row of another's goes on from.
+
+    Parameters
+    ----------
+    former, scenario
+        The scenario that was learned in, and the one that follows.
+    shared
+        Whether weights are those of roles; if not, the agents must be the same.
+
+    Returns
+    -------
+    IntArray
+        ``(n_rows,)`` rows of the weights of `former`.
+
+    Raises
+    ------
+    ValueError
+        If state space, actions, or whose weights there are differ; one line.
+
+    Examples
+    --------
+    >>> from nested_agents.scenarios.line_up import LineUpSettings
+    >>> one, three = (LineUpSettings(carts=carts).build() for carts in (1, 3))
+    >>> carried_rows(one, three, shared=True).tolist()
+    [0]
+    """
+    trained, acting = (
+        f"{len(s.agents)} agents over {s.state_space.name!r}" for s in (former, scenario)
+    )
+    said = f"a team trained with {trained} cannot act with {acting}"
+    if former.state_space != scenario.state_space:
+        raise ValueError(f"{said}: the state spaces differ")
+    if former.action_set != scenario.action_set:
+        raise ValueError(f"{said}: the actions differ")
+    owners, others = (
+        list(dict.fromkeys(roles_of(s) if shared else s.agents)) for s in (former, scenario)
+    )
+    if set(owners) != set(others):
+        raise ValueError(
+            f"{said}: their roles are {', '.join(owners)}, and {', '.join(others)}"
+            if shared
+            else f"{said}: learner.weights = 'own'; with 'role', agents of a role share theirs"
+        )
+    return np.array([owners.index(owner) for owner in others])
+
+
+def _no_successor(part: object) -> str:
+    return f"{type(part).__name__} has no take_over, by which it would go on with another team"

@@ -43,7 +43,7 @@ _PLACES = {
     "SUCCESS": ("core.protocols", "SUCCESS"),
     "Scenario": ("core.protocols", "Scenario"),
     "ScenarioSettings": ("core.settings", "ScenarioSettings"),
-    "Session": ("studies.trials.trial", "Session"),
+    "Session": ("studies.trials.session", "Session"),
     "Settings": ("core.settings", "Settings"),
     "Spec": ("studies.spec.spec", "Spec"),
     "StateSpace": ("core.spaces", "StateSpace"),
@@ -62,7 +62,7 @@ _PLACES = {
     "parse_topology": ("topologies", "parse"),
     "policy_seed": ("core.loop", "policy_seed"),
     "rate": ("studies.analysis.statistics", "rate"),
-    "run_trial": ("studies.trials.trial", "run_trial"),
+    "run_trial": ("studies.trials.session", "run_trial"),
     "state_variable": ("scenarios.box_pushing.states.variables", "state_variable"),
 }
 

@@ -21,7 +21,7 @@ from ..core.refusals import rule
 from ..core.registry import Plugged, SettingsRegistry, closest
 from ..core.robot_agents import per_robot
 from ..core.settings import Fraction, Settings
-from ..core.single_agent import single_agent
+from ..core.single_agent import SingleAgent
 from . import builders, files
 from .builders import from_networkx
 from .checks import check_names
@@ -248,7 +248,7 @@ class SingleAgentSettings(TopologySettings):
 
     def arrange(self, scenario: Scenario) -> tuple[Scenario, Hierarchy]:
         """Return the scenario as that of one agent."""
-        one = single_agent(scenario)
+        one = SingleAgent(scenario)
         return one, Hierarchy(one.agents, [])
 
 

@@ -18,6 +18,7 @@ EVALUATORS = SettingsRegistry(
         "sampling": f"{__name__}.sampling:SamplingSettings",
         "moments": f"{__name__}.additive:MomentsSettings",
         "extremes": f"{__name__}.additive:ExtremesSettings",
+        "best-response": f"{__name__}.best_response:BestResponseSettings",
     },
     EvaluatorSettings,
 )

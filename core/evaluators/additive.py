@@ -52,8 +52,8 @@ class _Additive(Aggregation, ABC):
     Raises
     ------
     ValueError
-        If the scenario predicts no sums, predicted rewards are asked for, or the teammate model is
-        not one of the evaluator's.
+        If the scenario predicts no sums, predicted rewards or values of others are asked for, or
+        the teammate model is not one of the evaluator's.
     """
 
     name: str
@@ -69,6 +69,11 @@ class _Additive(Aggregation, ABC):
         if problem.rule != "value":
             raise ValueError(
                 f"learner.decision.rule = {problem.rule!r}: {self.name} evaluates 'value' only"
+            )
+        if problem.value_of != "own":
+            raise ValueError(
+                f"learner.decision.value_of = {problem.value_of!r}: {self.name} evaluates 'own' "
+                "only, use best-response"
             )
         if problem.teammates not in self.allowed:
             raise ValueError(

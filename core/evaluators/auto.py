@@ -1,4 +1,7 @@
-"""The evaluator that suits a team: exact for few agents, sampled for some, additive for many."""
+"""The evaluator that suits a team: exact for few agents, sampled for some, additive for many.
+
+If the values of others decide too, it is best responses for all but the few.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from .additive import ExtremesSettings, MomentsSettings
+from .best_response import BestResponseSettings
 from .evaluator import DecisionProblem, Evaluator, EvaluatorSettings
 from .exact import MOST_JOINT_ACTIONS, ExactSettings
 from .sampling import Samples, SamplingSettings
@@ -33,7 +37,10 @@ class AutoSettings(EvaluatorSettings):
         free = max(1 + len(hierarchy.below(i)) for i in range(len(hierarchy)))
         if free <= self.exact_up_to and problem.n_actions**free <= MOST_JOINT_ACTIONS:
             return ExactSettings()
-        if free <= self.sampling_up_to or not (problem.additive and problem.rule == "value"):
-            return SamplingSettings(samples=self.samples)
         best_response = problem.teammates == "best-response"
+        if problem.value_of != "own" and best_response:
+            return BestResponseSettings()
+        by_sums = problem.additive and problem.rule == "value" and problem.value_of == "own"
+        if free <= self.sampling_up_to or not by_sums:
+            return SamplingSettings(samples=self.samples)
         return ExtremesSettings() if best_response else MomentsSettings()

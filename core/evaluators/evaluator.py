@@ -10,8 +10,9 @@ import numpy as np
 
 from ..arrays import FloatArray, IntArray
 from ..hierarchy import Hierarchy
-from ..protocols import Prediction, RewardPrediction
+from ..protocols import Prediction, RewardPrediction, states_of_all
 from ..settings import Settings
+from .pooled import Pooled, Pooling
 
 if TYPE_CHECKING:
     from ..rules.rule_base import RuleBase
@@ -20,6 +21,9 @@ Rule = Literal["value", "reward", "reward-and-value"]
 """By what a joint action is valued."""
 Teammates = Literal["best-response", "uniform", "empirical"]
 """The teammate model: what the agents below are expected to do."""
+
+ValueOf = Literal["own", "below", "team"]
+"""Whose value decides: the agent's own, the mean of its own and those below it, or all agents'."""
 
 
 class Deliberation(NamedTuple):
@@ -97,6 +101,8 @@ class DecisionProblem:
         By what a joint action is valued, and what the agents below are expected to do.
     discount
         Weight of the value, where it is added to the reward.
+    value_of
+        Whose value decides.
     """
 
     rules: RuleBase
@@ -107,6 +113,7 @@ class DecisionProblem:
     rule: Rule
     teammates: Teammates
     discount: float
+    value_of: ValueOf = "own"
 
 
 class EvaluatorSettings(Settings):
@@ -135,6 +142,20 @@ def probabilities_of(frequencies: FloatArray, below: tuple[int, ...]) -> FloatAr
     return probabilities / probabilities.sum()
 
 
+def concerned(hierarchy: Hierarchy, value_of: ValueOf) -> list[IntArray]:
+    """Return, for every agent, the agents whose values decide what it does, in agent order.
+
+    >>> chain = Hierarchy("abc", [("a", "b"), ("b", "c")])
+    >>> [[list(map(int, who)) for who in concerned(chain, of)] for of in ("own", "below")]
+    [[[0], [1], [2]], [[0, 1, 2], [1, 2], [2]]]
+    """
+    every = range(len(hierarchy))
+    if value_of == "team":
+        return [np.arange(len(hierarchy))] * len(hierarchy)
+    below = [hierarchy.below(i) if value_of == "below" else () for i in every]
+    return [np.array(sorted((i, *below[i]))) for i in every]
+
+
 class Aggregation:
     """What evaluators share: the decision rule, and the aggregation over teammates."""
 
@@ -143,31 +164,54 @@ class Aggregation:
         self.rules, self.hierarchy = problem.rules, problem.hierarchy
         self.n_actions = problem.n_actions
         self.counts = Counts()
+        self.concerned = concerned(self.hierarchy, problem.value_of)
+        """Per agent ``(k,)`` the agents whose values decide."""
+        self._pooling = Pooling(problem.rules, problem.groups)
+        self._last: tuple[Sequence[FloatArray], IntArray, Pooled] | None = None
 
     def count(self, joint_actions: int) -> None:
-        """Note that joint actions have been valued."""
+        """Note that joint actions have been valued, each by each agent concerned."""
         self.counts.joint_actions += joint_actions
         if self.problem.rule != "reward":
             self.counts.rule_evaluations += joint_actions * self.rules.n_rules
 
-    def indifferent(self, weights: FloatArray) -> bool:
+    def indifferent(self, deliberation: Deliberation) -> bool:
         """Return whether every action must come to zero: nothing is learned yet, or ever."""
-        return self.problem.rule == "value" and not weights[:64].any() and not weights.any()
+        if self.problem.rule != "value":
+            return False
+        concerned = [deliberation.weights[i] for i in self.concerned[deliberation.agent]]
+        return not any(weights[:64].any() or weights.any() for weights in concerned)
+
+    def worth(self, deliberation: Deliberation, joint_actions: IntArray) -> FloatArray:
+        """Return what joint actions ``(m, n)`` are worth to the deciding agent, ``(m,)``."""
+        prediction, concerned = deliberation.prediction, self.concerned[deliberation.agent]
+        self.count(len(joint_actions) * len(concerned))
+        rewards = values = None
+        if self.problem.rule != "value":
+            rewards = cast(RewardPrediction, prediction).rewards(joint_actions)
+        if self.problem.rule != "reward":
+            if len(concerned) == 1:
+                states = prediction.states(deliberation.agent, joint_actions)
+                values = self.rules.values(deliberation.own_weights, states)
+            else:
+                states = states_of_all(prediction, joint_actions)
+                values = self._pooling.mean(self._pooled(deliberation), states)
+        return self.combine(rewards, values)
+
+    def _pooled(self, deliberation: Deliberation) -> Pooled:
+        """Return the pooled weights of those concerned, once for agents of one decision."""
+        weights, concerned = deliberation.weights, self.concerned[deliberation.agent]
+        if self._last is None or self._last[0] is not weights or self._last[1] is not concerned:
+            self._last = weights, concerned, self._pooling.pooled(weights, concerned)
+        return self._last[2]
 
     def by_states(self, deliberation: Deliberation, tried: IntArray) -> FloatArray:
         """Value ``(A, m)`` each own action with each of the joint actions `tried` ``(m, k)``."""
-        agent, prediction, a = deliberation.agent, deliberation.prediction, self.n_actions
+        agent, a = deliberation.agent, self.n_actions
         joint = np.tile(deliberation.joint_action, (a * len(tried), 1))
         joint[:, agent] = np.repeat(np.arange(a), len(tried))
         joint[:, list(self.hierarchy.below(agent))] = np.tile(tried, (a, 1))
-        self.count(len(joint))
-        rewards = values = None
-        if self.problem.rule != "value":
-            rewards = cast(RewardPrediction, prediction).rewards(joint)
-        if self.problem.rule != "reward":
-            states = prediction.states(agent, joint)
-            values = self.rules.values(deliberation.own_weights, states)
-        return self.combine(rewards, values).reshape(a, -1)
+        return self.worth(deliberation, joint).reshape(a, -1)
 
     def combine(self, rewards: FloatArray | None, values: FloatArray | None) -> FloatArray:
         """Return what the decision rule makes of predicted rewards and values."""

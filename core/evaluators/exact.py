@@ -61,6 +61,7 @@ class ExactEnumeration(Aggregation):
         uniform = problem.teammates == "uniform"
         self._expected = np.full((n, a), 1.0 / a) if uniform else np.zeros((0, 0))
         self._tried: list[Tried] = []
+        self._means: tuple[tuple[object, ...], FloatArray] | None = None
         if self.hierarchy.joint_actions(a) >= a**n:
             places = a ** np.arange(n - 1, -1, -1, dtype=np.int64)
             self._tried = [self._tried_by(i, places) for i in range(n)]
@@ -79,7 +80,8 @@ class ExactEnumeration(Aggregation):
         """Return the value ``(A,)`` of each action of the deciding agent."""
         agent, problem = deliberation.agent, self.problem
         tabulated = bool(self._tried) and hasattr(deliberation.prediction, "blocks")
-        if tabulated and problem.rule == "value":
+        own = len(self.concerned[agent]) == 1
+        if tabulated and own and problem.rule == "value":
             tried = self._tried[agent]
             self.count(tried.indices.size)
             empirical = problem.teammates == "empirical"
@@ -91,8 +93,8 @@ class ExactEnumeration(Aggregation):
                 deliberation.frequencies if empirical else self._expected,
             )
         below, combined = self.hierarchy.below(agent), self._below[agent]
-        if self.indifferent(deliberation.own_weights):
-            self.count(self.n_actions * len(combined))
+        if self.indifferent(deliberation):
+            self.count(self.n_actions * len(combined) * len(self.concerned[agent]))
             return np.zeros(self.n_actions)
         probabilities = None
         if problem.teammates == "empirical":
@@ -104,13 +106,27 @@ class ExactEnumeration(Aggregation):
         return self.aggregate(table, probabilities)
 
     def _by_tables(self, deliberation: Deliberation) -> FloatArray:
-        """Value ``(A, m)`` each own action with each joint action below, by rewards too."""
+        """Value ``(A, m)`` each own action with each joint action below, by anything."""
         prediction = cast(TabulatedPrediction, deliberation.prediction)
-        tried = self._tried[deliberation.agent]
+        tried, concerned = self._tried[deliberation.agent], self.concerned[deliberation.agent]
         indices = (tried.indices + int(deliberation.joint_action @ tried.places)).ravel()
-        self.count(len(indices))
-        rewards, values = prediction.reward_table()[indices], None
+        self.count(len(indices) * len(concerned))
+        rewards = values = None
+        if self.problem.rule != "value":
+            rewards = prediction.reward_table()[indices]
         if self.problem.rule != "reward":
-            blocks = prediction.blocks(deliberation.agent)
-            values = self.rules.block_values(deliberation.own_weights, blocks, indices)
+            values = self._mean(deliberation, concerned)[indices]
         return self.combine(rewards, values).reshape(self.n_actions, -1)
+
+    def _mean(self, deliberation: Deliberation, concerned: IntArray) -> FloatArray:
+        """Return the mean value ``(A ** n,)`` of all joint actions, once for a whole decision."""
+        prediction, weights = deliberation.prediction, deliberation.weights
+        of = prediction, weights, concerned
+        if self._means is None or any(a is not b for a, b in zip(self._means[0], of, strict=True)):
+            tables = cast(TabulatedPrediction, prediction)
+            indices = np.arange(self.n_actions ** len(weights))
+            values = [
+                self.rules.block_values(weights[i], tables.blocks(i), indices) for i in concerned
+            ]
+            self._means = of, np.mean(values, axis=0)
+        return self._means[1]

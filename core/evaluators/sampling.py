@@ -60,7 +60,7 @@ class Sampling(Aggregation):
             tried = (draws >= ladder).sum(axis=2)
         else:
             tried = rng.integers(a, size=(self.samples, len(below)))
-        if self.indifferent(deliberation.own_weights):
-            self.count(a * len(tried))
+        if self.indifferent(deliberation):
+            self.count(a * len(tried) * len(self.concerned[deliberation.agent]))
             return np.zeros(a)
         return self.aggregate(self.by_states(deliberation, tried), probabilities)

@@ -73,6 +73,17 @@ class Experience(NamedTuple):
     """Greatest one."""
 
 
+class Earlier(NamedTuple):
+    """After-states of a row that agents of another team met."""
+
+    states: FloatArray
+    """``(m, d)``."""
+    rewards: FloatArray
+    """``(m,)``, as they were received."""
+    follower: IntArray
+    """``(m,)`` index of the next after-state among them, `TERMINAL` or `CUT_OFF`."""
+
+
 class Replay(ABC):
     """What the batch learners share: a memory of after-states, and the regression.
 
@@ -95,6 +106,9 @@ class Replay(ABC):
         self.members = [np.flatnonzero(rows == row) for row in range(int(rows.max()) + 1)]
         """The agents ``(k,)`` of every row."""
         self.theta: FloatArray = np.zeros((len(self.members), rules.n_rules), rules.dtype)
+        d = len(rules.partitions)
+        nothing = Earlier(np.zeros((0, d)), np.zeros(0), np.zeros(0, dtype=np.int64))
+        self._earlier = [nothing] * len(self.members)
         self._states: list[FloatArray] = []
         self._rewards: list[FloatArray] = []
         self._follower: list[int] = []
@@ -127,25 +141,35 @@ class Replay(ABC):
         """Find the weights of all rows anew; return how many there are."""
 
     def experience(self, row: int) -> Experience:
-        """Return what the agents of a row have met."""
-        members = self.members[row]
-        rewards = (REWARD_SCALE * np.array(self._rewards)[:, members]).ravel()
-        steps = np.array(self._follower)
-        steps[steps == len(steps)] = CUT_OFF  # of a running episode: not known yet
-        k = len(members)
-        follower = np.where(
-            steps[:, None] < 0, steps[:, None], steps[:, None] * k + np.arange(k)
-        ).ravel()
+        """Return what the agents of a row have met, and before them those of another team."""
+        rewards, follower = self._outcomes(row)
+        rewards = REWARD_SCALE * rewards
         known = (follower != CUT_OFF).astype(float)
         gamma = self.settings.discount
         low, high = rewards.min() / (1.0 - gamma), rewards.max() / (1.0 - gamma)
         return Experience(rewards, follower, known, low, high)
 
+    def _outcomes(self, row: int) -> tuple[FloatArray, IntArray]:
+        """Return rewards and followers of all after-states of a row, the earlier ones first."""
+        earlier, members = self._earlier[row], self.members[row]
+        k, before = len(members), len(earlier.states)
+        steps = np.array(self._follower, dtype=np.int64)
+        steps[steps == len(steps)] = CUT_OFF  # of a running episode: not known yet
+        follower = np.where(
+            steps[:, None] < 0, steps[:, None], before + steps[:, None] * k + np.arange(k)
+        ).ravel()
+        rewards = np.array(self._rewards).reshape(-1, self._n_agents)[:, members].ravel()
+        return (
+            np.concatenate([earlier.rewards, rewards]),
+            np.concatenate([earlier.follower, follower]),
+        )
+
     def states_of(self, row: int, since: int = 0) -> FloatArray:
-        """Return the after-states ``(m, d)`` of a row, those since a step alone."""
+        """Return the after-states ``(m, d)`` of a row, those since a step of this team alone."""
         d = len(self.rules.partitions)
         new = np.array(self._states[since:]).reshape(-1, self._n_agents, d)
-        return new[:, self.members[row]].reshape(-1, d)
+        own = new[:, self.members[row]].reshape(-1, d)
+        return own if since else np.concatenate([self._earlier[row].states, own])
 
     @property
     def _n_agents(self) -> int:
@@ -159,6 +183,13 @@ class Replay(ABC):
             "states": np.array(self._states).reshape(-1, n, d),
             "rewards": np.array(self._rewards).reshape(-1, n),
             "follower": np.array(self._follower, dtype=np.int64),
+            "earlier_rows": np.repeat(
+                np.arange(len(self._earlier)), [len(earlier.states) for earlier in self._earlier]
+            ),
+            **{
+                f"earlier_{name}": np.concatenate([getattr(e, name) for e in self._earlier])
+                for name in Earlier._fields
+            },
         }
 
     def restore(self, arrays: Mapping[str, FloatArray]) -> None:
@@ -169,6 +200,16 @@ class Replay(ABC):
         self._follower = [int(f) for f in arrays["follower"]]
         ended = [s for s, f in enumerate(self._follower) if f in (TERMINAL, CUT_OFF)]
         self._begun = ended[-1] + 1 if ended else 0
+        rows = arrays["earlier_rows"]
+        self._earlier = [
+            Earlier(*(arrays[f"earlier_{name}"][rows == row] for name in Earlier._fields))
+            for row in range(len(self.theta))
+        ]
+
+    def take_over(self, former: Replay, rows: IntArray) -> None:
+        """Begin with weights and experience of another team, of which no episode is under way."""
+        self.theta = former.theta[rows]
+        self._earlier = [Earlier(former.states_of(row), *former._outcomes(row)) for row in rows]
 
 
 class BatchTD(Replay):

@@ -48,3 +48,7 @@ class Frozen:
     def restore(self, arrays: Mapping[str, FloatArray]) -> None:
         """Take over the consequent weights."""
         self.theta = arrays["theta"].copy()
+
+    def take_over(self, former: Frozen, rows: IntArray) -> None:
+        """Begin with the consequent weights of another team."""
+        self.theta = former.theta[rows]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Literal, Protocol
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol, runtime_checkable
 
 from pydantic import Field
 
@@ -58,6 +58,23 @@ class Learner(Protocol):
 
     def restore(self, arrays: Mapping[str, FloatArray]) -> None:
         """Continue from `arrays`."""
+        ...
+
+
+@runtime_checkable
+class SuccessorLearner(Protocol):
+    """A learner that can begin with what one of the same kind has learned for other agents."""
+
+    def take_over(self, former: Any, rows: IntArray) -> None:
+        """Begin with weights and experience of a learner whose episodes are over.
+
+        Parameters
+        ----------
+        former
+            Of the same settings and rule base, which is not modified.
+        rows
+            ``(n_rows,)`` the row of it that each row goes on from.
+        """
         ...
 
 

@@ -22,7 +22,8 @@ class Online(ABC):
     """
 
     kept: tuple[str, ...] = ("theta", "trace", "reach")
-    """Names of the arrays that are saved."""
+    """Names of the arrays that are saved: those of rows, and of agents the `traces`."""
+    traces = ("trace", "reach")
 
     def __init__(self, discount: float, rules: RuleBase, rows: IntArray) -> None:
         self.discount, self.rules, self.rows = discount, rules, rows
@@ -81,3 +82,11 @@ class Online(ABC):
             self.weights = self.theta
         self._previous = arrays["previous"].copy() if arrays["previous"].size else None
         self._rewards = arrays["rewards"].copy()
+
+    def take_over(self, former: Online, rows: IntArray) -> None:
+        """Begin with all weights of another team; traces are of an episode, and begin anew."""
+        for name in (name for name in self.kept if name not in self.traces):
+            array = getattr(former, name)
+            setattr(self, name, array[rows] if array.ndim else array.copy())
+        if "weights" not in self.kept:
+            self.weights = self.theta

@@ -15,6 +15,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import combinations
+from math import prod
+from typing import Literal
 
 import numpy as np
 
@@ -24,6 +26,9 @@ from ..spaces import StateSpace
 from . import kernels
 from .fuzzy import Partition
 from .settings import RuleBaseSettings
+
+MOST_RULES = 2**63 - 1
+"""Rules that can be numbered."""
 
 
 class RuleBase:
@@ -39,6 +44,8 @@ class RuleBase:
         How many leading variables form the own block (see `nested_agents.core.spaces`).
     dtype
         Type of the consequent weights that learners keep; states are double precision always.
+    common
+        Indices of variables that are the same for all agents.
 
     Examples
     --------
@@ -56,6 +63,7 @@ class RuleBase:
         terms: Sequence[tuple[int, ...]],
         n_own: int = 0,
         dtype: str = "float64",
+        common: Sequence[int] = (),
     ) -> None:
         d = len(partitions)
         for term in terms:
@@ -70,10 +78,11 @@ class RuleBase:
         self.partitions = tuple(partitions)
         self.terms = tuple(terms)
         self.n_own = n_own
-        self.sizes = tuple(
-            int(np.prod([self.partitions[j].size for j in term])) for term in self.terms
-        )
+        self.common = frozenset(common)
+        self.sizes = tuple(prod(self.partitions[j].size for j in term) for term in self.terms)
         self.n_rules = sum(self.sizes)
+        if self.n_rules > MOST_RULES:
+            raise ValueError(f"rule base: {self.n_rules} rules, allowed {MOST_RULES} at most")
         self.layout = kernels.layout(self.partitions, self.terms, n_own)
         # Not worth compiling it for; interpreted kernels, NUMBA_DISABLE_JIT=1, are plain already.
         lay = getattr(kernels.unpack, "py_func", kernels.unpack)(self.layout)
@@ -126,7 +135,15 @@ class RuleBase:
             Partition.of(v, settings.membership, settings.memberships, settings.steepness)
             for v in space.variables
         ]
-        return cls(partitions, list(dict.fromkeys(terms)), space.n_own, settings.precision)
+        common = [names.index(name) for name in space.common]
+        terms = list(dict.fromkeys(terms))
+        return cls(partitions, terms, space.n_own, settings.precision, common)
+
+    def shared_by(self, term: tuple[int, ...]) -> Literal["agent", "body", "all"]:
+        """Return who sees the same variables of a term: the agent alone, its body's, or all."""
+        if any(j < self.n_own for j in term):
+            return "agent"
+        return "all" if self.common.issuperset(term) else "body"
 
     def features(self, states: FloatArray) -> FloatArray:
         """Return phi ``(m, n_rules)`` of states ``(m, d)`` explicitly.

@@ -19,6 +19,9 @@ Index = Annotated[int, Field(ge=0)]
 class RewardSettings(Settings):
     """The constants of the reward (Eq. 15-17); distances in metres, angles in radians."""
 
+    of: Literal["team", "robot"] = "team"
+    """Whose contact and infrared readings the conditions ask for: those of all robots, as in the
+    paper, one reward for all agents; or those of each robot, a reward for the agents of each."""
     c1: NonNegative = 0.01
     r1: NonNegative = 1.5
     """Per metre of the box's distance to the goal."""
@@ -155,8 +158,9 @@ class BoxSettings(Settings):
     """Coefficient of friction with the ground."""
     contact_friction: NonNegative = 0.3
     """Coefficient of friction with robots."""
-    grows: bool = False
-    """Whether it grows with the number of robots, as the boxes known by name do."""
+    grows: bool | Literal["width"] = False
+    """Whether it grows with the number of robots, as the boxes known by name do; or along its
+    ``width`` only, the side behind which robots start."""
 
 
 class WheelSettings(Settings):
@@ -244,9 +248,12 @@ class BoxPushingSettings(ScenarioSettings):
     infrared: InfraredSettings = InfraredSettings()
     start: Literal["easy", "medium", "hard"] = "medium"
     """Start distribution."""
+    scaling: Literal["fixed", "similar"] = "fixed"
+    """Whether the box's distance to the goal, `tolerance`, `termination_radius` and the reward's r1
+    stay as they are whatever the number of robots, or are in units of the box and grow with it."""
     failures: tuple[Failure, ...] = ()
     """Failures of wheels, as ``[[scenario.failures]]`` tables."""
-    state_space: Literal["paper", "relational", "pose"] | tuple[str, ...] = "relational"
+    state_space: Literal["paper", "relational", "pose", "crowd"] | tuple[str, ...] = "relational"
     """Eq. 1, the relational variables, those and the orientation of the box, or state variables by
     name, one's own included, see `box_pushing.states.variables`."""
     predictor: Literal["push", "rigid", "static", "exact"] = "push"

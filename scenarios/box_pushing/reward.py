@@ -5,6 +5,10 @@ is within range then some robot is not. They are tested from the most specific t
 C1 and C2 (all in contact), C3 (all within range), C5 (none), C4 (some not). The paper has one
 penalty term per robot, R2 and R3 for its two; here every robot has one, with the same constants.
 
+Of a large team one robot is hardly ever out of contact with nobody else, and one that has lost
+touch is not told apart from those that have not. So every robot may be paid by itself
+(`RewardSettings.of`): the conditions then hold for its own contact and its own reading.
+
 A learner takes a terminal state for one that is entered for ever. By the conditions a goal that is
 reached while one of the robots has lost touch would be punished for ever, so reaching it pays c1,
 what R1 is there, whatever the robots do (`RewardSettings.pays_at_goal`).
@@ -45,7 +49,7 @@ def reward(
     contact: BoolArray,
     readings: FloatArray,
 ) -> FloatArray:
-    """Return the reward ``(m,)`` of ``m`` situations.
+    """Return the reward of ``m`` situations: ``(m, 1)`` of the team, or ``(m, M)`` of every robot.
 
     Parameters
     ----------
@@ -69,19 +73,24 @@ def reward(
     >>> ones, none = np.ones(1), np.zeros((1, 2))
     >>> task = Task(RewardSettings(), tolerance=0.05, orientation_tolerance=None)
     >>> reward(task, ones, ones, ones, none.astype(bool), none).tolist()
-    [-0.002]
+    [[-0.002]]
     """
     settings = task.reward
+    if settings.of == "team":  # of robots (m, parties, members)
+        contact, readings = contact[:, None], readings[:, None]
+    else:
+        contact, readings = contact[:, :, None], readings[:, :, None]
+    distance, approach, orientation = distance[:, None], approach[:, None], orientation[:, None]
     r1 = settings.c1 * np.exp(-settings.r1 * distance)
-    r2_r3 = (settings.c2 * np.exp(-settings.r2 * readings)).sum(axis=1)
+    r2_r3 = (settings.c2 * np.exp(-settings.r2 * readings)).sum(axis=2)
     r4 = settings.c4 * np.abs(orientation)
-    touching = contact.all(axis=1)
+    touching = contact.all(axis=2)
     within = readings > 0.0
     near = -r2_r3 + (r1 if settings.attraction_without_contact else 0.0)
     nearer = approach < -settings.least_approach
     there = task.reached(distance, orientation) & settings.pays_at_goal
     return np.select(
-        [there, touching & nearer, touching, within.all(axis=1), ~within.any(axis=1)],
+        [there, touching & nearer, touching, within.all(axis=2), ~within.any(axis=2)],
         [settings.c1, r1 - r2_r3 - r4, settings.receding, near, settings.all_out_of_range],
         default=settings.some_out_of_range,
     )

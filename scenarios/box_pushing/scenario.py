@@ -26,7 +26,7 @@ from .reward import Task, reward
 from .starts import place
 from .states.state_spaces import state_space_for
 from .states.view import View
-from .world.boxes import box_for
+from .world.boxes import box_for, growth
 from .world.failures import Failures
 from .world.infrared import InfraredSpec, strongest_reading
 from .world.robots import nominal_effect, robot_for
@@ -87,6 +87,8 @@ class BoxPushing:
         self.settings = settings
         self.robot = robot_for(settings.robot)
         self.box = box_for(settings.box, settings.robots)
+        similar = settings.scaling == "similar"
+        self._unit = growth(settings.box, settings.robots) if similar else 1.0
         # Whether they fit is better known now than in the middle of a study.
         place(settings.start, np.random.default_rng(0), [self.robot] * settings.robots, self.box)
         wheels = len(self.robot.wheels)
@@ -111,11 +113,12 @@ class BoxPushing:
         self._failures = (
             Failures(settings.failures, self.agents, self._limits) if settings.failures else None
         )
-        self._task = Task(settings.reward, settings.tolerance, settings.orientation_tolerance)
+        paid = settings.reward.model_copy(update={"r1": settings.reward.r1 / self._unit})
+        self._task = Task(paid, self._unit * settings.tolerance, settings.orientation_tolerance)
         self._belief = PushBelief.of(self._model, robots, settings.belief.stiffness)
         self._premises = Premises(
             self._belief, self._space, self.action_set, settings.speed_increment, self._limits,
-            self._task, self.infrared, settings.period,
+            self._task, self.infrared, self.box.outline, settings.period,
             settings.prediction_horizon * CONTROL_PERIOD,
         )  # fmt: skip
         self._goal: FloatArray = np.zeros(3)
@@ -162,7 +165,7 @@ class BoxPushing:
         )
         rng = np.random.default_rng(seed)
         robots, box, self._goal = place(
-            self.settings.start, rng, [self.robot] * self.settings.robots, self.box
+            self.settings.start, rng, [self.robot] * self.settings.robots, self.box, self._unit
         )
         self.world.place(robots, box)
         self._speeds = np.zeros(len(self.agents))
@@ -198,17 +201,19 @@ class BoxPushing:
             np.array([measured["orientation_rad"]]),
             self.world.contact[None],
             readings[None],
-        )
+        )[0]
+        paid: float | FloatArray = float(gained[0])
+        if self.settings.reward.of == "robot":
+            paid = np.repeat(gained, [len(group) for group in self.groups])
         sensed = perf_counter()
         if terminated:
             measured["stopped_at_goal"] = self._stays()
         self._step += 1
         self._save()
         measured["seconds"] = {"physics": moved - begin, "sensors": sensed - moved}
-        truncated = not terminated and measured["distance_m"] > self.settings.termination_radius
-        return Transition(
-            states, float(gained[0]), terminated, truncated, measured, motions, pushed
-        )
+        farthest = self._unit * self.settings.termination_radius
+        truncated = not terminated and measured["distance_m"] > farthest
+        return Transition(states, paid, terminated, truncated, measured, motions, pushed)
 
     @property
     def nominal_effects(self) -> tuple[FloatArray, ...]:
@@ -328,7 +333,10 @@ class BoxPushing:
         `before` is the distance of the box from the goal one decision period ago [m].
         """
         world, poses = self.world, self.world.robot_poses
-        view = View(poses[None], world.box_pose[None], world.gaps[None], self._goal, before, 1.0)
+        view = View(
+            poses[None], world.box_pose[None], world.gaps[None], self._goal, before, 1.0,
+            self.box.outline,
+        )  # fmt: skip
         rows = []
         for r, group in enumerate(self.groups):
             shared = self._space.shared(view, r)[0]

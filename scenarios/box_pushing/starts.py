@@ -1,6 +1,7 @@
 """Start distributions: where robots, box and goal are when an episode begins.
 
-The goal pose is always (1 m, 0, 0): one metre away in the easier starts' mean direction. *Bearing*
+The goal pose is always (1 m, 0, 0): one metre away in the easier starts' mean direction, unless
+distances are in units of the box. *Bearing*
 is the direction from box to goal, *behind* the back of the box (its -x side). A further
 distribution is one `Start` and one line in `STARTS`.
 """
@@ -65,7 +66,11 @@ STARTS: dict[str, Start] = {
 
 
 def place(
-    start: str, rng: np.random.Generator, robots: Sequence[RobotSpec], box: BoxSpec
+    start: str,
+    rng: np.random.Generator,
+    robots: Sequence[RobotSpec],
+    box: BoxSpec,
+    unit: float = 1.0,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Draw the start of an episode.
 
@@ -77,6 +82,9 @@ def place(
         Random numbers.
     robots, box
         What is to be placed.
+    unit
+        Multiplies the distance from the box to the goal; robots are as near to the box as ever,
+        since they do not grow.
 
     Returns
     -------
@@ -103,7 +111,7 @@ def place(
     bearing = rng.uniform(-spec.bearing, spec.bearing)
     angle = rng.uniform(-spec.angle, spec.angle)
     goal = np.array(GOAL)
-    away = spec.distance * np.array([cos(bearing), sin(bearing)])
+    away = unit * spec.distance * np.array([cos(bearing), sin(bearing)])
     box_pose = np.array([*(goal[:2] - away), angle])
     local = _around(spec, rng, robots, box) if spec.around else _behind(spec, rng, robots, box)
     turn = np.array([[cos(angle), -sin(angle)], [sin(angle), cos(angle)]])

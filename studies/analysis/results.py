@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ...core.protocols import SUCCESS, Measure
 from ..store.store import Store
+from ..trials.episodes import ELSEWHERE
 from ..trials.measures import AFTER
 
 Arrays = dict[str, NDArray[Any]]
@@ -50,6 +51,14 @@ class Results:
     usage: dict[str, Arrays] = field(default_factory=dict)
     columns: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     measures: tuple[Measure, ...] = (SUCCESS,)
+
+    def elsewhere(self, condition: str) -> dict[str, Arrays]:
+        """Return what the evaluations of a condition beside its own gave, by their names."""
+        return {
+            phase.removeprefix(ELSEWHERE): arrays[condition]
+            for phase, arrays in self.phases.items()
+            if phase.startswith(ELSEWHERE) and condition in arrays
+        }
 
 
 def read(store: Store) -> Results:

@@ -6,7 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .statistics import Estimate
+from .results import Results
+from .statistics import Estimate, rate
+
+EVALUATED = "evaluation success"
+"""Title of the success of a trained team in the scenario of its condition."""
 
 
 @dataclass(frozen=True)
@@ -26,6 +30,18 @@ class Summary:
     condition: str
     seeds: int
     estimates: dict[str, Estimate]
+
+
+def evaluated(results: Results, condition: str) -> dict[str, Estimate]:
+    """Return the success of a condition's trained teams by title, in its own scenario and others.
+
+    Those of `[evaluations]` are called ``success, NAME``.
+    """
+    if condition not in results.evaluation:
+        return {}
+    elsewhere = {f"success, {n}": arrays for n, arrays in results.elsewhere(condition).items()}
+    evaluations = {EVALUATED: results.evaluation[condition], **elsewhere}
+    return {title: rate(arrays["success"]) for title, arrays in evaluations.items()}
 
 
 def two_figures(value: float) -> str:

@@ -20,9 +20,12 @@ from rich.progress import (
 from rich.table import Table
 
 from ..presentation.tables import SummaryTable
+from ..spec.outline import Outline
 from ..spec.spec import Spec
 from ..workers.runner import Outcome
 
+LABEL = 24
+"""What a condition's label may be broken to, if there is no room for all of it [characters]."""
 PLAIN_SECONDS = 10.0
 """How often a line tells of the progress when there is no terminal."""
 
@@ -40,7 +43,7 @@ class Terminal:
         conditions, seeds = len(spec.conditions()), len(spec.seeds)
         say(
             f"{spec.study}: {count(conditions, 'condition')} x {count(seeds, 'seed')}, "
-            f"{count(spec.episodes, 'episode')} of up to {count(spec.steps, 'step')}, "
+            f"{Outline.of(spec).lengths} of up to {count(spec.steps, 'step')}, "
             f"{count(processes, 'process', 'es')}, kept in {directory}"
         )
 
@@ -125,23 +128,53 @@ def _failure(outcome: Outcome) -> str:
 
 
 def print_table(found: SummaryTable) -> None:
-    """Print estimates by condition, each over its 95 % interval."""
+    """Print estimates by condition, each over its 95 % interval.
+
+    Columns that do not fit side by side without breaking a word follow below, as a further table.
+    """
     if not found.rows:
         print("no trial has finished")
         return
-    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, header_style="bold")
-    table.add_column("", overflow="fold")
-    for title in found.titles:
-        table.add_column(escape(title), justify="right", overflow="fold")
-    for condition, seeds, cells in found.rows:
-        table.add_row(
-            f"{escape(condition)}\n[dim]{count(seeds, 'seed')}[/]",
-            *(f"{c.value}\n[dim]{c.interval or '–'}[/]" if c else "" for c in cells),
-        )
-    Console().print(table)
-    print("\nMeans over seeds, and below them their 95 % intervals.")
+    console = Console()
+    for block in _blocks(found, console.width):
+        table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, header_style="bold")
+        table.add_column("", overflow="fold")
+        for i, width in block.items():
+            table.add_column(escape(found.titles[i]), justify="right", overflow="fold", width=width)
+        for condition, seeds, cells in found.rows:
+            shown = (cells[i] for i in block)
+            table.add_row(
+                f"{escape(condition)}\n[dim]{count(seeds, 'seed')}[/]",
+                *(f"{c.value}\n[dim]{c.interval or '–'}[/]" if c else "" for c in shown),
+            )
+        console.print(table)
+        print()
+    print("Means over seeds, and below them their 95 % intervals.")
     if found.remark:
         print(found.remark)
+
+
+def _blocks(found: SummaryTable, width: int) -> list[dict[int, int]]:
+    """Return which columns stand side by side, and how wide each is: in as few blocks as fit.
+
+    Where titles fit in one line there is one block; elsewhere they are broken between words.
+    """
+    label = max(max(len(c), len(count(seeds, "seed"))) for c, seeds, _ in found.rows)
+    texts = [
+        [text for _, _, row in found.rows if (c := row[i]) for text in (c.value, c.interval)]
+        for i in range(len(found.titles))
+    ]
+    pairs = list(zip(found.titles, texts, strict=True))
+    whole = [max(map(len, [title, *of_cells])) for title, of_cells in pairs]
+    if label + sum(1 + wide for wide in whole) <= width:
+        return [dict(enumerate(whole))]
+    broken = [max(map(len, [*title.split(), *of_cells])) for title, of_cells in pairs]
+    n, label = len(broken), min(label, LABEL)
+    for many in range(n, 0, -1):
+        blocks = [{i: broken[i] for i in range(k, min(k + many, n))} for k in range(0, n, many)]
+        if all(label + sum(1 + wide for wide in block.values()) <= width for block in blocks):
+            break
+    return blocks
 
 
 def print_places(directory: Path, figures: Sequence[Path], replays: Sequence[Path]) -> None:

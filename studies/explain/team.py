@@ -24,8 +24,10 @@ from ...core.team import Team
 from ...scenarios.box_pushing.scenario import BoxPushing
 from ..spec.errors import SpecError
 from ..store.store import Store
+from ..trials.episodes import STAGE
 from ..trials.measures import columns
-from ..trials.trial import Session, Trial, trials_of
+from ..trials.session import Session
+from ..trials.trial import Trial, trials_of
 from . import policy as explain_policy
 from . import rules as explain_rules
 from .body import Bodies
@@ -148,22 +150,28 @@ def _trained(store: Store, trial: Trial) -> tuple[Team, Scenario, Bodies | None]
         bodies.note("after", model)
     measured = [measure.name for measure in store.measures()]
     kept = _kept(store, trial)
-    found = [row.flat(measured)[1:] for row in session.result().rows]
+    found = [row.flat(measured) for row in session.result().rows]
     if kept != found:
-        same = [one == other for one, other in zip(kept, found, strict=False)]
-        episode = same.index(False) if False in same else len(same)
+        pairs = zip(kept, found, strict=False)
+        other = next((ours for theirs, ours in pairs if theirs != ours), found[-1])
+        stage = "" if other[0] == "training" else f" of {other[0]}"
         raise SpecError(
             f"{store.directory}: training {trial.condition}, seed {trial.seed} again gives another "
-            f"episode {episode} than the one that is kept; this is not the software, or not the "
-            "kind of machine, that ran the study"
+            f"episode {other[1]}{stage} than the one that is kept; this is not the software, or "
+            "not the kind of machine, that ran the study"
         )
     return team, scenario, bodies
 
 
 def _kept(store: Store, trial: Trial) -> list[tuple[object, ...]]:
-    """Return the training episodes of a trial as they are kept, none if it has not finished."""
-    names, rows = store.rows("training")
-    at = [names.index(name) for name in columns(store.measures())[1:]]
+    """Return the training episodes of a trial as they are kept, none if it has not finished.
+
+    Those of a curriculum come first.
+    """
+    names, every = store.episodes()
+    phase = names.index("phase")
+    rows = [row for row in every if row[phase] == "training" or row[phase].startswith(STAGE)]
+    at = [names.index(name) for name in columns(store.measures())]
     where = names.index("condition"), names.index("seed")
     own = (row for row in rows if tuple(row[i] for i in where) == (trial.condition, trial.seed))
     return [tuple(row[i] for i in at) for row in own]

@@ -28,7 +28,7 @@ def text(found: Explained, agents: int | None = None) -> Iterator[str]:
         How many agents' rules to tell; none: all.
     """
     trial = found.trial
-    yield f"{trial.condition}, seed {trial.seed}: the team after {trial.episodes} episodes"
+    yield f"{trial.condition}, seed {trial.seed}: the team after {trial.lengths}"
     yield ""
     yield from _functions(found, len(found.agents) if agents is None else agents)
     yield "POLICY"

@@ -59,14 +59,15 @@ def runs(values: Iterable[int]) -> str:
 
 def extent(outline: Outline) -> str:
     """Return what a study consists of."""
-    after = (
-        f", {count(outline.evaluation, 'evaluation episode')} after them"
-        if outline.evaluation
-        else ""
-    )
+    after = ""
+    if outline.evaluation:
+        after = f", {count(outline.evaluation, 'evaluation episode')} after them"
+        elsewhere = len(outline.table.get("evaluations", ()))
+        each = "another scenario" if elsewhere == 1 else f"each of {elsewhere} other scenarios"
+        after += f" and as many in {each}" if elsewhere else ""
     return (
         f"{count(len(outline.columns), 'condition')} × {count(len(outline.seeds), 'seed')}, each "
-        f"{count(outline.episodes, 'training episode')} of up to "
+        f"{outline.lengths.replace('episode', 'training episode')} of up to "
         f"{count(outline.steps, 'step')}{after}"
     )
 

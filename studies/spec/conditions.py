@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from ...core.learners import LEARNERS, LearnerSettings
 from ...core.learners.batch import BatchTDSettings
@@ -23,6 +23,7 @@ from ...core.settings import ScenarioSettings, Settings, tuples
 from ...scenarios import SCENARIOS
 from ...scenarios.box_pushing.config import BoxPushingSettings
 from ...topologies.config import ChainSettings, Topology, parse
+from .curriculum import Curriculum, Name, Stage, StageSettings
 from .errors import SpecError, explain, show
 from .overlay import TomlTable, nested, overlay
 from .presets import PRESETS
@@ -45,16 +46,6 @@ class ConditionSettings(Settings):
         )
 
 
-def _printable(name: str) -> str:
-    if not name.strip() or not name.isprintable():
-        raise ValueError("must be a name that can be printed")
-    return name
-
-
-Name = Annotated[str, AfterValidator(_printable)]
-"""How users call something of theirs."""
-
-
 class Override(Settings):
     """A named set of tables laid over those of a spec."""
 
@@ -67,6 +58,8 @@ class Override(Settings):
     learner: Mapping[str, Any] = Field(default_factory=dict)
     sweep: Mapping[str, tuple[Any, ...]] = Field(default_factory=dict)
     """Lists of values by dotted key, for this override alone."""
+    curriculum: Curriculum | None = None
+    """Stages in place of the spec's; none: the spec's."""
 
     @property
     def tables(self) -> Mapping[str, TomlTable]:
@@ -89,18 +82,22 @@ class Condition:
         The resolved settings.
     evaluations
         Names and scenarios in which its trained teams are evaluated beside its own.
+    curriculum
+        What its teams are trained on before.
     """
 
     label: str
     columns: Mapping[str, Any]
     settings: ConditionSettings
     evaluations: tuple[tuple[str, ScenarioSettings], ...] = ()
+    curriculum: tuple[Stage, ...] = ()
 
     @property
     def tables(self) -> list[Any]:
-        """Its settings and those of its evaluations, as tables."""
+        """Its settings and those of its evaluations and stages, as tables."""
         elsewhere = [scenario.model_dump(mode="json") for _, scenario in self.evaluations]
-        return [self.settings.model_dump(mode="json"), *elsewhere]
+        stages = [stage.table() for stage in self.curriculum]
+        return [self.settings.model_dump(mode="json"), *elsewhere, *stages]
 
 
 def grid(
@@ -109,6 +106,7 @@ def grid(
     sweep: Mapping[str, Sequence[Any]],
     overrides: Sequence[Override] = (),
     evaluations: Mapping[str, Mapping[str, Any]] | None = None,
+    curriculum: Sequence[StageSettings] = (),
 ) -> tuple[Condition, ...]:
     """Return the conditions: override by override, the last key of the sweeps varying fastest.
 
@@ -124,6 +122,8 @@ def grid(
         Crossed with `sweep`; none: the tables as they are.
     evaluations
         By name, what is laid over each condition's scenario.
+    curriculum
+        Stages before the training of conditions whose override names none.
 
     Raises
     ------
@@ -139,14 +139,24 @@ def grid(
         name = label(point, override.name if override else "") or preset
         where = f" (condition {name!r})" if point or override else ""
         settings = resolve(preset, tables, point, where, override)
-        other = seen.setdefault(settings.canonical(), name)
+        own = override.curriculum if override else None
+        stages = tuple(
+            Stage(s.name, s.episodes, _beside(settings, s.scenario, f" (stage {s.name!r}){where}"))
+            for s in (curriculum if own is None else own)
+        )
+        content = json.dumps([settings.canonical(), *(stage.table() for stage in stages)])
+        other = seen.setdefault(content, name)
         if other != name or name in labels:
             raise SpecError(f"{source}: conditions {other!r} and {name!r} are the same")
         labels.add(name)
         columns: dict[str, Any] = {"name": override.name} if override else {}
         columns |= {key: _scalar(point[key]) if key in point else "" for key in keys}
-        elsewhere = _elsewhere(settings, evaluations or {}, where)
-        conditions.append(Condition(name, columns or {"preset": preset}, settings, elsewhere))
+        elsewhere = tuple(
+            (other, _beside(settings, changes, f" (evaluation {other!r}){where}"))
+            for other, changes in (evaluations or {}).items()
+        )
+        columns = columns or {"preset": preset}
+        conditions.append(Condition(name, columns, settings, elsewhere, stages))
     return tuple(conditions)
 
 
@@ -181,16 +191,12 @@ def resolve(
     return _validated(table, where)
 
 
-def _elsewhere(
-    settings: ConditionSettings, evaluations: Mapping[str, Mapping[str, Any]], where: str
-) -> tuple[tuple[str, ScenarioSettings], ...]:
-    table = settings.model_dump()
-    found = []
-    for name, changes in evaluations.items():
-        changed = overlay(table, {"scenario": section(name, changes)}, ConditionSettings)
-        resolved = _validated(changed, f" (evaluation {name!r}){where}")
-        found.append((name, resolved.scenario))
-    return tuple(found)
+def _beside(
+    settings: ConditionSettings, changes: Mapping[str, Any], where: str
+) -> ScenarioSettings:
+    """Return a condition's scenario with changes laid over it."""
+    table = overlay(settings.model_dump(), {"scenario": dict(changes)}, ConditionSettings)
+    return _validated(table, where).scenario
 
 
 def _validated(table: TomlTable, where: str) -> ConditionSettings:

@@ -50,6 +50,9 @@ def _differences(
     settings = {c.label: c.settings.model_dump(mode="json") for c in new.conditions()}
     if list(settings) != list(old_settings):
         yield f"conditions = {show(list(old_settings))} there, {show(list(settings))} here"
+    for before_stages, after_stages in zip(_curricula(old), _curricula(new), strict=False):
+        if before_stages != after_stages:
+            yield f"curriculum = {show(before_stages)} there, {show(after_stages)} here"
     before_keys, after_keys = _columns(old), _columns(new)
     if before_keys != after_keys:
         yield f"columns = {show(before_keys)} there, {show(after_keys)} here"
@@ -59,6 +62,13 @@ def _differences(
             if before.get(key) != after.get(key):
                 then, now = show(before.get(key, "absent")), show(after.get(key, "absent"))
                 yield f"condition {label!r}: {key} = {then} there, {now} here"
+
+
+def _curricula(spec: Spec) -> list[list[Mapping[str, Any]]]:
+    """Return the stages of the spec and of each of its overrides, as they are written."""
+    found = [spec.curriculum]
+    found += [spec.curriculum if o.curriculum is None else o.curriculum for o in spec.overrides]
+    return [[stage.model_dump() for stage in stages] for stages in found]
 
 
 def _columns(spec: Spec) -> list[str]:

@@ -8,6 +8,7 @@ from typing import Any
 from ...core.evaluators import EVALUATORS
 from ...core.exploration import EXPLORATIONS
 from ...core.learners import LEARNERS
+from ...core.places import located
 from ...core.registry import Registry
 from ...core.settings import Settings
 from ...scenarios import SCENARIOS
@@ -60,13 +61,8 @@ def _of_settings(settings: Settings, registry: Registry | None) -> Any:
     if registry is not None and not table.get("kind"):
         owner = type(settings)
         outer = owner.__qualname__.rpartition(".")[0]
-        thing: Any = owner
-        if outer:  # a class's nested Settings stand for the class
-            import sys
-
-            thing = sys.modules[owner.__module__]
-            for part in outer.split("."):
-                thing = getattr(thing, part)
+        # A class's nested Settings stand for the class.
+        thing = located(f"{owner.__module__}:{outer}") if outer else owner
         table["kind"] = _name(thing, registry)
     return table
 

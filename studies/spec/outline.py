@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from .curriculum import lengths
 from .spec import Spec
 
 
@@ -32,6 +33,13 @@ class Outline:
     evaluation: int
     columns: Mapping[str, Mapping[str, Any]]
     table: Mapping[str, Any]
+
+    @property
+    def lengths(self) -> str:
+        """Episodes of training, stage by stage, in words."""
+        common = self.table.get("curriculum", ())
+        curricula = [o.get("curriculum", common) for o in self.table.get("overrides", [{}])]
+        return lengths(([s["episodes"] for s in stages] for stages in curricula), self.episodes)
 
     @classmethod
     def of(cls, spec: Spec) -> Outline:

@@ -3,7 +3,8 @@
 ``study``, ``preset``, ``seeds``, ``episodes``, ``steps``, ``evaluation``, then the tables
 ``[scenario]``, ``[topology]``, ``[learner]``, laid over the preset. What is compared:
 ``[[overrides]]``, further tables by name, and ``[sweep]``, lists of values by dotted key; the
-conditions are their combinations. ``[evaluations]`` are further scenarios for the trained teams.
+conditions are their combinations. ``[[curriculum]]`` are stages of training before that of the
+conditions, ``[evaluations]`` further scenarios for the trained teams.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ from ...core.registry import closest
 from ...core.settings import Settings, tuples
 from ...core.sources import Sources, is_reference, named
 from .. import STUDIES
-from .conditions import SECTIONS, Condition, Name, Override, grid, section
+from .conditions import SECTIONS, Condition, Override, grid, section
+from .curriculum import Curriculum, Length, Name
 from .errors import SpecError, explain, show
 from .objects import plain
 from .overlay import TomlTable, assignment, flat, overlay
@@ -29,7 +31,6 @@ from .presets import PRESETS
 MOST_TRIALS = 100_000
 """A larger grid is taken for a slip of the pen."""
 
-Length = Annotated[int, Field(ge=1, le=1_000_000)]
 Seed = Annotated[int, Field(ge=0, le=2**63 - 1)]
 
 
@@ -73,6 +74,8 @@ class Spec(Settings):
     """Lists of values by dotted key; the conditions are all their combinations."""
     overrides: tuple[Override, ...] = ()
     """Tables by name, each laid over those above and crossed with the sweep."""
+    curriculum: Curriculum = ()
+    """Stages in which teams are trained before `episodes`, in scenarios laid over their own."""
     evaluations: Mapping[Name, Mapping[str, Any]] = Field(default_factory=dict)
     """By name, changes of the scenario in which the trained teams are evaluated too."""
 
@@ -150,7 +153,9 @@ class Spec(Settings):
             grid_size = f"{points} conditions x {len(spec.seeds)} seeds"
             raise SpecError(f"sweep: {grid_size}, at most {MOST_TRIALS} trials")
         tables = {name: getattr(spec, name) for name in SECTIONS}
-        spec._conditions = grid(spec.preset, tables, spec.sweep, spec.overrides, spec.evaluations)
+        spec._conditions = grid(
+            spec.preset, tables, spec.sweep, spec.overrides, spec.evaluations, spec.curriculum
+        )
         spec._sources = sources.only(
             named([spec.study, *(condition.tables for condition in spec._conditions)])
         )
@@ -227,7 +232,7 @@ class Spec(Settings):
         table["overrides"] = [_filled(override) for override in table.get("overrides", ())]
         if self.seeds == tuple(range(len(self.seeds))):
             table["seeds"] = len(self.seeds)
-        return {key: value for key, value in table.items() if value != []}
+        return {key: value for key, value in table.items() if value not in ([], ())}
 
 
 def _changed(table: TomlTable, change: TomlTable) -> TomlTable:
@@ -239,7 +244,7 @@ def _changed(table: TomlTable, change: TomlTable) -> TomlTable:
 
 
 def _filled(table: TomlTable) -> TomlTable:
-    return {key: value for key, value in table.items() if value not in ({}, (), None)}
+    return {key: value for key, value in table.items() if value not in ({}, None)}
 
 
 def _read(table: Mapping[str, Any], where: str) -> TomlTable:

@@ -16,6 +16,7 @@ from ..spec.errors import SpecError
 from ..spec.outline import Outline
 from ..spec.spec import Spec
 from ..trials import code
+from ..trials.episodes import ELSEWHERE, STAGE
 from ..trials.measures import measures_from
 from ..trials.trial import RESULTS_VERSION
 from . import database, integrity
@@ -221,10 +222,18 @@ class Reading:
         return {"done": 0, "failed": 0} | dict(self._db.execute(query).fetchall())
 
     def phases(self) -> list[str]:
-        """Return the phases that episodes were run in, training and evaluation first."""
-        query = "SELECT DISTINCT phase FROM episodes"
-        found = {phase for (phase,) in self._db.execute(query)}
-        return sorted(found, key=lambda phase: (phase != "training", phase != "evaluation", phase))
+        """Return the phases that episodes were run in.
+
+        First training and evaluation, then the stages of curricula and the further evaluations,
+        each in their order, then others.
+        """
+        known = ["training", "evaluation"]
+        query = "SELECT phase, min(episode) FROM episodes GROUP BY phase ORDER BY 2, 1"
+        found = [phase for phase, _ in self._db.execute(query)]
+        stages = [phase for phase in found if phase.startswith(STAGE)]
+        evaluations = [f"{ELSEWHERE}{name}" for name in self._table("spec").get("evaluations", ())]
+        ordered = [*known, *stages, *evaluations]
+        return [phase for phase in ordered if phase in found] + sorted({*found} - {*ordered})
 
     def columns(self) -> dict[str, dict[str, Any]]:
         """Return what tells each condition from the others, by label; see `Condition`."""

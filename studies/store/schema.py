@@ -18,6 +18,7 @@ from typing import Any
 from ...core.protocols import Measure
 from ..spec.spec import Spec
 from ..trials.code import Code
+from ..trials.episodes import STAGE
 from ..trials.measures import columns, tables
 from ..trials.trial import RESULTS_VERSION, trials_of
 from .database import insert, quoted
@@ -68,12 +69,14 @@ def prepare(
     db.execute(f"CREATE TABLE IF NOT EXISTS conditions ({told})")
     db.execute("DELETE FROM conditions")
     insert(db, "conditions", [(i, c.label, *c.columns.values()) for i, c in enumerate(conditions)])
+    stage = f"e.phase GLOB '{STAGE}*'"  # stages come first, in the order in which they are trained
     db.execute(
         f"""CREATE VIEW IF NOT EXISTS results AS
         SELECT c.condition, {"".join(f"c.{key}, " for key in swept)}t.seed,
             {", ".join(f"e.{quoted(name)}" for name in columns(measures))}
         FROM episodes e JOIN trials t USING (identity) JOIN conditions c USING (condition)
-        WHERE t.state = 'done' ORDER BY c.position, t.seed, e.phase DESC, e.episode"""
+        WHERE t.state = 'done' ORDER BY c.position, t.seed, {stage} DESC,
+            CASE WHEN {stage} THEN e.episode END, e.phase DESC, e.episode"""
     )
     db.execute("DELETE FROM planned")
     planned: list[tuple[object, ...]] = [

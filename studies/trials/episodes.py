@@ -12,6 +12,11 @@ from numpy.typing import NDArray
 from ...core.loop import StepRecord
 from ...core.protocols import Measure, RecordedScenario, Transition
 
+STAGE = "training:"
+"""With what the phase of a stage of a curriculum begins; the stage's name follows."""
+ELSEWHERE = "evaluation:"
+"""With what the phase of an evaluation beside a trial's own begins; its name follows."""
+
 Recording = dict[str, NDArray[Any]]
 """Arrays of one episode of T steps by name: what the scenario's ``recorded`` names, each
 ``(T + 1, ...)``; ``reward`` ``(T,)``, or ``(T, n)`` if agents are rewarded one by one; and what
@@ -22,9 +27,9 @@ class EpisodeRow(NamedTuple):
     """The measurements of one episode."""
 
     phase: str
-    """``training`` or ``evaluation``."""
+    """``training`` or ``evaluation``; or one that begins with `STAGE` or `ELSEWHERE`."""
     episode: int
-    """Counted from 0 within its phase."""
+    """Counted from 0 within its phase, or through all stages of a curriculum."""
     steps: int
     measures: Mapping[str, float]
     """Values of the scenario's measures by name, in their order; of a rate, whether it is so."""

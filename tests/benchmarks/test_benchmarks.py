@@ -51,3 +51,13 @@ def test_a_small_crowd_is_drawn(tmp_path: Path) -> None:
     run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     assert run.stdout.startswith("16 agents, 2 decisions of 512 ms each")
     assert path.stat().st_size > 5000
+
+
+@pytest.mark.slow
+def test_what_can_be_solved_at_a_size_is_told() -> None:
+    few = ["--robots", "3", "--seeds", "2", "--scalings", "similar", "--grows", "width"]
+    command = [sys.executable, "-m", "benchmarks.sizes", *few]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert all(len(line) <= 80 for line in run.stdout.splitlines())
+    assert "scaling similar, box grows: width" in run.stdout
+    assert "│ 3 " in run.stdout

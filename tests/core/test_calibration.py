@@ -87,3 +87,20 @@ def test_it_continues_from_what_was_saved():
         taught(calibration, np.log([2.0, 2.0]), 5, seed=1)
     np.testing.assert_array_equal(one.constants, other.constants)
     np.testing.assert_array_equal(one.deviations, other.deviations)
+
+
+def test_another_calibration_goes_on_with_bodies_alike_and_begins_anew_with_others():
+    settings, levers = CalibrationSettings(enabled=True), np.array([0.1, 0.05])
+    former = Calibration(settings, 1, levers)
+    predicted = np.zeros((2, 2, 3))
+    predicted[:, 0, 0] = 0.05 * np.exp(former.points[:, 0])
+    former.observe(np.full((2, 3), 0.07), predicted)
+    assert former.constants[0] != 0.0
+    alike, longer, more = (
+        Calibration(settings, 1, other) for other in (levers, 2.0 * levers, np.ones(3))
+    )
+    for calibration in (alike, longer, more):
+        calibration.take_over(former)
+    assert alike.constants[0] == former.constants[0]
+    assert alike.deviations[0] == former.deviations[0]
+    assert longer.constants[0] == more.constants[0] == 0.0

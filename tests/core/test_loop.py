@@ -133,6 +133,14 @@ def test_a_run_in_two_parts_is_the_run_in_one(settings, world, tmp_path: Path) -
     assert parts == whole
 
 
+def test_worlds_may_be_numbered_apart_from_episodes(world) -> None:
+    begun = []
+    reset = world.reset
+    world.reset = lambda seed, episode: (begun.append((seed.spawn_key, episode)), reset(seed))[1]
+    run(world, team_of(world, LEARNING), episodes=2, first_episode=3, first_world=70)
+    assert begun == [((0, 70), 3), ((0, 71), 4)]
+
+
 @pytest.mark.parametrize("settings", [LEARNING, BatchTDSettings(ridge=0.1)])
 def test_evaluation_leaves_what_was_learned_alone(settings, world) -> None:
     team = team_of(world, settings)

@@ -93,3 +93,18 @@ def test_innovations_larger_than_expected_are_owned_up_to() -> None:
         covered[surprise] = np.mean(inside)
     assert covered[False] < 0.6
     assert covered[True] > 0.9
+
+
+def test_another_model_goes_on_with_bodies_alike_and_begins_anew_with_others():
+    nominal = np.array([[0.5, 0.5, 0.0], [0.0, 0.0, 0.0], [-9.0, 9.0, 0.0]])
+    former = SelfModel(SelfModelSettings(enabled=True), [nominal])
+    former.observe(0, np.array([0.1, 0.1]), np.zeros(3))
+    alike, longer, more = (
+        SelfModel(SelfModelSettings(enabled=True), bodies)
+        for bodies in ([nominal], [2.0 * nominal], [nominal, nominal])
+    )
+    for model in (alike, longer, more):
+        model.take_over(former)
+    assert (alike.effects[0] == former.effects[0]).all()
+    assert (longer.effects[0] == 2.0 * nominal).all()
+    assert (more.effects[0] == nominal).all()

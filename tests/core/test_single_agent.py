@@ -9,14 +9,14 @@ from nested_agents.core.hierarchy import Hierarchy
 from nested_agents.core.learners.td import TDLambdaSettings
 from nested_agents.core.loop import control_loop
 from nested_agents.core.rules.settings import RuleBaseSettings
-from nested_agents.core.single_agent import single_agent
+from nested_agents.core.single_agent import SingleAgent
 from nested_agents.core.team import Team
 
 
 @pytest.fixture
 def pair(line_world):
     """A world of two agents and the same one seen as one agent's, in the same state."""
-    world, single = line_world(2, 1), single_agent(line_world(2, 1))
+    world, single = line_world(2, 1), SingleAgent(line_world(2, 1))
     assert (single.reset(1) == world.reset(1).reshape(1, -1)).all()
     return world, single
 
@@ -41,7 +41,7 @@ def test_steps_are_those_of_the_world(pair) -> None:
         expected, found = world.step(np.array(joint)), single.step(np.array([code]))
         assert (found.states == expected.states.reshape(1, -1)).all()
         assert (found.reward, found.info) == (expected.reward, expected.info)
-    assert single.measure() == world.measure()
+    assert single.scenario.measure() == world.measure()
 
 
 def test_predictions_are_those_of_the_world(pair) -> None:
@@ -70,4 +70,4 @@ def test_a_team_of_one_acts_and_learns(pair) -> None:
 
 def test_too_many_joint_actions_are_refused(line_world) -> None:
     with pytest.raises(ValueError, match=r"single agent: 4 \*\* 7 actions, allowed: 4096 or fewer"):
-        single_agent(line_world(7, 1))
+        SingleAgent(line_world(7, 1))

@@ -14,7 +14,8 @@ from nested_agents.core.evaluators.sampling import Sampling
 from nested_agents.core.hierarchy import Hierarchy
 from nested_agents.core.learners import LEARNERS, LearnerSettings
 from nested_agents.core.robot_agents import per_robot
-from nested_agents.core.team import Team
+from nested_agents.core.spaces import ActionSet, StateSpace
+from nested_agents.core.team import Team, carried_rows
 
 PAPER = {"kind": "paper", "decay": 0.05, "clock": "episode"}
 BURST = {"kind": "burst", "rate": 0.4}
@@ -322,3 +323,63 @@ def test_permuting_agents_permutes_what_is_learned(name: str, line_world) -> Non
         two.end_episode()
     assert np.abs(one.learner.theta).max() > 0
     assert (two.learner.theta == one.learner.theta[there.order]).all()
+
+
+@pytest.mark.parametrize("name", TEAMS)
+def test_a_team_that_takes_over_goes_on_as_the_former_one_would(name: str, world) -> None:
+    former = team_of(name, world)
+    run_episode(former, world, seed=5)
+    same = copy.deepcopy(former)
+    successor = team_of(name, world, seed=2)
+    successor.take_over(former, carried_rows(world, world, shared=False))
+    assert run_episode(successor, world, seed=6) == run_episode(same, world, seed=6)
+    assert (successor.learner.theta == same.learner.theta).all()
+
+
+def test_a_larger_team_takes_over_by_role(line_world) -> None:
+    small, large = (line_world(carts=carts, wheels=2) for carts in (1, 3))
+    for world in (small, large):
+        world.roles = ("front", "rear") * world.shape[0]
+    settings = settings_of({**TEAMS["sampling"], "weights": "role", "exploration": BURST})
+    former, successor = (
+        Team.build(settings, world, chain_of(world.agents), np.random.SeedSequence(1))
+        for world in (small, large)
+    )
+    run_episode(former, small, seed=5)
+    successor.take_over(former, carried_rows(small, large, shared=True))
+    assert (successor.learner.theta == former.learner.theta).all()
+    assert successor.explorer.memory[0] == 0.0  # one episode has been begun
+    seen, before = successor.arrays()["seen"], former.arrays()["seen"]
+    assert (seen == np.tile(before, (3, 1))).all()
+    run_episode(successor, large, seed=6)
+    assert (successor.learner.theta != former.learner.theta).any()
+
+
+@pytest.mark.parametrize(
+    ("change", "shared", "said"),
+    [
+        ({"carts": 3}, False, "4 agents over 'line' cannot act with 6 .*: learner.weights = 'own'"),
+        ({"carts": 3}, True, "cannot act with 6 agents over 'line': their roles are cart0.wheel0"),
+        ({"state_space": "short"}, True, "with 4 agents over 'short': the state spaces differ"),
+        ({"action_set": "two"}, True, "the actions differ"),
+    ],
+)
+def test_weights_are_not_carried_where_they_mean_nothing(
+    change: dict, shared: bool, said: str, world, line_world
+) -> None:
+    other = line_world(carts=change.get("carts", 2), wheels=2)
+    if "state_space" in change:
+        other.state_space = StateSpace("short", other.state_space.variables[:1])
+    if "action_set" in change:
+        other.action_set = ActionSet(("go", "stay"), (1.0, 1.0), (1.0, 0.0), 1)
+    with pytest.raises(ValueError, match=said) as caught:
+        carried_rows(world, other, shared=shared)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("part", ["learner", "explorer"])
+def test_parts_that_cannot_take_over_are_named(part: str, world) -> None:
+    former, successor = team_of("batch-td", world), team_of("batch-td", world)
+    setattr(successor, part, object())
+    with pytest.raises(ValueError, match=r"learner\..*kind: object has no take_over"):
+        successor.take_over(former, np.arange(4))

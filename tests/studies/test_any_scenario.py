@@ -23,8 +23,8 @@ from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store import reading
 from nested_agents.studies.store.store import Store
-from nested_agents.studies.trials import trial as trial_module
-from nested_agents.studies.trials.trial import check, measures_of_spec, run_trial, trials_of
+from nested_agents.studies.trials.session import Session, run_trial
+from nested_agents.studies.trials.trial import check, trials_of
 
 SPREAD = Measure("spread_m", "greatest spread of the carts", "m", "spread_m", "max", "lower")
 LEVEL = Measure("level", "ever level", source="level", gathering="max", is_rate=True)
@@ -196,7 +196,7 @@ def test_a_study_whose_scenarios_now_tell_something_else_is_not_continued(study)
     changed = (SUCCESS, SPREAD)
     with pytest.raises(SpecError, match="use another directory"):
         Store.create(study, SPEC, changed).__enter__()
-    with Store.create(study, SPEC, measures_of_spec(SPEC)) as store:
+    with Store.create(study, SPEC, check(SPEC)) as store:
         assert store.pending(trials_of(SPEC)) == []
 
 
@@ -216,9 +216,8 @@ def test_a_measure_that_two_scenarios_mean_otherwise_is_refused(carts, monkeypat
         return made
 
     monkeypatch.setattr(BoxPushingSettings, "build", build)
-    for function in (check, measures_of_spec):
-        with pytest.raises(SpecError, match="measure 'far': is declared as"):
-            function(SPEC)
+    with pytest.raises(SpecError, match="measure 'far': is declared as"):
+        check(SPEC)
 
 
 def test_results_of_an_older_version_are_not_read(study, monkeypatch):
@@ -229,7 +228,7 @@ def test_results_of_an_older_version_are_not_read(study, monkeypatch):
 
 def test_the_world_is_asked_and_not_what_agents_see_of_it(carts):
     spec = Spec.of(SPEC.table() | {"topology": {"kind": "single-agent"}})
-    session = trial_module.Session(trials_of(spec)[1])
+    session = Session(trials_of(spec)[1])
     assert session.scenario is not session.world
     assert len(groups_of(session.world)) == 2
     session.train(1)

@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 from nested_agents import studies
+from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.trial import check
 
@@ -34,6 +35,22 @@ def test_the_toml_is_as_it_says() -> None:
     assert len(labels) == 10
     assert (labels[0], labels[-1]) == ("default, robots=2", "as printed, robots=3")
     check(Spec.parse(evaluations))
+
+
+def test_the_curriculum_runs_as_it_says(tmp_path, monkeypatch, capsys) -> None:
+    (spec,) = [block for block in blocks("toml") if "[[curriculum]]" in block]
+    (shown,) = [block for block in blocks("text") if "growing.toml" in block]
+    monkeypatch.setenv("COLUMNS", "80")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "growing.toml").write_text(spec)
+    commands = re.findall(r"^\$ nested-agents (.*)$", shown, flags=re.MULTILINE)
+    said = ""
+    for command in commands:
+        assert main([*command.split(), *["--jobs", "1"] * command.startswith("run")]) == 0
+        said += capsys.readouterr().out
+    lines = [line.rstrip() for line in said.splitlines()]
+    for line in shown.splitlines():
+        assert line.startswith("$ ") or line in lines
 
 
 def test_the_python_builds_a_spec() -> None:

@@ -9,7 +9,8 @@ Robots show their heading by a white nose, their wheels with the speed commanded
 contact; failed wheels are crossed out. The dashed outline is the goal pose; it and the box point
 ahead. Trails show where all have been. With ``sensors`` rays are drawn as far as infrared sensors
 see; those that meet something are violet and end there, the wider the stronger the reading. Robots
-too small to show wheels show a line ahead, and are never drawn smaller than a few pixels.
+too small to show wheels show a line ahead, always solid, and are never drawn smaller than a few
+pixels.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ AXES = (0.09, 0.11, 0.89, 0.81)
 DPI = 100
 MOST_FRAMES = 120
 """Longer episodes are thinned out to this many frames."""
-LEAST_RADIUS, WHEELS_FROM = 3.0, 6.0
+LEAST_RADIUS, WHEELS_FROM = 3.5, 6.0
 """Radius of a robot in pixels, at least, and from which on its wheels are drawn."""
 MARGIN = 0.04
 """Around what is drawn, as a fraction of it."""
@@ -156,12 +157,13 @@ class _Stage:
             failed = self.recording["failed"][step, wheels]
         radius, scale = self.radius, min(1.0, self.pixels_of_robot / 20)
         self._trail(poses, step, colour)
-        fill = to_rgba(colour, 0.9 if touching else 0.4)
+        small = self.pixels_of_robot < WHEELS_FROM
+        fill = to_rgba(colour, 0.9 if touching or small else 0.4)
         self._patch(Circle((0, 0), radius, fc=fill, ec=colour, lw=scale), poses[step])
-        if self.pixels_of_robot < WHEELS_FROM:
+        if small:
             edge = FAILED_COLOUR if failed.any() else "black"
-            line = [(0.0, 0.0), (1.8 * radius, 0.0)]
-            self._patch(Polygon(line, closed=False, fill=False, ec=edge), poses[step])
+            line = [(0.0, 0.0), (radius, 0.0)]  # no longer, or a row of robots looks like a comb
+            self._patch(Polygon(line, closed=False, fill=False, ec=edge, lw=0.8), poses[step])
             return
         nose = Polygon([(radius, 0), (0.4 * radius, 0.35 * radius), (0.4 * radius, -0.35 * radius)])
         nose.set(facecolor="white", edgecolor=colour, lw=scale)

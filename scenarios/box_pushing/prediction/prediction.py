@@ -81,7 +81,8 @@ class BoxPrediction:
         """Return a view of situations that the present leads to in `seconds`."""
         goal, now = self.situation.goal, self.situation.box
         before = float(np.hypot(goal[0] - now[0], goal[1] - now[1]))
-        return View(robots, box, gaps, goal, before, seconds / self.premises.hold)
+        periods = seconds / self.premises.hold
+        return View(robots, box, gaps, goal, before, periods, self.premises.outline)
 
     def _choices(self, joint_actions: IntArray) -> IntArray:
         """Return the wheel command ``(m, M)`` of each robot in joint actions ``(m, n)``."""
@@ -179,9 +180,14 @@ class BoxPrediction:
         shared = self.premises.space.shared_of(view, range(len(self.situation.groups)))
         n, n_own = len(self._places), self.premises.space.space.n_own
         found = np.empty((n, len(choices), self.premises.space.space.n_variables))
-        for agent, states in enumerate(found):
-            states[:, :n_own] = self._own_after(agent, choices, view)
-            states[:, n_own:] = shared[self.robot_of(agent)]
+        if self.premises.space.own_needs_pose:
+            for agent, states in enumerate(found):
+                states[:, :n_own] = self._own_after(agent, choices, view)
+        else:
+            speeds = self.wheel_commands.speeds[np.arange(choices.shape[1]), choices]
+            own = self.premises.space.own(np.zeros((0, 3)), speeds.reshape(-1), self.situation.goal)
+            found[:, :, :n_own] = own.reshape(len(choices), n, n_own).swapaxes(0, 1)
+        found[:, :, n_own:] = np.asarray(shared)[[robot for robot, _ in self._places]]
         return found
 
     def _own_after(self, agent: int, choices: IntArray, view: View) -> FloatArray:
@@ -229,7 +235,7 @@ class BoxPrediction:
         return found
 
     def rewards(self, joint_actions: IntArray) -> FloatArray:
-        """Return the predicted rewards ``(m,)`` of joint actions ``(m, n)``."""
+        """Return the predicted rewards ``(m,)`` of joint actions ``(m, n)``, the robots' mean."""
         return self._rewards(self._view_again(self._choices(joint_actions)))
 
     def reward_table(self) -> FloatArray:
@@ -238,7 +244,7 @@ class BoxPrediction:
         return self._rewards(view)[row]
 
     def _rewards(self, view: View) -> FloatArray:
-        return reward(
+        of_parties = reward(
             self.premises.task,
             view.distance,
             -view.approach,
@@ -246,6 +252,8 @@ class BoxPrediction:
             view.gaps < CONTACT_GAP,
             expected_reading(view.gaps, self.premises.infrared),
         )
+        mean: FloatArray = of_parties.mean(axis=1)
+        return mean
 
 
 def first_alike(keys: IntArray) -> IntArray:

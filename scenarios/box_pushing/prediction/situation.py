@@ -8,6 +8,7 @@ from ....core.arrays import FloatArray
 from ....core.spaces import ActionSet
 from ..reward import Task
 from ..states.state_spaces import BoxStateSpace
+from ..world.geometry import Outline
 from ..world.infrared import InfraredSpec
 from .belief import PushBelief
 
@@ -50,6 +51,8 @@ class Premises:
         What actions tell the wheels: an increment is a fraction of the ``(n,)`` limits [m/s].
     task, infrared
         What is rewarded, and what the sensors read.
+    outline
+        Of the box.
     hold, seconds
         How long a decision stands, and how far predictions look ahead [s].
     """
@@ -61,5 +64,6 @@ class Premises:
     limits: FloatArray
     task: Task
     infrared: InfraredSpec
+    outline: Outline
     hold: float
     seconds: float

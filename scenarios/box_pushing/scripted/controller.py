@@ -4,14 +4,15 @@ It picks a side at which to push the box towards the goal, gives every robot a s
 the robots that are not at their slot there (a short search over sequences of actions of one robot,
 around the box and clear of the others), and once all are, pushes: it tries the joint actions on the
 push predictor and takes the one after which the box is nearest to the goal and best aligned, with
-the robots still at their slots. It knows the whole situation and remembers nothing.
+the robots still at their slots. Three robots and more push a convex box in another way, see
+`box_pushing.scripted.crowd`. It knows the whole situation and remembers nothing.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import pairwise, product
-from math import atan2, cos, pi, prod, sin
+from itertools import product
+from math import atan2, cos, prod, sin
 from typing import Any
 
 import numpy as np
@@ -23,16 +24,14 @@ from ..prediction.predictors import push_model
 from ..prediction.push import push
 from ..scenario import BoxPushing
 from ..world.boxes import BoxSpec
-from ..world.robots import RobotSpec, nominal_effect
-from .routes import moved, paths
+from ..world.robots import RobotSpec
+from .crowd import SLOT_GAP, Crowd
+from .driving import CLEARANCE, Drivers, wrap
+from .routes import paths
 from .sides import SPREAD, Side, behind, is_concave, sides_of
 
-CLEARANCE = 0.006
-"""Least gap [m] to box and other robots on the way to a slot."""
-SLOT_GAP = 0.015
-"""Gap to the box at which a robot waits at its slot [m]."""
-LONGEST_SEARCH = 5000
-"""Action sequences tried per robot and decision."""
+CROWD = 3
+"""Robots, all alike, from which on a convex box with sides is pushed as by a `Crowd`."""
 WIDEST_JOINT = 300
 """Joint actions tried at once; above, robots choose in turn."""
 
@@ -76,13 +75,17 @@ class ScriptedController:
         self.increment = increment
         self.seconds = seconds
         self._radii: FloatArray = np.array([robot.radius for robot in robots])
-        self._choices = [_robot_actions(robot, len(self.actions)) for robot in robots]
-        self._effects = [nominal_effect(robot) for robot in robots]
-        counts = np.cumsum([0] + [len(robot.wheels) for robot in robots])
-        self._wheels = [slice(a, b) for a, b in pairwise(counts)]
         self._model = push_model("push", list(robots), box)
+        self._drivers = Drivers(
+            robots, box, self._model, self.actions, self.increment, self.seconds
+        )
         self._sides = sides_of(box, len(robots), float(self._radii.max()) + CLEARANCE)
         self._hollow = is_concave(box)
+        alike = len(set(self.robots)) == 1
+        crowded = len(self.robots) >= CROWD and alike and self._sides and not self._hollow
+        self._crowd = (
+            Crowd(self.robots, box, self._model, self._drivers, self._sides) if crowded else None
+        )
         self._backs: dict[tuple[float, float, float], float] = {}
 
     def act(self, measurements: Mapping[str, Any]) -> IntArray:
@@ -96,21 +99,30 @@ class ScriptedController:
         """
         robots, box = measurements["robot_poses"], measurements["box_pose"]
         goal, speeds = measurements["goal_pose"], measurements["wheel_speeds"]
+        if self._crowd is not None:
+            return self._joint(self._crowd.choose(robots, box, goal, speeds))
         side, slots = self._plan(robots, box, goal)
         heading = box[2] + side.direction
         away = [r for r, pose in enumerate(robots) if not self._at_slot(pose, slots[r], heading)]
         local = [
-            self._drive(r, robots, box, speeds, np.array([*slots[r], heading]), wait=r not in away)
+            self._drivers.drive(r, robots, box, speeds, np.array([*slots[r], heading]))
+            if r in away
+            else self._drivers.rest(r, speeds)
             for r in range(len(robots))
         ]
         # With steps as coarse as the actions' a robot may find no better place than it has.
         stuck = not any(speeds) and not any(
-            self._next(r, speeds[w][None])[0][0, k].any()
-            for r, (w, k) in enumerate(zip(self._wheels, local, strict=True))
+            self._drivers.next(r, speeds[w][None])[0][0, k].any()
+            for r, (w, k) in enumerate(zip(self._drivers.wheels, local, strict=True))
         )
         if stuck or not away:
             local = self._push(robots, box, goal, speeds, side, slots)
-        return np.concatenate([choices[k] for choices, k in zip(self._choices, local, strict=True)])
+        return self._joint(local)
+
+    def _joint(self, local: Sequence[int]) -> IntArray:
+        """Return the joint action ``(n,)`` of robot actions."""
+        choices = zip(self._drivers.choices, local, strict=True)
+        return np.concatenate([robot[k] for robot, k in choices])
 
     def _plan(
         self, robots: FloatArray, box: FloatArray, goal: FloatArray
@@ -120,7 +132,7 @@ class ScriptedController:
         sides = self._sides or [Side(course, self.box.reach, 0.0, 0.6 * self.box.reach)]
         best = None
         for side in sides:
-            error = float(_wrap(course - side.direction))
+            error = float(wrap(course - side.direction))
             slots = self._slots(side, box, error)
             costs = np.array(
                 [
@@ -178,61 +190,8 @@ class ScriptedController:
         dx, dy = pose[:2] - slot
         along, aside = cos(heading) * dx + sin(heading) * dy, cos(heading) * dy - sin(heading) * dx
         allowed = 0.03 if along < 0 else 0.045  # once it pushes, it is left alone for longer
-        turn = abs(_wrap(pose[2] - heading))
+        turn = abs(wrap(pose[2] - heading))
         return bool(-0.05 < along < 0.04 and abs(aside) < allowed and turn < 0.7)
-
-    def _next(self, robot: int, speeds: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return wheel speeds ``(m, k, w)`` and twists ``(m, k, 3)`` after the k robot actions.
-
-        `speeds` is ``(m, w)``.
-        """
-        limit = np.full(speeds.shape[-1], self.robots[robot].max_speed)
-        after = self.actions.apply(
-            speeds[:, None], self._choices[robot][None], self.increment * limit, limit
-        )
-        effect = self._effects[robot]
-        return after, after @ effect[:, :-1].T + effect[:, -1]
-
-    def _drive(
-        self,
-        robot: int,
-        robots: FloatArray,
-        box: FloatArray,
-        speeds: FloatArray,
-        target: FloatArray,
-        *,
-        wait: bool,
-    ) -> int:
-        """Return the robot action that leads a robot towards a pose, or stops it if it waits."""
-        now = speeds[self._wheels[robot]][None]
-        if wait:
-            after, _ = self._next(robot, now)
-            return int(np.abs(after[0]).sum(axis=1).argmin())
-        others = np.delete(robots[:, :2], robot, axis=0)
-        spans = self._radii[robot] + np.delete(self._radii, robot) + CLEARANCE
-        poses, first = robots[robot][None], None
-        cost = np.zeros(1)
-        while len(poses) * len(self._choices[robot]) <= LONGEST_SEARCH:
-            after, twists = self._next(robot, now)
-            options = twists.shape[1]
-            poses = np.repeat(poses, options, axis=0)
-            cost = np.repeat(cost, options)
-            first = np.arange(options) if first is None else np.repeat(first, options)
-            now = after.reshape(-1, now.shape[1])
-            twists = twists.reshape(-1, 3)
-            for _ in range(2):
-                poses = moved(poses, twists, self.seconds / 2)
-                apart = np.hypot(*(poses[:, None, :2] - others).transpose(2, 0, 1))
-                cost = cost + 10.0 * np.maximum(spans - apart, 0.0).sum(axis=1)
-                path = paths(
-                    poses, target[:2], box, self._model.edges, self._model.rounding,
-                    self._radii[robot] + CLEARANCE, self.box.reach,
-                )  # fmt: skip
-                turn = np.abs(_wrap(poses[:, 2] - target[2]))
-                cost = cost + 0.1 * (path + 0.06 * turn * np.exp(-path / 0.05))
-            arrived = path + 0.06 * turn * np.exp(-path / 0.05)
-        assert first is not None
-        return int(first[(cost + arrived).argmin()])
 
     def _push(
         self,
@@ -244,7 +203,9 @@ class ScriptedController:
         slots: FloatArray,
     ) -> list[int]:
         """Return the robot actions that push best, as far as the push predictor can tell."""
-        tables = [self._next(r, speeds[w][None])[1][0] for r, w in enumerate(self._wheels)]
+        tables = [
+            self._drivers.next(r, speeds[w][None])[1][0] for r, w in enumerate(self._drivers.wheels)
+        ]
         twists = np.zeros((len(tables), max(map(len, tables)), 3))
         for r, table in enumerate(tables):
             twists[r, : len(table)] = table
@@ -284,14 +245,14 @@ class ScriptedController:
         heading = box[:, 2] + side.direction
         cost = distance.copy()
         if self._sides:
-            error = _wrap(np.arctan2(ahead[:, 1], ahead[:, 0]) - heading)
+            error = wrap(np.arctan2(ahead[:, 1], ahead[:, 0]) - heading)
             steer = 2.2 * self._spread(side) * np.abs(error)
             cost += steer * np.minimum(1.0, distance / 0.2)
         for r in range(robots.shape[1]):
             dx, dy = robots[:, r, 0] - box[:, 0], robots[:, r, 1] - box[:, 1]
             off = np.cos(heading) * dy - np.sin(heading) * dx - aside[r]
             cost += 0.3 * np.maximum(gaps[:, r], 0.0) + 3.0 * off**2
-            cost += 0.02 * _wrap(robots[:, r, 2] - heading) ** 2
+            cost += 0.02 * wrap(robots[:, r, 2] - heading) ** 2
         return cost
 
 
@@ -322,15 +283,3 @@ def decisions_to_goal(scenario: BoxPushing, seed: int, steps: int) -> int | None
         if transition.terminated or transition.truncated:
             return step if transition.terminated else None
     return None
-
-
-def _robot_actions(robot: RobotSpec, n_actions: int) -> IntArray:
-    """Return the combinations ``(k, w)`` of actions to try: wheels of one side act alike."""
-    sides = [int(np.sign(wheel.y)) for wheel in robot.wheels]
-    groups = sorted(set(sides))
-    rows = product(range(n_actions), repeat=len(groups))
-    return np.array([[row[groups.index(side)] for side in sides] for row in rows])
-
-
-def _wrap(angle: Any) -> Any:
-    return (angle + pi) % (2 * pi) - pi

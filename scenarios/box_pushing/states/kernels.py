@@ -14,7 +14,9 @@ import numpy as np
 
 from ....core.arrays import FloatArray, IntArray
 from ....core.compiling import njit
-from .view import View
+from ..world.geometry import ON_SURFACE
+from .relational import AWAY
+from .view import CLOSE, LEAST, View
 
 LANES = 32
 """Situations side by side."""
@@ -22,13 +24,20 @@ _EXACT = {"contract", "nsz"}
 
 COMPILED = (
     "gap", "box_bearing", "side", "others_gap", "push_bearing", "cross_track_error",
-    "box_distance", "approach", "box_turn", "bend",
+    "box_distance", "approach", "box_turn", "bend", "face_bearing", "others_away",
+    "contact_push_bearing", "contact_cross_track_error",
 )  # fmt: skip
 """The built-in variables that are computed here, each in a row of scratch of its own."""
-GAP, BEARING, SIDE, OTHERS, PUSH, CROSS_TRACK, DISTANCE, APPROACH, TURN, BEND = range(len(COMPILED))
+(
+    GAP, BEARING, SIDE, OTHERS, PUSH, CROSS_TRACK, DISTANCE, APPROACH, TURN, BEND, FACE_BEARING,
+    AWAY_OTHERS, CONTACT_PUSH, CONTACT_CROSS_TRACK,
+) = range(len(COMPILED))  # fmt: skip
 # Rows of what several variables need; no column can name them.
-_COURSE, _X, _Y = len(COMPILED), len(COMPILED) + 1, len(COMPILED) + 2
-_ROWS = len(COMPILED) + 3
+_COURSE, _X, _Y, _WEIGHT, _SQUARE, _NEAR_X, _NEAR_Y, _INSIDE = range(
+    len(COMPILED), len(COMPILED) + 8
+)
+_ROWS = len(COMPILED) + 8
+_OF_CONTACT = (CONTACT_PUSH, CONTACT_CROSS_TRACK)
 
 
 class Columns:
@@ -48,13 +57,16 @@ class Columns:
     def __init__(self, names: Sequence[str]) -> None:
         assert set(names) <= set(COMPILED), f"{list(names)}: not all of them are compiled"
         self.rows: IntArray = np.array([COMPILED.index(name) for name in names], dtype=np.int64)
+        self._of_face = bool((self.rows == FACE_BEARING).any())
+        self._of_contact = bool(np.isin(self.rows, _OF_CONTACT).any())
 
     def of(self, view: View, robots: Sequence[int]) -> FloatArray:
         """Return the variables ``(len(robots), m, columns)`` of robots in the view's situations."""
         found: FloatArray = _relational(
             np.ascontiguousarray(view.robots.transpose(1, 2, 0)),
             np.ascontiguousarray(view.box.T), np.ascontiguousarray(view.gaps.T),
-            view.goal, view.before, view.periods, np.array(robots), self.rows,
+            view.goal, view.before, view.periods, view.outline.edges,
+            np.array(robots), self.rows, self._of_face, self._of_contact,
         )  # fmt: skip
         return found
 
@@ -117,7 +129,7 @@ def _of_box(box, goal, before, periods, first, count, work):  # type: ignore[no-
 @njit(cache=True, error_model="numpy", fastmath=_EXACT)
 def _of_push(robots, box, goal, first, count, work):  # type: ignore[no-untyped-def]
     """Write where the robots' middle would push the box, and its cross-track error."""
-    n, gx, gy = len(robots), goal[0], goal[1]
+    n = len(robots)
     for k in range(count):
         work[_X * LANES + k] = work[_Y * LANES + k] = 0.0
     for r in range(n):
@@ -125,15 +137,41 @@ def _of_push(robots, box, goal, first, count, work):  # type: ignore[no-untyped-
         for k in range(count):
             work[_X * LANES + k] += x[k]
             work[_Y * LANES + k] += y[k]
+    for k in range(count):
+        work[_WEIGHT * LANES + k] = n
+    _of_middle(box, goal, first, count, work, PUSH, CROSS_TRACK)
+
+
+@njit(cache=True, error_model="numpy", fastmath=_EXACT)
+def _of_contact_push(robots, gaps, box, goal, first, count, work):  # type: ignore[no-untyped-def]
+    """Write the same of the robots in contact, see `View.contact_push`."""
+    for k in range(count):
+        work[_X * LANES + k] = work[_Y * LANES + k] = work[_WEIGHT * LANES + k] = 0.0
+    for r in range(len(robots)):
+        x, y = robots[r, 0, first : first + count], robots[r, 1, first : first + count]
+        apart = gaps[r, first : first + count]
+        for k in range(count):
+            weight = np.exp(-max(apart[k], 0.0) / CLOSE) + LEAST
+            work[_X * LANES + k] += weight * x[k]
+            work[_Y * LANES + k] += weight * y[k]
+            work[_WEIGHT * LANES + k] += weight
+    _of_middle(box, goal, first, count, work, CONTACT_PUSH, CONTACT_CROSS_TRACK)
+
+
+@njit(cache=True, error_model="numpy", fastmath=_EXACT)
+def _of_middle(box, goal, first, count, work, push, cross_track):  # type: ignore[no-untyped-def]
+    """Write into two rows where a weighted middle would push the box, and its cross-track error."""
+    gx, gy = goal[0], goal[1]
     bx, by = box[0, first : first + count], box[1, first : first + count]
     for k in range(count):
-        dx, dy = bx[k] - work[_X * LANES + k] / n, by[k] - work[_Y * LANES + k] / n
+        weight = work[_WEIGHT * LANES + k]
+        dx, dy = bx[k] - work[_X * LANES + k] / weight, by[k] - work[_Y * LANES + k] / weight
         ahead, left = gx - bx[k], gy - by[k]
-        work[PUSH * LANES + k] = wrapped(angle_of(dx, dy) - work[_COURSE * LANES + k])
+        work[push * LANES + k] = wrapped(angle_of(dx, dy) - work[_COURSE * LANES + k])
         length = np.sqrt(dx * dx + dy * dy)
         across = (ahead * dy - left * dx) / (length if length > 0.0 else 1.0)
         beyond = np.copysign(work[DISTANCE * LANES + k], across)
-        work[CROSS_TRACK * LANES + k] = across if ahead * dx + left * dy >= 0.0 else beyond
+        work[cross_track * LANES + k] = across if ahead * dx + left * dy >= 0.0 else beyond
 
 
 @njit(cache=True, error_model="numpy", fastmath=_EXACT)
@@ -150,21 +188,85 @@ def _of_robot(robot, gap, box, first, count, work):  # type: ignore[no-untyped-d
 
 
 @njit(cache=True, error_model="numpy", fastmath=_EXACT)
+def _of_face(robot, box, edges, first, count, work):  # type: ignore[no-untyped-def]
+    """Write the bearing of the way into the face of the box that is next to a robot.
+
+    As `View.inward`: the direction to the nearest point from outside, away from it from inside.
+    Rounding moves that point along the same line.
+    """
+    x, y, psi = (
+        robot[0, first : first + count], robot[1, first : first + count],
+        robot[2, first : first + count],
+    )  # fmt: skip
+    bx, by, turn = (
+        box[0, first : first + count], box[1, first : first + count], box[2, first : first + count],
+    )  # fmt: skip
+    for k in range(count):
+        cos, sin = np.cos(turn[k]), np.sin(turn[k])
+        dx, dy = x[k] - bx[k], y[k] - by[k]
+        work[_X * LANES + k] = cos * dx + sin * dy
+        work[_Y * LANES + k] = cos * dy - sin * dx
+        work[_SQUARE * LANES + k] = np.inf
+        work[_INSIDE * LANES + k] = 1.0
+    for i in range(len(edges)):
+        x0, y0, x1, y1 = edges[i, 0], edges[i, 1], edges[i, 2], edges[i, 3]
+        dx, dy = x1 - x0, y1 - y0
+        length2 = dx * dx + dy * dy
+        scale = 1.0 / length2 if length2 > 0.0 else 0.0
+        slope = dx / dy if dy != 0.0 else 0.0
+        for k in range(count):
+            px, py = work[_X * LANES + k], work[_Y * LANES + k]
+            t = min(max(((px - x0) * dx + (py - y0) * dy) * scale, 0.0), 1.0)
+            cx, cy = x0 + t * dx - px, y0 + t * dy - py
+            square = cx * cx + cy * cy
+            nearer = square < work[_SQUARE * LANES + k]
+            if square <= ON_SURFACE * ON_SURFACE:  # straight across the edge
+                cx, cy = -dy, dx
+            work[_SQUARE * LANES + k] = square if nearer else work[_SQUARE * LANES + k]
+            work[_NEAR_X * LANES + k] = cx if nearer else work[_NEAR_X * LANES + k]
+            work[_NEAR_Y * LANES + k] = cy if nearer else work[_NEAR_Y * LANES + k]
+            crosses = ((y0 > py) != (y1 > py)) & (px < x0 + (py - y0) * slope)
+            side = work[_INSIDE * LANES + k]
+            work[_INSIDE * LANES + k] = -side if crosses else side
+    for k in range(count):
+        on_surface = work[_SQUARE * LANES + k] <= ON_SURFACE * ON_SURFACE
+        sign = 1.0 if on_surface else work[_INSIDE * LANES + k]
+        inward = turn[k] + angle_of(
+            sign * work[_NEAR_X * LANES + k], sign * work[_NEAR_Y * LANES + k]
+        )
+        work[FACE_BEARING * LANES + k] = wrapped(inward - psi[k])
+
+
+@njit(cache=True, error_model="numpy", fastmath=_EXACT)
 def _of_others(gaps, robot, first, count, work):  # type: ignore[no-untyped-def]
-    """Write the greatest gap of the other robots; of the robot itself if it is alone."""
+    """Write the greatest gap of the other robots and how many are away; of one alone its own."""
     n = len(gaps)
+    share = 1.0 / max(n - 1, 1)
     for k in range(count):
         work[OTHERS * LANES + k] = -np.inf
+        work[AWAY_OTHERS * LANES + k] = 0.0
     for r in range(n):
         if r != robot or n == 1:
             gap = gaps[r, first : first + count]
             for k in range(count):
                 work[OTHERS * LANES + k] = max(work[OTHERS * LANES + k], gap[k])
+                away = min(max(gap[k] / AWAY, 0.0), 1.0)
+                work[AWAY_OTHERS * LANES + k] += share * away
 
 
 @njit(cache=True)
 def _relational(  # type: ignore[no-untyped-def]
-    robots, box, gaps, goal, before: float, periods: float, wanted: IntArray, columns: IntArray
+    robots,
+    box,
+    gaps,
+    goal,
+    before: float,
+    periods: float,
+    edges: FloatArray,
+    wanted: IntArray,
+    columns: IntArray,
+    of_face: bool,
+    of_contact: bool,
 ) -> FloatArray:
     """Return relational shared blocks ``(robots wanted, m, columns)``.
 
@@ -172,12 +274,14 @@ def _relational(  # type: ignore[no-untyped-def]
     ----------
     robots, box, gaps
         ``(M, 3, m)``, ``(3, m)`` and ``(M, m)``: a `View`, its situations last.
-    goal, before, periods
-        Of the view.
+    goal, before, periods, edges
+        Of the view and the outline of its box.
     wanted
         Indices of robots.
     columns
         Rows of scratch of variables, see `Columns`.
+    of_face, of_contact
+        Whether some are what `_of_face` and `_of_contact_push` write.
     """
     m = box.shape[1]
     out, work = np.empty((len(wanted), m, len(columns))), np.empty(_ROWS * LANES)
@@ -185,10 +289,14 @@ def _relational(  # type: ignore[no-untyped-def]
         count = min(LANES, m - first)
         _of_box(box, goal, before, periods, first, count, work)
         _of_push(robots, box, goal, first, count, work)
+        if of_contact:
+            _of_contact_push(robots, gaps, box, goal, first, count, work)
         for i in range(len(wanted)):
             r = wanted[i]
             _of_robot(robots[r], gaps[r], box, first, count, work)
             _of_others(gaps, r, first, count, work)
+            if of_face:
+                _of_face(robots[r], box, edges, first, count, work)
             for k in range(count):
                 row = out[i, first + k]
                 for c in range(len(columns)):

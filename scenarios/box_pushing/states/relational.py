@@ -17,6 +17,8 @@ from ....core.arrays import FloatArray
 from .variables import StateFunction, StateVariable, state_variable
 from .view import View, wrap
 
+AWAY = 0.03
+"""Gap [m] from which a robot counts as wholly away from the box."""
 SIDES = (-2.2, -0.5, 0.0, 0.5, 2.2)
 GAPS = (0.0, 0.015, 0.06, 0.2, 0.5)
 NEARNESS = ("touching", "close", "near", "away", "far")
@@ -24,9 +26,11 @@ TURNS = ("far right", "right", "ahead", "left", "far left")
 
 
 def _angle(
-    centres: tuple[float, ...], labels: tuple[str, ...] = TURNS
+    centres: tuple[float, ...], labels: tuple[str, ...] = TURNS, *, common: bool = False
 ) -> Callable[[StateFunction], StateVariable]:
-    return state_variable("rad", -pi, pi, periodic=True, centres=centres, labels=labels)
+    return state_variable(
+        "rad", -pi, pi, periodic=True, centres=centres, labels=labels, common=common
+    )
 
 
 @state_variable("m", 0.0, 0.5, centres=GAPS, labels=NEARNESS)
@@ -55,7 +59,7 @@ def others_gap(view: View, robot: int) -> FloatArray:
     return gaps
 
 
-@_angle(SIDES)
+@_angle(SIDES, common=True)
 def push_bearing(view: View, robot: int) -> FloatArray:
     """Where the robots' middle would push the box, off the course."""
     return wrap(view.push - view.course)
@@ -63,7 +67,7 @@ def push_bearing(view: View, robot: int) -> FloatArray:
 
 @state_variable(
     "m", -0.4, 0.4, centres=(-0.3, -0.06, 0.0, 0.06, 0.3),
-    labels=("far right", "right", "none", "left", "far left"),
+    labels=("far right", "right", "none", "left", "far left"), common=True,
 )  # fmt: skip
 def cross_track_error(view: View, robot: int) -> FloatArray:
     """By how much that push would miss the goal; beyond it the whole distance."""
@@ -74,7 +78,7 @@ def cross_track_error(view: View, robot: int) -> FloatArray:
 
 @state_variable(
     "m", 0.0, 1.1, centres=(0.0, 0.1, 0.3, 0.6, 1.1),
-    labels=("there", "close", "near", "away", "far"),
+    labels=("there", "close", "near", "away", "far"), common=True,
 )  # fmt: skip
 def box_distance(view: View, robot: int) -> FloatArray:
     """Distance of the box from the goal."""
@@ -83,20 +87,58 @@ def box_distance(view: View, robot: int) -> FloatArray:
 
 @state_variable(
     "m", -0.05, 0.05, centres=(-0.02, -0.005, 0.0, 0.01, 0.03),
-    labels=("receding", "slipping", "none", "slow", "fast"),
+    labels=("receding", "slipping", "none", "slow", "fast"), common=True,
 )  # fmt: skip
 def approach(view: View, robot: int) -> FloatArray:
     """By how much the box came nearer per decision period: -Delta D of Conditions 1, 2."""
     return view.approach
 
 
-@_angle((-0.8, -0.2, 0.0, 0.2, 0.8))
+@_angle((-0.8, -0.2, 0.0, 0.2, 0.8), common=True)
 def box_turn(view: View, robot: int) -> FloatArray:
     """Turn of the box from the goal pose."""
     return view.turn
 
 
-@_angle((-0.8, -0.15, 0.0, 0.15, 0.8))
+@_angle((-0.8, -0.15, 0.0, 0.15, 0.8), common=True)
 def bend(view: View, robot: int) -> FloatArray:
     """By how much the box is turned off the arc that ends in the goal pose."""
     return wrap(view.turn - 2.0 * wrap(view.course - view.goal[2]))
+
+
+@_angle(SIDES)
+def face_bearing(view: View, robot: int) -> FloatArray:
+    """Bearing, in the frame of the robot, of the way straight into the nearest face of the box."""
+    return wrap(view.inward(robot) - view.robots[:, robot, 2])
+
+
+@state_variable(
+    "1", 0.0, 1.0, centres=(0.0, 0.25, 0.5, 0.75, 1.0),
+    labels=("none", "some", "half", "most", "all"),
+)  # fmt: skip
+def others_away(view: View, robot: int) -> FloatArray:
+    """How many of the other robots are away from the box, as a share: gaps up to `AWAY` in part.
+
+    Of a robot that is alone, its own.
+    """
+    others = [r for r in range(view.gaps.shape[1]) if r != robot] or [robot]
+    away: FloatArray = np.clip(view.gaps[:, others] / AWAY, 0.0, 1.0).mean(axis=1)
+    return away
+
+
+@_angle((-1.2, -0.4, 0.0, 0.4, 1.2), common=True)
+def contact_push_bearing(view: View, robot: int) -> FloatArray:
+    """Where the robots in contact push the box, off the course."""
+    return wrap(view.contact_push - view.course)
+
+
+@state_variable(
+    "m", -1.0, 1.0, centres=(-0.8, -0.3, -0.08, 0.0, 0.08, 0.3, 0.8),
+    labels=("very far right", "far right", "right", "none", "left", "far left", "very far left"),
+    common=True,
+)  # fmt: skip
+def contact_cross_track_error(view: View, robot: int) -> FloatArray:
+    """By how much that push would miss the goal; beyond it the whole distance."""
+    off = np.clip(contact_push_bearing(view, robot), -0.5 * pi, 0.5 * pi)
+    missed: FloatArray = view.distance * np.sin(off)
+    return missed

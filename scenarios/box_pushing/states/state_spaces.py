@@ -82,6 +82,7 @@ class Listed:
         things = [found(name) for name in names]
         is_compiled = np.array([name in COMPILED for name in names], dtype=bool)
         self.variables = tuple(thing.variable for thing in things)
+        self.common = tuple(thing.variable.name for thing in things if thing.common)
         self.functions = tuple(thing for thing, c in zip(things, is_compiled, strict=True) if not c)
         self._things, self._is_compiled = things, is_compiled
         self._columns = Columns([name for name in names if name in COMPILED])
@@ -152,7 +153,7 @@ def listed(name: str, *shared: str) -> BoxStateSpace:
             f"scenario.state_space = {list(shared)}: variables must be distinct and at least one"
         )
     return BoxStateSpace(
-        StateSpace(name, (_SPEED, *variables.variables), n_own=1),
+        StateSpace(name, (_SPEED, *variables.variables), 1, variables.common),
         lambda poses, speeds, goal: speeds[:, None],
         variables.sensed,
         own_needs_pose=False,
@@ -166,6 +167,17 @@ _PUSHING = (
     "side",
     "others_gap",
     "cross_track_error",
+    "box_distance",
+    "approach",
+)
+
+_PUSHING_TOGETHER = (
+    "gap",
+    "face_bearing",
+    "side",
+    "others_away",
+    "contact_push_bearing",
+    "contact_cross_track_error",
     "box_distance",
     "approach",
 )
@@ -185,6 +197,7 @@ STATE_SPACES: dict[str, BoxStateSpace] = {
                 Variable("box_distance", "m", 0.0, 1.2),
             ),
             n_own=4,
+            common=("box_orientation", "box_goal_bearing", "box_distance"),
         ),
         _paper_own,
         _paper_shared,
@@ -194,6 +207,8 @@ STATE_SPACES: dict[str, BoxStateSpace] = {
     # What matters for bringing the box to the goal, and for turning it into the goal pose besides.
     "relational": listed("relational", *_PUSHING),
     "pose": listed("pose", *_PUSHING, "bend", "box_turn"),
+    # The same for boxes that are wide for a robot, and for any number of robots.
+    "crowd": listed("crowd", *_PUSHING_TOGETHER),
 }
 """State spaces by the name that specs use."""
 

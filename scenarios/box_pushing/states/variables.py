@@ -39,10 +39,13 @@ class StateVariable:
         Its name, unit, range and membership centres.
     function
         ``function(view, robot) -> (m,)``.
+    common
+        Whether it is the same for all robots.
     """
 
     variable: Variable
     function: StateFunction
+    common: bool = False
 
     def __call__(self, view: View, robot: int) -> FloatArray:
         """Return the values ``(m,)`` for a robot."""
@@ -73,12 +76,15 @@ def state_variable(
     periodic: bool = False,
     centres: tuple[float, ...] = (),
     labels: tuple[str, ...] = (),
+    common: bool = False,
 ) -> Callable[[StateFunction], StateVariable]:
     """Make a function of a view and a robot a state variable of the function's name.
 
-    Parameters are those of `nested_agents.core.spaces.Variable`. What the function is given is
-    read-only. Built-in variables are compiled for prediction: with one of its seven shared
-    variables written as here, the decision of a team of two e-Pucks takes about a third longer.
+    Parameters are those of `nested_agents.core.spaces.Variable`, and `common`: whether it is the
+    same for all robots, which makes decisions by the values of many agents faster. What the
+    function is given is read-only. Built-in variables are compiled for prediction: with one of its
+    seven shared variables written as here, the decision of a team of two e-Pucks takes about a
+    third longer.
 
     Examples
     --------
@@ -92,7 +98,7 @@ def state_variable(
     def described(function: StateFunction) -> StateVariable:
         name: Any = getattr(function, "__name__", None)
         variable = Variable(name, unit, low, high, periodic, centres, labels)
-        return StateVariable(variable, function)
+        return StateVariable(variable, function, common)
 
     return described
 
@@ -105,7 +111,8 @@ STATE_VARIABLES = Registry(
         name: f"{_PLACE}:{name}"
         for name in (
             "gap", "box_bearing", "side", "others_gap", "push_bearing", "cross_track_error",
-            "box_distance", "approach", "box_turn", "bend",
+            "box_distance", "approach", "box_turn", "bend", "face_bearing",
+            "others_away", "contact_push_bearing", "contact_cross_track_error",
         )
     },
 )  # fmt: skip

@@ -9,6 +9,13 @@ from math import pi
 import numpy as np
 
 from ....core.arrays import FloatArray
+from ....core.compiling import njit
+from ..world.geometry import Outline, surface
+
+CLOSE = 0.02
+"""Gap [m] over which the weight of a robot's contact falls to 1/e."""
+LEAST = 0.001
+"""Weight of a robot far away: where none is close, all count alike."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +36,8 @@ class View:
         Distance of the box from the goal before the motion that led here [m].
     periods
         How many decision periods that motion took.
+    outline
+        Of the box, in its own frame.
     """
 
     robots: FloatArray
@@ -37,13 +46,15 @@ class View:
     goal: FloatArray
     before: float
     periods: float
+    outline: Outline
 
     # What all robots share is computed once, and must stay as it is.
 
     def guarded(self) -> View:
         """Return the same situations, not to be written to."""
         robots, box, gaps = (_fixed(a.view()) for a in (self.robots, self.box, self.gaps))
-        return View(robots, box, gaps, _fixed(self.goal.view()), self.before, self.periods)
+        goal = _fixed(self.goal.view())
+        return View(robots, box, gaps, goal, self.before, self.periods, self.outline)
 
     @cached_property
     def distance(self) -> FloatArray:
@@ -70,6 +81,17 @@ class View:
         return _fixed(np.arctan2(ahead[:, 1], ahead[:, 0]))
 
     @cached_property
+    def contact_push(self) -> FloatArray:
+        """The same direction ``(m,)``, every robot weighing by how close it is to the box [rad].
+
+        The weight of a robot is ``exp(-gap / CLOSE) + LEAST``: those that do not push do not count.
+        """
+        weights = (np.exp(-np.maximum(self.gaps, 0.0) / CLOSE) + LEAST)[:, :, None]
+        middle = (weights * self.robots[:, :, :2]).sum(axis=1) / weights.sum(axis=1)
+        ahead = self.box[:, :2] - middle
+        return _fixed(np.arctan2(ahead[:, 1], ahead[:, 0]))
+
+    @cached_property
     def turn(self) -> FloatArray:
         """Turn ``(m,)`` of the box from the goal pose [rad]."""
         return _fixed(wrap(self.box[:, 2] - self.goal[2]))
@@ -79,11 +101,27 @@ class View:
         pose = self.robots[:, robot]
         return np.arctan2(self.box[:, 1] - pose[:, 1], self.box[:, 0] - pose[:, 0])
 
+    def inward(self, robot: int) -> FloatArray:
+        """Direction ``(m,)`` into the box at the point of its surface next to a robot [rad]."""
+        return _inward(self.robots[:, robot], self.box, self.outline.edges, self.outline.rounding)
+
 
 def _fixed(array: FloatArray) -> FloatArray:
     """Make an array read-only, and return it."""
     array.flags.writeable = False
     return array
+
+
+@njit(cache=True)
+def _inward(robots, boxes, edges, rounding):  # type: ignore[no-untyped-def]
+    """Return the direction into the box ``(m,)`` at the point next to each robot, world frame."""
+    directions = np.empty(len(robots))
+    for c in range(len(robots)):
+        cos, sin = np.cos(boxes[c, 2]), np.sin(boxes[c, 2])
+        dx, dy = robots[c, 0] - boxes[c, 0], robots[c, 1] - boxes[c, 1]
+        near = surface(edges, rounding, cos * dx + sin * dy, cos * dy - sin * dx)
+        directions[c] = boxes[c, 2] + np.arctan2(-near[2], -near[1])
+    return directions
 
 
 _TURN = 2.0 * pi

@@ -188,13 +188,19 @@ class BoxSpec:
             mass=factor * self.mass,
         )
 
+    def widened(self, factor: float) -> BoxSpec:
+        """Return the polygon with its extent along y and its mass multiplied by `factor`."""
+        rings = [tuple((x, factor * y) for x, y in ring) for ring in (self.vertices, *self.holes)]
+        return replace(self, vertices=rings[0], holes=tuple(rings[1:]), mass=factor * self.mass)
+
 
 def box_for(box: str | BoxSettings, robots: int) -> BoxSpec:
     """Return the box that a spec names or describes, or that `label` has written.
 
     Up to two robots push the box as it stands in the table. For more, its lengths and its mass
     grow in proportion to their number: each has the same room along the back and the same share
-    of the friction as one of two. A box that is described grows only if it says so.
+    of the friction as one of two. A box that is described grows only if it says so, and if it says
+    so along its width only.
 
     Raises
     ------
@@ -207,6 +213,31 @@ def box_for(box: str | BoxSettings, robots: int) -> BoxSpec:
     >>> round(box.area, 12), box.mass
     (0.16, 0.8)
     """
+    described, grows = _described(box)
+    factor = growth(box, robots)
+    if factor == 1.0:
+        return described
+    return described.widened(factor) if grows == "width" else described.scaled(factor)
+
+
+def growth(box: str | BoxSettings, robots: int) -> float:
+    """Return by what factor a box is larger for some robots than for two; 1: it does not grow.
+
+    Raises
+    ------
+    ValueError
+        As `box_for`.
+
+    Examples
+    --------
+    >>> growth("square", 2), growth("square", 8)
+    (1.0, 4.0)
+    """
+    return max(robots / ROBOTS_PER_BOX, 1.0) if _described(box)[1] else 1.0
+
+
+def _described(box: str | BoxSettings) -> tuple[BoxSpec, bool | str]:
+    """Return a box as it stands in the table or the spec, and whether it grows."""
     if isinstance(box, str) and box.startswith("{"):
         box = BoxSettings.model_validate_json(box)
     if isinstance(box, BoxSettings):
@@ -214,13 +245,10 @@ def box_for(box: str | BoxSettings, robots: int) -> BoxSpec:
             "own", box.vertices, box.holes,
             mass=box.mass, friction=box.friction, contact_friction=box.contact_friction,
         )  # fmt: skip
-        grows = box.grows
-    elif box in BOXES:
-        described, grows = BOXES[box], True
-    else:
+        return described, box.grows
+    if box not in BOXES:
         raise ValueError(f"scenario.box = {box!r}, allowed {', '.join(sorted(BOXES))}")
-    crowded = grows and robots > ROBOTS_PER_BOX
-    return described.scaled(robots / ROBOTS_PER_BOX) if crowded else described
+    return BOXES[box], True
 
 
 def _rectangle(name: str, depth: float, width: float) -> BoxSpec:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ...trials.trial import run_trial as measure
+from ...trials.session import run_trial as measure
 from .analysis import ChainOrders, analyse
 
 if TYPE_CHECKING:

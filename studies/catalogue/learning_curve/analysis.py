@@ -15,11 +15,10 @@ import numpy as np
 from ....core.protocols import SUCCESS, Measure
 from ...analysis.results import Results
 from ...analysis.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, rates
-from ...analysis.summary import Summary
+from ...analysis.summary import EVALUATED, Summary, evaluated
 
 BLOCK = 5
 """Episodes at each end of training that the table averages over."""
-EVALUATED = "evaluation success"
 
 
 @dataclass(frozen=True)
@@ -107,6 +106,8 @@ def analyse(results: Results) -> LearningCurves:
             estimates[metric.title] = (
                 rate(values) if metric.is_rate else bootstrap(_runs(values), bounds=metric.bounds)
             )
+            if metric.title == EVALUATED:
+                estimates |= evaluated(results, condition)
         table.append(Summary(condition, len(training["success"]), estimates))
     followed = [m for m in results.measures if m.name == SUCCESS.name or not m.is_rate]
     curves = {

@@ -22,22 +22,23 @@ import numpy as np
 from ....core.protocols import groups_of
 from ...analysis.results import Results
 from ...analysis.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
-from ...analysis.summary import Summary
+from ...analysis.summary import Summary, evaluated
 from ...trials.contact import ContactShares
-from ...trials.trial import Session, Trial, TrialResult
+from ...trials.session import Session
+from ...trials.trial import Trial, TrialResult
 
 COLUMNS = (
-    "success", "evaluation success", "all touch",
-    "decide [ms]", "learn [ms]", "team [MB]", "process [MB]",
+    "success", "all touch", "decide [ms]", "learn [ms]", "team [MB]", "process [MB]",
 )  # fmt: skip
-"""What the table shows."""
+"""What the table shows, and after the first of them the evaluations."""
 MEMORY = Path("/proc/self/status")
 CLEAR = Path("/proc/self/clear_refs")
 
 
 def measure(trial: Trial) -> TrialResult:
     """Train and evaluate a team, and note what it takes; imported by name in workers."""
-    Session(replace(trial, episodes=1, steps=2)).train(1)  # compiles, once a process
+    # Compiles, once a process.
+    Session(replace(trial, episodes=1, steps=2, curriculum=())).train(1)
     session = Session(trial)
     _forget_peak()
     session.train(trial.episodes)
@@ -57,6 +58,7 @@ def measure(trial: Trial) -> TrialResult:
         numbers["period_s"] = period
     contact = ContactShares()
     session.evaluate(contact)
+    session.evaluate_elsewhere()
     shares = contact.shares
     if len(shares):
         numbers["least_touching"] = float(shares.min(axis=1).mean())
@@ -170,18 +172,16 @@ def analyse(results: Results) -> Scaling:
         }
         if "process_bytes" in usage:
             costs["process [MB]"] = 1e-6 * usage["process_bytes"]
-        values = {"success": rate(training["success"][:, -5:])}
+        evaluations = evaluated(results, condition)
+        values = {"success": rate(training["success"][:, -5:])} | evaluations
         values |= {title: bootstrap(cost, bounds=NOT_NEGATIVE) for title, cost in costs.items()}
-        if condition in results.evaluation:
-            evaluation = rate(results.evaluation[condition]["success"])
-            values = {"success": values.pop("success"), "evaluation success": evaluation} | values
         if "all_touching" in numbers:
             values["all touch"] = bootstrap(numbers["all_touching"], bounds=(0, 1))
         agents, passed = (int(numbers[n][0]) for n in ("agents", "messages"))
         evaluator = _without_robots(condition, sizes)
         period = float(numbers["period_s"][0]) if "period_s" in numbers else None
         points.append(Point(evaluator, sizes[condition], agents, passed, period, values))
-        shown = {name: values[name] for name in COLUMNS if name in values}
+        shown = {n: values[n] for n in (*COLUMNS[:1], *evaluations, *COLUMNS[1:]) if n in values}
         table.append(Summary(condition, len(steps), shown))
     exponents = _exponents(points)
     notes = [

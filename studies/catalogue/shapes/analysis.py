@@ -21,11 +21,11 @@ from ...analysis.summary import Summary
 from ...spec.errors import SpecError
 from ...spec.spec import Spec
 from ...trials.contact import ContactShares
-from ...trials.trial import Session, Trial, TrialResult
+from ...trials.session import Session
+from ...trials.trial import Trial, TrialResult
 
 TRAINED = "trained on"
 """How the box of training is called among the others."""
-PREFIX = "evaluation:"
 
 
 def check(spec: Spec) -> None:
@@ -75,7 +75,7 @@ def analyse(results: Results) -> Shapes:
     table: list[Summary] = []
     ratios: dict[str, tuple[Difference, ...]] = {}
     for condition, trained in results.evaluation.items():
-        boxes = {TRAINED: trained} | _other_boxes(results, condition)
+        boxes = {TRAINED: trained} | results.elsewhere(condition)
         found = ratios[condition] = ratios_of(results, condition)
         by_box = {d.condition: d for d in found}
         for box, arrays in boxes.items():
@@ -89,20 +89,12 @@ def analyse(results: Results) -> Shapes:
     return Shapes(tuple(table), ratios, tuple(notes))
 
 
-def _other_boxes(results: Results, condition: str) -> dict[str, Arrays]:
-    return {
-        phase.removeprefix(PREFIX): arrays[condition]
-        for phase, arrays in results.phases.items()
-        if phase.startswith(PREFIX) and condition in arrays
-    }
-
-
 def ratios_of(results: Results, condition: str) -> tuple[Difference, ...]:
     """Return the ratios of a condition, box by box; none if it has not been evaluated."""
     if condition not in results.evaluation:
         return ()
     base = results.evaluation[condition]["success"]
-    others = {box: arrays["success"] for box, arrays in _other_boxes(results, condition).items()}
+    others = {box: arrays["success"] for box, arrays in results.elsewhere(condition).items()}
     adjusted = holm([_p(outcomes, base) for outcomes in others.values()])
     return tuple(
         Difference(box, "ratio", len(base), ratio(outcomes, base), float(p))

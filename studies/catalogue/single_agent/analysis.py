@@ -17,7 +17,8 @@ from ....core.cost import Problem, below_counts
 from ...analysis.results import Results
 from ...analysis.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, rates
 from ...analysis.summary import Summary
-from ...trials.trial import Session, Trial, TrialResult
+from ...trials.session import Session
+from ...trials.trial import Trial, TrialResult
 
 BLOCK = 20
 """Episodes at the end of training that the table averages over."""

@@ -31,7 +31,8 @@ from ...analysis.summary import Summary
 from ...spec.conditions import label
 from ...spec.errors import SpecError
 from ...spec.spec import Spec
-from ...trials.trial import Session, Trial, TrialResult, build
+from ...trials.session import Session
+from ...trials.trial import Trial, TrialResult, build
 
 BLOCK = 5
 """Episodes that a level is measured over."""

@@ -42,7 +42,7 @@ def command(directory: Path, condition: str | None, seed: int | None, trust: boo
     with Store.open(directory) as store:
         trial = explain.choose(store, condition, seed)
         conditions = [c.label for c in store.spec().conditions()]
-        say(f"training {trial.condition}, seed {trial.seed} again: {trial.episodes} episodes")
+        say(f"training {trial.condition}, seed {trial.seed} again: {trial.lengths}")
         found = explain.explained(store, trial)
     folder = explain.folder(directory, trial, conditions)
     folder.mkdir(parents=True, exist_ok=True)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..arguments import Choice, Command
+from ..arguments import Choice, Command, Text
 from . import options
 
 if TYPE_CHECKING:
@@ -25,9 +25,11 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--phase",
-    type=Choice(["training", "evaluation"]),
+    type=Text(),
+    metavar="PHASE",
     default="training",
-    help="The episodes of training, or those of the greedy evaluation after it.",
+    help="The episodes of training, those of the greedy evaluation after it (evaluation), of a "
+    "stage before it (training:NAME) or of another evaluation (evaluation:NAME).",
 )
 def command(directory: Path, form: Format, phase: str) -> int:
     """Print one row per trial and episode, as a table, CSV or JSON.
@@ -36,12 +38,16 @@ def command(directory: Path, form: Format, phase: str) -> int:
     """
     import sys
 
+    from ....core.registry import closest
     from ...presentation.row_formats import write_rows
+    from ...spec.errors import SpecError
     from ...store.store import Store
 
     with Store.open(directory) as store:
         store.verify()
-        measures = store.measures()
+        measures, phases = store.measures(), store.phases()
+        if phases and phase not in phases:
+            raise SpecError(f"--phase {phase!r}: {closest(phase, phases)}")
         names, rows = store.rows(phase)
     write_rows(names, rows, measures, form, sys.stdout)
     return 0

@@ -119,6 +119,12 @@ def test_a_rule_base_refuses_terms(terms: list, complaint: str) -> None:
     assert "\n" not in str(caught.value)
 
 
+def test_rules_that_cannot_be_numbered_are_refused() -> None:
+    partition = Partition(np.linspace(0, 1, 256), "triangular")
+    with pytest.raises(ValueError, match=f"^rule base: {256**8} rules, allowed {2**63 - 1}"):
+        RuleBase([partition] * 8, [tuple(range(8))])  # 2 ** 64, which overflows to 0
+
+
 def test_a_rule_base_refuses_mixed_shapes() -> None:
     with pytest.raises(ValueError, match="one membership shape"):
         RuleBase([LOW_HIGH, Partition((0.0, 1.0), "sigmoid")], [(0, 1)])

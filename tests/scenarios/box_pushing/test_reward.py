@@ -22,7 +22,7 @@ def one(
         np.array([contact]),
         np.array([readings]),
     )
-    return float(value[0])
+    return float(value[0, 0])
 
 
 def penalties(*readings: float) -> float:
@@ -71,3 +71,13 @@ def test_the_goal_pays_whatever_the_robots_do(contact: tuple[bool, bool]) -> Non
 def test_any_orientation_counts_unless_one_is_asked_for() -> None:
     task = TASK._replace(orientation_tolerance=None)
     assert one(distance=0.05, turn=3.0, task=task) == 0.01
+
+
+def test_of_robots_the_conditions_hold_for_each_by_itself() -> None:
+    task = TASK._replace(reward=RewardSettings(of="robot"))
+    found = reward(
+        task, np.array([0.5]), np.array([-0.02]), np.array([0.2]),
+        np.array([[True, False, False]]), np.array([[1.0, 0.4, 0.0]]),
+    )  # fmt: skip
+    first = 0.01 * exp(-1.5 * 0.5) - penalties(1.0) - 0.0003 * 0.2
+    np.testing.assert_allclose(found, [[first, -penalties(0.4), -0.002]], rtol=1e-12)

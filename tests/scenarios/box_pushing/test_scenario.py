@@ -134,3 +134,31 @@ def test_it_can_be_recorded_drawn_and_predicted_exactly(tmp_path: Path) -> None:
     recording |= {name: np.array(value) for name, value in constants.items()}
     scenario.animate(recording, tmp_path / "episode.gif")
     assert (tmp_path / "episode.gif").stat().st_size > 1000
+
+
+def test_a_task_in_units_of_the_box() -> None:
+    fixed, similar = (
+        BoxPushingSettings(robots=8, scaling=scaling).build() for scaling in ("fixed", "similar")
+    )
+    for scenario in (fixed, similar):
+        scenario.reset(0)
+    near, far = fixed.measure(), similar.measure()
+    assert near["distance_m"] == pytest.approx(1.0)
+    assert far["distance_m"] == pytest.approx(4.0)
+    assert similar._task.tolerance == pytest.approx(4 * fixed._task.tolerance)
+    assert similar._task.reward.r1 == pytest.approx(fixed._task.reward.r1 / 4)
+    # 2 m further from the goal the fixed task is broken off, the similar one is not yet.
+    for scenario, expected in ((fixed, True), (similar, False)):
+        box = scenario.measure()["goal_pose"] - [3.0, 0.0, 0.0]
+        robots = box + np.column_stack([np.full(8, -0.5), np.linspace(0.35, -0.35, 8), np.zeros(8)])
+        scenario.world.place(robots, box)
+        assert scenario.step(np.full(16, 2)).truncated is expected
+
+
+@pytest.mark.parametrize("robots", [1, 2])
+def test_up_to_two_robots_there_is_one_scaling(robots: int) -> None:
+    states = [
+        BoxPushingSettings(robots=robots, scaling=scaling).build().reset(4)
+        for scaling in ("fixed", "similar")
+    ]
+    np.testing.assert_array_equal(*states)

@@ -48,6 +48,18 @@ def test_hard_starts_cover_all_sides() -> None:
     assert counts.min() > 20
 
 
+def test_the_distance_to_the_goal_in_units_of_the_box() -> None:
+    box = box_for("square", 8)
+    draws = [
+        place("medium", np.random.default_rng(3), [ROBOT] * 8, box, unit) for unit in (1.0, 4.0)
+    ]
+    (near, at, goal), (robots, far, same) = draws
+    np.testing.assert_array_equal(goal, same)
+    np.testing.assert_allclose(goal[:2] - far[:2], 4.0 * (goal[:2] - at[:2]))
+    # Robots do not grow: they stand as near to the box as ever.
+    np.testing.assert_allclose(robots[:, :2] - far[:2], near[:, :2] - at[:2])
+
+
 def test_equal_seeds_give_equal_starts() -> None:
     draws = [
         place("medium", np.random.default_rng(seed), [ROBOT] * 2, BOXES["square"])

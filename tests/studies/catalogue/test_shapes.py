@@ -10,7 +10,8 @@ from nested_agents.studies.catalogue.shapes.analysis import analyse, least_ratio
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.trial import run_trial, trials_of
+from nested_agents.studies.trials.session import run_trial
+from nested_agents.studies.trials.trial import trials_of
 
 CHANCES = {"circle": 0.95, "hexagon": 0.9, "L": 0.3}
 

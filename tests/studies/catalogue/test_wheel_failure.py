@@ -17,7 +17,8 @@ from nested_agents.studies.catalogue.wheel_failure.analysis import (
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.trial import Session, run_trial, trials_of
+from nested_agents.studies.trials.session import Session, run_trial
+from nested_agents.studies.trials.trial import trials_of
 
 ENDS = {
     "4 wheels, seized": {"nothing": 0.05, "weights": 0.4, "self-model": 0.7, "both": 0.95},

@@ -14,7 +14,8 @@ from nested_agents.studies.spec.conditions import ConditionSettings
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store import reading
 from nested_agents.studies.store.store import DATABASE, Store
-from nested_agents.studies.trials.trial import RESULTS_VERSION, build, run_trial, trials_of
+from nested_agents.studies.trials.session import run_trial
+from nested_agents.studies.trials.trial import RESULTS_VERSION, build, trials_of
 
 SPEC = Spec.of(
     {

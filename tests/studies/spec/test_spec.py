@@ -302,7 +302,8 @@ KEYS = st.sampled_from(
     ["study", "preset", "seeds", "episodes", "steps", "evaluation", "scenario", "topology",
      "learner", "sweep", "kind", "robots", "box", "reward", "c1", "rule_base", "order", "ridge",
      "exploration", "decision", "rule", "products", "members", "edges", "a", "", "x.y", "'\n",
-     "learner.kind", "scenario.robots", "topology.order", "overrides", "evaluations", "name"]
+     "learner.kind", "scenario.robots", "topology.order", "overrides", "evaluations", "name",
+     "curriculum"]
 )  # fmt: skip
 WORDS = st.sampled_from(
     ["default", "paper", "frozen", "chain", "chain:reversed", "teams", "edges", "random", "file",

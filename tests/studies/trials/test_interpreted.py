@@ -13,7 +13,8 @@ ROOT = Path(__file__).resolve().parents[3]
 RUN = """
 import json
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.trial import run_trial, trials_of
+from nested_agents.studies.trials.session import run_trial
+from nested_agents.studies.trials.trial import trials_of
 spec = Spec.of({"seeds": 1, "episodes": 1, "steps": 2, "evaluation": 1,
                 "sweep": {"preset": ["default", "random"]}})
 rows = [row for trial in trials_of(spec) for row in run_trial(trial).rows]

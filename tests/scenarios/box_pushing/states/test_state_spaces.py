@@ -17,13 +17,15 @@ from nested_agents.scenarios.box_pushing.states.state_spaces import (
 )
 from nested_agents.scenarios.box_pushing.states.variables import STATE_VARIABLES, found
 from nested_agents.scenarios.box_pushing.states.view import View, wrap
+from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 
 GOAL = np.array([1.0, 0.0, 0.0])
+SQUARE = BOXES["square"].outline
 
 
 def view(robots, box, gaps) -> View:
     described = np.array([robots], float), np.array([box], float), np.array([gaps], float)
-    return View(*described, GOAL, before=1.03, periods=3.0)
+    return View(*described, GOAL, before=1.03, periods=3.0, outline=SQUARE)
 
 
 VARIABLES = tuple(STATE_VARIABLES.built_in)
@@ -34,7 +36,7 @@ EVERY = listed("every", *VARIABLES)
 def test_functions_fill_the_space_they_describe(name: str) -> None:
     spec = STATE_SPACES[name]
     poses = np.random.default_rng(0).uniform(-1, 1, (5, 2, 3))
-    seen = View(poses, poses[:, 0], np.abs(poses[:, :, 0]), GOAL, 1.0, 1.0)
+    seen = View(poses, poses[:, 0], np.abs(poses[:, :, 0]), GOAL, 1.0, 1.0, SQUARE)
     assert spec.own(poses[:, 0], poses[:, 0, 0], GOAL).shape == (5, spec.space.n_own)
     assert spec.shared(seen, 1).shape == (5, spec.space.n_variables - spec.space.n_own)
 
@@ -54,6 +56,34 @@ def test_relational_variables_by_hand() -> None:
     second = dict(zip(VARIABLES, EVERY.shared(situation, 1)[0], strict=True))
     assert second["box_bearing"] == pytest.approx(0.0)
     assert second["side"] == pytest.approx(-pi / 2)
+
+
+def test_variables_of_crowds_by_hand() -> None:
+    # A square of 20 cm, turned by .3; robot 1 touches its back, low on it, robot 2 is far away.
+    turn = np.array([np.cos(0.3), np.sin(0.3)])
+    left = np.array([-turn[1], turn[0]])
+    low = -0.1 * turn - 0.08 * left
+    situation = view([[*low, 0.1], [0.0, 0.9, -pi / 2]], [0.0, 0.0, 0.3], [0.0, 0.77])
+    first = dict(zip(VARIABLES, EVERY.shared(situation, 0)[0], strict=True))
+    assert first["face_bearing"] == pytest.approx(0.2)
+    assert first["others_away"] == 1.0
+    second = dict(zip(VARIABLES, EVERY.shared(situation, 1)[0], strict=True))
+    assert second["others_away"] == 0.0
+    # Nearly all of the push is that of the robot in contact.
+    alone = np.arctan2(*-low[::-1])
+    assert first["contact_push_bearing"] == pytest.approx(alone, abs=0.005)
+    assert second["contact_push_bearing"] == first["contact_push_bearing"]
+    assert first["contact_cross_track_error"] == pytest.approx(np.sin(alone), abs=0.005)
+
+
+def test_common_variables_are_the_same_for_all_robots() -> None:
+    rng = np.random.default_rng(0)
+    poses = rng.normal(size=(20, 5, 3))
+    seen = View(poses, poses[:, 0].copy(), rng.normal(size=(20, 5)), GOAL, 0.7, 3.0, SQUARE)
+    blocks = dict(enumerate(EVERY.shared(seen, r) for r in range(5)))
+    for column, name in enumerate(VARIABLES):
+        alike = all((blocks[r][:, column] == blocks[0][:, column]).all() for r in range(5))
+        assert alike == (name in EVERY.space.common), name
 
 
 def test_a_push_away_from_the_goal_misses_it_by_the_whole_distance() -> None:
@@ -129,12 +159,19 @@ def test_a_fast_robot_gets_them() -> None:
 
 
 @pytest.mark.parametrize("robots", [1, 2, 5])
-@pytest.mark.parametrize("names", [VARIABLES, ("cross_track_error",), ("bend", "gap")])
-def test_compiled_blocks_are_those_of_the_definition(names: tuple[str, ...], robots: int) -> None:
+@pytest.mark.parametrize(
+    "names",
+    [VARIABLES, ("cross_track_error",), ("bend", "gap"), ("face_bearing", "others_away")],
+)
+@pytest.mark.parametrize("box", ["square", "L", "circle"])
+def test_compiled_blocks_are_those_of_the_definition(
+    box: str, names: tuple[str, ...], robots: int
+) -> None:
     rng = np.random.default_rng(robots)
     seen = View(
         rng.normal(size=(100, robots, 3)) * [1, 1, 9], rng.normal(size=(100, 3)) * [1, 1, 9],
         rng.normal(size=(100, robots)), rng.normal(size=3), 0.7, 3.0,
+        BOXES[box].outline,
     )  # fmt: skip
     space, wanted = listed("some", *names), list(range(robots))[::-1]
     expected = np.array([space.shared(seen, r) for r in wanted])
@@ -254,7 +291,7 @@ def wrong(view, robot):
     with Sources(texts={"wrong.py": text}).active():
         space = listed("own", "gap", "wrong.py:wrong")
     poses = np.random.default_rng(0).normal(size=(5, 2, 3))
-    seen = View(poses, poses[:, 0].copy(), np.abs(poses[:, :, 0]), GOAL, 1.0, 1.0)
+    seen = View(poses, poses[:, 0].copy(), np.abs(poses[:, :, 0]), GOAL, 1.0, 1.0, SQUARE)
     for compute in (lambda: space.shared(seen, 0), lambda: space.shared_of(seen, [0, 1])):
         with pytest.raises(ValueError, match=complaint) as error:
             compute()

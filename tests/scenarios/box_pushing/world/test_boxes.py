@@ -14,7 +14,7 @@ from shapely.affinity import rotate, translate
 from shapely.geometry import Polygon
 
 from nested_agents.scenarios.box_pushing.config import BoxSettings, label
-from nested_agents.scenarios.box_pushing.world.boxes import AREA, BOXES, BoxSpec, box_for
+from nested_agents.scenarios.box_pushing.world.boxes import AREA, BOXES, BoxSpec, box_for, growth
 from nested_agents.scenarios.box_pushing.world.polygons import _merged, moments, polygon_edges
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
 from nested_agents.scenarios.box_pushing.world.world import UNIT, World
@@ -153,6 +153,10 @@ def test_a_described_box_and_its_label() -> None:
     assert box_for(label(table), 2) == box
     assert box_for(table, 6) == box
     assert box_for(table.model_copy(update={"grows": True}), 6) == box.scaled(3.0)
+    wide = table.model_copy(update={"grows": "width"})
+    assert box_for(label(wide), 6) == box.widened(3.0)
+    assert [growth(b, 6) for b in (table, wide, "square")] == [1.0, 3.0, 3.0]
+    assert growth("square", 1) == 1.0
     assert label("L") == "L"
 
 
@@ -226,6 +230,14 @@ def test_many_vertices_take_no_time(depth: float) -> None:
     assert time.perf_counter() - begin < 5.0
     assert max(len(piece) for piece in box.fixtures) <= 8
     assert sum(piece.area for piece in pieces) == pytest.approx(box.area)
+
+
+def test_a_box_may_grow_along_its_width_only() -> None:
+    square, wide = BOXES["square"], BOXES["square"].widened(4.0)
+    assert wide.width == pytest.approx((-0.4, 0.4))
+    assert wide.area == pytest.approx(4 * square.area)
+    assert wide.mass == 4 * square.mass
+    assert np.ptp(wide.outline.edges[:, 0]) == pytest.approx(0.2)
 
 
 def test_size_grows_with_the_number_of_robots() -> None:

@@ -1,0 +1,174 @@
+"""Best responses around a plan: joint actions of large teams, found by local search.
+
+The first agent to decide makes a plan for all agents that it sees below it. The plan starts from
+the best of a few joint actions: those in which all bodies do the same, and those in which the team
+is cut in two and the agents of either part do the same. (To turn a wide box half a team must slow
+down, and no agent gains by doing so alone.) One sweep of best responses improves it: body by body,
+each takes what is best while the others keep to the plan (iterated best response, Gauss-Seidel;
+Shoham and Leyton-Brown 2009, Section 7.7).
+
+Then the agents decide in the order of the hierarchy, as ever. Each values its own actions and those
+of its body's agents below it; the actions above are decided, and all others are taken to keep to
+the plan, which is passed down and kept up with what is decided. Agents that see others than the one
+above them, as in a tree, make a plan of their own: nobody plans with what it cannot see.
+
+The number of joint actions tried grows linearly with the number of bodies.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from ..arrays import FloatArray, IntArray
+from ..exploration import greatest
+from ..protocols import Prediction
+from .evaluator import (
+    Aggregation,
+    DecisionProblem,
+    Deliberation,
+    EvaluatorSettings,
+    combinations,
+)
+
+CUTS = (0.25, 0.5, 0.75)
+"""Where a team is cut in two, as shares of its bodies in the order of decision."""
+
+
+class BestResponseSettings(EvaluatorSettings):
+    """Best responses around a plan, for teams of any size."""
+
+    kind: Literal["best-response"] = "best-response"
+
+    def build(self, problem: DecisionProblem) -> BestResponse:
+        """Return the evaluator of a team."""
+        return BestResponse(problem)
+
+
+class _Known(NamedTuple):
+    """What the agents of one body have last been found to be able to bring about."""
+
+    concerned: IntArray
+    plan: IntArray
+    free: tuple[int, ...]
+    tried: IntArray
+    found: FloatArray
+
+
+class BestResponse(Aggregation):
+    """Plans for the agents below by one sweep of best responses.
+
+    Raises
+    ------
+    ValueError
+        If the teammate model is another than best response.
+    """
+
+    def __init__(self, problem: DecisionProblem) -> None:
+        super().__init__(problem)
+        if problem.teammates != "best-response":
+            raise ValueError(
+                f"learner.decision.teammates = {problem.teammates!r}: best-response plans for "
+                "'best-response' only"
+            )
+        hierarchy, groups = problem.hierarchy, problem.groups
+        n = len(hierarchy)
+        self._group_of = {i: g for g, group in enumerate(groups) for i in group}
+        # Agents that do not see the same others plan apart.
+        unseen = [hierarchy.unseen(i) for i in range(n)]
+        self._context = [unseen.index(others) for others in unseen]
+        self._place = np.zeros(n, dtype=np.int64)
+        for group in groups:
+            self._place[list(group)] = np.arange(len(group))
+        widest = max(map(len, groups))
+        self._of_bodies = combinations(tuple(range(widest)), self.n_actions)
+        self._of_parts = combinations((0, 1), self.n_actions)
+        rank = {i: k for k, i in enumerate(hierarchy.order)}
+        self._free = [
+            tuple(sorted((i, *hierarchy.below(i)), key=rank.__getitem__)) for i in range(n)
+        ]
+        self._prediction: Prediction | None = None
+        self._plans: dict[int, IntArray] = {}
+        self._known: _Known | None = None
+
+    def values(self, deliberation: Deliberation) -> FloatArray:
+        """Return the value ``(A,)`` of each action of the deciding agent."""
+        agent = deliberation.agent
+        if self.indifferent(deliberation):
+            return np.zeros(self.n_actions)
+        first = agent == self.hierarchy.order[0]
+        if first or deliberation.prediction is not self._prediction:
+            self._prediction, self._plans, self._known = deliberation.prediction, {}, None
+        context = self._context[agent]
+        if context not in self._plans:
+            self._plans[context] = self._planned(deliberation)
+        plan = self._plans[context]
+        decided = [i for i in range(len(plan)) if i not in self._free[agent]]
+        plan[decided] = deliberation.joint_action[decided]
+        free = tuple(i for i in self._free[agent] if self._group_of[i] == self._group_of[agent])
+        tried, found = self._valued(deliberation, plan, free)
+        best = np.full(self.n_actions, -np.inf)
+        np.maximum.at(best, tried[:, free.index(agent)], found)
+        # What its body does is kept in the plan; what it takes in the end, the next one is told.
+        plan[list(free)] = tried[greatest(found, deliberation.rng)]
+        return best
+
+    def _valued(
+        self, deliberation: Deliberation, plan: IntArray, free: tuple[int, ...]
+    ) -> tuple[IntArray, FloatArray]:
+        """Return the actions ``(m, k)`` of the free agents of a body, and what each is worth.
+
+        The second agent of a body finds what the first one did, if their interest is the same.
+        """
+        known, concerned = self._known, self.concerned[deliberation.agent]
+        if known is not None and known.concerned is concerned and set(free) < set(known.free):
+            others = [i for i in range(len(plan)) if i not in known.free]
+            if (known.plan[others] == plan[others]).all():
+                places = [known.free.index(i) for i in free]
+                decided = [k for k in range(len(known.free)) if k not in places]
+                told = plan[[known.free[k] for k in decided]]
+                same = (known.tried[:, decided] == told).all(axis=1)
+                return known.tried[same][:, places], known.found[same]
+        tried = combinations(free, self.n_actions)
+        found = self.worth(deliberation, _with(plan, free, tried))
+        self._known = _Known(concerned, plan.copy(), free, tried, found)
+        return tried, found
+
+    def _planned(self, deliberation: Deliberation) -> IntArray:
+        """Return a plan ``(n,)`` for the agent and those below it."""
+        free, rng = self._free[deliberation.agent], deliberation.rng
+        bodies: dict[int, list[int]] = {}
+        for i in free:
+            bodies.setdefault(self._group_of[i], []).append(i)
+        tried = _with(deliberation.joint_action, free, self._starts(free, list(bodies)))
+        plan = tried[greatest(self.worth(deliberation, tried), rng)].copy()
+        for members in map(tuple, bodies.values()):
+            tried = _with(plan, members, self._distinct(deliberation.prediction, members))
+            plan = tried[greatest(self.worth(deliberation, tried), rng)].copy()
+        return plan
+
+    def _starts(self, free: tuple[int, ...], bodies: list[int]) -> IntArray:
+        """Return actions ``(m, k)`` of the k free agents, of `bodies` in the order of decision."""
+        rank = np.array([bodies.index(self._group_of[i]) for i in free])
+        starts = [self._of_bodies[:, self._place[list(free)]]]
+        for cut in sorted({round(share * len(bodies)) for share in CUTS} - {0, len(bodies)}):
+            starts.append(self._of_parts[:, (rank >= cut).astype(np.int64)])
+        return np.unique(np.concatenate(starts), axis=0)
+
+    def _distinct(self, prediction: Prediction, members: tuple[int, ...]) -> IntArray:
+        """Return the actions ``(m, k)`` of agents of one body, but those alike to others."""
+        actions = combinations(members, self.n_actions)
+        alike = getattr(prediction, "alike", None)
+        group = self.problem.groups[self._group_of[members[0]]]
+        if alike is None or len(members) < len(group):
+            return actions
+        indices = np.arange(len(actions))
+        return actions[alike[self._group_of[members[0]], : len(actions)] == indices]
+
+
+def _with(joint_action: IntArray, agents: tuple[int, ...], actions: IntArray) -> IntArray:
+    """Return the joint action ``(n,)`` with the `actions` ``(m, k)`` of k agents: ``(m, n)``."""
+    joint = np.tile(joint_action, (len(actions), 1))
+    joint[:, list(agents)] = actions
+    return joint

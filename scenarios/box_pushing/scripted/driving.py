@@ -1,0 +1,141 @@
+"""How one robot gets to a place: a short search over sequences of its own actions.
+
+Around the box and clear of the other robots. A decision costs at most `LONGEST_SEARCH` sequences;
+those that come to the same wheel speeds are followed once, and of the other robots only those
+within reach count.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise, product
+from math import log, pi
+from typing import Any
+
+import numpy as np
+
+from ....core.arrays import FloatArray, IntArray
+from ....core.spaces import ActionSet
+from ..prediction.push import PushModel
+from ..world.boxes import BoxSpec
+from ..world.robots import RobotSpec, nominal_effect
+from .routes import moved, paths
+
+CLEARANCE = 0.006
+"""Least gap [m] to box and other robots on the way to a slot."""
+LONGEST_SEARCH = 5000
+"""Action sequences tried per robot and decision, those that come to the same included."""
+
+
+class Drivers:
+    """What each robot of a team can do by itself.
+
+    Parameters
+    ----------
+    robots, box, model
+        What is in the world, and what is believed of it.
+    action_set, increment, seconds
+        As of `ScriptedController`.
+
+    Attributes
+    ----------
+    choices
+        Per robot ``(k, w)``: its robot actions.
+    wheels
+        Per robot: where its wheels stand among those of all.
+    """
+
+    def __init__(
+        self,
+        robots: Sequence[RobotSpec],
+        box: BoxSpec,
+        model: PushModel,
+        action_set: ActionSet,
+        increment: float,
+        seconds: float,
+    ) -> None:
+        self.robots, self.box, self.model = tuple(robots), box, model
+        self.actions, self.increment, self.seconds = action_set, increment, seconds
+        self.choices = [_robot_actions(robot, len(action_set)) for robot in robots]
+        counts = np.cumsum([0] + [len(robot.wheels) for robot in robots])
+        self.wheels = [slice(a, b) for a, b in pairwise(counts)]
+        self._effects = [nominal_effect(robot) for robot in robots]
+        self._radii: FloatArray = np.array([robot.radius for robot in robots])
+
+    def next(self, robot: int, speeds: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return wheel speeds ``(m, k, w)`` and twists ``(m, k, 3)`` after the k robot actions.
+
+        `speeds` is ``(m, w)``.
+        """
+        limit = np.full(speeds.shape[-1], self.robots[robot].max_speed)
+        after = self.actions.apply(
+            speeds[:, None], self.choices[robot][None], self.increment * limit, limit
+        )
+        effect = self._effects[robot]
+        return after, after @ effect[:, :-1].T + effect[:, -1]
+
+    def rest(self, robot: int, speeds: FloatArray) -> int:
+        """Return the robot action after which a robot's wheels are slowest."""
+        after, _ = self.next(robot, speeds[self.wheels[robot]][None])
+        return int(np.abs(after[0]).sum(axis=1).argmin())
+
+    def drive(
+        self,
+        robot: int,
+        robots: FloatArray,
+        box: FloatArray,
+        speeds: FloatArray,
+        target: FloatArray,
+    ) -> int:
+        """Return the robot action that leads a robot towards a pose ``(3,)``.
+
+        `robots` ``(M, 3)`` and `box` ``(3,)`` are present poses, `speeds` ``(n,)`` those of all
+        wheels.
+        """
+        now = speeds[self.wheels[robot]][None]
+        depth = int(log(LONGEST_SEARCH) / log(len(self.choices[robot])))
+        spans = self._radii[robot] + self._radii + CLEARANCE
+        within = spans + depth * self.seconds * self.robots[robot].max_speed
+        near = np.hypot(*(robots[:, :2] - robots[robot, :2]).T) < within
+        near[robot] = False
+        others, spans = robots[near, :2], spans[near]
+        poses, first = robots[robot][None], None
+        cost = np.zeros(1)
+        for _ in range(depth):
+            after, twists = self.next(robot, now)
+            row, option = np.nonzero(_distinct(after))
+            poses, cost = poses[row], cost[row]
+            first = option if first is None else first[row]
+            now, twists = after[row, option], twists[row, option]
+            for _ in range(2):
+                poses = moved(poses, twists, self.seconds / 2)
+                apart = np.hypot(*(poses[:, None, :2] - others).transpose(2, 0, 1))
+                cost = cost + 10.0 * np.maximum(spans - apart, 0.0).sum(axis=1)
+                path = paths(
+                    poses, target[:2], box, self.model.edges, self.model.rounding,
+                    self._radii[robot] + CLEARANCE, self.box.reach,
+                )  # fmt: skip
+                turn = np.abs(wrap(poses[:, 2] - target[2]))
+                cost = cost + 0.1 * (path + 0.06 * turn * np.exp(-path / 0.05))
+            arrived = path + 0.06 * turn * np.exp(-path / 0.05)
+        assert first is not None
+        return int(first[(cost + arrived).argmin()])
+
+
+def wrap(angle: Any) -> Any:
+    """Return angles from -pi to pi."""
+    return (angle + pi) % (2 * pi) - pi
+
+
+def _distinct(speeds: FloatArray) -> Any:
+    """Return which of ``(m, k, w)`` wheel speeds no earlier option gives, ``(m, k)``."""
+    same = (speeds[:, :, None] == speeds[:, None]).all(axis=-1)
+    return same.argmax(axis=2) == np.arange(speeds.shape[1])
+
+
+def _robot_actions(robot: RobotSpec, n_actions: int) -> IntArray:
+    """Return the combinations ``(k, w)`` of actions to try: wheels of one side act alike."""
+    sides = [int(np.sign(wheel.y)) for wheel in robot.wheels]
+    groups = sorted(set(sides))
+    rows = product(range(n_actions), repeat=len(groups))
+    return np.array([[row[groups.index(side)] for side in sides] for row in rows])

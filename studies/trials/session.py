@@ -1,0 +1,206 @@
+"""Running a trial: a team is trained and evaluated, and what is measured of it kept."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+
+from ...core.loop import StepRecord, control_loop, world_seed
+from ...core.protocols import Measure, RecordedScenario, measures_of
+from ...core.settings import ScenarioSettings
+from ...core.team import Team
+from .episodes import (
+    ELSEWHERE,
+    STAGE,
+    EpisodeMeter,
+    EpisodeRecorder,
+    EpisodeRow,
+    Recording,
+    Stopwatch,
+)
+from .measures import joined
+from .trial import Arrangement, Trial, TrialResult, arrange
+
+EVALUATION_WORLDS = 10**6
+"""Number of the first evaluation episode's world: after any training, and the same for all."""
+
+CURRICULUM_WORLDS = 2 * 10**6
+"""The same of the first episode of a curriculum."""
+
+Observer = Callable[[StepRecord], None]
+"""Is shown every step of some episodes, as it is done."""
+
+
+class Session:
+    """A trial under way: its scenario, its team, and what has been measured so far.
+
+    Parameters
+    ----------
+    trial
+        The trial; its team is untrained to begin with.
+
+    Attributes
+    ----------
+    world
+        The scenario as the settings describe it.
+    scenario
+        The same as the agents see it.
+    team
+        The agents.
+    """
+
+    def __init__(self, trial: Trial) -> None:
+        self.trial = trial
+        self._own = arrange(trial.settings, trial.seed)
+        self.world, self.scenario, self.team = self._own
+        self._stages = trial.curriculum  # those that the team has not gone through
+        self.deciding: list[float] = []
+        """Seconds of every decision in training."""
+        self._rows: list[EpisodeRow] = []
+        self._measures = measures_of(self.world)
+        self._recordings: dict[str, Recording] = {}
+        self._watch = Stopwatch()
+
+    def train(
+        self,
+        episodes: int,
+        first: int = 0,
+        *,
+        phase: str = "training",
+        team: Team | None = None,
+        observe: Observer | None = None,
+    ) -> None:
+        """Let the team (or another one, whose time is not counted) explore, learn, be measured.
+
+        Before its first episode the team goes through the trial's curriculum. Recorded are, of the
+        trial's own team, the episodes of `Trial.recorded`. Every step is shown to `observe`.
+        """
+        self._go_through_curriculum()
+        is_recorded = (
+            team is None
+            and isinstance(self.world, RecordedScenario)
+            and len(self.world.recorded) > 0
+        )
+        kept = self.trial.recorded if is_recorded else {}
+        steps = control_loop(
+            self.scenario, self.team if team is None else team, episodes=episodes,
+            steps=self.trial.steps, seed=self.trial.seed, first_episode=first,
+        )  # fmt: skip
+        for record in self._measured(steps, phase, measures_of(self.world), observe):
+            if record.episode in kept:
+                if record.step == 0:
+                    recorder = EpisodeRecorder(_opened(self.trial, record.episode))
+                recorder.add(record.transition)
+                if record.last:
+                    self._recordings[kept[record.episode]] = recorder.recording()
+            if team is None:
+                self._watch.add(record)
+                self.deciding.append(record.deciding)
+
+    def evaluate(self, observe: Observer | None = None) -> None:
+        """Let the team act greedily on worlds of no training, and show every step to `observe`."""
+        self._go_through_curriculum()
+        self._evaluate(self._own, "evaluation", observe)
+
+    def evaluate_elsewhere(self, observers: Mapping[str, Observer] | None = None) -> None:
+        """Evaluate in each of the trial's `evaluations`, whatever the others are.
+
+        The same agents are the same team; others take over what it has learned. The steps of each
+        are shown to the observer of its name, if there is one.
+        """
+        self._go_through_curriculum()
+        state = self.team.rng.bit_generator.state
+        for name, settings in self.trial.evaluations:
+            self.team.rng.bit_generator.state = state
+            there = self._elsewhere(settings)
+            there = there.with_trained(self._own, self.trial.settings.learner)
+            observe = (observers or {}).get(name)
+            self._evaluate(there, f"{ELSEWHERE}{name}", observe)
+
+    def _elsewhere(self, scenario: ScenarioSettings) -> Arrangement:
+        """Return another world with its untrained team, and note what is measured there."""
+        settings = self.trial.settings.model_copy(update={"scenario": scenario})
+        there = arrange(settings, self.trial.seed)
+        self._measures = joined((self._measures, measures_of(there.world)))
+        return there
+
+    def _go_through_curriculum(self) -> None:
+        """Train team after team in the stages that are left; the trial's own takes over at last."""
+        stages, self._stages = self._stages, ()
+        reached: Arrangement | None = None
+        done = 0
+        for stage in stages:
+            there = self._elsewhere(stage.scenario)
+            if reached is not None:
+                there.take_over(reached, self.trial.settings.learner)
+            steps = control_loop(
+                there.scenario, there.team, episodes=stage.episodes, steps=self.trial.steps,
+                seed=self.trial.seed, first_world=CURRICULUM_WORLDS + done,
+            )  # fmt: skip
+            measures = measures_of(there.world)
+            for _ in self._measured(steps, f"{STAGE}{stage.name}", measures, first=-done):
+                pass
+            reached, done = there, done + stage.episodes
+        if reached is not None:
+            self._own.take_over(reached, self.trial.settings.learner)
+
+    def _evaluate(self, there: Arrangement, phase: str, observe: Observer | None) -> None:
+        steps = control_loop(
+            there.scenario, there.team, episodes=self.trial.evaluation,
+            steps=self.trial.steps, seed=self.trial.seed, first_episode=EVALUATION_WORLDS,
+            learn=False,
+        )  # fmt: skip
+        measures = measures_of(there.world)
+        for _ in self._measured(steps, phase, measures, observe, EVALUATION_WORLDS):
+            pass
+
+    def _measured(
+        self,
+        steps: Iterator[StepRecord],
+        phase: str,
+        measures: Sequence[Measure],
+        observe: Observer | None = None,
+        first: int = 0,
+    ) -> Iterator[StepRecord]:
+        """Yield the steps of episodes, show them to `observe`, and keep the row of each episode.
+
+        The number of an episode in its row is counted from `first`.
+        """
+        for record in steps:
+            if record.step == 0:
+                meter = EpisodeMeter(phase, record.episode - first, measures)
+            meter.add(record.transition)
+            yield record
+            if observe is not None:
+                observe(record)
+            if record.last:
+                self._rows.append(meter.row())
+
+    def result(
+        self,
+        numbers: Mapping[str, float] | None = None,
+        usage: Mapping[str, float] | None = None,
+    ) -> TrialResult:
+        """Return what has been measured, and what the measure adds to it."""
+        return TrialResult(
+            tuple(self._rows), self._measures, self._recordings, self._watch.seconds,
+            numbers or {}, usage or {},
+        )  # fmt: skip
+
+
+def run_trial(trial: Trial) -> TrialResult:
+    """Train a team from nothing, evaluate it greedily, and return what was measured.
+
+    World and policy draw from separate streams, so conditions of equal seed meet equal worlds.
+    """
+    session = Session(trial)
+    session.train(trial.episodes)
+    session.evaluate()
+    session.evaluate_elsewhere()
+    return session.result()
+
+
+def _opened(trial: Trial, episode: int) -> RecordedScenario:
+    """Return a like of a trial's scenario before an episode's first step, which no record holds."""
+    scenario = trial.settings.scenario.build()
+    scenario.reset(world_seed(trial.seed, episode), episode)
+    return scenario

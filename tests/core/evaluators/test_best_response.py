@@ -1,0 +1,178 @@
+"""Decisions by the values of several agents, and best responses around a plan."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+
+from nested_agents.core.evaluators.auto import AutoSettings
+from nested_agents.core.evaluators.best_response import BestResponse, BestResponseSettings
+from nested_agents.core.evaluators.evaluator import (
+    DecisionProblem,
+    Deliberation,
+    Rule,
+    ValueOf,
+    concerned,
+)
+from nested_agents.core.evaluators.exact import ExactEnumeration
+from nested_agents.core.evaluators.pooled import Pooling
+from nested_agents.core.evaluators.sampling import Sampling
+from nested_agents.core.hierarchy import Hierarchy
+from nested_agents.core.rules.rule_base import RuleBase
+from nested_agents.core.rules.settings import RuleBaseSettings
+from nested_agents.core.spaces import StateSpace, Variable
+
+A = 4
+NEUTRAL = 2
+VALUES_OF = ("own", "below", "team")
+EDGES = {"chain": ["ab", "bc", "cd"], "tree": ["ab", "ac", "bd"], "apart": []}
+
+
+def problem_of(world, rules, name, value_of: ValueOf, rule: Rule = "value") -> DecisionProblem:
+    rename = dict(zip("abcd", world.agents, strict=True))
+    hierarchy = Hierarchy(world.agents, [(rename[x], rename[y]) for x, y in EDGES[name]])
+    return DecisionProblem(
+        rules, hierarchy, A, world.groups, False, rule, "best-response", 0.9, value_of
+    )
+
+
+@pytest.fixture
+def world(line_world):
+    world = line_world(carts=2, wheels=2)
+    world.reset(3)
+    world.step(np.array([0, 1, 0, 0]))
+    return world
+
+
+@pytest.fixture
+def rules(world) -> RuleBase:
+    return RuleBase.build(world.state_space, RuleBaseSettings(products=(("speed", "gap"),)))
+
+
+def asked(agent, world, theta, hierarchy, rng) -> Deliberation:
+    joint = np.full(4, NEUTRAL)
+    above = list(hierarchy.above(agent))
+    joint[above] = rng.integers(A, size=len(above))
+    return Deliberation(agent, joint, world.predict(), theta, np.full((4, A), 1 / A), rng)
+
+
+def worth_of(problem, deliberation, joint, theta) -> float:
+    """The mean f of those concerned, read aloud."""
+    who = concerned(problem.hierarchy, problem.value_of)[deliberation.agent]
+    prediction = deliberation.prediction
+    values = [problem.rules.features(prediction.states(i, joint[None]))[0] @ theta[i] for i in who]
+    mean, reward = float(np.mean(values)), float(prediction.rewards(joint[None])[0])
+    return {"value": mean, "reward": reward, "reward-and-value": reward + 0.9 * mean}[problem.rule]
+
+
+@pytest.mark.parametrize("rule", ["value", "reward-and-value"])
+@pytest.mark.parametrize("value_of", VALUES_OF)
+@pytest.mark.parametrize("name", EDGES)
+def test_whose_value_decides(name, value_of, rule, world, rules) -> None:
+    problem, rng = problem_of(world, rules, name, value_of, rule), np.random.default_rng(1)
+    theta = rng.normal(size=(4, rules.n_rules))
+    for agent in range(4):
+        deliberation = asked(agent, world, theta, problem.hierarchy, rng)
+        below = problem.hierarchy.below(agent)
+        expected = np.full(A, -np.inf)
+        for own, *actions in product(range(A), repeat=1 + len(below)):
+            joint = deliberation.joint_action.copy()
+            joint[[agent, *below]] = own, *actions
+            expected[own] = max(expected[own], worth_of(problem, deliberation, joint, theta))
+        for evaluator in (ExactEnumeration(problem), Sampling(A**3, problem)):
+            assert evaluator.values(deliberation) == pytest.approx(expected, rel=0, abs=1e-12)
+
+
+@pytest.mark.parametrize("value_of", VALUES_OF)
+@pytest.mark.parametrize("name", EDGES)
+def test_values_are_those_of_joint_actions_that_keep_what_is_decided(
+    name, value_of, world, rules
+) -> None:
+    problem, rng = problem_of(world, rules, name, value_of), np.random.default_rng(2)
+    theta = rng.normal(size=(4, rules.n_rules))
+    exact, search = ExactEnumeration(problem), BestResponse(problem)
+    for agent in problem.hierarchy.order:
+        deliberation = asked(agent, world, theta, problem.hierarchy, rng)
+        before = deliberation.joint_action.copy()
+        found, best = search.values(deliberation), exact.values(deliberation)
+        assert (found <= best + 1e-12).all()
+        assert found.max() >= np.median(best)
+        if not set(problem.hierarchy.below(agent)) - set(world.groups[agent // 2]):
+            assert found == pytest.approx(best, rel=0, abs=1e-12)
+        assert (deliberation.joint_action == before).all()
+
+
+def test_what_half_a_team_must_do_together_is_found(line_world) -> None:
+    # Only if the carts drive apart is anything gained; any cart alone loses.
+    world = line_world(carts=6, wheels=2)
+    world.reset(0)
+    rules = RuleBase.build(world.state_space, RuleBaseSettings())
+    edges = list(zip(world.agents, world.agents[1:], strict=False))
+    hierarchy = Hierarchy(world.agents, edges)
+    problem = DecisionProblem(
+        rules, hierarchy, A, world.groups, False, "reward", "best-response", 0.9, "team"
+    )
+
+    class Apart:
+        def rewards(self, joint: np.ndarray) -> np.ndarray:
+            halves = (joint[:, :6] == 1).all(axis=1) & (joint[:, 6:] == 0).all(axis=1)
+            return np.where(halves, 1.0, -0.1 * (joint != NEUTRAL).sum(axis=1))
+
+    rng, prediction = np.random.default_rng(0), Apart()
+    search, joint = BestResponse(problem), np.full(12, NEUTRAL)
+    for agent in hierarchy.order:
+        deliberation = Deliberation(agent, joint, prediction, [], np.zeros((12, A)), rng)
+        joint[agent] = search.values(deliberation).argmax()
+    assert joint.tolist() == [1] * 6 + [0] * 6
+
+
+def test_agents_below_answer_to_what_is_decided_above(world, rules) -> None:
+    # The reward asks agent 3 to do as agent 0 does, whatever that is.
+    problem = problem_of(world, rules, "chain", "team", "reward")
+
+    class Alike:
+        def rewards(self, joint: np.ndarray) -> np.ndarray:
+            return (joint[:, 3] == joint[:, 0]).astype(float)
+
+    rng, prediction, search = np.random.default_rng(0), Alike(), BestResponse(problem)
+    for first in range(A):
+        joint = np.full(4, NEUTRAL)
+        for agent in range(4):
+            asking = Deliberation(agent, joint, prediction, [], np.zeros((4, A)), rng)
+            values = search.values(asking)
+            joint[agent] = first if agent == 0 else values.argmax()
+        assert joint[3] == first
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_pooled_means_are_means(order: int) -> None:
+    names = ("own", "mine", "ours", "common")
+    space = StateSpace(
+        "demo", tuple(Variable(name, "m", 0.0, 1.0) for name in names), 1, ("ours", "common")
+    )
+    rules = RuleBase.build(space, RuleBaseSettings(order=order))
+    rng = np.random.default_rng(order)
+    groups, agents = ((0, 1), (2, 3), (4, 5)), np.array([1, 2, 3, 5])
+    states = rng.uniform(size=(6, 7, 4))
+    states[1::2, :, 1] = states[::2, :, 1]
+    states[:, :, 2:] = states[0, :, 2:]
+    theta = rng.normal(size=(6, rules.n_rules))
+    pooling = Pooling(rules, groups)
+    expected = np.mean([rules.values(theta[i], states[i]) for i in agents], axis=0)
+    found = pooling.mean(pooling.pooled(list(theta), agents), states)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
+
+
+def test_auto_takes_best_responses_where_values_of_others_decide(world, rules) -> None:
+    auto = AutoSettings(exact_up_to=2)
+    assert auto.chosen(problem_of(world, rules, "chain", "team")) == BestResponseSettings()
+    assert auto.chosen(problem_of(world, rules, "apart", "team")).kind == "exact"
+
+
+def test_other_teammate_models_are_refused(world, rules) -> None:
+    problem = problem_of(world, rules, "chain", "team")
+    fields = {**vars(problem), "teammates": "uniform"}
+    with pytest.raises(
+        ValueError, match=r"learner\.decision\.teammates = 'uniform': best-response"
+    ):
+        BestResponse(DecisionProblem(**fields))

@@ -1,0 +1,39 @@
+"""How one robot gets to a place by itself."""
+
+import numpy as np
+
+from nested_agents.core.spaces import ActionSet
+from nested_agents.scenarios.box_pushing.prediction.predictors import push_model
+from nested_agents.scenarios.box_pushing.scripted.driving import Drivers
+from nested_agents.scenarios.box_pushing.world.boxes import BOXES
+from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
+
+BOX = np.zeros(3)
+
+
+def drivers(robots: int) -> Drivers:
+    team, box = [ROBOTS["e-puck"]] * robots, BOXES["square"]
+    return Drivers(team, box, push_model("push", team, box), ActionSet(), 0.5, 0.512)
+
+
+def wheels_after(team: Drivers, choice: int, speeds: np.ndarray) -> np.ndarray:
+    return team.next(0, speeds[:2][None])[0][0, choice]
+
+
+def test_a_robot_sets_out_for_a_place_ahead_and_rests() -> None:
+    team, speeds = drivers(1), np.zeros(2)
+    poses = np.array([[-0.6, 0.0, 0.0]])
+    ahead = team.drive(0, poses, BOX, speeds, np.array([-0.3, 0.0, 0.0]))
+    np.testing.assert_allclose(wheels_after(team, ahead, speeds), 0.065)
+    fast = np.full(2, 0.13)
+    np.testing.assert_allclose(wheels_after(team, team.rest(0, fast), fast), 0.0)
+
+
+def test_it_keeps_clear_of_a_robot_in_its_way_and_those_far_off_do_not_count() -> None:
+    target, speeds = np.array([-0.3, 0.0, 0.0]), np.zeros(4)
+    at = [-0.6, 0.0, 0.0]
+    free = drivers(1).drive(0, np.array([at]), BOX, speeds[:2], target)
+    far = drivers(2).drive(0, np.array([at, [-0.6, 0.9, 0.0]]), BOX, speeds, target)
+    near = drivers(2).drive(0, np.array([at, [-0.52, 0.0, 0.0]]), BOX, speeds, target)
+    assert far == free
+    assert near != free

@@ -1,0 +1,39 @@
+import numpy as np
+import pytest
+
+from nested_agents.studies.analysis.statistics import Estimate
+from nested_agents.studies.analysis.summary import Summary
+from nested_agents.studies.cli.display import print_table
+from nested_agents.studies.presentation.tables import tabulate
+
+TITLES = ["success", "evaluation success", "final orientation error [rad]", "time in contact"]
+LINES = [
+    Summary(
+        label,
+        30,
+        {t: Estimate(*map(np.asarray, (0.5, 0.25, 0.75))) for t in TITLES if t != missing},
+    )
+    for label, missing in (("default", ""), ("sampling (best response), robots=16", TITLES[1]))
+]
+
+
+@pytest.mark.parametrize("width", [40, 60, 80, 120])
+def test_a_table_of_any_width_breaks_no_word(width, monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", str(width))
+    print_table(tabulate(LINES))
+    *lines, _ = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= width
+    words = " ".join(lines).split()
+    for title in TITLES:
+        assert set(title.split()) <= set(words)
+    assert words.count(".25–.75") == 7
+
+
+def test_columns_without_room_follow_below(monkeypatch, capsys):
+    tables = {}
+    for width in (40, 120):
+        monkeypatch.setenv("COLUMNS", str(width))
+        print_table(tabulate(LINES))
+        tables[width] = capsys.readouterr().out
+    assert tables[40].count("default") > tables[120].count("default") == 1
+    assert tables[120].splitlines()[0].split() == " ".join(TITLES).split()
