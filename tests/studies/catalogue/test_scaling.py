@@ -115,15 +115,18 @@ def test_a_trial_is_measured_without_being_changed() -> None:
     result = measure(trial)
     assert result.rows == run_trial(trial).rows
     assert (result.numbers["agents"], result.numbers["messages"]) == (4.0, 6.0)
-    assert result.numbers["weight_bytes"] == 4 * 40 * 8
+    assert result.numbers["weight_bytes"] == 2 * 47 * 8, "two roles"
     assert result.numbers["joint_actions"] == pytest.approx(340.0), "4 + 16 + 64 + 256"
     assert 0.0 < result.usage["decision_median"] <= result.usage["decision_99"]
     assert result.usage["process_bytes"] > result.usage["step_bytes"] > 0
 
 
 def test_the_spec_reaches_from_2_to_64_robots() -> None:
-    spec = Spec.load(Path(module.__file__).parent / "scaling.toml")
-    robots = {condition.settings.scenario.robots for condition in spec.conditions()}
-    assert {2, 4, 8, 16, 32, 64} <= robots
+    folder = Path(module.__file__).parent
+    specs = [Spec.load(folder / f"{name}.toml") for name in ("costs", "scaling", "crowds")]
+    for reached in (specs[:1], specs[1:]):
+        conditions = [condition for spec in reached for condition in spec.conditions()]
+        assert {2, 4, 8, 16, 32, 64} <= {c.settings.scenario.robots for c in conditions}
+    spec = specs[0]
     small = spec.model_copy(update={"overrides": spec.overrides[:1]})
     check(small)

@@ -273,7 +273,8 @@ def test_evaluations_are_laid_over_the_scenario_of_every_condition():
 def test_a_section_may_be_a_settings_model():
     from nested_agents.core.learners.td import TDLambdaSettings
 
-    spec = Spec.of({"overrides": [{"name": "online", "learner": TDLambdaSettings(step_size=0.1)}]})
+    named = {"name": "online", "learner": TDLambdaSettings(step_size=0.1)}
+    spec = Spec.of({"preset": "own-value", "overrides": [named]})
     assert spec.conditions()[0].settings.learner == TDLambdaSettings(step_size=0.1)
     assert Spec.parse(dumps(spec.table())) == spec
 
