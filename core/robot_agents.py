@@ -29,6 +29,7 @@ from .protocols import (
     Transition,
     groups_of,
     measures_of,
+    roles_of,
 )
 from .spaces import ActionSet, StateSpace
 
@@ -70,6 +71,8 @@ class RobotAgents:
         self.action_set = ActionSet(names, zeros, zeros, neutral)
         self.agents = tuple(robot_of(scenario.agents[group[0]]) for group in self.wheel_groups)
         self.groups = tuple((r,) for r in range(len(self.agents)))
+        roles = roles_of(scenario)
+        self.roles = tuple("+".join(roles[i] for i in group) for group in self.wheel_groups)
         space = scenario.state_space
         own = tuple(
             replace(v, name=f"{scenario.agents[wheel].rpartition('.')[2]}.{v.name}")

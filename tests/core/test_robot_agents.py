@@ -6,7 +6,7 @@ import pytest
 from nested_agents.core.decision import Decision
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.loop import control_loop, policy_seed
-from nested_agents.core.protocols import EmbodiedScenario
+from nested_agents.core.protocols import EmbodiedScenario, roles_of
 from nested_agents.core.robot_agents import RobotAgents, per_robot
 from nested_agents.core.self_model import SelfModelSettings
 from nested_agents.core.team import Team
@@ -42,6 +42,13 @@ def test_predictions_by_blocks_are_those_by_states(line_world) -> None:
         blocks = prediction.blocks(agent)
         assert blocks.states(codes) == pytest.approx(prediction.states(agent, joint))
     assert prediction.reward_table() == pytest.approx(prediction.rewards(joint))
+
+
+def test_robots_whose_wheels_have_the_same_roles_are_of_one_role(line_world) -> None:
+    world = line_world(2, 2)
+    assert roles_of(per_robot(world)) == ("cart0.wheel0+cart0.wheel1", "cart1.wheel0+cart1.wheel1")
+    world.roles = ("front", "rear") * 2
+    assert roles_of(per_robot(world)) == ("front+rear", "front+rear")
 
 
 def test_the_scenario_keeps_its_promises() -> None:
