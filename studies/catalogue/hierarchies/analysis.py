@@ -37,6 +37,8 @@ REFERENCE = "chain"
 """The hierarchy that others are compared with, if it is there."""
 WIDTH = 80
 """Of a note [characters]."""
+DECIDING, MESSAGES = "decide [ms]", "messages"
+"""Titles of what a decision costs."""
 UNBROKEN = "\N{NO-BREAK SPACE}"
 
 
@@ -209,9 +211,9 @@ def _estimates(evaluation: Arrays, numbers: Arrays, usage: Arrays) -> dict[str, 
     decisions = to_the_goal(evaluation)
     if len(decisions):
         values["decisions to goal"] = bootstrap(decisions)
-    values["decide [ms]"] = bootstrap(1e3 * usage["decision_median"])
+    values[DECIDING] = bootstrap(1e3 * usage["decision_median"])
     unknown = np.asarray(np.nan)  # a count has no interval
-    values["messages"] = Estimate(numbers["messages"][0], unknown, unknown)
+    values[MESSAGES] = Estimate(numbers["messages"][0], unknown, unknown)
     return values
 
 
@@ -233,20 +235,22 @@ def _verdicts(results: Results, cases: tuple[Case, ...]) -> tuple[Verdict, ...]:
     found: dict[str, list[Difference]] = {}
     bases = {case.setting: case.condition for case in cases if case.hierarchy == reference}
     for case in cases:
-        base = bases.get(case.setting, case.condition)
-        outcomes = paired(results, case.condition, base, _outcomes)
-        if base != case.condition and len(outcomes[0]) >= 2:
-            raw = paired_permutation(*(runs.mean(axis=1) for runs in outcomes))
-            estimate, seeds = difference(*outcomes), len(outcomes[0])
-            compared = Difference(case.hierarchy, EVALUATED, seeds, estimate, raw)
+        base = bases.get(case.setting)
+        if base is None or base == case.condition:
+            continue
+        own, other = paired(results, case.condition, base, _outcomes)
+        if len(own) >= 2:
+            raw = paired_permutation(own.mean(axis=1), other.mean(axis=1))
+            estimate = difference(own, other)
+            compared = Difference(case.hierarchy, EVALUATED, len(own), estimate, raw)
             found.setdefault(case.setting, []).append(compared)
-    every = [compared for own in found.values() for compared in own]
-    adjusted = iter(holm([compared.p for compared in every]))
+    ps = [compared.p for group in found.values() for compared in group]
+    adjusted = iter(holm(ps))
     return tuple(
         Verdict(
-            setting, reference, tuple(replace(d, p=float(next(adjusted))) for d in own), len(every)
+            setting, reference, tuple(replace(d, p=float(next(adjusted))) for d in group), len(ps)
         )
-        for setting, own in found.items()
+        for setting, group in found.items()
     )
 
 
@@ -264,11 +268,12 @@ def _told(verdicts: tuple[Verdict, ...]) -> Iterator[str]:
     if not verdicts:
         return
     reference, among = verdicts[0].reference, verdicts[0].among
-    yield (
-        f"\nDoes the hierarchy matter? Evaluation success less that of {reference}, seed by seed;\n"
-        f"p is adjusted over {among} comparisons, so fewer than {seeds_needed(among)} seeds cannot "
+    text = (
+        f"Does the hierarchy matter? Evaluation success less that of {reference}, seed by seed; p "
+        f"is adjusted over {among} comparisons, so fewer than {seeds_needed(among)} seeds cannot "
         "tell."
     )
+    yield from ("", *wrap(text, WIDTH, break_on_hyphens=False))
     for verdict in verdicts:
         count = f"{len(verdict.different)} of {len(verdict.comparisons)}"
         yield f"{verdict.setting}: {count} found to differ"
@@ -289,14 +294,12 @@ def _listed(said: str, comparisons: tuple[Difference, ...]) -> Iterator[str]:
 def _highest(cases: tuple[Case, ...]) -> Iterator[str]:
     """Yield a line for every number of robots: the highest success, and what it costs."""
     if cases:
-        yield "\nHighest evaluation success, the quickest if several are equal:"
+        yield "\nHighest evaluation success, the quickest of equals; what a decision costs:"
     for robots in dict.fromkeys(case.robots for case in cases):
         best = min(
             (case for case in cases if case.robots == robots),
-            key=lambda case: (-case.values[EVALUATED].value, case.values["decide [ms]"].value),
+            key=lambda case: (-case.values[EVALUATED].value, case.values[DECIDING].value),
         )
-        values = {title: two_figures(float(e.value)) for title, e in best.values.items()}
-        yield (
-            f"{best.setting}, {best.hierarchy}: {values[EVALUATED]}, "
-            f"{values['decide [ms]']} ms, {values['messages']} messages a decision"
-        )
+        success, time = (two_figures(float(best.values[t].value)) for t in (EVALUATED, DECIDING))
+        passed = f"{best.values[MESSAGES].value:,.0f}"
+        yield f"{best.setting}, {best.hierarchy}: {success}; {time} ms, messages {passed}"

@@ -9,9 +9,9 @@ from matplotlib.ticker import LogLocator
 from ...analysis.summary import EVALUATED
 from ...presentation.by_robots import add_legend, draw_line, scale_axis
 from ...presentation.figures import SETTINGS
-from .analysis import Hierarchies
+from .analysis import DECIDING, Hierarchies
 
-ROWS = (EVALUATED, "decide [ms]")
+ROWS = (EVALUATED, DECIDING)
 """What is shown above and below."""
 
 
@@ -43,7 +43,7 @@ def figure_of(analysis: Hierarchies) -> Figure:
         panels[1][0].yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         panels[1][0].yaxis.set_major_formatter("{x:g}")
         panels[1][0].yaxis.set_minor_formatter("")
-        for axes, title in zip(panels[:, 0], ("evaluation success", "deciding [ms]"), strict=True):
+        for axes, title in zip(panels[:, 0], (EVALUATED, "deciding [ms]"), strict=True):
             axes.set_ylabel(title)
         add_legend(figure, hierarchies, "means over seeds, bars: 95 % intervals")
         return figure
