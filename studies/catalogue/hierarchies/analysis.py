@@ -4,12 +4,12 @@ Conditions are topologies, crossed with whose value decides and with the number 
 the same worlds, seed by seed. One measure was fixed beforehand: evaluation success. For each number
 of robots and each choice of whose value decides, every hierarchy is compared with the chain (with
 the first hierarchy if there is no chain) by permutation of signs; p is adjusted by Holm's method
-over all of these comparisons. Few seeds cannot give a small p whatever the outcome: what they leave
-open is said to be open, and how many seeds it takes.
+over all of these comparisons. Few seeds cannot give a small p whatever the outcome: what they
+leave undecided is called so, and how many seeds it takes is said.
 
 A trial is measured as one of the scaling study, messages included: one for every edge of the
-hierarchy's transitive closure. Decisions to the goal are those of successful episodes alone, so
-that a hierarchy that succeeds where it is easy only looks quick.
+hierarchy's transitive closure. Decisions to the goal are those of successful episodes alone: a
+hierarchy that succeeds only where it is easy looks quick.
 """
 
 from __future__ import annotations
@@ -81,7 +81,8 @@ class Case:
     @property
     def setting(self) -> str:
         """What it has in common with those that it is compared with."""
-        return _setting(self.robots, self.value_of)
+        counted = f"{self.robots} robot{'s' * (self.robots != 1)}"
+        return f"{counted}, {self.value_of}" if self.value_of else counted
 
 
 @dataclass(frozen=True)
@@ -176,11 +177,6 @@ def analyse(results: Results) -> Hierarchies:
     verdicts = _verdicts(results, cases)
     notes = (*_legend(cases), *_told(verdicts), *_highest(cases))
     return Hierarchies(table, cases, verdicts, notes)
-
-
-def _setting(robots: int, value_of: str) -> str:
-    counted = f"{robots} robot{'s' * (robots != 1)}"
-    return f"{counted}, {value_of}" if value_of else counted
 
 
 def _cases(results: Results) -> tuple[Case, ...]:
