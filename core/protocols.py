@@ -9,6 +9,7 @@ digits of one group read as a number are its *robot-action index*.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -167,6 +168,8 @@ class Measure:
         Which way is better, if one is.
     is_rate
         Whether an episode has it or has it not: 1 or 0.
+    least, greatest
+        What it cannot be below or above, if there is such; intervals end there.
     """
 
     name: str
@@ -176,10 +179,18 @@ class Measure:
     gathering: Literal["last", "mean", "sum", "max"] = "last"
     better: Literal["higher", "lower"] | None = None
     is_rate: bool = False
+    least: float | None = None
+    greatest: float | None = None
 
     def __post_init__(self) -> None:
         """Take it from the key of its own name, if no other is given."""
         object.__setattr__(self, "source", self.source or self.name)
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """The least and the greatest value, infinite where none is known."""
+        least = -math.inf if self.least is None else self.least
+        return least, math.inf if self.greatest is None else self.greatest
 
     @property
     def heading(self) -> str:

@@ -21,6 +21,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from . import trust
+
 FOLDER = "sources"
 """Where a study keeps copies, below its own directory."""
 MOST_BYTES = 1_000_000
@@ -41,6 +43,9 @@ class Sources:
     study
         Directory of a study, whose copies stand in for files that are not there any more;
         none: `folder`.
+    brought_by
+        What brought the `texts` along, if they are not the user's own: these are run only if they
+        are trusted, see `nested_agents.core.trust`.
 
     Examples
     --------
@@ -56,10 +61,14 @@ class Sources:
         folder: Path | None = None,
         texts: Mapping[str, str] | None = None,
         study: Path | None = None,
+        brought_by: str | None = None,
     ) -> None:
         self.folder = folder
         self._texts = dict(texts or {})
         self._study = study or folder
+        # By name; of what was sent to a worker all that is known is that its sender has run it.
+        self._brought = dict.fromkeys(self._texts, brought_by) if brought_by else {}
+        self._was_sent = False
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Sources) and self._texts == other._texts
@@ -68,7 +77,7 @@ class Sources:
         return hash(tuple(sorted(self._texts)))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Sources, (None, self._texts)
+        return _sent, (self._texts,)
 
     @property
     def texts(self) -> dict[str, str]:
@@ -77,7 +86,9 @@ class Sources:
 
     def only(self, names: set[str]) -> Sources:
         """Return the files of some names alone."""
-        return Sources(None, {name: self.text(name) for name in sorted(names)})
+        found = Sources(None, {name: self.text(name) for name in sorted(names)})
+        found._brought = {name: by for name, by in self._brought.items() if name in names}
+        return found
 
     def text(self, name: str) -> str:
         """Return the text of a file.
@@ -108,7 +119,7 @@ class Sources:
         Raises
         ------
         ValueError
-            If there is no such file or name, or the file raises when it is run.
+            If there is no such file or name, the file raises when it is run, or it may not be run.
         """
         path, name = split(reference)
         module = self._module(path)
@@ -135,7 +146,8 @@ class Sources:
         path = self.folder / name
         if not path.exists() and self._study is not None:
             kept = self._study / FOLDER / kept_name(name)
-            path = kept if kept.exists() else path
+            if kept.exists():
+                path, self._brought[name] = kept, str(self._study)
         try:
             content = path.read_bytes()
         except OSError as error:
@@ -161,6 +173,13 @@ class Sources:
         key = f"_nested_agents_{_sha256(name + chr(0) + text)}"
         if key in sys.modules:
             return sys.modules[key]
+        if name in self._brought and not trust.is_trusted(text):
+            raise ValueError(
+                f"{name} came with {self._brought[name]} and was not run from a spec of yours: it "
+                "can do whatever you can; --trust runs it"
+            )
+        if not self._was_sent:
+            trust.trust(text)
         module = ModuleType(key)
         path = None if self.folder is None else self.folder / name
         # Compiled code can be cached beside a file that exists.
@@ -174,6 +193,13 @@ class Sources:
             del sys.modules[key]
             raise ValueError(f"{name} cannot be run: {told(error)}") from None
         return module
+
+
+def _sent(texts: Mapping[str, str]) -> Sources:
+    """Return the files that another process has sent."""
+    sources = Sources(None, texts)
+    sources._was_sent = True
+    return sources
 
 
 _ACTIVE: ContextVar[Sources | None] = ContextVar("sources", default=None)

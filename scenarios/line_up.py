@@ -42,8 +42,8 @@ LEAD = Variable("lead", "m", -0.8, 0.8, centres=(-0.8, -0.2, 0.0, 0.2, 0.8))
 
 MEASURES = (
     SUCCESS,
-    Measure("final_distance_m", "mean distance", "m", "distance_m", better="lower"),
-    Measure("final_spread_m", "spread", "m", "spread_m", better="lower"),
+    Measure("final_distance_m", "mean distance", "m", "distance_m", better="lower", least=0.0),
+    Measure("final_spread_m", "spread", "m", "spread_m", better="lower", least=0.0),
 )
 
 

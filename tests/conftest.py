@@ -1,5 +1,7 @@
 """A world small enough to reason about, for tests that need a scenario but no physics."""
 
+import os
+from collections.abc import Iterator
 from math import pi
 
 import numpy as np
@@ -106,6 +108,14 @@ class LinePrediction:
 
     def reward_table(self) -> np.ndarray:
         return self.rewards(decode(np.arange(self.n_actions**self.n), self.n, self.n_actions))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def state_home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """What tests trust is not noted in the list of who runs them."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(os.environ, "XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -32,13 +32,39 @@ def check_names(
     known = set(agents)
     for name, times in Counter(names).items():
         if name not in known:
-            raise ValueError(f"unknown agent {name!r} in {what}, known: {listed(agents)}")
+            raise ValueError(f"unknown agent {shown(name)} in {what}, known: {listed(agents)}")
         if times > 1:
-            raise ValueError(f"agent {name!r} occurs more than once in {what}")
+            raise ValueError(f"agent {shown(name)} occurs more than once in {what}")
     missing = known.difference(names)
     if all_needed and missing:
         first = next(agent for agent in agents if agent in missing)
         raise ValueError(f"agent {first!r} is missing from {what}")
+
+
+def check_legible(names: Iterable[object]) -> None:
+    """Refuse what is no name: neither text nor a whole number, empty, or not to be printed.
+
+    Raises
+    ------
+    ValueError
+        If a name is so; escaped and shortened.
+    """
+    for name in names:
+        is_name = isinstance(name, str | int) and not isinstance(name, bool)
+        if not is_name or not str(name) or not str(name).isprintable():
+            raise ValueError(f"{shown(name)} is no name of an agent, allowed: printable text")
+
+
+def shown(value: object, most: int = 60) -> str:
+    r"""Return a value for a message, in `most` characters at most, none of them special.
+
+    Examples
+    --------
+    >>> shown("a\nb"), shown("n" * 100, most=10)
+    ("'a\\nb'", "'nnnnnn...")
+    """
+    text = ascii(value) if not isinstance(value, str) or not value.isprintable() else repr(value)
+    return text if len(text) <= most else text[: most - 3] + "..."
 
 
 def with_edges(graph: nx.DiGraph, edges: Iterable[Sequence[str]]) -> nx.DiGraph:

@@ -11,11 +11,12 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Protocol
+from xml.etree import ElementTree
 
 import networkx as nx
 
 from ..core import sources
-from .checks import with_edges
+from .checks import check_legible, shown, with_edges
 
 
 def read_graph(path: str) -> nx.DiGraph:
@@ -34,8 +35,17 @@ def read_graph(path: str) -> nx.DiGraph:
         raise ValueError(f"{path}: suffix must be .graphml or .json")
     text = sources.active().text(path)
     try:
-        graph = nx.parse_graphml(text) if suffix == ".graphml" else _graph_of(json.loads(text))
-    except (ValueError, KeyError, TypeError, SyntaxError, nx.NetworkXException) as error:
+        if suffix == ".graphml":
+            _check_graphml(text)
+            graph = nx.parse_graphml(text)
+        else:
+            graph = _graph_of(json.loads(text, parse_constant=_no_name))
+        check_legible(graph)
+    except RecursionError:
+        raise ValueError(f"{path} holds no graph: it is nested too deeply") from None
+    except (
+        ValueError, KeyError, TypeError, AttributeError, SyntaxError, nx.NetworkXException
+    ) as error:  # fmt: skip
         reason = " ".join(str(error).split()) or type(error).__name__
         raise ValueError(f"{path} holds no graph: {reason}") from None
     return graph
@@ -102,10 +112,47 @@ def _graph_of(content: Any) -> nx.DiGraph:
         raise ValueError("it must be an object with the key edges")
     if "nodes" in content:
         key = "edges" if "edges" in content else "links"
+        for node in _list_of(content, "nodes"):
+            if not isinstance(node, dict) or "id" not in node:
+                raise ValueError(f"nodes: {shown(node)} must be an object with the key id")
+        for edge in _list_of(content, key):
+            if not isinstance(edge, dict) or not {"source", "target"} <= edge.keys():
+                raise ValueError(f"{key}: {shown(edge)} must be an object with source and target")
+            check_legible([edge["source"], edge["target"]])
+        check_legible(node["id"] for node in content["nodes"])
         return nx.node_link_graph(content, directed=content.get("directed", True), edges=key)
     unknown = set(content) - {"edges", "alone"}
     if unknown or "edges" not in content:
-        raise ValueError(f"its keys must be edges and alone, not {', '.join(content) or 'none'}")
+        keys = ", ".join(map(shown, content)) or "none"
+        raise ValueError(f"its keys must be edges and alone, not {keys}")
+    edges = _list_of(content, "edges")
+    for edge in edges:
+        if not isinstance(edge, list) or len(edge) != 2:
+            raise ValueError(f"edges: {shown(edge)} must be a pair [superior, subordinate]")
+        check_legible(edge)
+    alone = _list_of(content, "alone") if "alone" in content else []
+    check_legible(alone)
     graph = nx.DiGraph()
-    graph.add_nodes_from(content.get("alone", []))
-    return with_edges(graph, content["edges"])
+    graph.add_nodes_from(alone)
+    return with_edges(graph, edges)
+
+
+def _check_graphml(text: str) -> None:
+    """Refuse nodes and edges without what names agents; networkx would call these None."""
+    needed = {"node": ("id",), "edge": ("source", "target")}
+    for element in ElementTree.fromstring(text).iter():
+        kind = element.tag.rpartition("}")[2]
+        for attribute in needed.get(kind, ()):
+            if element.get(attribute) is None:
+                raise ValueError(f"{kind} {dict(element.attrib)}: has no {attribute}")
+
+
+def _list_of(content: dict[str, Any], key: str) -> list[Any]:
+    found = content.get(key)
+    if not isinstance(found, list):
+        raise ValueError(f"{key} = {shown(found)}: must be a list")
+    return found
+
+
+def _no_name(constant: str) -> Any:
+    raise ValueError(f"{constant} is neither a name nor JSON")

@@ -15,6 +15,7 @@ from ..core.cost import below_counts
 from ..core.hierarchy import Hierarchy
 from ..core.robot_agents import MOST_ACTIONS, robot_of
 from . import TOPOLOGIES, TopologySettings, build, builders, files, parse
+from .checks import check_legible
 from .config import (
     ChainSettings,
     EdgesSettings,
@@ -122,6 +123,7 @@ def named_by(settings: TopologySettings) -> tuple[str, ...]:
         names = [name for edge in settings.edges for name in edge] + list(settings.alone)
     elif isinstance(settings, FileSettings):
         names = [str(node) for node in files.read_graph(settings.path)]
+    check_legible(names)
     return tuple(dict.fromkeys(names))
 
 

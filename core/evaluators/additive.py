@@ -103,7 +103,7 @@ class _Additive(Aggregation, ABC):
             agent, np.repeat(distinct, len(sums)), reached.reshape(-1, sums.shape[1]), expected
         )
         found = self.rules.values(deliberation.own_weights, states).reshape(len(distinct), -1)
-        self.count(found.size)
+        self.count(agent, found.size)
         valued = self._over_sums(found, probabilities)[which]
         return self._grouping.by_action(agent, local, weights[local], valued)
 

@@ -169,11 +169,11 @@ class Aggregation:
         self._pooling = Pooling(problem.rules, problem.groups)
         self._last: tuple[Sequence[FloatArray], IntArray, Pooled] | None = None
 
-    def count(self, joint_actions: int) -> None:
-        """Note that joint actions have been valued, each by each agent concerned."""
+    def count(self, agent: int, joint_actions: int) -> None:
+        """Note that joint actions have been tried: valued by each agent concerned, or rewarded."""
+        valued = 0 if self.problem.rule == "reward" else len(self.concerned[agent])
         self.counts.joint_actions += joint_actions
-        if self.problem.rule != "reward":
-            self.counts.rule_evaluations += joint_actions * self.rules.n_rules
+        self.counts.rule_evaluations += joint_actions * valued * self.rules.n_rules
 
     def indifferent(self, deliberation: Deliberation) -> bool:
         """Return whether every action must come to zero: nothing is learned yet, or ever."""
@@ -185,7 +185,7 @@ class Aggregation:
     def worth(self, deliberation: Deliberation, joint_actions: IntArray) -> FloatArray:
         """Return what joint actions ``(m, n)`` are worth to the deciding agent, ``(m,)``."""
         prediction, concerned = deliberation.prediction, self.concerned[deliberation.agent]
-        self.count(len(joint_actions) * len(concerned))
+        self.count(deliberation.agent, len(joint_actions))
         rewards = values = None
         if self.problem.rule != "value":
             rewards = cast(RewardPrediction, prediction).rewards(joint_actions)

@@ -83,7 +83,7 @@ class ExactEnumeration(Aggregation):
         own = len(self.concerned[agent]) == 1
         if tabulated and own and problem.rule == "value":
             tried = self._tried[agent]
-            self.count(tried.indices.size)
+            self.count(agent, tried.indices.size)
             empirical = problem.teammates == "empirical"
             return self.rules.enumerate(
                 deliberation.own_weights,
@@ -94,7 +94,7 @@ class ExactEnumeration(Aggregation):
             )
         below, combined = self.hierarchy.below(agent), self._below[agent]
         if self.indifferent(deliberation):
-            self.count(self.n_actions * len(combined) * len(self.concerned[agent]))
+            self.count(agent, self.n_actions * len(combined))
             return np.zeros(self.n_actions)
         probabilities = None
         if problem.teammates == "empirical":
@@ -110,7 +110,7 @@ class ExactEnumeration(Aggregation):
         prediction = cast(TabulatedPrediction, deliberation.prediction)
         tried, concerned = self._tried[deliberation.agent], self.concerned[deliberation.agent]
         indices = (tried.indices + int(deliberation.joint_action @ tried.places)).ravel()
-        self.count(len(indices) * len(concerned))
+        self.count(deliberation.agent, len(indices))
         rewards = values = None
         if self.problem.rule != "value":
             rewards = prediction.reward_table()[indices]

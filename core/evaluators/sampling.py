@@ -61,6 +61,6 @@ class Sampling(Aggregation):
         else:
             tried = rng.integers(a, size=(self.samples, len(below)))
         if self.indifferent(deliberation):
-            self.count(a * len(tried) * len(self.concerned[deliberation.agent]))
+            self.count(deliberation.agent, a * len(tried))
             return np.zeros(a)
         return self.aggregate(self.by_states(deliberation, tried), probabilities)

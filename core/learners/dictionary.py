@@ -15,9 +15,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 
 from ..arrays import FloatArray, IntArray
+from ..compiling import njit
 
 
 class Dictionary:

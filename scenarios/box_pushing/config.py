@@ -177,7 +177,7 @@ class RobotSettings(Settings):
     """A robot of one's own; what is not given is the e-Puck's."""
 
     wheels: Annotated[tuple[WheelSettings, ...], Field(min_length=1)]
-    radius: Positive = 0.037
+    radius: Annotated[float, Field(ge=0.001, le=10)] = 0.037
     """Of the round body [m]."""
     mass: Positive = 0.15
     """[kg]."""

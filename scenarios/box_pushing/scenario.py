@@ -41,14 +41,14 @@ MEASURES = (
         "stopped_at_goal", "stopped at goal", source="stopped_at_goal", better="higher",
         is_rate=True,
     ),
-    Measure("final_distance_m", "final distance", "m", "distance_m", better="lower"),
+    Measure("final_distance_m", "final distance", "m", "distance_m", better="lower", least=0.0),
     Measure(
         "final_orientation_rad", "final orientation error", "rad", "orientation_error_rad",
-        better="lower",
+        better="lower", least=0.0,
     ),
     Measure(
         "contact_fraction", "time in contact", source="contact_fraction", gathering="mean",
-        better="higher",
+        better="higher", least=0.0, greatest=1.0,
     ),
 )  # fmt: skip
 """What an episode is told by: whether the box came within the tolerance of the goal at whatever

@@ -63,16 +63,31 @@ def paired_permutation(
 ) -> float:
     """Return the two-sided p of equal means of paired values ``(n_seeds,)``, by sign flips.
 
-    All ``2 ** n_seeds`` sign patterns are tried if they are no more than `permutations`.
+    All ``2 ** n_seeds`` sign patterns are tried if they are no more than `permutations`. Sums that
+    differ by no more than rounding are equal, whatever the size of the values.
+
+    Raises
+    ------
+    ValueError
+        If there are not as many values of the one as of the other, none, or one is not finite.
 
     Examples
     --------
     >>> paired_permutation([1, 2, 3, 4, 5, 6], [0, 1, 2, 3, 4, 5])
     0.03125
     """
-    difference = np.asarray(first, dtype=float) - np.asarray(second, dtype=float)
-    n = len(difference)
-    observed = abs(difference.sum()) - 1e-12
+    one, other = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
+    if one.ndim != 1 or one.shape != other.shape or not len(one):
+        raise ValueError(
+            f"paired_permutation: values of shape {one.shape} against {other.shape}, allowed: one "
+            "for each seed, as many on both sides"
+        )
+    if not (np.isfinite(one).all() and np.isfinite(other).all()):
+        raise ValueError("paired_permutation: values must be finite")
+    difference, n = one - other, len(one)
+    # Each difference is off by half a unit in the last place, and each of n additions again.
+    rounding = 2 * (n + 1) * np.finfo(float).eps * float((abs(one) + abs(other)).sum())
+    observed = abs(difference.sum()) - rounding
     if 2**n <= permutations:
         codes = np.arange(2**n)[:, None] >> np.arange(n) & 1
         return float((abs((2 * codes - 1) @ difference) >= observed).mean())

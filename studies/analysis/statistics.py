@@ -1,7 +1,8 @@
-"""Point estimates with intervals: percentile bootstrap over seeds, and rates over episodes.
+"""Point estimates with intervals: bootstrap over seeds, or Student's t, and rates over episodes.
 
 The seed is the unit of sampling: episodes of one run depend on each other, runs do not. Intervals
-of fewer than two seeds are not a number rather than of no width.
+of fewer than two seeds are not a number rather than of no width. Resamples of few seeds hold too
+few different values: below `FEW` seeds intervals of means are Student's.
 """
 
 from __future__ import annotations
@@ -21,6 +22,16 @@ STATISTICS: dict[str, Callable[[Array], Array]] = {
     "median": lambda x: np.median(x, axis=-1),
 }
 """Statistics of the last axis by name; the interquartile mean leaves out a quarter at each end."""
+
+FEW = 8
+"""Below so many seeds a bootstrap interval covers too seldom: of normal values a 95 % interval from
+2, 3, 4, 5 seeds would cover 51, 74, 87, 92 %."""
+
+SPREAD = {"mean": 1.0, "iqm": 1.1, "median": 1.26}
+"""Standard deviation of each statistic of few normal values, over that of their mean."""
+
+NOT_NEGATIVE = (0.0, np.inf)
+"""The bounds of times, sizes and numbers of things, see `bootstrap`."""
 
 ALIKE = 2.0
 """Failures that `rate` supposes beside those seen. With seeds of which one in twenty never learns,
@@ -43,13 +54,16 @@ def bootstrap(
     level: float = 0.95,
     resamples: int = 4000,
     seed: int = 0,
+    bounds: tuple[float, float] = (-np.inf, np.inf),
 ) -> Estimate:
     """Return a statistic of values pooled over strata, with its stratified bootstrap interval.
 
     Each stratum is resampled on its own, whole runs at a time, so that every stratum keeps its
     weight (Agarwal et al. 2021, Section 4.1). The percentiles lie further out than `level` says, by
     as much as Student's t distribution does and variances of few runs fall short (Hesterberg 2015,
-    Section 5.2); without that, intervals of five normal values cover their mean in 84 %.
+    Section 5.2). Of fewer than `FEW` runs the interval is Student's, with the degrees of freedom of
+    Welch and Satterthwaite if there are several strata: exact for means of normal values, near that
+    for the other statistics.
 
     Parameters
     ----------
@@ -62,6 +76,10 @@ def bootstrap(
         Coverage of the interval.
     resamples, seed
         Number of resamples, and the seed that draws them.
+    bounds
+        The least and the greatest value that there can be, beyond which no interval reaches. If
+        both are finite and all runs have one of them, the interval is as wide as Wilson's for a
+        rate of 0 or 1.
 
     Raises
     ------
@@ -71,8 +89,8 @@ def bootstrap(
     Examples
     --------
     >>> e = bootstrap([1.0, 2.0, 3.0, 4.0])
-    >>> float(e.value), bool(1.0 <= e.low < 2.5 < e.high <= 4.0)
-    (2.5, True)
+    >>> f"{e.value:.2f} [{e.low:.2f}, {e.high:.2f}]"
+    '2.50 [0.45, 4.55]'
     """
     if statistic not in STATISTICS:
         raise ValueError(f"statistic = {statistic!r}: known: {', '.join(STATISTICS)}")
@@ -83,13 +101,42 @@ def bootstrap(
     value = compute(np.concatenate(arrays).T)
     if any(len(array) < 2 for array in arrays):
         return Estimate(value, np.full_like(value, np.nan), np.full_like(value, np.nan))
+    if sum(map(len, arrays)) < FEW:
+        half = _student(arrays, level) * SPREAD[statistic]
+        return _bounded(value, value - half, value + half, bounds, level, sum(map(len, arrays)))
     rng = np.random.default_rng(seed)
     drawn = [array[rng.integers(len(array), size=(resamples, len(array)))] for array in arrays]
     # (resamples, n_runs) or (resamples, n_runs, n_points): runs last for the statistic.
     samples = np.moveaxis(np.concatenate(drawn, axis=1), 1, -1)
     tail = _tail(level, samples.shape[-1])
     low, high = np.quantile(compute(samples), [tail, 1.0 - tail], axis=0)
+    return _bounded(value, low, high, bounds, level, samples.shape[-1])
+
+
+def _bounded(
+    value: Array, low: Array, high: Array, bounds: tuple[float, float], level: float, n_runs: int
+) -> Estimate:
+    """Return an estimate whose interval ends at the bounds, but is no point there."""
+    least, greatest = bounds
+    low, high = np.clip(low, *bounds), np.clip(high, *bounds)
+    if np.isfinite(greatest - least):
+        z = stats.norm.ppf(0.5 + level / 2.0)
+        reach = (greatest - least) * z**2 / (n_runs + z**2)
+        low = np.where(value >= greatest, np.minimum(low, greatest - reach), low)
+        high = np.where(value <= least, np.maximum(high, least + reach), high)
     return Estimate(value, low, high)
+
+
+def _student(strata: list[Array], level: float) -> Array:
+    """Return half the width of Student's interval of the mean of all values of some strata."""
+    n = sum(map(len, strata))
+    parts = np.array([len(s) * s.var(axis=0, ddof=1) / n**2 for s in strata])
+    freedom = np.array([len(s) - 1 for s in strata]).reshape(-1, *[1] * (parts.ndim - 1))
+    variance = parts.sum(axis=0)
+    shares = np.divide(parts, variance, out=np.zeros_like(parts), where=variance > 0)
+    # Where nothing varies the interval has no width, with any degrees of freedom.
+    degrees = 1.0 / np.maximum((shares**2 / freedom).sum(axis=0), 1e-300)
+    return np.asarray(stats.t.ppf(0.5 + level / 2.0, degrees) * np.sqrt(variance))
 
 
 def _tail(level: float, n_runs: int) -> float:

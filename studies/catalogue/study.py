@@ -48,9 +48,12 @@ def load_study(name: str) -> Study:
     Raises
     ------
     SpecError
-        If it lacks a function that studies have; one line.
+        If there is none, it may not be run, or lacks a function that studies have; one line.
     """
-    found = STUDIES.find(name)
+    try:
+        found = STUDIES.find(name)
+    except ValueError as error:
+        raise SpecError(f"study = {name!r}: {error}") from None
     study = found() if isinstance(found, type) else found
     missing = [part for part in PARTS if not callable(getattr(study, part, None))]
     if missing:

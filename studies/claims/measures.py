@@ -14,7 +14,7 @@ import numpy as np
 from ...core.cost import Problem
 from ..analysis.comparison import difference, paired, ratio
 from ..analysis.results import Results
-from ..analysis.statistics import Estimate, bootstrap, rate
+from ..analysis.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
 from ..catalogue.chain_order.analysis import analyse as analyse_orders
 from ..catalogue.shapes.analysis import least_ratio, ratios_of
 from ..catalogue.wheel_failure.analysis import courses_of
@@ -78,7 +78,7 @@ def sooner_than_planned(results: Results) -> Measured | None:
     if not {"default", PLANNER} <= results.evaluation.keys():
         return None
     base, own = paired(results, PLANNER, "default", _evaluation_steps)
-    return Measured(bootstrap(own / base), len(own)) if len(own) else None
+    return Measured(bootstrap(own / base, bounds=NOT_NEGATIVE), len(own)) if len(own) else None
 
 
 def success(episodes: slice) -> Compute:
@@ -166,7 +166,7 @@ def decision_share(results: Results) -> Measured | None:
         for condition in sizes[most]
     ]
     fastest = min(shares, key=lambda share: float(share.mean()))
-    return Measured(bootstrap(fastest), len(fastest), note=f"{most} robots")
+    return Measured(bootstrap(fastest, bounds=NOT_NEGATIVE), len(fastest), note=f"{most} robots")
 
 
 def success_by_size(results: Results) -> Measured | None:

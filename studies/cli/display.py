@@ -150,6 +150,8 @@ def print_table(found: SummaryTable) -> None:
         console.print(table)
         print()
     print("Means over seeds, and below them their 95 % intervals.")
+    if found.remark:
+        print(found.remark)
 
 
 def _blocks(found: SummaryTable, width: int) -> list[dict[int, int]]:

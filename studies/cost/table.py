@@ -5,7 +5,6 @@ A ratio is written as an integer where it is one or no floating-point number hol
 
 from __future__ import annotations
 
-import csv
 import io
 import json
 import sys
@@ -16,6 +15,7 @@ from typing import Any, Literal
 
 from ...topologies.view import aligned, readable
 from ..analysis.statistics import Estimate
+from ..presentation.csv_text import write_csv
 from .cost import RULES, CostRow, Measured, exponent, fitted
 
 Form = Literal["table", "json", "csv", "latex"]
@@ -45,9 +45,7 @@ def written(rows: Sequence[CostRow], form: Form) -> str:
             return "[" + ",\n ".join(json.dumps(record) for record in records) + "]"
         file = io.StringIO()
         columns = list(dict.fromkeys(name for record in records for name in record))
-        writer = csv.DictWriter(file, columns, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(records)
+        write_csv(file, columns, [[record.get(name) for name in columns] for record in records])
         return file.getvalue().rstrip("\n")
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 from collections.abc import Callable, Sequence, Set
 from pathlib import Path
@@ -13,6 +12,7 @@ from ..analysis.results import read
 from ..spec.errors import SpecError
 from ..store.durable import replacing
 from ..store.store import Store
+from .csv_text import write_csv
 
 Form = Literal["csv", "parquet", "json"]
 NamesAndRows = tuple[list[str], list[tuple[Any, ...]]]
@@ -79,9 +79,7 @@ def _write_csv(table: NamesAndRows, path: Path) -> None:
     names, rows = table
     with replacing(path) as file:
         text = io.TextIOWrapper(file, encoding="utf-8", newline="", write_through=True)
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(names)
-        writer.writerows(rows)
+        write_csv(text, names, rows)
         text.detach()
 
 

@@ -9,6 +9,8 @@ from typing import Any
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
+from ..store.durable import replacing
+
 SUFFIXES = (".svg", ".png", ".pdf")
 """Formats that figures are written in."""
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -33,7 +35,9 @@ def save(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
 
 
 def write(figure: Figure, path: Path) -> None:
-    """Write a figure: SVG, PNG or PDF by suffix. Equal figures give equal files: no date in them.
+    """Write a figure: SVG, PNG or PDF by suffix; it is there whole or not at all.
+
+    Equal figures give equal files: no date in them.
 
     Raises
     ------
@@ -42,8 +46,8 @@ def write(figure: Figure, path: Path) -> None:
     """
     check_suffix(path)
     metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(path.suffix)
-    with mpl.rc_context(SETTINGS):  # type: ignore[arg-type]
-        figure.savefig(path, dpi=150, metadata=metadata)
+    with mpl.rc_context(SETTINGS), replacing(path) as file:  # type: ignore[arg-type]
+        figure.savefig(file, format=path.suffix[1:], dpi=150, metadata=metadata)
 
 
 def check_suffix(path: Path) -> None:

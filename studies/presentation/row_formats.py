@@ -6,7 +6,6 @@ rounds. What the condition's label tells already, the swept keys, is left to CSV
 
 from __future__ import annotations
 
-import csv
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from textwrap import wrap
 from typing import Any, Literal, TextIO
 
 from ...core.protocols import Measure
+from .csv_text import write_csv
 
 Format = Literal["table", "csv", "json"]
 
@@ -60,9 +60,7 @@ def write_rows(
     CSV, true and false in JSON.
     """
     if form == "csv":
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(names)
-        writer.writerows(rows)
+        write_csv(file, names, rows)
     elif form == "json":
         rates = {measure.name for measure in measures if measure.is_rate}
         truths = {i for i, name in enumerate(names) if name in rates}

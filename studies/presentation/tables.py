@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import csv
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..analysis.statistics import Estimate
+from ..analysis.statistics import FEW, Estimate
 from ..analysis.summary import Summary, between, two_figures
 from ..spec.errors import SpecError
+from .csv_text import write_csv
 
 LATEX = {
     "\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_",
@@ -62,6 +62,13 @@ class SummaryTable:
     latex: str
     markdown: str
 
+    @property
+    def remark(self) -> str:
+        """What must be said of intervals of few seeds, if there are any; else nothing."""
+        if all(seeds >= FEW for _, seeds, _ in self.rows):
+            return ""
+        return f"Means of fewer than {FEW} seeds have Student's intervals, rates Wilson's."
+
 
 def tabulate(lines: Sequence[Summary], columns: Sequence[str] = ()) -> SummaryTable:
     """Return the table of some summaries, whose estimates may differ in their titles.
@@ -101,16 +108,16 @@ def _cell(estimate: Estimate | None) -> Cell | None:
 
 def _csv(lines: Sequence[Summary], titles: Sequence[str]) -> str:
     file = io.StringIO()
-    writer = csv.writer(file, lineterminator="\n")
     ends = [f"{title}{end}" for title in titles for end in ("", " low", " high")]
-    writer.writerow(["condition", "seeds", *ends])
+    rows = []
     for line in lines:
         values: list[object] = [line.condition, line.seeds]
         for title in titles:
             estimate = line.estimates.get(title)
             numbers = (np.nan,) * 3 if estimate is None else _ends(estimate)
             values += ["" if np.isnan(value) else repr(value) for value in numbers]
-        writer.writerow(values)
+        rows.append(values)
+    write_csv(file, ["condition", "seeds", *ends], rows)
     return file.getvalue()
 
 

@@ -16,12 +16,17 @@ from ...core.registry import closest
 from .overlay import Slot, field_of, kind_of, model_at, models_of
 from .renamed import now_called
 
+LONGEST = 1200
+"""Characters of a message; of a longer one the middle is left out."""
+
 
 class SpecError(ValueError):
     """Something the user can mend: its message is one line that names what, and what is allowed."""
 
     def __init__(self, message: str) -> None:
         line = " ".join(message.split())
+        if len(line) > LONGEST:
+            line = f"{line[: LONGEST // 2]} ... {line[-LONGEST // 4 :]}"
         # A terminal obeys control characters, and cannot write half of a surrogate pair.
         shown = (c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)
         super().__init__("".join(shown))

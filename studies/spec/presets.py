@@ -21,11 +21,27 @@ class Preset(NamedTuple):
 
 PRESETS: dict[str, Preset] = {
     "default": Preset(
-        "the best learner known: batch TD on a first-order rule base over relational variables",
+        "the best learner known, for teams of any size: batch TD, decisions by the team's value",
+        {
+            "scenario": {
+                "kind": "box-pushing",
+                "state_space": "crowd",
+                "reward": {"of": "robot"},
+            },
+            "learner": {
+                "kind": "batch-td",
+                "weights": "role",
+                "exploration": {"kind": "burst", "floor": 0.0, "team_limit": 1.0},
+                "decision": {"value_of": "team"},
+            },
+        },
+    ),
+    "own-value": Preset(
+        "batch TD, every wheel by its own value and weights, as in the paper: for few robots",
         {"learner": {"kind": "batch-td"}},
     ),
     "pose": Preset(
-        "as default, and the box must stand within 15 degrees of the goal pose to be there",
+        "as own-value, and the box must stand within 15 degrees of the goal pose to be there",
         {
             "scenario": {
                 "kind": "box-pushing",
@@ -81,7 +97,7 @@ PRESETS: dict[str, Preset] = {
                 "prediction_horizon": 48,
                 "reward": {"attraction_without_contact": True},
             },
-            "learner": {"kind": "frozen", "decision": {"rule": "reward"}},
+            "learner": {"kind": "frozen", "decision": {"rule": "reward", "value_of": "team"}},
         },
     ),
 }

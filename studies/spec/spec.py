@@ -173,7 +173,7 @@ class Spec(Settings):
             If the file cannot be read, is no TOML, or anything in it is wrong.
         """
         try:
-            text = path.read_text(encoding="utf-8")
+            text = path.read_text(encoding="utf-8-sig")
         except OSError as error:
             raise SpecError(f"{path}: {error.strerror or error}") from None
         except UnicodeDecodeError:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import sqlite3
 import tempfile
@@ -10,6 +11,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ..spec.errors import SpecError
+
+DATABASE = "results.sqlite"
+"""Name of the file, in the directory of a study."""
 
 CIRCUMSTANCES = (
     sqlite3.SQLITE_PERM,
@@ -21,6 +25,9 @@ CIRCUMSTANCES = (
     sqlite3.SQLITE_CANTOPEN,
 )
 """Errors that are no fault of the database; all others are: our statements fit our tables."""
+
+ILL = (UnicodeError, MemoryError, OverflowError)
+"""What Python itself raises when SQLite hands it damaged text or sizes."""
 
 
 class DamageError(SpecError):
@@ -48,6 +55,7 @@ def writing(path: Path) -> Iterator[sqlite3.Connection]:
     SpecError
         If it cannot be used, or the disk is full.
     """
+    _check_beside(path)
     with _one_line(path), _closing(sqlite3.connect(path, isolation_level=None)) as connection:
         connection.execute("PRAGMA journal_mode = WAL")
         connection.execute("PRAGMA synchronous = FULL")
@@ -57,7 +65,7 @@ def writing(path: Path) -> Iterator[sqlite3.Connection]:
 
 @contextmanager
 def reading(path: Path) -> Iterator[sqlite3.Connection]:
-    """Connect to an existing database to read it, also where nothing can be written.
+    """Connect to an existing database to read one state of it, also where nothing can be written.
 
     Raises
     ------
@@ -66,17 +74,21 @@ def reading(path: Path) -> Iterator[sqlite3.Connection]:
     SpecError
         If it cannot be read.
     """
+    _check_beside(path)
     with _one_line(path):
         # Not mode=ro: such a connection leaves SQLite's -wal and -shm files behind.
         uri = f"{path.absolute().as_uri()}?mode=rw"
         with _closing(sqlite3.connect(uri, uri=True, isolation_level=None)) as connection:
             try:
+                connection.execute("BEGIN")
                 connection.execute("SELECT 1 FROM sqlite_master").fetchone()
             except sqlite3.OperationalError:
                 connection.close()
                 with copied(path) as copy:
                     yield copy
                 return
+            except ILL as error:
+                raise DamageError(path, " ".join(str(error).split())) from None
             connection.execute("PRAGMA query_only = ON")
             yield connection
 
@@ -129,6 +141,14 @@ def _closing(connection: sqlite3.Connection) -> Iterator[sqlite3.Connection]:
         yield connection
     finally:
         connection.close()
+
+
+def _check_beside(path: Path) -> None:
+    """Refuse what stands in the place of a file that SQLite keeps beside the database."""
+    for suffix in ("", "-wal", "-shm"):
+        beside = path.with_name(path.name + suffix)
+        if os.path.lexists(beside) and not beside.is_file():
+            raise SpecError(f"{beside}: is no file, and in the way of one; remove it")
 
 
 @contextmanager

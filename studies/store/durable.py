@@ -6,6 +6,7 @@ import hashlib
 import io
 import os
 import zipfile
+import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -65,8 +66,17 @@ def sha256(path: Path) -> str | None:
         return None
 
 
-def read_recording(path: Path, name: str) -> Recording:
+def read_recording(path: Path, name: str, digest: str | None = None) -> Recording:
     """Read one recording from a file that `write_recordings` wrote.
+
+    Parameters
+    ----------
+    path
+        Of the file.
+    name
+        Of the recording.
+    digest
+        SHA-256 that the file must have, if that is known.
 
     Raises
     ------
@@ -77,12 +87,17 @@ def read_recording(path: Path, name: str) -> Recording:
     """
     prefix = f"{name}/"
     try:
-        with np.load(path, allow_pickle=False) as arrays:
+        content = path.read_bytes()
+        if digest not in (None, hashlib.sha256(content).hexdigest()):
+            raise SpecError(f"{path}: is damaged")
+        with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
             keys = [key for key in arrays.files if key.startswith(prefix)]
             found = {key.removeprefix(prefix): arrays[key] for key in keys}
     except FileNotFoundError:
         raise SpecError(f"{path}: no such file") from None
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile):
+    except OSError as error:
+        raise SpecError(f"{path}: {error.strerror or error}") from None
+    except (ValueError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError):
         raise SpecError(f"{path}: is damaged") from None
     if not found:
         raise NotRecordedError(f"{path}: holds no recording {name!r}")

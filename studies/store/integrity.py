@@ -9,8 +9,9 @@ from contextlib import suppress
 from pathlib import Path
 
 from ..spec.errors import SpecError
+from ..trials.trial import RESULTS_VERSION
 from . import database
-from .schema import OF_A_TRIAL, study_checksum, trial_checksum
+from .schema import OF_A_TRIAL, study_checksum, trial_checksums
 
 
 def damage(path: Path) -> str | None:
@@ -21,22 +22,59 @@ def damage(path: Path) -> str | None:
     SpecError
         If it cannot be read for another reason, or is sound but no study's.
     """
+    if bereft(path):
+        return "its log is there without it"
+    if not path.exists():
+        return None
     try:
         with database.reading(path) as db:
-            tables = {name for (name,) in db.execute("SELECT name FROM sqlite_master")}
-            if not tables:
-                return None
-            if not tables & {"meta", "trials", *OF_A_TRIAL}:
-                raise SpecError(f"{path}: is a database, but no study; use another directory")
-            (said,) = db.execute("PRAGMA integrity_check(1)").fetchone()
-            if said != "ok":
-                return " ".join(str(said).replace("*** in database main ***", "").split())
-            noted = db.execute("SELECT value FROM meta WHERE key = 'sha256'").fetchone()
-            # Studies begun before there were checksums have none.
-            if noted is not None and noted[0] != study_checksum(db):
-                return "what it says of the study is not what was written"
+            return fault(path, db)
     except database.DamageError as error:
         return error.reason
+
+
+def bereft(path: Path) -> bool:
+    """Tell whether only the log is left of a database: SQLite would drop it without a word."""
+    log = path.with_name(f"{path.name}-wal")
+    return _size(log) > 0 and _size(path) == 0
+
+
+def holds_tables(path: Path) -> bool:
+    """Tell a study from nothing, and from a run that was killed before it had noted its spec."""
+    if not path.exists():
+        return False
+    with database.reading(path) as db:
+        return db.execute("SELECT 1 FROM sqlite_master").fetchone() is not None
+
+
+def _size(path: Path) -> int:
+    return path.stat().st_size if path.exists() else 0
+
+
+def fault(path: Path, db: sqlite3.Connection) -> str | None:
+    """Return what is wrong with an open database as a whole, see `damage`."""
+    try:
+        tables = {name for (name,) in db.execute("SELECT name FROM sqlite_master")}
+        if not tables:
+            (pages,) = db.execute("PRAGMA page_count").fetchone()
+            return "it has no tables" if pages > 1 else None
+        if not tables & {"meta", "trials", *OF_A_TRIAL}:
+            raise SpecError(f"{path}: is a database, but no study; use another directory")
+        (said,) = db.execute("PRAGMA integrity_check(1)").fetchone()
+        if said != "ok":
+            return " ".join(str(said).replace("*** in database main ***", "").split())
+        noted = dict(db.execute("SELECT key, value FROM meta").fetchall())
+        if "planned" not in tables and noted.get("results_version") != str(RESULTS_VERSION):
+            return None  # of a version that kept less; what it holds is not read
+        # Studies begun before there were checksums have none.
+        if noted.get("sha256") not in (None, study_checksum(db)):
+            return "what it says of the study is not what was written"
+        if "ledger" in tables:
+            kept = db.execute("SELECT count(*) FROM checksums").fetchall()
+            if db.execute("SELECT trials FROM ledger").fetchall() != kept:
+                return "it does not hold as many trials as were run"
+    except database.ILL as error:
+        return " ".join(str(error).split()) or type(error).__name__
     return None
 
 
@@ -74,6 +112,7 @@ def recover(damaged: Path, db: sqlite3.Connection) -> int:
         for table, rows in tables.items():
             database.insert(db, table, rows)
         copied += 1
+    db.execute("UPDATE ledger SET trials = ?", (copied,))
     return copied
 
 
@@ -87,21 +126,25 @@ def _sound(path: Path, columns: list[str]) -> Iterator[dict[str, list[tuple[obje
     None if episodes have other `columns`.
     """
     identities: dict[str, str] = {}
-    with suppress(sqlite3.DatabaseError), database.copied(path) as db:
+    with suppress(sqlite3.Error, *database.ILL), database.copied(path) as db:
         db.execute("PRAGMA writable_schema = ON")  # a table it cannot understand is passed over
         noted_by = db.execute("SELECT identity, sha256 FROM checksums")
         for identity, noted in noted_by if _columns(db) == columns else ():
             identities.setdefault(identity, noted)
+    if not identities:
+        return
     with database.copied(path) as db:
         db.execute("PRAGMA writable_schema = ON")
         for identity, noted in identities.items():
             found: dict[str, list[tuple[object, ...]]] = {}
             try:
-                if trial_checksum(db, identity) == noted:
+                if dict(trial_checksums(db, identity)) == {identity: noted}:
                     for table in ("trials", *OF_A_TRIAL):
                         query = f"SELECT * FROM {table} WHERE identity = ?"
                         found[table] = db.execute(query, (identity,)).fetchall()
-            except sqlite3.DatabaseError:
+                    # The row that an index leads to may be another one.
+                    found["checksums"] = [(identity, noted)]
+            except (sqlite3.Error, *database.ILL):
                 continue
             if found:
                 yield found

@@ -1,7 +1,8 @@
 """The tables of a study's database, and checksums of what they hold.
 
-SQLite notices a torn page but not a flipped digit. Each finished trial therefore has a checksum of
-its rows, and what concerns the study as a whole has another one, in `meta`.
+SQLite notices a torn page but not a flipped digit. Each trial that was run therefore has a checksum
+of its rows, and what concerns the study as a whole has another one, in `meta`. The table `ledger`
+says how many trials have been run, so that none can be gone unnoticed.
 """
 
 from __future__ import annotations
@@ -9,7 +10,10 @@ from __future__ import annotations
 import hashlib
 import json
 import sqlite3
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import groupby
+from operator import itemgetter
+from typing import Any
 
 from ...core.protocols import Measure
 from ..spec.spec import Spec
@@ -45,6 +49,7 @@ SCHEMA = (
         WITHOUT ROWID""",
     """CREATE TABLE IF NOT EXISTS checksums (
         identity TEXT PRIMARY KEY REFERENCES trials ON DELETE CASCADE, sha256 TEXT NOT NULL)""",
+    "CREATE TABLE IF NOT EXISTS ledger (trials INTEGER NOT NULL)",
 )
 """Tables that studies have alike; beside them are `conditions` and `episodes`, whose columns
 differ."""
@@ -85,6 +90,9 @@ def prepare(
     meta |= {"sources": json.dumps(spec.sources.texts), "code": json.dumps(computed_by)}
     insert(db, "meta", list(meta.items()))
     insert(db, "meta", [("sha256", study_checksum(db))])
+    if db.execute("SELECT 1 FROM ledger").fetchone() is None:
+        # A study begun before there was a ledger: what has a checksum is what there is.
+        db.execute("INSERT INTO ledger SELECT count(*) FROM checksums")
 
 
 def _episodes(measures: Sequence[Measure]) -> str:
@@ -107,18 +115,47 @@ def study_checksum(db: sqlite3.Connection) -> str:
     return _sha256([db.execute(query).fetchall() for query in queries])
 
 
-def trial_checksum(db: sqlite3.Connection, identity: str) -> str:
-    """Return the SHA-256 of all rows of a trial."""
-    queries = (
-        "SELECT identity, condition, seed, state, recording_sha256, code FROM trials"
-        " WHERE identity = ?",
-        "SELECT * FROM episodes WHERE identity = ? ORDER BY phase, episode",
-        "SELECT * FROM seconds WHERE identity = ?",
-        "SELECT * FROM numbers WHERE identity = ? ORDER BY name",
+def trial_checksums(
+    db: sqlite3.Connection, identity: str | None = None
+) -> Iterator[tuple[str, str]]:
+    """Yield the SHA-256 of all rows of each trial, or of one alone, after its identity.
+
+    What has rows in any table counts as a trial. Tables are read from end to end, as asking for
+    each of many trials on its own takes longer.
+    """
+    trials = _by_identity(
+        db,
+        "trials",
+        "identity, condition, seed, state, recording_sha256, code, error",
+        "",
+        identity,
     )
-    return _sha256([db.execute(query, (identity,)).fetchall() for query in queries])
+    # Only what failed has a traceback; that of a finished trial is no part of its checksum.
+    first = {key: [r[:-1] if r[-1] is None else r for r in rows] for key, rows in trials}
+    seconds, numbers = (
+        {key: list(rows) for key, rows in _by_identity(db, table, "*", order, identity)}
+        for table, order in (("seconds", ""), ("numbers", ", name"))
+    )
+    left = dict.fromkeys((*first, *seconds, *numbers))
+    for key, rows in _by_identity(db, "episodes", "*", ", phase, episode", identity):
+        left.pop(key, None)
+        parts = first.get(key, []), list(rows), seconds.get(key, []), numbers.get(key, [])
+        yield key, _sha256(parts)
+    for key in left:
+        yield key, _sha256((first.get(key, []), [], seconds.get(key, []), numbers.get(key, [])))
+
+
+def _by_identity(
+    db: sqlite3.Connection, table: str, columns: str, order: str, identity: str | None
+) -> Iterator[tuple[str, Iterable[tuple[Any, ...]]]]:
+    where, values = ("", ()) if identity is None else ("WHERE identity = ?", (identity,))
+    query = f"SELECT {columns} FROM {table} {where} ORDER BY identity{order}"
+    return groupby(db.execute(query, values), itemgetter(0))
+
+
+ENCODER = json.JSONEncoder(check_circular=False, default=repr)
+"""Writes rows as text. A flipped type makes bytes of a text: hence the default."""
 
 
 def _sha256(content: object) -> str:
-    # default: a flipped type makes bytes of a text
-    return hashlib.sha256(json.dumps(content, default=repr).encode()).hexdigest()
+    return hashlib.sha256(ENCODER.encode(content).encode()).hexdigest()

@@ -57,19 +57,21 @@ def _offering() -> Iterator[Path]:
             yield origin.parent if origin.name == "__init__.py" else origin
 
 
-def present() -> Code:
-    """Return the digests of the installed code."""
-    return {name: (_digest(text), meaning(text, name)) for name, text in modules().items()}
+def present(known: Mapping[str, tuple[str, str]] | None = None) -> Code:
+    """Return the digests of the installed code; modules whose text is `known` are not parsed."""
+    found, known = {}, known or {}
+    for name, text in modules().items():
+        digest = _digest(text)
+        is_same = name in known and known[name][0] == digest
+        found[name] = known[name] if is_same else (digest, meaning(text, name))
+    return found
 
 
 def changed(known: Mapping[str, tuple[str, str]]) -> list[str]:
     """Return the modules that mean something else than they did, or are new or gone."""
-    texts = modules()
-    found = sorted(known.keys() ^ texts.keys())
-    for name, text in texts.items():
-        if name in known and _digest(text) != known[name][0]:
-            found += [name] * (meaning(text, name) != known[name][1])
-    return found
+    here = present(known)
+    edited = [name for name in here if name in known and here[name][1] != known[name][1]]
+    return sorted(known.keys() ^ here.keys()) + edited
 
 
 def digest(code: Mapping[str, tuple[str, str]]) -> str:

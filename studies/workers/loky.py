@@ -17,6 +17,9 @@ from ..trials.trial import Trial
 from .interrupts import deaf
 from .worker import Arrival, RunTrial, attempt, begin
 
+QUIET = "ignore:resource_tracker:UserWarning"
+"""The process that tidies up after a killed run would complain at length of what it tidies up."""
+
 
 class LokyWorkers:
     """Processes of this machine, which end with their parent; see `Workers`.
@@ -40,6 +43,9 @@ class LokyWorkers:
         if jobs < 1:
             raise ValueError(f"jobs = {jobs}: must be at least 1")
         self.processes = jobs
+        filters = os.environ.get("PYTHONWARNINGS", "")
+        if QUIET not in filters:  # processes that are started from here on inherit it
+            os.environ["PYTHONWARNINGS"] = f"{filters},{QUIET}".lstrip(",")
 
     def arrivals(
         self, trials: Sequence[Trial], run_trial: RunTrial, started: Callable[[Trial], None]

@@ -44,23 +44,24 @@ class Progress:
 
 def progress(store: Store) -> Progress:
     """Return how far the study of an open store is."""
-    trials, refusal, counts = store.planned(), store.outdated(), store.counts()
+    trials, refusal, states = store.planned(), store.outdated(), store.states()
+    failed = [*states.values()].count("failed")
     if refusal is not None:
         # Trials of another version have other identities: what is there counts.
         return Progress(
             total=len(trials),
-            done=counts["done"],
-            failed=counts["failed"],
-            left=len(trials) - counts["done"] - counts["failed"],
+            done=len(states) - failed,
+            failed=failed,
+            left=len(trials) - len(states),
             running=(),
             processes=CORES,
             seconds=None,
-            damaged=(),
+            damaged=tuple(store.notes),
             refusal=refusal,
         )
     mark = look(store.directory)
     begun = {} if mark is None else mark.seconds
-    pending = store.pending(trials)
+    pending = [trial for trial in trials if trial.identity not in states]
     running = [trial for trial in pending if trial.identity in begun]
     left = [trial for trial in pending if trial.identity not in begun]
     processes = CORES if mark is None else mark.processes
@@ -72,8 +73,8 @@ def progress(store: Store) -> Progress:
     )
     return Progress(
         total=len(trials),
-        done=len(trials) - len(pending) - counts["failed"],
-        failed=counts["failed"],
+        done=len(trials) - len(pending) - failed,
+        failed=failed,
         left=len(left),
         running=tuple((t.condition, t.seed, begun[t.identity]) for t in running),
         processes=processes,

@@ -28,6 +28,12 @@ def test_killed_studies_end_with_the_bytes_of_undisturbed_ones(backend: str, kil
 
 
 @pytest.mark.slow
+def test_an_adversary_finds_neither_silence_nor_tracebacks() -> None:
+    said = run("benchmarks.adversary", "--kills", "3", "--flips", "11", "--hostile", "30")
+    assert said.rstrip().endswith(", 0 failures")
+
+
+@pytest.mark.slow
 def test_the_runner_is_measured() -> None:
     said = run("benchmarks.runner", "--trials", "2", "--rounds", "1", "--episodes", "1")
     assert re.search(r"jobs 1: .* overhead \d", said)

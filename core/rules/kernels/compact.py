@@ -7,9 +7,9 @@ two active functions; bit v of a corner's number tells which it is of the term's
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from ...arrays import FloatArray, IntArray
+from ...compiling import njit
 from .contraction import total_width
 from .layout import Layout, Packed, unpack
 from .pairs import pairs

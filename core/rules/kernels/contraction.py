@@ -13,8 +13,8 @@ Where five functions to a variable are spelled out, it is for the paper's case.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ...compiling import njit
 from .layout import Layout
 from .strengths import hull, negligible, product_of, strengths_of, strengths_room
 

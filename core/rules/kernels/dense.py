@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from ...arrays import FloatArray, IntArray
+from ...compiling import njit
 from .contraction import contract, total_width
 from .folding import fold
 from .layout import Layout, Packed, unpack

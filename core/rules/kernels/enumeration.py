@@ -8,9 +8,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ...arrays import FloatArray, IntArray
+from ...compiling import njit
 from .compact import contracted, looked_up
 from .dense import folded
 from .layout import Packed, unpack

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from ...arrays import FloatArray, IntArray
+from ...compiling import njit
 from .layout import Layout, Packed, unpack
 from .strengths import all_strengths, hull, negligible, product_of, strengths_room
 from .updates import advance

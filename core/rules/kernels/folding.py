@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ...compiling import njit
 from .layout import Layout
 
 _FAST = {"reassoc", "contract"}

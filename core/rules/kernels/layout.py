@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
-from numba import njit
 
 from ...arrays import FloatArray, IntArray
+from ...compiling import njit
 
 if TYPE_CHECKING:
     from ..fuzzy import Partition

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from ...arrays import FloatArray
+from ...compiling import njit
 from .layout import Layout
 
 NEGLIGIBLE, NEGLIGIBLE_SINGLE = 1e-15, 1e-8

@@ -12,9 +12,9 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
-from numba import njit
 
 from ....core.arrays import BoolArray, FloatArray, IntArray
+from ....core.compiling import njit
 from ..states.view import View
 from ..world.geometry import surface
 from .push import PushModel, push

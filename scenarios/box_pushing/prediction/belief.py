@@ -12,9 +12,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ....core.arrays import FloatArray
+from ....core.compiling import njit
 from ..world.robots import RobotSpec, resistance
 from .push import PushModel, push
 

@@ -16,9 +16,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ....core.arrays import FloatArray, IntArray
+from ....core.compiling import njit
 from . import push_lanes as lanes
 from .push_lanes import BODY_ROWS, BOX_ROWS, LANES, MARGIN
 

@@ -11,7 +11,8 @@ readable definition.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from ....core.compiling import njit
 
 LANES = 32
 """Joint actions side by side."""

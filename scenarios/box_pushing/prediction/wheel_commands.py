@@ -12,9 +12,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ....core.arrays import FloatArray, IntArray
+from ....core.compiling import njit
 
 SAME_TWIST = 1e-11
 """Twists [m/s, rad/s] that differ by less are one twist."""

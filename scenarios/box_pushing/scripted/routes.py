@@ -5,9 +5,9 @@ from __future__ import annotations
 from math import pi
 
 import numpy as np
-from numba import njit
 
 from ....core.arrays import FloatArray
+from ....core.compiling import njit
 from ..world.geometry import surface
 
 

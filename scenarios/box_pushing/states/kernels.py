@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from math import pi
 
 import numpy as np
-from numba import njit
 
 from ....core.arrays import FloatArray, IntArray
+from ....core.compiling import njit
 from ..world.geometry import ON_SURFACE
 from .relational import AWAY
 from .view import CLOSE, LEAST, View

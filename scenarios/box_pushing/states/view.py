@@ -7,9 +7,9 @@ from functools import cached_property
 from math import pi
 
 import numpy as np
-from numba import njit
 
 from ....core.arrays import FloatArray
+from ....core.compiling import njit
 from ..world.geometry import Outline, surface
 
 CLOSE = 0.02

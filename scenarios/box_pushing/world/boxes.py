@@ -20,7 +20,7 @@ from shapely.geometry.polygon import orient
 from ....core.arrays import FloatArray
 from ..config import BoxSettings
 from .geometry import Outline
-from .polygons import Moments, Vertices, centred, convex_pieces, moments, polygon_edges
+from .polygons import LARGEST, Moments, Vertices, centred, convex_pieces, moments, polygon_edges
 from .robots import GRAVITY
 
 AREA = 0.04
@@ -77,6 +77,10 @@ class BoxSpec:
                 raise ValueError(f"box {self.name!r}: {name} = {value}, out of range")
         if bool(self.vertices) == bool(self.radius):
             raise ValueError(f"box {self.name!r}: needs either vertices or a radius")
+        if 2 * self.radius > LARGEST:
+            raise ValueError(
+                f"box {self.name!r}: radius = {self.radius}, allowed: up to {LARGEST / 2:g} m"
+            )
         _ = self.polygon  # what cannot be one is refused at once
 
     @classmethod

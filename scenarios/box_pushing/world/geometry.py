@@ -15,9 +15,9 @@ from dataclasses import dataclass
 from math import hypot, inf, sqrt
 
 import numpy as np
-from numba import njit
 
 from ....core.arrays import FloatArray
+from ....core.compiling import njit
 
 ON_SURFACE = 1e-12
 """Distance below which the direction to the nearest point is meaningless [m]."""

@@ -19,9 +19,9 @@ from math import exp, isfinite
 from typing import Protocol
 
 import numpy as np
-from numba import njit
 
 from ....core.arrays import FloatArray
+from ....core.compiling import njit
 from .geometry import Outline, disc_hit, ray, ray_numpy, surface
 from .robots import RobotSpec
 

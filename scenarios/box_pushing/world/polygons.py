@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Sequence
-from itertools import combinations
+from heapq import heapify, heappop, heappush
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +25,10 @@ Vertices = Sequence[tuple[float, float]]
 
 MAX_VERTICES = 8
 """Of a convex piece; b2_maxPolygonVertices."""
+MOST_VERTICES = 1000
+"""Of an outline and its holes; a drawing with more is to be simplified."""
+LEAST_EDGE, LARGEST = 1e-6, 100.0
+"""Shortest edge, and greatest distance of a vertex from another one [m]."""
 STRAIGHT = 1e-9
 """Sine of the angle between edges that counts as straight on."""
 
@@ -87,13 +91,13 @@ def centred(name: str, vertices: Vertices, holes: Sequence[Vertices] = ()) -> Po
     Raises
     ------
     ValueError
-        If the polygon has fewer than 3 vertices, is not finite, crosses or touches itself, or has
-        no area.
+        If the polygon has fewer than 3 vertices or more than `MOST_VERTICES`, is not finite or too
+        large, has two vertices at one place, crosses or touches itself, or has no area.
     """
-    if len(vertices) < 3 or any(len(hole) < 3 for hole in holes):
-        raise ValueError(f"box {name!r}: an outline needs at least 3 vertices")
-    if not all(np.isfinite(np.asarray(ring)).all() for ring in (vertices, *holes)):
-        raise ValueError(f"box {name!r}: vertices must be finite")
+    for ring in (vertices, *holes):
+        _check_ring(f"box {name!r}", ring)
+    if (count := sum(map(len, (vertices, *holes)))) > MOST_VERTICES:
+        raise ValueError(f"box {name!r}: {count} vertices, allowed: {MOST_VERTICES} or fewer")
     polygon = Polygon(vertices, holes)
     if not polygon.is_valid:
         raise ValueError(f"box {name!r}: not a simple polygon: {explain_validity(polygon)}")
@@ -107,6 +111,27 @@ def centred(name: str, vertices: Vertices, holes: Sequence[Vertices] = ()) -> Po
     polygon = orient(polygon)
     whole = moments(polygon_edges(polygon))
     return translate(polygon, *(-whole.first / whole.area))
+
+
+def _check_ring(box: str, vertices: Vertices) -> None:
+    """Refuse an outline that no body can have."""
+    if len(vertices) < 3:
+        raise ValueError(f"{box}: an outline needs at least 3 vertices")
+    ring = np.asarray(vertices, dtype=float)
+    if not np.isfinite(ring).all():
+        raise ValueError(f"{box}: vertices must be finite")
+    # Halved before they are subtracted: the difference of two numbers may overflow.
+    extent = 2 * float(np.ptp(ring / 2, axis=0).max())
+    if extent > LARGEST:
+        raise ValueError(f"{box}: is {extent:.3g} m long, allowed: up to {LARGEST:g} m")
+    edges = np.roll(ring, -1, axis=0) - ring
+    short = np.flatnonzero(np.hypot(edges[:, 0], edges[:, 1]) < LEAST_EDGE)
+    if len(short):
+        first, second = short[0] + 1, (short[0] + 1) % len(ring) + 1
+        raise ValueError(
+            f"{box}: vertices {first} and {second} are at the same place {vertices[short[0]]}, "
+            "allowed: each once, the first not again at the end"
+        )
 
 
 def _merged(first: FloatArray, second: FloatArray) -> FloatArray | None:
@@ -130,22 +155,48 @@ def _turns(ring: FloatArray) -> FloatArray:
 def convex_pieces(polygon: Polygon) -> tuple[FloatArray, ...]:
     """Return convex counter-clockwise pieces ``(<= 8, 2)`` that together are the polygon.
 
-    Constrained Delaunay triangles, merged greedily as long as the union of two is convex.
+    Constrained Delaunay triangles, merged greedily as long as the union of two is convex: always
+    the first two in their order. What neighbours a piece is kept, so that the time grows hardly
+    faster than the number of vertices.
     """
     ring = np.asarray(polygon.exterior.coords)[:-1]
     if not polygon.interiors and len(ring) <= MAX_VERTICES and (_turns(ring) > 0).all():
         return (ring,)
     triangles = shapely.constrained_delaunay_triangles(polygon).geoms
-    pieces = [np.asarray(orient(t).exterior.coords)[:-1] for t in triangles if t.area > 0]
-    merged = True
-    while merged:
-        merged = False
-        for i, j in combinations(range(len(pieces)), 2):
-            shared = {tuple(p) for p in pieces[i]} & {tuple(p) for p in pieces[j]}
-            union = _merged(pieces[i], pieces[j]) if len(shared) >= 2 else None
-            if union is not None:
-                pieces[i] = union
-                del pieces[j]
-                merged = True
-                break
-    return tuple(pieces)
+    rings = [np.asarray(orient(t).exterior.coords)[:-1] for t in triangles if t.area > 0]
+    pieces = dict(enumerate(rings))
+    neighbours = _neighbours(rings)
+    pairs = [(i, j) for i, beside in neighbours.items() for j in beside if i < j]
+    heapify(pairs)
+    while pairs:
+        i, j = heappop(pairs)
+        if i not in pieces or j not in pieces or j not in neighbours[i]:
+            continue
+        shared = {tuple(p) for p in pieces[i]} & {tuple(p) for p in pieces[j]}
+        union = _merged(pieces[i], pieces[j]) if len(shared) >= 2 else None
+        if union is None:
+            continue
+        pieces[i] = union
+        del pieces[j]
+        for other in neighbours.pop(j):
+            neighbours[other].discard(j)
+            if other != i:
+                neighbours[other].add(i)
+                neighbours[i].add(other)
+        for other in neighbours[i]:
+            heappush(pairs, (min(i, other), max(i, other)))
+    return tuple(pieces.values())
+
+
+def _neighbours(rings: Sequence[FloatArray]) -> dict[int, set[int]]:
+    """Return by index which rings have an edge in common."""
+    by_edge: dict[frozenset[tuple[float, ...]], list[int]] = {}
+    for index, ring in enumerate(rings):
+        points = [tuple(point) for point in ring.tolist()]
+        for edge in zip(points, [*points[1:], points[0]], strict=True):
+            by_edge.setdefault(frozenset(edge), []).append(index)
+    found: dict[int, set[int]] = {index: set() for index in range(len(rings))}
+    for both in by_edge.values():
+        for one in both:
+            found[one].update(other for other in both if other != one)
+    return found

@@ -24,9 +24,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ....core.arrays import FloatArray, IntArray
+from ....core.compiling import njit
 from .robots import RobotSpec
 
 

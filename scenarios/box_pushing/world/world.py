@@ -25,9 +25,9 @@ from typing import Any, NamedTuple
 import Box2D
 import numpy as np
 from Box2D import _Box2D
-from numba import njit
 
 from ....core.arrays import FloatArray
+from ....core.compiling import njit
 from ..config import CONTROL_PERIOD
 from .boxes import BoxSpec
 from .geometry import surface

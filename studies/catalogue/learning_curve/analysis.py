@@ -14,7 +14,7 @@ import numpy as np
 
 from ....core.protocols import SUCCESS, Measure
 from ...analysis.results import Results
-from ...analysis.statistics import Estimate, bootstrap, rate, rates
+from ...analysis.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, rates
 from ...analysis.summary import EVALUATED, Summary, evaluated
 
 BLOCK = 5
@@ -35,12 +35,15 @@ class Metric:
         Which episodes: the first or the last `BLOCK` of training, or those of the evaluation.
     is_rate
         Whether each episode is a success or not.
+    bounds
+        The least and the greatest value that there can be.
     """
 
     title: str
     measure: str
     block: Literal["first", "last", "evaluation"]
     is_rate: bool = False
+    bounds: tuple[float, float] = NOT_NEGATIVE
 
 
 def metrics_of(measures: Sequence[Measure]) -> tuple[Metric, ...]:
@@ -57,7 +60,7 @@ def metrics_of(measures: Sequence[Measure]) -> tuple[Metric, ...]:
         Metric(EVALUATED, SUCCESS.name, "evaluation", is_rate=True),
         *(Metric(f"{m.title}, evaluation", m.name, "evaluation", is_rate=True) for m in rates),
         Metric("evaluation steps", "steps", "evaluation"),
-        *(Metric(m.heading, m.name, "last") for m in numbers),
+        *(Metric(m.heading, m.name, "last", bounds=m.bounds) for m in numbers),
     )
 
 
@@ -100,14 +103,18 @@ def analyse(results: Results) -> LearningCurves:
             block = slice(None, BLOCK) if metric.block == "first" else slice(-BLOCK, None)
             values = arrays[metric.measure]
             values = values if metric.block == "evaluation" else values[:, block]
-            estimates[metric.title] = rate(values) if metric.is_rate else bootstrap(_runs(values))
+            estimates[metric.title] = (
+                rate(values) if metric.is_rate else bootstrap(_runs(values), bounds=metric.bounds)
+            )
             if metric.title == EVALUATED:
                 estimates |= evaluated(results, condition)
         table.append(Summary(condition, len(training["success"]), estimates))
     followed = [m for m in results.measures if m.name == SUCCESS.name or not m.is_rate]
     curves = {
         condition: {
-            m.name: (rates if m.is_rate else bootstrap)(training[m.name])
+            m.name: rates(training[m.name])
+            if m.is_rate
+            else bootstrap(training[m.name], bounds=m.bounds)
             for m in followed
             if m.name in training
         }

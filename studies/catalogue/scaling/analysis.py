@@ -21,7 +21,7 @@ import numpy as np
 
 from ....core.protocols import groups_of
 from ...analysis.results import Results
-from ...analysis.statistics import Estimate, bootstrap, rate
+from ...analysis.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
 from ...analysis.summary import Summary, evaluated
 from ...trials.contact import ContactShares
 from ...trials.session import Session
@@ -163,20 +163,20 @@ def analyse(results: Results) -> Scaling:
     for condition, training in results.training.items():
         numbers, usage = results.numbers[condition], results.usage[condition]
         steps = training["steps"].sum(axis=1)
-        values = {
-            "success": rate(training["success"][:, -5:]),
-            "decide [ms]": bootstrap(1e3 * usage["decision_median"]),
-            "learn [ms]": bootstrap(1e3 * usage["learning"] / steps),
-            "world [ms]": bootstrap(1e3 * (usage["physics"] + usage["sensors"]) / steps),
-            "team [MB]": bootstrap(1e-6 * numbers["team_bytes"]),
-            "step [MB]": bootstrap(1e-6 * usage["step_bytes"]),
+        costs = {
+            "decide [ms]": 1e3 * usage["decision_median"],
+            "learn [ms]": 1e3 * usage["learning"] / steps,
+            "world [ms]": 1e3 * (usage["physics"] + usage["sensors"]) / steps,
+            "team [MB]": 1e-6 * numbers["team_bytes"],
+            "step [MB]": 1e-6 * usage["step_bytes"],
         }
         if "process_bytes" in usage:
-            values["process [MB]"] = bootstrap(1e-6 * usage["process_bytes"])
+            costs["process [MB]"] = 1e-6 * usage["process_bytes"]
         evaluations = evaluated(results, condition)
-        values = {"success": values.pop("success")} | evaluations | values
+        values = {"success": rate(training["success"][:, -5:])} | evaluations
+        values |= {title: bootstrap(cost, bounds=NOT_NEGATIVE) for title, cost in costs.items()}
         if "all_touching" in numbers:
-            values["all touch"] = bootstrap(numbers["all_touching"])
+            values["all touch"] = bootstrap(numbers["all_touching"], bounds=(0, 1))
         agents, passed = (int(numbers[n][0]) for n in ("agents", "messages"))
         evaluator = _without_robots(condition, sizes)
         period = float(numbers["period_s"][0]) if "period_s" in numbers else None

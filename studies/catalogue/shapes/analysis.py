@@ -115,8 +115,8 @@ def _further(arrays: Arrays, numbers: Arrays, box: str) -> dict:
     if "stopped_at_goal" in arrays:
         found["stopped"] = rate(arrays["stopped_at_goal"])
     if "contact_fraction" in arrays:
-        found["contact"] = bootstrap(arrays["contact_fraction"].mean(axis=1))
-    return found | {title: bootstrap(values) for title, values in robots.items()}
+        found["contact"] = bootstrap(arrays["contact_fraction"].mean(axis=1), bounds=(0, 1))
+    return found | {title: bootstrap(values, bounds=(0, 1)) for title, values in robots.items()}
 
 
 def least_ratio(found: tuple[Difference, ...]) -> Difference:

@@ -15,7 +15,7 @@ import numpy as np
 
 from ....core.cost import Problem, below_counts
 from ...analysis.results import Results
-from ...analysis.statistics import Estimate, bootstrap, rate, rates
+from ...analysis.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, rates
 from ...analysis.summary import Summary
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
@@ -94,7 +94,9 @@ def analyse(results: Results) -> Contests:
     for condition, training in results.training.items():
         numbers, usage = results.numbers[condition], results.usage[condition]
         success, steps = training["success"], training["steps"].sum(axis=1)
-        milliseconds = bootstrap(1e3 * (usage["decision"] + usage["learning"]) / steps)
+        milliseconds = bootstrap(
+            1e3 * (usage["decision"] + usage["learning"]) / steps, bounds=NOT_NEGATIVE
+        )
         estimates = {f"success last {BLOCK}": rate(success[:, -BLOCK:])}
         if condition in results.evaluation:
             estimates["evaluation success"] = rate(results.evaluation[condition]["success"])

@@ -26,7 +26,7 @@ from ....core.team import Team
 from ...analysis.comparison import Array, Difference
 from ...analysis.paired_tests import holm, paired_permutation
 from ...analysis.results import Arrays, Results
-from ...analysis.statistics import Estimate, bootstrap, rate, rates
+from ...analysis.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, rates
 from ...analysis.summary import Summary
 from ...spec.conditions import label_but
 from ...spec.errors import SpecError
@@ -249,8 +249,8 @@ def _summary(course: Course) -> Summary:
     if course.before.any():  # else there is nothing to lose or to come back to
         estimates |= {
             "recovered": rate(recovered[:, None]),
-            "episodes": bootstrap(episodes),
-            "steps": bootstrap(steps),
+            "episodes": bootstrap(episodes, bounds=NOT_NEGATIVE),
+            "steps": bootstrap(steps, bounds=NOT_NEGATIVE),
             "cumulative loss": bootstrap(course.lost),
         }
     return Summary(f"{course.fault}: {course.adapts}", len(course.success), estimates)
@@ -270,7 +270,7 @@ def _gains(courses: tuple[Course, ...]) -> tuple[Difference, ...]:
             c.end.mean(axis=1)[[c.seeds.index(seed) for seed in shared]] for c in (course, base)
         ]
         raw = paired_permutation(*ends)
-        found.append((course, len(shared), bootstrap(ends[0] - ends[1]), raw))
+        found.append((course, len(shared), bootstrap(ends[0] - ends[1], bounds=(-1, 1)), raw))
     adjusted = holm([raw for *_, raw in found])
     return tuple(
         Difference(f"{course.fault}, {course.adapts}", "end", seeds, estimate, float(p))

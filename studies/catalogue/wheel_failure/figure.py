@@ -37,7 +37,7 @@ def figure_of(analysis: WheelFailures) -> Figure:
                 axes.axvline(course.onset + 0.5, color="#888888", linewidth=0.8)
                 index = cases.index(course.adapts)
                 runs = _smoothed(course.success, course.onset)
-                estimate = bootstrap(runs)
+                estimate = bootstrap(runs, bounds=(0, 1))
                 episodes = np.arange(1, runs.shape[1] + 1)
                 colour, style = COLOURS[index % len(COLOURS)], STYLES[index % len(STYLES)]
                 axes.fill_between(

@@ -21,7 +21,8 @@ from . import options
 @click.option(
     "--seed", type=Whole(), metavar="SEED", help="The seed; the first one unless said otherwise."
 )
-def command(directory: Path, condition: str | None, seed: int | None) -> int:
+@options.trust
+def command(directory: Path, condition: str | None, seed: int | None, trust: bool) -> int:
     """Explain a trained team: its rules in words, its policy around the box, its self-model.
 
     DIR is where the study is kept. Text and figures go into its folder explain. Training is run
@@ -34,7 +35,10 @@ def command(directory: Path, condition: str | None, seed: int | None) -> int:
     from ...store import durable
     from ...store.store import Store
     from ..display import say
+    from ..trusting import trust_files
 
+    if trust:
+        trust_files(directory)
     with Store.open(directory) as store:
         trial = explain.choose(store, condition, seed)
         conditions = [c.label for c in store.spec().conditions()]

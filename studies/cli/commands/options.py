@@ -42,6 +42,14 @@ accept_code = click.option(
 )
 """Whether results of two versions of the code may stand side by side."""
 
+trust = click.option(
+    "--trust",
+    is_flag=True,
+    help="Run, from now on, the Python files that came with the study, though no spec of yours has "
+    "run them yet. They can do whatever you can.",
+)
+"""Whether the users' files that a study brings along may be run."""
+
 changes = click.option(
     "--set",
     "changes",

@@ -18,7 +18,8 @@ from . import options
     metavar="FILE.html",
     help="Where to write; report.html in the study's directory unless said otherwise.",
 )
-def command(directory: Path, out: Path | None) -> int:
+@options.trust
+def command(directory: Path, out: Path | None, trust: bool) -> int:
     """Write a study as one self-contained HTML file: verdict, table, figures, replays, spec.
 
     DIR is where the study is kept; it may be unfinished.
@@ -26,12 +27,15 @@ def command(directory: Path, out: Path | None) -> int:
     from ...report.page import page
     from ...spec.errors import SpecError
     from ...store import durable
+    from ..trusting import trust_files
 
     path = directory / "report.html" if out is None else out
     if path.is_dir() or not path.name:
         raise SpecError(f"--out {path}: is a directory")
     if path.suffix not in (".html", ".htm"):
         raise SpecError(f"--out {path}: suffix must be .html or .htm")
+    if trust:
+        trust_files(directory)
     content = page(directory).encode()
     if not path.parent.is_dir():
         raise SpecError(f"--out {path}: there is no directory {path.parent}")

@@ -20,8 +20,14 @@ if TYPE_CHECKING:
 @options.backend
 @options.address
 @options.accept_code
+@options.trust
 def command(
-    directory: Path, jobs: int | None, backend: Backend, address: str | None, accept_code: bool
+    directory: Path,
+    jobs: int | None,
+    backend: Backend,
+    address: str | None,
+    accept_code: bool,
+    trust: bool,
 ) -> int:
     """Run the failed trials of a study again, and whatever is left of it.
 
@@ -29,7 +35,10 @@ def command(
     """
     from ...store.store import Store
     from ..running import run_and_show
+    from ..trusting import trust_files
 
+    if trust:
+        trust_files(directory)
     with Store.open(directory) as store:
         spec = store.spec()
     return run_and_show(

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 @options.backend
 @options.address
 @options.accept_code
+@options.trust
 @options.changes
 def command(
     spec: Path,
@@ -36,17 +37,32 @@ def command(
     backend: Backend,
     address: str | None,
     accept_code: bool,
+    trust: bool,
     changes: tuple[str, ...],
 ) -> int:
     """Run the study of a spec; the same command again continues it.
 
     SPEC.toml says what to run; `nested-agents demo --print-spec` prints an example.
     """
+    from ...spec.errors import SpecError
     from ...spec.spec import Spec
+    from ...store.store import DATABASE, SPEC_FILE
     from ..running import run_and_show
+    from ..trusting import trust_files
 
+    if trust and out.exists():
+        trust_files(out)
+    try:
+        given = Spec.load(spec, changes, study=out)
+    except SpecError as error:
+        if not (out / DATABASE).exists() or spec.resolve() != (out / SPEC_FILE).resolve():
+            raise
+        raise SpecError(
+            f"{error}; if you did not edit {spec}, it is damaged: nested-agents retry {out} goes "
+            "on by the database"
+        ) from None
     return run_and_show(
-        Spec.load(spec, changes, study=out),
+        given,
         out,
         jobs=jobs,
         backend=backend,

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from ..arguments import Choice, Command, File, Several, Text
+from . import options
 
 
 @click.command(cls=Command)
@@ -25,7 +26,8 @@ from ..arguments import Choice, Command, File, Several, Text
     default="table",
     help="How to print the table; CSV holds every digit.",
 )
-def command(source: Path, columns: tuple[str, ...], form: str) -> int:
+@options.trust
+def command(source: Path, columns: tuple[str, ...], form: str, trust: bool) -> int:
     """Print conditions against estimates with their 95 % intervals, as at the end of a run.
 
     DIR is where a study is kept, FILE.json a file of its results that `export --format json` has
@@ -38,6 +40,7 @@ def command(source: Path, columns: tuple[str, ...], form: str) -> int:
     from ...presentation.tables import tabulate
     from ...store.store import Store
     from ..display import print_table, say
+    from ..trusting import trust_files
 
     if source.is_file():
         of_file = published.load(source)
@@ -46,6 +49,8 @@ def command(source: Path, columns: tuple[str, ...], form: str) -> int:
         if of_file.note:
             say(f"{source}: {of_file.note}")
     else:
+        if trust:
+            trust_files(source)
         with Store.open(source) as store:
             store.verify()
             outline, results, sources = store.outline(), read(store), store.sources()

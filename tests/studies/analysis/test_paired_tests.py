@@ -47,6 +47,30 @@ def test_sign_flips_by_hand() -> None:
     assert paired_permutation([1, 2], [1, 2]) == 1.0
 
 
+@pytest.mark.parametrize("scale", [1e-9, 0.1, 1.0, 1e4, 1e12])
+def test_ties_are_ties_whatever_the_size_of_the_values(scale: float) -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(160):
+        whole = rng.integers(0, 6, size=(2, int(rng.integers(1, 9))))
+        difference = [int(a) - int(b) for a, b in whole.T]
+        sums = [sum(s * d for s, d in zip(signs, difference, strict=True))
+                for signs in product((-1, 1), repeat=len(difference))]  # fmt: skip
+        exact = np.mean([abs(found) >= abs(sum(difference)) for found in sums])
+        assert paired_permutation(whole[0] * scale, whole[1] * scale) == exact
+        assert (
+            paired_permutation(whole[0] / 7 * scale + 3 * scale, (whole[1] / 7 + 3) * scale)
+            == exact
+        )
+
+
+def test_what_is_no_pairs_is_refused() -> None:
+    for one, other in (([1.0, 2.0, 3.0], [1.0]), ([], []), ([[1.0]], [[1.0]])):
+        with pytest.raises(ValueError, match="as many on both sides"):
+            paired_permutation(one, other)
+    with pytest.raises(ValueError, match="finite"):
+        paired_permutation([1.0, np.nan], [0.0, 0.0])
+
+
 def test_drawn_sign_flips_are_near_all_of_them() -> None:
     rng = np.random.default_rng(2)
     difference = rng.normal(0.4, 1.0, size=14)

@@ -69,13 +69,58 @@ def test_one_run_has_no_interval():
         assert np.isnan(estimate.high)
 
 
-@pytest.mark.parametrize("runs", [5, 10, 30])
+@pytest.mark.parametrize("runs", [2, 3, 4, 5, 6, 7, 8, 10, 15, 30])
 def test_the_mean_is_covered_about_as_often_as_promised(runs):
-    rng, covered = np.random.default_rng(0), 0
-    for _ in range(400):
-        estimate = bootstrap(rng.normal(size=runs), resamples=1000)
-        covered += bool(estimate.low <= 0.0 <= estimate.high)
-    assert 0.89 <= covered / 400 <= 0.98  # of five runs about .91
+    rng, times = np.random.default_rng(0), 600
+    values = rng.normal(3.0, 2.0, size=(runs, times))  # points are estimated apart
+    found = [bootstrap(column, resamples=1000) for column in values.T]
+    covered = np.mean([e.low <= 3.0 <= e.high for e in found])
+    assert 0.92 <= covered <= 0.975
+
+
+@pytest.mark.parametrize("statistic", ["iqm", "median"])
+@pytest.mark.parametrize("runs", [2, 3, 4, 5, 6, 7])
+def test_other_statistics_of_few_runs_are_covered_too(statistic, runs):
+    found = bootstrap(np.random.default_rng(0).normal(size=(runs, 4000)), statistic=statistic)
+    assert 0.92 <= np.mean((found.low <= 0.0) & (found.high >= 0.0)) <= 0.99
+
+
+@pytest.mark.parametrize("runs", [2, 3, 5, 7, 8, 12, 20, 30])
+@pytest.mark.parametrize("success", [0.5, 0.9, 0.98])
+def test_rates_are_covered_however_few_the_runs(runs, success):
+    rng, covered, times = np.random.default_rng(1), 0, 500
+    for _ in range(times):
+        chances = rng.beta(9.0 * success, 9.0 * (1.0 - success), size=runs)
+        estimate = rate(rng.random((runs, 10)) < chances[:, None])
+        assert 0.0 <= estimate.low < estimate.high <= 1.0
+        covered += bool(estimate.low <= success <= estimate.high)
+    assert covered / times >= 0.92
+
+
+def test_few_runs_have_students_interval_by_hand():
+    # t(.975, 2) = 4.3027; the standard error of the mean of 1, 2, 3 is 1 / sqrt(3).
+    estimate = bootstrap([1.0, 2.0, 3.0])
+    assert estimate.low == pytest.approx(2.0 - 4.302653 / np.sqrt(3.0), abs=1e-6)
+    bounded = bootstrap([0.9, 1.0, 1.0], bounds=(0.0, 1.0))
+    assert bounded.high == 1.0
+    assert bounded.low == pytest.approx(29 / 30 - 4.302653 / 30, abs=1e-6)
+
+
+@pytest.mark.parametrize("runs", [2, 5, 8, 30])
+def test_what_all_runs_have_in_full_is_not_certain(runs):
+    for value in (0.0, 1.0):
+        estimate = bootstrap(np.full(runs, value), bounds=(0.0, 1.0))
+        wilson = rate(np.full((runs, 1), value))
+        assert (estimate.low, estimate.high) == pytest.approx((wilson.low, wilson.high))
+    assert bootstrap(np.ones(runs)).low == 1.0  # a number of bytes, say
+
+
+def test_few_runs_of_two_strata_have_welchs_degrees_of_freedom():
+    one, other = np.array([1.0, 2.0, 4.0]), np.array([0.0, 5.0, 9.0])
+    estimate = bootstrap(one, other)
+    test = stats.ttest_ind(one, -other, equal_var=False).confidence_interval(0.95)
+    assert estimate.low == pytest.approx(test.low / 2.0)
+    assert estimate.high == pytest.approx(test.high / 2.0)
 
 
 @pytest.mark.parametrize(("successes", "runs"), [(0, 8), (1, 8), (5, 8), (8, 8), (31, 40)])

@@ -36,7 +36,7 @@ def test_the_spec_compares_one_change_at_a_time_over_twenty_seeds() -> None:
     default, *others = spec.conditions()
     assert default.label == "default"
     assert len(spec.seeds) >= 20
-    assert default.settings == Spec.of({}).conditions()[0].settings
+    assert default.settings == Spec.of({"preset": "own-value"}).conditions()[0].settings
     for other in others[:-1]:
         changed = [
             name

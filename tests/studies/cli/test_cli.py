@@ -8,12 +8,12 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from types import ModuleType
 
 import made_up
 import pytest
+from made_up_commands import finish, heeding_interrupts, run_here, start, wait_for_results
 
 from nested_agents.studies import run as studies_run
 from nested_agents.studies.catalogue import learning_curve
@@ -23,37 +23,6 @@ from nested_agents.studies.cli.running import run_and_show
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.spec.toml import dumps
 from nested_agents.studies.store.store import DATABASE
-
-PROGRAM = Path(made_up.__file__).with_name("made_up_cli.py")
-
-
-def run_here(measure, *arguments):
-    """Run a command in this process with made-up results; return status, output and errors."""
-    out, err = io.StringIO(), io.StringIO()
-    with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
-        patch.setattr(learning_curve, "measure", measure)
-        patch.setattr(studies_run, "check", lambda spec: made_up.MEASURES)
-        patch.setenv("COLUMNS", "80")
-        status = main([str(argument) for argument in arguments])
-    return status, out.getvalue(), err.getvalue()
-
-
-def start(measure, *arguments, **options):
-    command = [sys.executable, str(PROGRAM), measure, *map(str, arguments)]
-    return subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        preexec_fn=heeding_interrupts, **options,
-    )  # fmt: skip
-
-
-def heeding_interrupts() -> None:
-    """Undo what a shell does to the commands that it begins in the background."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-
-
-def finish(process):
-    out, err = process.communicate(timeout=120)
-    return process.returncode, out, err
 
 
 @pytest.fixture(scope="module")
@@ -74,16 +43,6 @@ def results(directory, form="csv", *arguments, capsys=None):
     capsys.readouterr()
     assert main(["results", str(directory), "--format", form, *arguments]) == 0
     return capsys.readouterr().out
-
-
-def wait_for_results(directory, process):
-    """Wait until something has finished and is kept."""
-    deadline = time.monotonic() + 60
-    while time.monotonic() < deadline and process.poll() is None:
-        if list((directory / "recordings").glob("[!.]*.npz")):
-            return
-        time.sleep(0.02)
-    pytest.fail(f"nothing finished: {process.communicate()}")
 
 
 @pytest.mark.parametrize("command", ["", *COMMANDS])

@@ -12,9 +12,10 @@ from nested_agents.studies.explain import team as explain
 from nested_agents.studies.explain import text as explain_text
 from nested_agents.studies.spec.conditions import ConditionSettings
 from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.store import reading
 from nested_agents.studies.store.store import DATABASE, Store
 from nested_agents.studies.trials.session import run_trial
-from nested_agents.studies.trials.trial import build, trials_of
+from nested_agents.studies.trials.trial import RESULTS_VERSION, build, trials_of
 
 SPEC = Spec.of(
     {
@@ -117,11 +118,11 @@ def changed(study, tmp_path, statement):
     return copy
 
 
-def test_results_of_another_version_are_refused(study, tmp_path, capsys):
-    copy = changed(study, tmp_path, "UPDATE meta SET value = '0' WHERE key = 'results_version'")
-    status, said = run(capsys, copy)
+def test_results_of_another_version_are_refused(study, monkeypatch, capsys):
+    monkeypatch.setattr(reading, "RESULTS_VERSION", 99)
+    status, said = run(capsys, study)
     assert status == 2
-    assert "holds results of version 0" in said.err
+    assert f"holds results of version {RESULTS_VERSION}, this is version 99" in said.err
 
 
 def test_another_team_than_the_one_that_was_measured_is_not_explained(study, monkeypatch):

@@ -1,5 +1,6 @@
 import json
 import random
+import re
 import shutil
 import sqlite3
 
@@ -8,7 +9,9 @@ import pytest
 
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.errors import SpecError
-from nested_agents.studies.store.store import DATABASE, Store
+from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.store.schema import study_checksum
+from nested_agents.studies.store.store import DATABASE, SPEC_FILE, Store
 
 
 def finish(directory):
@@ -186,3 +189,156 @@ def test_a_database_that_is_no_study_is_left_alone(tmp_path):
         pass
     assert (tmp_path / DATABASE).read_bytes() == before
     assert {path.name for path in tmp_path.iterdir()} <= {DATABASE, ".lock"}
+
+
+def test_a_database_without_tables_is_not_begun_anew_if_it_held_some(study):
+    path = study / DATABASE
+    data = bytearray(path.read_bytes())
+    data[103:105] = bytes(2)  # the number of tables on the first page
+    path.write_bytes(data)
+    (note,), _ = finish(study)
+    assert "is damaged" in note
+    assert (study / f"{DATABASE}.damaged-1").read_bytes() == data
+
+
+@pytest.mark.parametrize("left", ["nothing", "an empty file"])
+def test_a_log_without_its_database_is_named_and_set_aside(study, left, capsys):
+    path = study / DATABASE
+    path.with_name(f"{DATABASE}-wal").write_bytes(b"log")
+    path.unlink()
+    if left == "an empty file":
+        path.touch()
+    assert main(["results", str(study)]) == 2
+    assert f"{path}-wal: is the log of a database that is not there" in capsys.readouterr().err
+    (note,), ran = finish(study)
+    assert "its log is there without it" in note
+    assert ran == 6
+    assert (study / f"{DATABASE}.damaged-1-wal").read_bytes() == b"log"
+
+
+@pytest.mark.parametrize(
+    "name", [".lock", "recordings", DATABASE, f"{DATABASE}-wal", f"{DATABASE}-shm"]
+)
+def test_what_is_in_the_way_of_a_file_is_named(study, name, tmp_path, capsys):
+    path = study / name
+    if path.is_dir():
+        shutil.rmtree(path)
+        path.touch()
+    else:
+        path.unlink(missing_ok=True)
+        path.mkdir()
+    with pytest.raises(SpecError, match=re.escape(f"{path}: ")) as caught:
+        finish(study)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_log_that_leads_nowhere_is_named(study, capsys):
+    path = study / f"{DATABASE}-wal"
+    path.symlink_to(study / "nowhere")
+    for command in ("results", "status"):
+        assert main([command, str(study)]) == 2
+        assert f"{path}: is no file" in capsys.readouterr().err
+
+
+def test_an_unreadable_copy_of_the_spec_is_written_anew(study):
+    (study / SPEC_FILE).write_bytes(b'preset = "fefault"\n\xff')
+    assert finish(study) == ([], 0)
+    assert Spec.load(study / SPEC_FILE) == made_up.SPEC
+
+
+def test_damage_does_not_read_as_a_slip_of_the_pen(study):
+    (study / DATABASE).write_bytes(b"no database at all")
+    (study / SPEC_FILE).write_text('preset = "fefault"\n')
+    with pytest.raises(SpecError, match=r"is no spec, and .* beside it is damaged"):
+        finish(study)
+
+
+def small(directory):
+    """Three of four trials are done, one has failed."""
+    spec = made_up.Spec.of(made_up.SPEC.table() | {"seeds": 2, "episodes": 1, "evaluation": 1})
+    trials = made_up.trials_of(spec)
+    with Store.create(directory, spec, made_up.MEASURES) as store:
+        for trial in trials[:3]:
+            store.save(trial, made_up.measure(trial), 1.5)
+        store.fail(trials[3], "Traceback:\nRuntimeError: a wheel came off")
+    return directory
+
+
+def told(directory, capsys):
+    """Return what the commands that read say: status, output, complaints."""
+    said = []
+    for command in ("results --format csv", "status"):
+        name, *options = command.split()
+        said.append((main([name, str(directory), *options]), *capsys.readouterr()))
+    return said
+
+
+def flipped_bits_are_told(directory, places, rng, capsys):
+    """Flip a bit in each byte at `places` of a database: equal output, or its file is named."""
+    path, expected = directory / DATABASE, told(directory, capsys)
+    whole, equal = path.read_bytes(), 0
+    for at in places(len(whole)):
+        data = bytearray(whole)
+        data[at] ^= 1 << rng.randrange(8)
+        path.write_bytes(data)
+        for found, sound in zip(told(directory, capsys), expected, strict=True):
+            named = DATABASE in found[1] + found[2] and "Traceback (most" not in found[2]
+            assert found == sound or named, (at, found)
+            equal += found == sound
+    return equal
+
+
+def test_no_flipped_bit_is_passed_over_in_silence(tmp_path, capsys):
+    study, rng = small(tmp_path / "study"), random.Random(5)
+    sound = (study / DATABASE).read_bytes()
+    # Pages are mostly empty: what is not empty, and some that is.
+    used = [at for at, byte in enumerate(sound) if byte]
+    flipped_bits_are_told(study, lambda n: used[::23], rng, capsys)
+    flipped_bits_are_told(study, lambda n: range(0, n, 997), rng, capsys)
+
+
+def test_everything_that_was_kept_is_checked(study, capsys):
+    statements = [
+        "UPDATE trials SET state = 'failed' WHERE seed = 1",
+        "DELETE FROM trials WHERE seed = 1",
+        "DELETE FROM checksums",
+        "UPDATE planned SET seed = 9 WHERE seed = 1",
+        "UPDATE conditions SET condition = 'x' WHERE position = 1",
+        "UPDATE meta SET value = '3' WHERE key = 'results_version'",
+        "UPDATE ledger SET trials = 5",
+        "DELETE FROM ledger",
+    ]
+    whole = (study / DATABASE).read_bytes()
+    for statement in statements:
+        (study / DATABASE).write_bytes(whole)
+        change(study, statement)
+        for command in ("results", "table", "export", "report", "status"):
+            status = main([command, str(study)])
+            out, err = capsys.readouterr()
+            assert DATABASE in out + err, (statement, command, out, err)
+            assert (status, err.count("\n")) == (2, 1) or command == "status"
+
+
+def test_studies_begun_before_there_was_a_ledger_can_be_read_and_continued(study, sound):
+    change(study, "DROP TABLE ledger")
+    with sqlite3.connect(study / DATABASE) as db:
+        db.execute("UPDATE meta SET value = ? WHERE key = 'sha256'", (study_checksum(db),))
+    db.close()
+    assert content(study) == content(sound)
+    assert finish(study) == ([], 0)
+    change(study, "DELETE FROM checksums WHERE rowid = 1")
+    with pytest.raises(SpecError, match="not hold as many trials"), Store.open(study):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("before", "after"), [("default", "fefault"), ("episodes = 4", "episodes = 5"), ("=", "5")]
+)
+def test_a_damaged_copy_of_the_spec_is_no_other_study(study, before, after, capsys):
+    path = study / SPEC_FILE
+    path.write_text(path.read_text().replace(before, after, 1))
+    assert main(["run", str(path), "--out", str(study)]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert f"{path}" in error
+    assert f"it is damaged: nested-agents retry {study} goes on by the database" in error

@@ -7,6 +7,7 @@ import pytest
 
 from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.store import reading
 from nested_agents.studies.store import store as store_module
 from nested_agents.studies.store.store import DATABASE, SPEC_FILE, Store
 from nested_agents.studies.trials.trial import RESULTS_VERSION, trials_of
@@ -151,7 +152,7 @@ def test_another_study_is_refused_and_nothing_changed(finished, changes, said):
 
 
 def test_results_of_another_version_are_refused(finished, monkeypatch):
-    monkeypatch.setattr(store_module, "RESULTS_VERSION", 99)
+    monkeypatch.setattr(reading, "RESULTS_VERSION", 99)
     said = f"holds results of version {RESULTS_VERSION}, this is version 99"
     with (
         pytest.raises(SpecError, match=said),
@@ -189,13 +190,14 @@ def test_another_study_that_came_first_is_not_overwritten(tmp_path, monkeypatch)
         assert store.spec() == other
 
 
-def test_one_reads_while_another_writes(finished):
-    with (
-        Store.create(finished, made_up.SPEC, made_up.MEASURES) as writer,
-        Store.open(finished) as reader,
-    ):
-        writer.fail(made_up.TRIALS[0], "Traceback")
-        assert reader.counts() == {"done": 5, "failed": 1}
+def test_one_reads_one_state_while_another_writes(finished):
+    with Store.create(finished, made_up.SPEC, made_up.MEASURES) as writer:
+        with Store.open(finished) as reader:
+            writer.fail(made_up.TRIALS[0], "Traceback")
+            assert reader.counts() == {"done": 6, "failed": 0}
+            assert len(reader.episodes()[1]) == 6 * (4 + 2)
+        with Store.open(finished) as reader:
+            assert reader.counts() == {"done": 5, "failed": 1}
 
 
 def test_a_run_killed_before_it_noted_its_spec_is_begun_anew(tmp_path):

@@ -4,7 +4,7 @@ import made_up
 import pytest
 
 from nested_agents.studies.cli.main import main
-from nested_agents.studies.store import store as store_module
+from nested_agents.studies.store import reading
 from nested_agents.studies.store.running import LOCK, MARK, Running, look
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.workers.progress import _estimate, progress
@@ -84,7 +84,7 @@ def test_failed_and_damaged_trials_are_counted_once(study, capsys):
 
 
 def test_what_another_version_has_done_is_done(study, monkeypatch, capsys):
-    monkeypatch.setattr(store_module, "RESULTS_VERSION", 99)
+    monkeypatch.setattr(reading, "RESULTS_VERSION", 99)
     now = read(study)
     assert (now.done, now.left, now.seconds) == (4, 2, None)
     assert main(["status", str(study)]) == 0

@@ -1,6 +1,8 @@
 """Boxes: mass properties against closed forms and Box2D, friction, scaling, refusals."""
 
+import time
 import warnings
+from itertools import combinations
 from math import pi, sqrt
 
 import numpy as np
@@ -13,7 +15,7 @@ from shapely.geometry import Polygon
 
 from nested_agents.scenarios.box_pushing.config import BoxSettings, label
 from nested_agents.scenarios.box_pushing.world.boxes import AREA, BOXES, BoxSpec, box_for, growth
-from nested_agents.scenarios.box_pushing.world.polygons import moments, polygon_edges
+from nested_agents.scenarios.box_pushing.world.polygons import _merged, moments, polygon_edges
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
 from nested_agents.scenarios.box_pushing.world.world import UNIT, World
 
@@ -27,6 +29,30 @@ def star(rng: np.random.Generator, corners: int) -> list[tuple[float, float]]:
     angles = (np.arange(corners) + rng.uniform(0.05, 0.95, corners)) * 2 * pi / corners
     radii = rng.uniform(0.03, 0.15, corners)
     return list(zip(radii * np.cos(angles), radii * np.sin(angles), strict=True))
+
+
+def regular(corners: int) -> list[tuple[float, float]]:
+    """Return a regular polygon."""
+    angles = 2 * pi * np.arange(corners) / corners
+    return list(zip(0.1 * np.cos(angles), 0.1 * np.sin(angles), strict=True))
+
+
+def greedy(polygon: Polygon) -> list[np.ndarray]:
+    """Merge triangles as `convex_pieces` says that it does, starting over after each merge."""
+    triangles = shapely.constrained_delaunay_triangles(polygon).geoms
+    pieces = [np.asarray(shapely.orient_polygons(t).exterior.coords)[:-1] for t in triangles]
+    merged = True
+    while merged:
+        merged = False
+        for i, j in combinations(range(len(pieces)), 2):
+            shared = {tuple(p) for p in pieces[i]} & {tuple(p) for p in pieces[j]}
+            union = _merged(pieces[i], pieces[j]) if len(shared) >= 2 else None
+            if union is not None:
+                pieces[i] = union
+                del pieces[j]
+                merged = True
+                break
+    return pieces
 
 
 def test_inertia_of_known_shapes() -> None:
@@ -157,6 +183,16 @@ def test_clockwise_is_turned_around_with_a_word() -> None:
         ({"vertices": ((0, 0), (1, 0))}, "at least 3"),
         ({"vertices": ((0, 0), (1, 0), (float("nan"), 1))}, "finite"),
         ({"vertices": FRAME, "radius": 0.1}, "either"),
+        ({"vertices": (*FRAME, FRAME[0])}, r"vertices \d+ and 1 are at the same place"),
+        ({"vertices": (FRAME[0], *FRAME)}, "vertices 1 and 2 are at the same place"),
+        (
+            {"vertices": ((0, 0), (1e300, 0), (0, 1e300))},
+            r"is 1e\+300 m long, allowed: up to 100 m",
+        ),
+        ({"vertices": ((-1e308, 0), (1e308, 0), (0, 1))}, "allowed: up to 100 m"),
+        ({"vertices": FRAME, "holes": [((0, 0), (1e-9, 0), (0, 1e-9))]}, "at the same place"),
+        ({"vertices": regular(1001)}, "1001 vertices, allowed: 1000 or fewer"),
+        ({"radius": 1e9}, r"radius = 1000000000\.0, allowed: up to 50 m"),
         ({}, "either"),
         ({"radius": 0.1, "mass": 0.0}, "mass"),
         ({"radius": 0.1, "friction": -1.0}, "friction"),
@@ -169,6 +205,31 @@ def test_bad_boxes_are_refused(arguments: dict[str, object], word: str) -> None:
         with pytest.raises(ValueError, match=word) as error:
             BoxSpec("bad", **arguments)  # type: ignore[arg-type]
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_pieces_are_merged_in_the_order_of_the_plain_algorithm(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    box = BoxSpec("star", tuple(star(rng, int(rng.integers(9, 24)))))
+    expected = greedy(box.polygon)
+    assert len(box.fixtures) == len(expected)
+    for one, other in zip(box.fixtures, expected, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.timeout(20)
+@pytest.mark.parametrize("depth", [0.0, 0.4])
+def test_many_vertices_take_no_time(depth: float) -> None:
+    ring = [
+        ((1 - depth * (i % 2)) * x, (1 - depth * (i % 2)) * y)
+        for i, (x, y) in enumerate(regular(1000))
+    ]
+    begin = time.perf_counter()
+    box = BoxSpec("gear", tuple(ring))
+    pieces = [Polygon(piece) for piece in box.fixtures]
+    assert time.perf_counter() - begin < 5.0
+    assert max(len(piece) for piece in box.fixtures) <= 8
+    assert sum(piece.area for piece in pieces) == pytest.approx(box.area)
 
 
 def test_a_box_may_grow_along_its_width_only() -> None:

@@ -1,0 +1,501 @@
+"""Attack studies and inputs, and count what survives: ``python -m benchmarks.adversary``.
+
+Three campaigns, each drawn from a seed:
+
+- *kills*: the command that runs a study is killed (SIGKILL) at a random moment, the same command
+  continues, and what it ends with must be equal byte by byte. Trials run in the process of the
+  command and take no time, so that a hundred kills do not take an hour; `benchmarks.crashes` kills
+  real workers;
+- *flips*: one bit of one file of a finished study is flipped. Commands that read must print what
+  they printed before, or name the file; a run must end with the rows and recordings of the sound
+  study. A file may also be cut short or be a folder;
+- *hostile input*: specs, files of topologies and polygons, mutated or absurd. Each is accepted or
+  refused in one line, within seconds.
+
+Silence (other output, nothing said) and tracebacks are failures.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import io
+import json
+import math
+import os
+import random
+import re
+import shutil
+import signal
+import sys
+import tempfile
+import time
+import traceback
+import warnings
+from collections import Counter
+from collections.abc import Callable, Generator, Iterator, Sequence
+from pathlib import Path
+
+from nested_agents.scenarios.box_pushing.world.boxes import BoxSpec
+from nested_agents.studies import run as studies_run
+from nested_agents.studies.catalogue import learning_curve
+from nested_agents.studies.cli.main import main as command_line
+from nested_agents.studies.spec.errors import SpecError
+from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.spec.toml import dumps
+from nested_agents.studies.store import durable
+from nested_agents.studies.store.running import LOCK
+from nested_agents.studies.store.store import DATABASE, Store
+from nested_agents.studies.trials.session import run_trial
+from nested_agents.studies.trials.trial import Trial, TrialResult, check, trials_of
+from nested_agents.studies.workers.worker import Arrival, RunTrial
+
+SPEC = Spec.of(
+    {"seeds": 5, "episodes": 2, "steps": 10, "evaluation": 1,
+     "sweep": {"preset": ["default", "frozen"]}}
+)  # fmt: skip
+SLOW = 10.0
+"""Seconds after which an input counts as one that stalls the program."""
+
+Said = tuple[int, str, str]
+"""Exit status, output and errors of a command."""
+
+
+class Adversary:
+    """A finished study, which is damaged and mended again and again.
+
+    Parameters
+    ----------
+    folder
+        Where to work.
+    rng
+        Draws the damage.
+    """
+
+    def __init__(self, folder: Path, rng: random.Random) -> None:
+        self.sound, self.study, self.rng = folder / "sound", folder / "study", rng
+        self.measures, self.trials = check(SPEC), trials_of(SPEC)
+        self.results = {trial.identity: run_trial(trial) for trial in self.trials}
+        self.finish(self.sound)
+        self.expected = self.content(self.sound)
+        shutil.copytree(self.sound, self.study)
+        self.said = {line: self.command(line) for line in self.lines()}
+        self.files = [p for p in sorted(self.sound.rglob("*")) if p.is_file() and p.stat().st_size]
+
+    def lines(self) -> list[str]:
+        """Return the commands that read."""
+        return ["results --format csv", "status", "table --format csv", "report", "export"]
+
+    def command(self, line: str) -> Said:
+        """Run a command on the study in this process."""
+        name, *options = line.split()
+        out, error = io.StringIO(), io.StringIO()
+        if name in ("report", "export"):
+            shutil.rmtree(self.study.parent / "written", ignore_errors=True)
+            written = self.study.parent / "written"
+            written.mkdir()
+            options += ["--out", str(written / "page.html" if name == "report" else written)]
+        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error):
+            status = command_line([name, str(self.study), *options])
+        text = out.getvalue()
+        if name in ("report", "export") and status == 0:
+            text += "".join(p.read_text() for p in sorted(written.iterdir()))
+        return status, text, error.getvalue()
+
+    def finish(self, directory: Path) -> list[str]:
+        """Run what is left of a study; return what had to be said."""
+        with Store.create(directory, SPEC, self.measures) as store:
+            for trial in store.pending(self.trials):
+                store.save(trial, self.result(trial), 1.0)
+            return store.notes
+
+    def result(self, trial: Trial) -> TrialResult:
+        """Return what a trial measures: a function of it, so that it is run once only."""
+        return self.results[trial.identity]
+
+    def content(self, directory: Path) -> object:
+        """Return all that a study has found."""
+        with Store.open(directory) as store:
+            store.verify()
+            rows = store.episodes(), store.planned(), store.columns(), store.spec() == SPEC
+        paths = sorted((directory / "recordings").glob("[!.]*.npz"))
+        return rows, [(path.name, path.read_bytes()) for path in paths]
+
+    def damage(self) -> Path:
+        """Flip a bit of a file, mostly where it is not empty; return the file."""
+        weights = [p.stat().st_size ** 0.5 for p in self.files]
+        source = self.rng.choices(self.files, weights)[0]
+        data = bytearray(source.read_bytes())
+        places = [i for i, byte in enumerate(data) if byte] if self.rng.random() < 0.7 else data
+        at = self.rng.choice(places) if places is not data else self.rng.randrange(len(data))
+        data[at] ^= 1 << self.rng.randrange(8)
+        path = self.study / source.relative_to(self.sound)
+        path.write_bytes(data)
+        return path
+
+    def restore(self) -> None:
+        """Make the study sound again."""
+        shutil.rmtree(self.study)
+        shutil.copytree(self.sound, self.study)
+
+
+class Here:
+    """Workers that are this process; trials are those that an adversary has run before."""
+
+    processes = 1
+
+    def __init__(self, adversary: Adversary) -> None:
+        self.adversary = adversary
+
+    def arrivals(
+        self, trials: Sequence[Trial], run_trial: RunTrial, started: Callable[[Trial], None]
+    ) -> Generator[Arrival]:
+        """See `nested_agents.studies.workers.workers.Workers.arrivals`."""
+        for trial in trials:
+            started(trial)
+            time.sleep(0.08)
+            yield Arrival(trial, self.adversary.result(trial), None, 1.0)
+
+
+def kills(number: int, rng: random.Random, folder: Path) -> Counter[str]:
+    """Kill the command that runs a study, again and again; return what happened."""
+    adversary, tally = Adversary(folder, rng), Counter[str]()
+    spec = folder / "spec.toml"
+    spec.write_text(dumps(SPEC.table()))
+    # Figures are no results; without them most kills fall into the run itself.
+    learning_curve.draw = lambda analysis: {}
+    studies_run.start_workers = (  # in the children too, which are copies of this process
+        lambda *_: contextlib.nullcontext(Here(adversary))
+    )
+    begin = time.monotonic()
+    assert _wait(_child(["run", str(spec), "--out", str(folder / "timed")])) == 0
+    whole = time.monotonic() - begin
+    while tally["kills"] < number:
+        directory = folder / str(tally["studies"])
+        tally["studies"] += 1
+        kept: set[str] = set()
+        while True:
+            child = _child(["run", str(spec), "--out", str(directory)])
+            if tally["kills"] < number and rng.random() < 0.8:
+                time.sleep(rng.uniform(0.0, whole))
+                os.kill(child, signal.SIGKILL)
+            status = _wait(child)
+            now = _kept(directory)
+            tally["lost trials"] += len(kept - now)
+            kept = now
+            if status == -signal.SIGKILL:
+                tally["kills"] += 1
+                tally["kills with trials kept, and others left"] += (
+                    0 < len(kept) < len(adversary.trials)
+                )
+            else:
+                tally["refused"] += status != 0
+                break
+        equal = adversary.content(directory) == adversary.expected
+        tally["studies: equal" if equal else "studies: unequal"] += 1
+    return tally
+
+
+def _child(line: list[str]) -> int:
+    """Begin a command in a copy of this process; return its number."""
+    child = os.fork()
+    if child == 0:
+        with open(os.devnull, "w") as nowhere:
+            os.dup2(nowhere.fileno(), 1)
+            os.dup2(nowhere.fileno(), 2)
+        os._exit(command_line(line))
+    return child
+
+
+def _wait(child: int) -> int:
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+
+
+def _kept(directory: Path) -> set[str]:
+    """Return the identities of the trials that are kept, and sound."""
+    try:
+        with Store.open(directory) as store:
+            store.verify()
+            names, rows = store.trials()
+            return {row[names.index("identity")] for row in rows}
+    except SpecError as error:
+        if re.search("holds no study", str(error)):
+            return set()  # killed before the study was noted
+        raise
+
+
+def flips(number: int, rng: random.Random, folder: Path) -> Counter[str]:
+    """Flip bits one by one, read the study, and mend it every fourth time; return what happened."""
+    adversary, tally = Adversary(folder, rng), Counter[str]()
+    for attempt in range(number):
+        tally["flips"] += 1
+        path = adversary.damage()
+        lines = adversary.lines()
+        for line in lines if attempt % 10 == 0 else lines[:2]:
+            tally["reads"] += 1
+            tally[_read(adversary, line, path)] += 1
+        if attempt % 4 == 0:
+            tally["runs"] += 1
+            tally[_mended(adversary, path)] += 1
+        adversary.restore()
+    return tally
+
+
+def _read(adversary: Adversary, line: str, path: Path) -> str:
+    try:
+        said = adversary.command(line)
+    except BaseException:
+        print(f"{line}, {path.name}:\n{traceback.format_exc()}", file=sys.stderr)
+        return "traceback"
+    if said == adversary.said[line]:
+        return "equal"
+    is_told = path.name in said[1] + said[2] or "recording is missing or damaged" in said[1]
+    if is_told:
+        return "told"
+    print(f"{line}, {path.name}: silence: {said[2]}", file=sys.stderr)
+    return "silence"
+
+
+def _mended(adversary: Adversary, path: Path) -> str:
+    try:
+        adversary.finish(adversary.study)
+        is_equal = adversary.content(adversary.study) == adversary.expected
+    except BaseException:
+        print(f"run, {path.name}:\n{traceback.format_exc()}", file=sys.stderr)
+        return "run: traceback"
+    return "run: equal" if is_equal else "run: unequal"
+
+
+def obstacles(rng: random.Random, folder: Path) -> Counter[str]:
+    """Put folders in place of files, and the other way round, and cut files short."""
+    adversary, tally = Adversary(folder, rng), Counter[str]()
+
+    def attack(path: Path, how: Callable[[], object]) -> None:
+        how()
+        for line in adversary.lines():
+            tally["reads"] += 1
+            tally[_read(adversary, line, path)] += 1
+        adversary.restore()
+
+    for name in (LOCK, DATABASE, f"{DATABASE}-wal", f"{DATABASE}-shm"):
+        path = adversary.study / name
+        attack(path, lambda path=path: (path.unlink(missing_ok=True), path.mkdir()))
+    for source in adversary.files:
+        path, size = adversary.study / source.relative_to(adversary.sound), source.stat().st_size
+        for cut in (1, size // 2, size):
+            attack(path, lambda path=path, to=size - cut: path.write_bytes(path.read_bytes()[:to]))
+    return tally
+
+
+def hostile(number: int, rng: random.Random, folder: Path) -> Counter[str]:
+    """Offer specs, topologies and polygons in turn; return what became of them."""
+    makers = {"specs": _specs(rng), "topologies": _topologies(rng), "polygons": _polygons(rng)}
+    tally = Counter[str]()
+    for attempt in range(number):
+        kind = list(makers)[attempt % 3]
+        tally[kind] += 1
+        attack = next(makers[kind])
+        begin = time.monotonic()
+        with warnings.catch_warnings(record=True) as warned:
+            warnings.simplefilter("always")
+            try:
+                became = attack(folder)
+            except BaseException:
+                print(f"{kind}:\n{traceback.format_exc()}", file=sys.stderr)
+                became = "traceback"
+        if time.monotonic() - begin > SLOW:
+            became = "stalled"
+        if any(issubclass(w.category, RuntimeWarning) for w in warned):
+            became = "warned"
+        tally[f"{kind}: {became}"] += 1
+    return tally
+
+
+Attack = Callable[[Path], str]
+VALUES = (
+    "-1", "0", "1e999", "nan", "true", '""', "[]", "{}", '"\\u0000"', '"' + "x" * 5000 + '"',
+    "[[[[[1]]]]]", "99999999999999999999", '"chain:a,a"', '"nothing.py:x"', "1979-05-27",
+)  # fmt: skip
+KEYS = (
+    "seeds", "episodes", "steps", "evaluation", "preset", "study", "topology", "scenario.robots",
+    "scenario.box", "scenario.robot", "scenario.failures", "learner.kind", "learner.discount",
+    "learner.decision", "sweep.preset", "overrides", "evaluations.x", "k" * 5000,
+    "scenario.x\\u001b",
+)  # fmt: skip
+
+
+def _specs(rng: random.Random) -> Iterator[Attack]:
+    """Yield specs that are mutated byte by byte, or hold a strange value."""
+    sound = (
+        b'study = "learning-curve"\nseeds = 2\nepisodes = 3\n[scenario]\nrobots = 2\nbox = "L"\n'
+        b'[topology]\nkind = "tree"\n[learner]\nridge = 3.0\n'
+        b'[sweep]\npreset = ["default", "paper"]\n'
+    )
+    while True:
+        data = bytearray(sound)
+        kind = rng.randrange(3)
+        if kind == 0:
+            for _ in range(rng.randrange(1, 4)):
+                data[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
+        elif kind == 1:
+            key = rng.choice(KEYS)
+            head, _, tail = key.rpartition(".")
+            table = f"[{head}]\n" if head else ""
+            data = bytearray(f'{table}"{tail}" = {rng.choice(VALUES)}\n'.encode())
+        else:
+            depth = rng.choice([10, 1000, 100_000])
+            data = bytearray(b"seeds = " + b"[" * depth + b"]" * depth + b"\n")
+
+        def attack(folder: Path, data: bytes = bytes(data)) -> str:
+            (folder / "spec.toml").write_bytes(data)
+            try:
+                Spec.load(folder / "spec.toml")
+            except SpecError as error:
+                return "refused in one line" if "\n" not in str(error) else "refused at length"
+            return "accepted"
+
+        yield attack
+
+
+def _topologies(rng: random.Random) -> Iterator[Attack]:
+    """Yield files of graphs."""
+    names = [
+        "a",
+        "b",
+        "c",
+        1,
+        None,
+        0.5,
+        True,
+        "",
+        "\x1b[31m",
+        "x\ny",
+        "\ud800",
+        "n" * 5000,
+        [],
+        {},
+    ]
+    names += ["a", "b", "c", "d"] * 5
+    graphml = (
+        '<graphml xmlns="http://graphml.graphdrawing.org/xmlns"><graph edgedefault="directed">'
+        '<node id="a"/><node id="b"/><edge source="a" target="b"/></graph></graphml>'
+    )
+    while True:
+        kind, suffix = rng.randrange(4), "json"
+        pairs = [[rng.choice(names), rng.choice(names)] for _ in range(rng.randrange(1, 4))]
+        if kind == 0:
+            text = json.dumps({"edges": pairs}).replace("0.5", rng.choice(["NaN", "1e999", "0.5"]))
+        elif kind == 1:
+            nodes = [{"id": rng.choice(names)} if rng.random() < 0.7 else rng.choice(names)]
+            links = [{"source": a, "target": b} if rng.random() < 0.8 else [a, b] for a, b in pairs]
+            text = json.dumps({"nodes": nodes * rng.randrange(1, 3), "links": links})
+        elif kind == 2:
+            depth = rng.choice([100, 100_000])
+            text = '{"edges": ' + "[" * depth + "]" * depth + "}"
+        else:
+            data, suffix = bytearray(graphml.encode()), "graphml"
+            at = rng.randrange(len(data))
+            data[at : at + rng.randrange(1, 9)] = rng.randbytes(rng.randrange(3))
+            text = data.decode("utf-8", "replace")
+
+        def attack(folder: Path, text: str = text, suffix: str = suffix) -> str:
+            path = folder / f"graph.{suffix}"
+            path.write_bytes(text.encode("utf-8", "surrogatepass"))
+            out, error = io.StringIO(), io.StringIO()
+            with contextlib.redirect_stdout(out), contextlib.redirect_stderr(error):
+                status = command_line(["topology", "show", str(path)])
+            said = error.getvalue()
+            if status == 0:
+                return "accepted" if out.getvalue().replace("\n", "").isprintable() else "raw"
+            one_line = said.count("\n") == 1 and said[:-1].isprintable() and path.name in said
+            return "refused in one line" if one_line else "refused at length"
+
+        yield attack
+
+
+def _polygons(rng: random.Random) -> Iterator[Attack]:
+    """Yield outlines of boxes."""
+    while True:
+        count = rng.choice([1, 2, 3, 5, 12, 50, 300, 1000, 1001, 20_000])
+        size = 10.0 ** rng.choice([-12, -4, -1, -1, -1, -1, -1, 0, 0, 2, 9, 308])
+        radii = [rng.uniform(0.3, 1.0) * size for _ in range(count)]
+        angles = [2 * math.pi * i / count for i in range(count)]
+        ring = [(r * math.cos(a), r * math.sin(a)) for r, a in zip(radii, angles, strict=True)]
+        change = rng.randrange(9)
+        if change == 0:
+            ring.append(ring[0])
+        elif change == 1:
+            ring.insert(rng.randrange(count), rng.choice(ring))
+        elif change == 2:
+            ring[rng.randrange(count)] = (rng.choice([math.nan, math.inf, -1e308]), 0.0)
+        elif change == 3:
+            rng.shuffle(ring)
+
+        def attack(folder: Path, ring: object = tuple(ring)) -> str:
+            try:
+                box = BoxSpec("attack", ring)  # type: ignore[arg-type]
+            except ValueError as error:
+                return "refused in one line" if "\n" not in str(error) else "refused at length"
+            area = sum(_area(piece.tolist()) for piece in box.fixtures)
+            return "accepted" if math.isclose(area, box.area, rel_tol=1e-6) else "unlike its pieces"
+
+        yield attack
+
+
+def _area(ring: list[list[float]]) -> float:
+    following = [*ring[1:], ring[0]]
+    return sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(ring, following, strict=True)) / 2
+
+
+ATTEMPTS = ("kills", "flips", "reads", "runs", "studies", "specs", "topologies", "polygons")
+FINE = (
+    "equal", "told", "run: equal", "studies: equal", "kills with trials kept, and others left",
+    "accepted", "refused in one line",
+)  # fmt: skip
+
+
+def _failures(tally: Counter[str]) -> int:
+    return sum(n for name, n in tally.items() if name not in ATTEMPTS and not name.endswith(FINE))
+
+
+def main() -> int:
+    """Attack, print the table; 1 if anything failed."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.adversary", description=__doc__)
+    parser.add_argument("--kills", type=int, default=100, metavar="N", help="0: none")
+    parser.add_argument("--flips", type=int, default=2000, metavar="N", help="0: none")
+    parser.add_argument("--hostile", type=int, default=600, metavar="N", help="0: none")
+    parser.add_argument("--seed", type=int, default=20)
+    options = parser.parse_args()
+    durable.os.fsync = lambda _: None  # type: ignore[attr-defined]  # no power fails here
+    campaigns: dict[str, Callable[[random.Random, Path], Counter[str]]] = {
+        "kill -9": lambda rng, folder: kills(options.kills, rng, folder),
+        "flipped bits": lambda rng, folder: flips(options.flips, rng, folder),
+        "files cut short, folders in their place": obstacles,
+        "hostile input": lambda rng, folder: hostile(options.hostile, rng, folder),
+    }
+    if not options.kills:
+        del campaigns["kill -9"]
+    if not options.flips:
+        del campaigns["flipped bits"], campaigns["files cut short, folders in their place"]
+    if not options.hostile:
+        del campaigns["hostile input"]
+    begin, failed = time.process_time(), 0
+    print("| attack | attempts | what became of them | failures |\n|---|---|---|---|")
+    with tempfile.TemporaryDirectory() as name:
+        for number, (title, campaign) in enumerate(campaigns.items()):
+            folder = Path(name) / str(number)
+            folder.mkdir()
+            tally = campaign(random.Random(options.seed), folder)
+            failed += _failures(tally)
+            tried = ", ".join(f"{tally[what]} {what}" for what in ATTEMPTS if tally[what])
+            became = ", ".join(
+                f"{what} {n}" for what, n in sorted(tally.items()) if what not in ATTEMPTS
+            )
+            print(f"| {title} | {tried} | {became} | {_failures(tally)} |", flush=True)
+    print(f"\nseed {options.seed}, {time.process_time() - begin:.0f} s of processor time, ", end="")
+    print(f"{failed} failures")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

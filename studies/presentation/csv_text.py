@@ -1,0 +1,39 @@
+"""CSV that is harmless in a spreadsheet.
+
+Spreadsheets take a cell that begins with ``=``, ``+``, ``-`` or ``@`` for a formula, and a formula
+can send away what stands beside it. Labels and names of a study may come from anybody: a text that
+begins so, and is no number, gets an apostrophe in front. Numbers stay numbers.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable, Sequence
+from typing import Any, TextIO
+
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""With what a spreadsheet's formula begins, if the spaces before it are left out."""
+
+
+def write_csv(file: TextIO, names: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
+    """Write a header and rows; None becomes an empty cell."""
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow(map(harmless, names))
+    writer.writerows(map(harmless, row) for row in rows)
+
+
+def harmless(value: Any) -> Any:
+    """Return a value as it may stand in a spreadsheet.
+
+    Examples
+    --------
+    >>> [harmless(value) for value in ("=1+1", "@SUM(A1)", "-0.5", -0.5, "chain", None)]
+    ["'=1+1", "'@SUM(A1)", '-0.5', -0.5, 'chain', None]
+    """
+    if not isinstance(value, str) or not value.lstrip(" \n").startswith(FORMULA):
+        return value
+    try:
+        float(value)
+    except ValueError:
+        return f"'{value}"
+    return value

@@ -1,0 +1,300 @@
+"""What the database of a study holds, as rows and words; nothing is written here."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol, Self, TypeVar
+
+from ...core.protocols import Measure
+from ...core.sources import Sources
+from ..spec.errors import SpecError
+from ..spec.outline import Outline
+from ..spec.spec import Spec
+from ..trials import code
+from ..trials.episodes import ELSEWHERE, STAGE
+from ..trials.measures import measures_from
+from ..trials.trial import RESULTS_VERSION
+from . import database, integrity
+from .database import DATABASE
+from .schema import PLANNED, SECONDS, trial_checksums
+
+
+class Identified(Protocol):
+    """A trial as far as the ledger needs it."""
+
+    @property
+    def identity(self) -> str: ...  # noqa: D102
+    @property
+    def condition(self) -> str: ...  # noqa: D102
+    @property
+    def seed(self) -> int: ...  # noqa: D102
+
+
+T = TypeVar("T", bound=Identified)
+
+
+class Planned(NamedTuple):
+    """A trial as it was noted before it was run: its members are those of a `Trial`."""
+
+    identity: str
+    condition: str
+    seed: int
+    recorded: dict[int, str]
+
+
+class Reading:
+    """The rows of an open study; see `open`.
+
+    Attributes
+    ----------
+    directory
+        Where the study is.
+    """
+
+    def __init__(self, directory: Path, connection: sqlite3.Connection) -> None:
+        self.directory = directory
+        self._db = connection
+
+    @classmethod
+    @contextmanager
+    def open(cls, directory: Path) -> Iterator[Self]:
+        """Open an existing study to read one state of it, whatever is added meanwhile.
+
+        Raises
+        ------
+        SpecError
+            If the directory holds no readable study, or its database is damaged as a whole: what
+            it says of the study, or the number of its trials. For their rows see `verify`.
+        """
+        path = directory / DATABASE
+        if integrity.bereft(path):
+            raise SpecError(
+                f"{path}-wal: is the log of a database that is not there any more; nested-agents "
+                "run sets it aside"
+            )
+        if not path.is_file():
+            raise SpecError(f"{directory}: holds no study (no {DATABASE})")
+        with database.reading(path) as connection:
+            if (wrong := integrity.fault(path, connection)) is not None:
+                raise database.DamageError(path, wrong)
+            if connection.execute("SELECT 1 FROM sqlite_master").fetchone() is None:
+                raise SpecError(f"{path}: is empty, it holds no study yet")
+            yield cls(directory, connection)
+
+    def spec(self, sources: Sources | None = None) -> Spec:
+        """Return the spec that the study runs; what it names of users' files is run.
+
+        Parameters
+        ----------
+        sources
+            The files; those that are kept with the study unless others are given.
+        """
+        return Spec.of(self._table("spec"), self.sources() if sources is None else sources)
+
+    def sources(self) -> Sources:
+        """Return the files of users that the study names, as they were when it began."""
+        return Sources(None, self._table("sources"), brought_by=str(self.directory))
+
+    def settings(self) -> dict[str, Any]:
+        """Return the settings of each condition by label, as they were when it began."""
+        return self._table("conditions")
+
+    def outline(self) -> Outline:
+        """Return what the study consists of, as it was noted; nothing is run for it."""
+        try:
+            return Outline.noted(self._table("spec"), self.columns())
+        except (KeyError, TypeError, ValueError):
+            raise SpecError(
+                f"{self.directory / DATABASE}: is damaged: spec cannot be read"
+            ) from None
+
+    def planned(self) -> tuple[Planned, ...]:
+        """Return all trials of the study, as they were noted."""
+        rows = self._db.execute(f"SELECT {', '.join(PLANNED)} FROM planned ORDER BY position")
+        return tuple(
+            Planned(identity, condition, seed, {int(k): v for k, v in json.loads(kept).items()})
+            for identity, condition, seed, kept in rows
+        )
+
+    def versions_of_code(self) -> int:
+        """Return by how many versions of the installed code finished trials were computed."""
+        query = "SELECT count(DISTINCT code) FROM trials WHERE state = 'done'"
+        return int(self._db.execute(query).fetchone()[0])
+
+    def outdated(self) -> str | None:
+        """Return why this code would not go on with the study, in one line; None if it would."""
+        if (other := self.other_version()) is not None:
+            return f"{other}; use another directory"
+        modules = code.changed(self.known_code())
+        if not modules:
+            return None
+        more = f" and {len(modules) - 1} more have" if len(modules) > 1 else " has"
+        return (
+            f"{self.directory}: its results are of other code: {modules[0]}{more} changed "
+            "since; --accept-code goes on with it"
+        )
+
+    def known_code(self) -> code.Code:
+        """Return the digests of the code that computed what was added last."""
+        return {name: (text, tree) for name, (text, tree) in self._table("code").items()}
+
+    def other_version(self) -> str | None:
+        """Return of which version the results are, in one line, if they are not of this one."""
+        if (version := self.meta("results_version")) == str(RESULTS_VERSION):
+            return None
+        return (
+            f"{self.directory}: holds results of version {version}, this is version "
+            f"{RESULTS_VERSION}"
+        )
+
+    def measures(self) -> tuple[Measure, ...]:
+        """Return what the study measures of its episodes, of any condition."""
+        return self._measures
+
+    @cached_property
+    def _measures(self) -> tuple[Measure, ...]:
+        if (other := self.other_version()) is not None:
+            raise SpecError(f"{other}; run it again to read it")
+        try:
+            return measures_from(json.loads(self.meta("measures")))
+        except (ValueError, TypeError):
+            raise SpecError(
+                f"{self.directory / DATABASE}: is damaged: measures cannot be read"
+            ) from None
+
+    def meta(self, key: str) -> str:
+        """Return what is noted under `key`, as ``spec``, ``conditions`` or ``results_version``."""
+        found = self._db.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
+        if found is None:
+            raise SpecError(f"{self.directory / DATABASE}: is no study: it has no {key}")
+        return str(found[0])
+
+    def _table(self, key: str) -> dict[str, Any]:
+        try:
+            table = json.loads(self.meta(key))
+        except ValueError:
+            table = None
+        if not isinstance(table, dict):
+            raise SpecError(f"{self.directory / DATABASE}: is damaged: {key} cannot be read")
+        return table
+
+    def verify(self) -> None:
+        """Raise `SpecError` if the rows of a trial that was run are not what was written."""
+        for where in self._damaged_rows().values():
+            raise SpecError(f"{where}; nested-agents run runs it again")
+
+    def _damaged_rows(self) -> dict[str, str]:
+        """Return by identity whose rows are not what was written, one line each."""
+        if not self._db.execute("PRAGMA table_info(checksums)").fetchall():
+            return {}  # begun before there were checksums
+        noted = dict(self._db.execute("SELECT identity, sha256 FROM checksums").fetchall())
+        names = {
+            identity: f"{condition}, seed {seed}"
+            for table in ("trials", "planned")
+            for identity, condition, seed in self._db.execute(
+                f"SELECT identity, condition, seed FROM {table}"
+            )
+        }
+        found = dict(trial_checksums(self._db))
+        path = self.directory / DATABASE
+        return {
+            identity: f"{path}: {names.get(identity, identity)}: rows are damaged"
+            for identity in found | noted
+            if identity not in found or noted.get(identity, found[identity]) != found[identity]
+        }
+
+    def failed(self) -> list[tuple[str, int, str]]:
+        """Return condition, seed and traceback of every failed trial."""
+        return self._db.execute(
+            "SELECT condition, seed, coalesce(error, '') FROM trials "
+            "JOIN conditions USING (condition) "
+            "WHERE state = 'failed' ORDER BY position, seed"
+        ).fetchall()
+
+    def counts(self) -> dict[str, int]:
+        """Return how many trials are ``done`` and how many ``failed``."""
+        query = "SELECT state, count(*) FROM trials GROUP BY state"
+        return {"done": 0, "failed": 0} | dict(self._db.execute(query).fetchall())
+
+    def phases(self) -> list[str]:
+        """Return the phases that episodes were run in.
+
+        First training and evaluation, then the stages of curricula and the further evaluations,
+        each in their order, then others.
+        """
+        known = ["training", "evaluation"]
+        query = "SELECT phase, min(episode) FROM episodes GROUP BY phase ORDER BY 2, 1"
+        found = [phase for phase, _ in self._db.execute(query)]
+        stages = [phase for phase in found if phase.startswith(STAGE)]
+        evaluations = [f"{ELSEWHERE}{name}" for name in self._table("spec").get("evaluations", ())]
+        ordered = [*known, *stages, *evaluations]
+        return [phase for phase in ordered if phase in found] + sorted({*found} - {*ordered})
+
+    def columns(self) -> dict[str, dict[str, Any]]:
+        """Return what tells each condition from the others, by label; see `Condition`."""
+        cursor = self._db.execute("SELECT * FROM conditions ORDER BY position")
+        swept = [column[0] for column in cursor.description][2:]
+        return {row[1]: dict(zip(swept, row[2:], strict=True)) for row in cursor}
+
+    def rows(self, phase: str = "training") -> tuple[list[str], list[tuple[Any, ...]]]:
+        """Return the column names and the rows of a phase, by condition, seed and episode."""
+        cursor = self._db.execute("SELECT * FROM results WHERE phase = ?", (phase,))
+        return [column[0] for column in cursor.description], cursor.fetchall()
+
+    def episodes(self) -> tuple[list[str], list[tuple[Any, ...]]]:
+        """Return the column names and the rows of all phases, by condition, seed and episode."""
+        cursor = self._db.execute("SELECT * FROM results")
+        return [column[0] for column in cursor.description], cursor.fetchall()
+
+    def trials(self) -> tuple[list[str], list[tuple[Any, ...]]]:
+        """Return the column names and one row per trial, by condition and seed.
+
+        After the swept keys and the seed: its state, its identity, the last line of its traceback
+        if it failed, the seconds of each part, and its `numbers`; None where there is no such.
+        """
+        swept = next(iter(self.columns().values()), {})
+        names = [n for (n,) in self._db.execute("SELECT DISTINCT name FROM numbers ORDER BY name")]
+        values = {
+            (i, n): v for i, n, v in self._db.execute("SELECT identity, name, value FROM numbers")
+        }
+        cursor = self._db.execute(
+            f"SELECT c.condition, {''.join(f'c.{database.quoted(key)}, ' for key in swept)}seed, "
+            f"state, identity, error, {', '.join(SECONDS)} FROM trials "
+            "JOIN conditions c USING (condition) LEFT JOIN seconds USING (identity) "
+            "ORDER BY position, seed"
+        )
+        columns = [column[0] for column in cursor.description]
+        identity, error = columns.index("identity"), columns.index("error")
+        rows = []
+        for row in cursor:
+            last = (row[error] or "").rstrip().rpartition("\n")[2] or None
+            measured = (values.get((row[identity], name)) for name in names)
+            rows.append((*row[:error], last, *row[error + 1 :], *measured))
+        return [*columns[: -len(SECONDS)], *(f"seconds.{part}" for part in SECONDS), *names], rows
+
+    def seconds(self) -> tuple[list[str], list[tuple[Any, ...]]]:
+        """Return the column names and the seconds of every part of every trial."""
+        cursor = self._db.execute(
+            f"SELECT condition, seed, {', '.join(SECONDS)} FROM seconds "
+            "JOIN trials USING (identity) JOIN conditions USING (condition) ORDER BY position, seed"
+        )
+        return [column[0] for column in cursor.description], cursor.fetchall()
+
+    def mean_seconds(self) -> dict[str, float]:
+        """Return by condition how long its finished trials took on average [s]."""
+        query = "SELECT condition, avg(total) FROM seconds JOIN trials USING (identity) GROUP BY 1"
+        return dict(self._db.execute(query).fetchall())
+
+    def numbers(self) -> list[tuple[str, int, str, float, bool]]:
+        """Return condition, seed, name, value and whether it is a function of the trial."""
+        cursor = self._db.execute(
+            "SELECT condition, seed, n.name, value, repeatable FROM numbers n "
+            "JOIN trials USING (identity) JOIN conditions USING (condition) "
+            "ORDER BY position, seed, n.name"
+        )
+        return [(*row[:4], bool(row[4])) for row in cursor]
