@@ -28,6 +28,7 @@ from .protocols import (
     TabulatedPrediction,
     Transition,
     groups_of,
+    joint_reward,
     measures_of,
     roles_of,
 )
@@ -88,7 +89,8 @@ class RobotAgents:
     def step(self, joint_action: IntArray) -> Transition:
         """Carry out a robot-action index per robot."""
         transition = self.scenario.step(self._local[joint_action].ravel())
-        return replace(transition, states=self._joined(transition.states))
+        reward = joint_reward(transition.reward, self.wheel_groups)
+        return replace(transition, states=self._joined(transition.states), reward=reward)
 
     def predict(self) -> RobotPrediction:
         """Predict from the present state."""

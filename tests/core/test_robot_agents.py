@@ -51,6 +51,18 @@ def test_robots_whose_wheels_have_the_same_roles_are_of_one_role(line_world) -> 
     assert roles_of(per_robot(world)) == ("front+rear", "front+rear")
 
 
+@pytest.mark.parametrize(("topology", "agents"), [("per-robot", 2), ("single-agent", 1)])
+def test_rewards_of_wheels_are_joined(topology: str, agents: int) -> None:
+    settings = BoxPushingSettings.model_validate({"reward": {"of": "robot"}})
+    world = BoxPushing(settings)
+    scenario, _ = parse(topology).arrange(BoxPushing(settings))
+    world.reset(0)
+    scenario.reset(0)
+    of_wheels = np.asarray(world.step(np.full(4, world.action_set.neutral)).reward)
+    joined = scenario.step(np.full(agents, scenario.action_set.neutral)).reward
+    assert joined == pytest.approx(of_wheels.reshape(agents, -1).mean(axis=1))
+
+
 def test_the_scenario_keeps_its_promises() -> None:
     def make() -> RobotAgents:
         return per_robot(BoxPushing(BoxPushingSettings()))
