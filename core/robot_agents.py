@@ -28,7 +28,9 @@ from .protocols import (
     TabulatedPrediction,
     Transition,
     groups_of,
+    joint_reward,
     measures_of,
+    roles_of,
 )
 from .spaces import ActionSet, StateSpace
 
@@ -70,6 +72,8 @@ class RobotAgents:
         self.action_set = ActionSet(names, zeros, zeros, neutral)
         self.agents = tuple(robot_of(scenario.agents[group[0]]) for group in self.wheel_groups)
         self.groups = tuple((r,) for r in range(len(self.agents)))
+        roles = roles_of(scenario)
+        self.roles = tuple("+".join(roles[i] for i in group) for group in self.wheel_groups)
         space = scenario.state_space
         own = tuple(
             replace(v, name=f"{scenario.agents[wheel].rpartition('.')[2]}.{v.name}")
@@ -85,7 +89,8 @@ class RobotAgents:
     def step(self, joint_action: IntArray) -> Transition:
         """Carry out a robot-action index per robot."""
         transition = self.scenario.step(self._local[joint_action].ravel())
-        return replace(transition, states=self._joined(transition.states))
+        reward = joint_reward(transition.reward, self.wheel_groups)
+        return replace(transition, states=self._joined(transition.states), reward=reward)
 
     def predict(self) -> RobotPrediction:
         """Predict from the present state."""

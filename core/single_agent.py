@@ -20,6 +20,7 @@ from .protocols import (
     RewardPrediction,
     Scenario,
     Transition,
+    joint_reward,
     measures_of,
 )
 from .spaces import ActionSet, StateSpace
@@ -73,7 +74,8 @@ class SingleAgent:
     def step(self, joint_action: IntArray) -> Transition:
         """Carry out the joint action of index ``joint_action[0]``."""
         transition = self.scenario.step(self._joint[joint_action[0]])
-        return replace(transition, states=transition.states.reshape(1, -1))
+        reward = joint_reward(transition.reward, (range(len(self.scenario.agents)),))
+        return replace(transition, states=transition.states.reshape(1, -1), reward=reward)
 
     def predict(self) -> SingleAgentPrediction:
         """Predict from the present state."""

@@ -11,6 +11,7 @@ STUDIES = Registry(
         "shapes": f"{__name__}.catalogue.shapes",
         "wheel-failure": f"{__name__}.catalogue.wheel_failure",
         "scaling": f"{__name__}.catalogue.scaling",
+        "hierarchies": f"{__name__}.catalogue.hierarchies",
         "single-agent": f"{__name__}.catalogue.single_agent",
     },
 )

@@ -22,7 +22,7 @@ from ..trials.measures import measures_from, tables
 from ..trials.trial import RESULTS_VERSION
 from .results import Arrays, Results
 
-SUCCESS_ALONE = ("ablation", "chain-order", "scaling", "wheel-failure")
+SUCCESS_ALONE = ("ablation", "chain-order", "hierarchies", "scaling", "wheel-failure")
 """Studies whose analysis asks for no other measure of an episode: of them no other is kept."""
 DECIMALS = 3
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -249,6 +249,18 @@ def label(point: Mapping[str, Any], name: str = "") -> str:
         value = _brief(point[key])
         parts.append(value if key == "preset" else f"{shown}={value}")
     return ", ".join(parts)
+
+
+def label_but(columns: Mapping[str, Any], keys: Collection[str]) -> str:
+    """Return the label that a condition of these columns would have without some swept keys.
+
+    Examples
+    --------
+    >>> label_but({"name": "no replay", "scenario.robots": 3, "topology": ""}, ["scenario.robots"])
+    'no replay'
+    """
+    point = {k: v for k, v in columns.items() if k not in (*keys, "name") and v != ""}
+    return label(point, columns.get("name", ""))
 
 
 def _brief(value: object) -> str:

@@ -6,7 +6,7 @@ import pytest
 from nested_agents.core.decision import Decision
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.loop import control_loop, policy_seed
-from nested_agents.core.protocols import EmbodiedScenario
+from nested_agents.core.protocols import EmbodiedScenario, roles_of
 from nested_agents.core.robot_agents import RobotAgents, per_robot
 from nested_agents.core.self_model import SelfModelSettings
 from nested_agents.core.team import Team
@@ -42,6 +42,25 @@ def test_predictions_by_blocks_are_those_by_states(line_world) -> None:
         blocks = prediction.blocks(agent)
         assert blocks.states(codes) == pytest.approx(prediction.states(agent, joint))
     assert prediction.reward_table() == pytest.approx(prediction.rewards(joint))
+
+
+def test_robots_whose_wheels_have_the_same_roles_are_of_one_role(line_world) -> None:
+    world = line_world(2, 2)
+    assert roles_of(per_robot(world)) == ("cart0.wheel0+cart0.wheel1", "cart1.wheel0+cart1.wheel1")
+    world.roles = ("front", "rear") * 2
+    assert roles_of(per_robot(world)) == ("front+rear", "front+rear")
+
+
+@pytest.mark.parametrize(("topology", "agents"), [("per-robot", 2), ("single-agent", 1)])
+def test_rewards_of_wheels_are_joined(topology: str, agents: int) -> None:
+    settings = BoxPushingSettings.model_validate({"reward": {"of": "robot"}})
+    world = BoxPushing(settings)
+    scenario, _ = parse(topology).arrange(BoxPushing(settings))
+    world.reset(0)
+    scenario.reset(0)
+    of_wheels = np.asarray(world.step(np.full(4, world.action_set.neutral)).reward)
+    joined = scenario.step(np.full(agents, scenario.action_set.neutral)).reward
+    assert joined == pytest.approx(of_wheels.reshape(agents, -1).mean(axis=1))
 
 
 def test_the_scenario_keeps_its_promises() -> None:

@@ -104,3 +104,24 @@ def scaling(success: dict[int, float], seconds_per_agent: float = 1e-4) -> Resul
             "process_bytes": 2e8 * spread,
         }
     return base
+
+
+def hierarchies(chances: dict[tuple[str, str, int], float], seeds: int = SEEDS) -> Results:
+    """By hierarchy, whose value decides and number of robots, the chance of success."""
+    by_label = {f"topology={t}, value_of={of}, robots={n}": (t, of, n) for t, of, n in chances}
+    base = ablation(dict(zip(by_label, chances.values(), strict=True)), seeds)
+    rng = np.random.default_rng(5)
+    for condition, (topology, value_of, robots) in by_label.items():
+        base.columns[condition] = {
+            "topology": topology,
+            "learner.decision.value_of": value_of,
+            "scenario.robots": robots,
+        }
+        passed = {"chain": robots * (2 * robots - 1), "star": 2 * robots - 1}
+        base.numbers[condition] = {
+            "robots": np.full(seeds, float(robots)),
+            "agents": np.full(seeds, 2.0 * robots),
+            "messages": np.full(seeds, float(passed.get(topology, 0))),
+        }
+        base.usage[condition] = {"decision_median": 2e-4 * robots * rng.uniform(0.9, 1.1, seeds)}
+    return base

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import matplotlib as mpl
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.ticker import NullLocator
 
-from ...presentation.figures import COLOURS, SETTINGS
+from ...presentation.by_robots import add_legend, draw_line, scale_axis, style
+from ...presentation.figures import SETTINGS
 from .analysis import Scaling
 
-MARKERS = "osD^vP"
 PANELS = (
     ("evaluation success", "evaluation success", False),
     ("decide [ms]", "deciding, per step [ms]", True),
@@ -38,8 +33,10 @@ def figure_of(analysis: Scaling) -> Figure:
         sizes = sorted({p.robots for p in analysis.points})
         for axes, (name, title, logarithmic) in zip(panels.flat, PANELS, strict=False):
             for index, evaluator in enumerate(evaluators):
-                beside = 2.0 ** (0.06 * (index - (len(evaluators) - 1) / 2))
-                _line(axes, analysis, evaluator, index, name, beside)
+                own = [p for p in analysis.points if p.evaluator == evaluator and name in p.values]
+                if own:
+                    robots, values = [p.robots for p in own], [p.values[name] for p in own]
+                    draw_line(axes, robots, values, index, len(evaluators))
             axes.set_title(title, loc="left")
             if logarithmic:
                 axes.set_yscale("log")
@@ -50,22 +47,11 @@ def figure_of(analysis: Scaling) -> Figure:
             panels[0][1].axhline(1e3 * period, color="#888888", linewidth=0.8, ls=":")
         _messages(panels[1][2], analysis, evaluators)
         for axes in panels.flat:
-            axes.set_xscale("log", base=2)
-            axes.set_xticks(sizes, [str(size) for size in sizes])
-            axes.xaxis.set_minor_locator(NullLocator())
-            axes.grid(alpha=0.25)
+            scale_axis(axes, sizes)
         for axes in panels[-1]:
             axes.set_xlabel("robots")
-        handles = [
-            Line2D(
-                [], [], color=COLOURS[i % len(COLOURS)], marker=MARKERS[i % len(MARKERS)], label=e
-            )
-            for i, e in enumerate(evaluators)
-        ]
         title = "means over seeds, bars: 95 % intervals; dotted: the decision period"
-        figure.legend(
-            handles=handles, title=title, loc="outside upper center", ncols=4, frameon=False
-        )
+        add_legend(figure, evaluators, title)
         return figure
 
 
@@ -79,34 +65,10 @@ def _messages(axes: Axes, analysis: Scaling, evaluators: list[str]) -> None:
             own = sorted(
                 (p.robots, p.messages) for p in analysis.points if p.evaluator == evaluator
             )
-            axes.plot(*zip(*own, strict=True), **_style(index))
+            axes.plot(*zip(*own, strict=True), **style(index))
     if min(passed for _, passed in counts):
         axes.set_yscale("log")
     else:  # agents that see nobody pass nothing
         axes.set_yscale("symlog", linthresh=1.0)
         axes.set_ylim(bottom=-0.2)
     axes.set_title("messages passed down, per step", loc="left")
-
-
-def _line(
-    axes: Axes, analysis: Scaling, evaluator: str, index: int, name: str, beside: float
-) -> None:
-    """Draw an evaluator's points, `beside` times to the right of their numbers of robots."""
-    own = [p for p in analysis.points if p.evaluator == evaluator and name in p.values]
-    if not own:
-        return
-    robots = [p.robots * beside for p in own]
-    value, low, high = np.array(
-        [[float(getattr(p.values[name], end)) for p in own] for end in ("value", "low", "high")]
-    )
-    style = _style(index)
-    axes.vlines(robots, low, high, color=style["color"], linewidth=1.2)
-    axes.plot(robots, value, **style)
-
-
-def _style(index: int) -> dict[str, Any]:
-    """Return how the line of an evaluator looks."""
-    return {
-        "color": COLOURS[index % len(COLOURS)], "marker": MARKERS[index % len(MARKERS)],
-        "markersize": 4, "linewidth": 1.2,
-    }  # fmt: skip

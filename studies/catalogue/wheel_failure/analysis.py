@@ -28,7 +28,7 @@ from ...analysis.paired_tests import holm, paired_permutation
 from ...analysis.results import Arrays, Results
 from ...analysis.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, rates
 from ...analysis.summary import Summary
-from ...spec.conditions import label
+from ...spec.conditions import label_but
 from ...spec.errors import SpecError
 from ...spec.spec import Spec
 from ...trials.session import Session
@@ -236,8 +236,7 @@ def _twin(condition: str, columns: Mapping[str, Any]) -> tuple[str, str]:
     enabled = str(columns.get(SWEPT, ""))
     if not enabled:
         return condition, ""
-    point = {k: v for k, v in columns.items() if k not in (SWEPT, "name") and v != ""}
-    return label(point, columns.get("name", "")) or "the failure", enabled
+    return label_but(columns, [SWEPT]) or "the failure", enabled
 
 
 def _summary(course: Course) -> Summary:

@@ -162,3 +162,16 @@ def test_the_spec_can_be_run_and_crosses_faults_with_self_models() -> None:
     others = Spec.load(Path(module.__file__).parent / "wheel_faults.toml")
     check(others)
     assert "2 wheels, seized, enabled=false" in [c.label for c in others.conditions()]
+
+
+def test_large_teams_lose_more_and_more_wheels_of_different_robots() -> None:
+    spec = Spec.load(Path(module.__file__).parent / "failures_of_large_teams.toml")
+    check(spec)
+    lost = []
+    for condition in spec.conditions():
+        scenario = condition.settings.scenario
+        (failure,) = scenario.failures
+        wheels = [failing.partition(".") for failing in failure.wheels]
+        assert len({robot for robot, *_ in wheels}) == len(wheels)
+        lost.append((scenario.robots, len(wheels)))
+    assert list(dict.fromkeys(lost)) == [(n, k) for n in (8, 16) for k in (1, 2, 4, 8)]

@@ -1,0 +1,180 @@
+"""The hierarchies study on made-up results, whose answer is known, and on one tiny run."""
+
+from pathlib import Path
+
+import pytest
+from made_up_results import hierarchies
+
+from nested_agents.studies.analysis.results import Results, read
+from nested_agents.studies.catalogue.hierarchies import analysis as module
+from nested_agents.studies.catalogue.hierarchies import check, draw, measure
+from nested_agents.studies.catalogue.hierarchies.analysis import analyse, seeds_needed
+from nested_agents.studies.presentation.figures import save
+from nested_agents.studies.presentation.tables import tabulate
+from nested_agents.studies.spec.errors import SpecError
+from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.store.store import Store
+from nested_agents.studies.trials.trial import check as measures_of
+from nested_agents.studies.trials.trial import trials_of
+
+CHANCES = {
+    (topology, value_of, robots): chance if robots > 2 and value_of == "team" else 0.9
+    for topology, chance in {"star": 0.2, "chain": 0.9, "tree:2": 0.9}.items()
+    for value_of in ("own", "team")
+    for robots in (2, 8)
+}
+
+
+def test_where_a_hierarchy_matters_is_told_and_where_not() -> None:
+    analysis = analyse(hierarchies(CHANCES))
+    assert [verdict.setting for verdict in analysis.verdicts] == [
+        "2 robots, own", "2 robots, team", "8 robots, own", "8 robots, team",
+    ]  # fmt: skip
+    assert {(verdict.reference, verdict.among) for verdict in analysis.verdicts} == {("chain", 8)}
+    *others, last = analysis.verdicts
+    assert all(not verdict.different and not verdict.undecided for verdict in others)
+    (star,) = last.different
+    assert (star.condition, star.seeds) == ("star", 20)
+    assert star.estimate.low < -0.7 < star.estimate.high < -0.4
+    assert [alike.condition for alike in last.alike] == ["tree:2"]
+    text = "\n".join(analysis.notes)
+    assert "8 robots, team: 1 of 2 found to differ\n  star differs by -0." in text
+    assert "8 robots, own: 0 of 2 found to differ\n  no difference found: star " in text
+    assert max(map(len, text.splitlines())) <= 80
+
+
+def test_with_few_seeds_nothing_can_be_told() -> None:
+    analysis = analyse(hierarchies(CHANCES, seeds=5))
+    assert all(len(verdict.undecided) == 2 for verdict in analysis.verdicts)
+    text = "\n".join(analysis.notes)
+    assert "adjusted over 8 comparisons, so fewer than 9 seeds cannot tell." in text
+    assert "differs by" not in text
+    assert "no difference found" not in text
+
+
+@pytest.mark.parametrize("comparisons", [1, 8, 63, 1000])
+def test_the_seeds_needed_are_the_fewest_whose_least_p_is_small_enough(comparisons: int) -> None:
+    n = seeds_needed(comparisons)
+    assert 2.0 ** (1 - n) * comparisons < 0.05 <= 2.0 ** (2 - n) * comparisons
+
+
+def test_an_interval_without_zero_is_not_called_no_difference() -> None:
+    found = hierarchies({("chain", "own", 4): 0.9, ("star", "own", 4): 0.9}, seeds=12)
+    one, other = (found.evaluation[c]["success"] for c in found.evaluation)
+    one[:], other[:] = 1, 1
+    other[:5] = 0  # p of five seeds that differ in one direction is 1/16
+    (verdict,) = analyse(found).verdicts
+    (star,) = verdict.undecided
+    assert (star.p, star.estimate.value) == (0.0625, pytest.approx(-5 / 12))
+    assert star.estimate.high < 0.0
+
+
+def test_the_first_hierarchy_is_the_reference_where_there_is_no_chain() -> None:
+    chances = {key: chance for key, chance in CHANCES.items() if key[0] != "chain"}
+    assert {verdict.reference for verdict in analyse(hierarchies(chances)).verdicts} == {"star"}
+
+
+def test_what_the_reference_has_not_finished_is_not_compared() -> None:
+    results = hierarchies(CHANCES)
+    for arrays in (results.training, results.evaluation):
+        arrays.pop("topology=chain, value_of=team, robots=8")
+    results.seeds["topology=chain, value_of=own, robots=8"] = (40,)
+    analysis = analyse(results)
+    assert [verdict.setting for verdict in analysis.verdicts] == ["2 robots, own", "2 robots, team"]
+    assert len(analysis.table) == 11
+
+
+def test_costs_stand_beside_success() -> None:
+    analysis = analyse(hierarchies(CHANCES))
+    by_name = {line.condition: line.estimates for line in analysis.table}
+    assert list(by_name)[:3] == [
+        "2 robots, own, star", "2 robots, own, chain", "2 robots, own, tree:2",
+    ]  # fmt: skip
+    chain = by_name["8 robots, own, chain"]
+    assert list(chain) == ["evaluation success", "decisions to goal", "decide [ms]", "messages"]
+    assert chain["messages"].value == 120.0
+    assert 1.4 < chain["decide [ms]"].low < 1.6 < chain["decide [ms]"].high < 1.8
+    assert 30.0 < chain["decisions to goal"].value < 90.0
+    assert tabulate(analysis.table).csv.count("\n") == 13
+
+
+def test_the_highest_success_is_told_with_its_cost() -> None:
+    analysis = analyse(hierarchies({("star", "own", 8): 0.1, ("chain", "own", 8): 1.0}))
+    assert analysis.notes[-1] == "8 robots, own, chain: 1.0; 1.6 ms, messages 120"
+
+
+def test_who_never_succeeds_has_no_decisions_to_the_goal() -> None:
+    results = hierarchies({("chain", "own", 2): 0.0, ("star", "own", 2): 0.0})
+    for line in analyse(results).table:
+        assert "decisions to goal" not in line.estimates
+
+
+def test_hierarchies_may_be_overrides_and_value_of_need_not_be_swept() -> None:
+    results = hierarchies({("chain", "own", 2): 0.9, ("star", "own", 2): 0.9})
+    for condition, columns in results.columns.items():
+        results.columns[condition] = {"name": columns["topology"], "scenario.carts": 2}
+    assert [line.condition for line in analyse(results).table] == [
+        "2 robots, chain", "2 robots, star",
+    ]  # fmt: skip
+
+
+def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
+    partly = {key: chance for key, chance in CHANCES.items() if key[:2] != ("star", "own")}
+    for chances, columns in ((CHANCES, 2), (partly, 2)):
+        (figure,) = draw(analyse(hierarchies(chances))).values()
+        assert len(figure.axes) == 2 * columns
+    paths = save({"hierarchies": figure}, tmp_path)
+    assert all(path.stat().st_size > 0 for path in paths)
+    assert draw(analyse(Results({}, {}))) == {}
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"evaluation": 0}, "evaluation = 0: hierarchies compares evaluation success"),
+        ({"sweep": {"scenario": {"robots": [2, 4]}}}, "topology = 'chain' in every condition"),
+    ],
+)
+def test_what_cannot_be_compared_is_refused(changes: dict, said: str) -> None:
+    table = {"study": "hierarchies", "sweep": {"topology": ["chain", "star"]}}
+    check(Spec.of(table))
+    with pytest.raises(SpecError, match=said):
+        check(Spec.of({**table, **changes}))
+
+
+def test_a_tiny_study_is_run_and_read(tmp_path: Path) -> None:
+    spec = Spec.of(
+        {
+            "study": "hierarchies", "seeds": [7, 8], "episodes": 1, "steps": 3, "evaluation": 1,
+            "learner": {"weights": "role", "decision": {"evaluator": "best-response"}},
+            "sweep": {
+                "topology": ["chain", "per-robot"],
+                "learner.decision.value_of": ["own", "team"],
+                "scenario.robots": [1, 2],
+            },
+        }
+    )  # fmt: skip
+    with Store.create(tmp_path, spec, measures_of(spec)) as store:
+        for trial in trials_of(spec):
+            store.save(trial, measure(trial), 1.0)
+        analysis = analyse(read(store))
+    assert [line.condition for line in analysis.table[:5]] == [
+        "1 robot, own, chain", "1 robot, own, per-robot",
+        "1 robot, team, chain", "1 robot, team, per-robot",
+        "2 robots, own, chain",
+    ]  # fmt: skip
+    messages = [float(line.estimates["messages"].value) for line in analysis.table]
+    assert messages == [1.0, 0.0, 1.0, 0.0, 6.0, 1.0, 6.0, 1.0]
+    assert len(analysis.verdicts) == 4
+
+
+def test_the_spec_crosses_hierarchies_whose_value_and_sizes_over_seeds_enough() -> None:
+    spec = Spec.load(Path(module.__file__).parent / "hierarchies.toml")
+    check(spec)
+    conditions = spec.conditions()
+    assert len(conditions) == 8 * 3 * 3
+    compared = len(conditions) - 3 * 3
+    assert len(spec.seeds) >= seeds_needed(compared)
+    searches = {c.settings.learner.decision.evaluator.kind for c in conditions}
+    assert searches == {"best-response"}
+    assert {c.settings.scenario.robots for c in conditions} == {2, 4, 8}
