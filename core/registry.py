@@ -233,6 +233,11 @@ class SettingsRegistry(Registry):
         return self.model(text)()
 
 
+def _dumped(value: Settings, info: Any) -> Any:
+    """Write settings as the model that holds them is written."""
+    return value.model_dump(mode=info.mode, exclude_none=info.exclude_none)
+
+
 class Plugged:
     """Marks a field that holds the settings of any thing of a registry.
 
@@ -256,9 +261,7 @@ class Plugged:
         """Return how pydantic validates and writes the field."""
         return core_schema.with_info_plain_validator_function(
             self._validated,
-            serialization=core_schema.plain_serializer_function_ser_schema(
-                lambda value, info: value.model_dump(mode=info.mode), info_arg=True
-            ),
+            serialization=core_schema.plain_serializer_function_ser_schema(_dumped, info_arg=True),
         )
 
     def _validated(self, value: Any, info: Any) -> Settings:

@@ -81,13 +81,19 @@ class BestResponse(Aggregation):
         self._place = np.zeros(n, dtype=np.int64)
         for group in groups:
             self._place[list(group)] = np.arange(len(group))
-        widest = max(map(len, groups))
-        self._of_bodies = combinations(tuple(range(widest)), self.n_actions)
-        self._of_parts = combinations((0, 1), self.n_actions)
+        sizes = {2, *(k for group in groups for k in range(1, len(group) + 1))}
+        self._actions = {k: combinations(tuple(range(k)), self.n_actions) for k in sizes}
+        self._widest = max(map(len, groups))
         rank = {i: k for k, i in enumerate(hierarchy.order)}
-        self._free = [
-            tuple(sorted((i, *hierarchy.below(i)), key=rank.__getitem__)) for i in range(n)
+        seen = [{i, *hierarchy.below(i)} for i in range(n)]
+        # Per agent, who is free to it, in the order of decision; those of its body; the others.
+        self._free = [tuple(sorted(free, key=rank.__getitem__)) for free in seen]
+        self._own = [
+            tuple(j for j in free if self._group_of[j] == self._group_of[i])
+            for i, free in enumerate(self._free)
         ]
+        self._decided = [np.array([j for j in range(n) if j not in free]) for free in seen]
+        self._starts: dict[int, IntArray] = {}
         self._prediction: Prediction | None = None
         self._plans: dict[int, IntArray] = {}
         self._known: _Known | None = None
@@ -104,9 +110,9 @@ class BestResponse(Aggregation):
         if context not in self._plans:
             self._plans[context] = self._planned(deliberation)
         plan = self._plans[context]
-        decided = [i for i in range(len(plan)) if i not in self._free[agent]]
-        plan[decided] = deliberation.joint_action[decided]
-        free = tuple(i for i in self._free[agent] if self._group_of[i] == self._group_of[agent])
+        decided, free = self._decided[agent], self._own[agent]
+        if len(decided):
+            plan[decided] = deliberation.joint_action[decided]
         tried, found = self._valued(deliberation, plan, free)
         best = np.full(self.n_actions, -np.inf)
         np.maximum.at(best, tried[:, free.index(agent)], found)
@@ -123,42 +129,45 @@ class BestResponse(Aggregation):
         """
         known, concerned = self._known, self.concerned[deliberation.agent]
         if known is not None and known.concerned is concerned and set(free) < set(known.free):
-            others = [i for i in range(len(plan)) if i not in known.free]
-            if (known.plan[others] == plan[others]).all():
+            changed = np.flatnonzero(known.plan != plan)
+            if all(i in known.free for i in changed):
                 places = [known.free.index(i) for i in free]
                 decided = [k for k in range(len(known.free)) if k not in places]
                 told = plan[[known.free[k] for k in decided]]
                 same = (known.tried[:, decided] == told).all(axis=1)
                 return known.tried[same][:, places], known.found[same]
-        tried = combinations(free, self.n_actions)
+        tried = self._actions[len(free)]
         found = self.worth(deliberation, _with(plan, free, tried))
         self._known = _Known(concerned, plan.copy(), free, tried, found)
         return tried, found
 
     def _planned(self, deliberation: Deliberation) -> IntArray:
         """Return a plan ``(n,)`` for the agent and those below it."""
-        free, rng = self._free[deliberation.agent], deliberation.rng
+        agent, rng = deliberation.agent, deliberation.rng
+        free = self._free[agent]
         bodies: dict[int, list[int]] = {}
         for i in free:
             bodies.setdefault(self._group_of[i], []).append(i)
-        tried = _with(deliberation.joint_action, free, self._starts(free, list(bodies)))
+        if agent not in self._starts:
+            self._starts[agent] = self._starting(free, list(bodies))
+        tried = _with(deliberation.joint_action, free, self._starts[agent])
         plan = tried[greatest(self.worth(deliberation, tried), rng)].copy()
         for members in map(tuple, bodies.values()):
             tried = _with(plan, members, self._distinct(deliberation.prediction, members))
             plan = tried[greatest(self.worth(deliberation, tried), rng)].copy()
         return plan
 
-    def _starts(self, free: tuple[int, ...], bodies: list[int]) -> IntArray:
+    def _starting(self, free: tuple[int, ...], bodies: list[int]) -> IntArray:
         """Return actions ``(m, k)`` of the k free agents, of `bodies` in the order of decision."""
         rank = np.array([bodies.index(self._group_of[i]) for i in free])
-        starts = [self._of_bodies[:, self._place[list(free)]]]
+        starts = [self._actions[self._widest][:, self._place[list(free)]]]
         for cut in sorted({round(share * len(bodies)) for share in CUTS} - {0, len(bodies)}):
-            starts.append(self._of_parts[:, (rank >= cut).astype(np.int64)])
+            starts.append(self._actions[2][:, (rank >= cut).astype(np.int64)])
         return np.unique(np.concatenate(starts), axis=0)
 
     def _distinct(self, prediction: Prediction, members: tuple[int, ...]) -> IntArray:
         """Return the actions ``(m, k)`` of agents of one body, but those alike to others."""
-        actions = combinations(members, self.n_actions)
+        actions = self._actions[len(members)]
         alike = getattr(prediction, "alike", None)
         group = self.problem.groups[self._group_of[members[0]]]
         if alike is None or len(members) < len(group):
