@@ -26,6 +26,8 @@ LAST = slice(-5, None)
 FIRST = slice(None, 5)
 UNREWARDED = ("frozen", "random")
 """Controls that know no more of the task than a learner does before its first reward."""
+LEARNER = "own-value"
+"""The preset by which claims are judged: every wheel seeks its own value, as in the paper."""
 PLANNER = "planner"
 """The control that has the reward function and plans by it."""
 PAPER_NESTED, PAPER_SINGLE = 2.45e12, 1.1e27
@@ -74,20 +76,20 @@ def learned(condition: str, known: tuple[str, ...] = UNREWARDED) -> Compute:
 
 
 def sooner_than_planned(results: Results) -> Measured | None:
-    """Measure the default's decisions in an evaluation episode over the planner's, by seed."""
-    if not {"default", PLANNER} <= results.evaluation.keys():
+    """Measure the learner's decisions in an evaluation episode over the planner's, by seed."""
+    if not {LEARNER, PLANNER} <= results.evaluation.keys():
         return None
-    base, own = paired(results, PLANNER, "default", _evaluation_steps)
+    base, own = paired(results, PLANNER, LEARNER, _evaluation_steps)
     return Measured(bootstrap(own / base, bounds=NOT_NEGATIVE), len(own)) if len(own) else None
 
 
 def success(episodes: slice) -> Compute:
-    """Return what measures the default's success in some episodes of training."""
+    """Return what measures the learner's success in some episodes of training."""
 
     def compute(results: Results) -> Measured | None:
-        if "default" not in results.training:
+        if LEARNER not in results.training:
             return None
-        outcomes = results.training["default"]["success"][:, episodes]
+        outcomes = results.training[LEARNER]["success"][:, episodes]
         return Measured(rate(outcomes), len(outcomes)) if outcomes.size else None
 
     return compute
@@ -102,7 +104,7 @@ def oriented(results: Results) -> Measured | None:
 
 
 def contact_gained(results: Results) -> Measured | None:
-    """Measure by how much more the default's time in contact grows than the planner's.
+    """Measure by how much more the learner's time in contact grows than the planner's.
 
     That of any agent grows in training, since fewer and fewer actions are random.
     """
@@ -112,9 +114,9 @@ def contact_gained(results: Results) -> Measured | None:
         return np.asarray(contact[:, LAST].mean(axis=1) - contact[:, FIRST].mean(axis=1))
 
     known = [c for c, arrays in results.training.items() if "contact_fraction" in arrays]
-    if not {"default", PLANNER} <= set(known):
+    if not {LEARNER, PLANNER} <= set(known):
         return None
-    base, own = paired(results, PLANNER, "default", gained)
+    base, own = paired(results, PLANNER, LEARNER, gained)
     return Measured(bootstrap(own - base), len(own)) if len(own) else None
 
 
@@ -215,7 +217,7 @@ def recovered(adapts: str) -> Compute:
 
 def worst_shape(results: Results) -> Measured | None:
     """Measure the success with the worst shape relative to that with the box of training."""
-    ratios = ratios_of(results, "default")
+    ratios = ratios_of(results, LEARNER)
     if not ratios:
         return None
     worst = least_ratio(ratios)

@@ -35,11 +35,11 @@ def ablation(chances: dict[str, float], seeds: int = SEEDS) -> Results:
 
 def shapes(chances: dict[str, float], trained: float = 0.95, seeds: int = SEEDS) -> Results:
     """A team trained with success `trained`, and its success with other boxes."""
-    base = ablation({"default": trained}, seeds)
+    base = ablation({"own-value": trained}, seeds)
     rng = np.random.default_rng(2)
     for box, chance in chances.items():
-        base.phases[f"evaluation:{box}"] = {"default": arrays(np.full(10, chance), rng, seeds)}
-    base.numbers["default"] = {
+        base.phases[f"evaluation:{box}"] = {"own-value": arrays(np.full(10, chance), rng, seeds)}
+    base.numbers["own-value"] = {
         f"touching.{box}.robot{r}": rng.uniform(0.5, 0.9, seeds)
         for box in ("trained on", *chances)
         for r in (1, 2)

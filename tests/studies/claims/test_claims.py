@@ -53,11 +53,11 @@ def test_criteria_decide_by_the_whole_interval(criterion, measured, verdict) -> 
 
 def curves(default: float, paper: float, planner: float) -> Results:
     rng = np.random.default_rng(5)
-    chances = {"default": np.linspace(0.0, 4 * default, 20).clip(0, default)}
+    chances = {"own-value": np.linspace(0.0, 4 * default, 20).clip(0, default)}
     others = {"pose": default, "frozen": 0.02, "random": 0.0, "planner": planner, "paper": paper}
     chances |= {c: np.full(20, p) for c, p in others.items()}
     training = {c: arrays(chance, rng) for c, chance in chances.items()}
-    training["default"]["contact_fraction"][:, :5] -= 0.5 * default - 0.3
+    training["own-value"]["contact_fraction"][:, :5] -= 0.5 * default - 0.3
     evaluation = {c: arrays(chance[-5:], rng) for c, chance in chances.items()}
     phases = {"training": training, "evaluation": evaluation}
     seeds = dict.fromkeys(chances, tuple(range(20)))
@@ -127,7 +127,7 @@ def test_claims_name_studies_and_conditions_that_their_specs_have() -> None:
             assert spec.study == study
             labels = {condition.label for condition in spec.conditions()}
             wanted = {
-                "learning-curve": {"default", "frozen", "random", "planner", "paper"},
+                "learning-curve": {"own-value", "frozen", "random", "planner", "paper"},
                 "ablation": {"default", "static predictor"},
                 "wheel-failure": {f"{f}, enabled={e}" for f in FAULTS for e in ("true", "false")},
             }.get(study, set())
@@ -225,7 +225,7 @@ evaluation = 1
 {rest}
 """
 REST = {
-    "learning-curve": 'sweep.preset = ["default", "frozen"]',
+    "learning-curve": 'sweep.preset = ["own-value", "frozen"]',
     "chain-order": 'sweep.topology = ["chain", "chain:reversed"]',
     "ablation": '[[overrides]]\nname = "default"\n'
     '[[overrides]]\nname = "static predictor"\nscenario.predictor = "static"',

@@ -122,8 +122,9 @@ def test_the_paper_preset_holds_the_printed_constants():
 def test_controls_differ_from_the_default_in_the_learner_and_planner_in_what_it_plans_by():
     conditions = Spec.of({"sweep": {"preset": ["default", "frozen", "random", "planner"]}})
     default, *controls = [c.settings for c in conditions.conditions()]
-    reward = default.scenario.reward.model_copy(update={"attraction_without_contact": True})
-    planned = default.scenario.model_copy(update={"prediction_horizon": 48, "reward": reward})
+    own = Spec.of({"preset": "own-value"}).conditions()[0].settings.scenario
+    reward = own.reward.model_copy(update={"attraction_without_contact": True})
+    planned = own.model_copy(update={"prediction_horizon": 48, "reward": reward})
     for control, scenario in zip(controls, [default.scenario] * 2 + [planned], strict=True):
         assert control.scenario == scenario
         assert control.topology == default.topology
