@@ -120,13 +120,13 @@ CLAIMS: tuple[Claim, ...] = (
     Claim(
         "learns", "wheels learn over epochs to push the box to the goal", "IX-A, Fig. 5b",
         "learning-curve", "success in episodes 16-20, less that of the better of frozen and random",
-        measured.learned(measured.LEARNER), AtLeast(0.5),
+        measured.learned(), AtLeast(0.5),
     ),
     Claim(
         "more", "learning achieves more than planning with the reward function",
         "not claimed: a control", "learning-curve",
         "success in episodes 16-20, less that of planner",
-        measured.learned(measured.LEARNER, (measured.PLANNER,)), AtLeast(0.05),
+        measured.learned(known=(measured.PLANNER,)), AtLeast(0.05),
     ),
     Claim(
         "sooner", "learning reaches the goal sooner than planning with the reward function",

@@ -27,7 +27,8 @@ FIRST = slice(None, 5)
 UNREWARDED = ("frozen", "random")
 """Controls that know no more of the task than a learner does before its first reward."""
 LEARNER = "own-value"
-"""The preset by which claims are judged: every wheel seeks its own value, as in the paper."""
+"""The preset by which claims are judged: every wheel seeks its own value, as in the paper. A study
+without it is judged by its `default`."""
 PLANNER = "planner"
 """The control that has the reward function and plans by it."""
 PAPER_NESTED, PAPER_SINGLE = 2.45e12, 1.1e27
@@ -56,14 +57,18 @@ class Measured:
     note: str = ""
 
 
-def learned(condition: str, known: tuple[str, ...] = UNREWARDED) -> Compute:
-    """Return what measures success at the end of training, less that of the better control."""
+def learned(name: str = "", known: tuple[str, ...] = UNREWARDED) -> Compute:
+    """Return what measures success at the end of training, less that of the better control.
 
-    def outcomes(r: Results, name: str) -> np.ndarray:
-        return np.asarray(r.training[name]["success"][:, LAST])
+    Of the condition of a `name`; without, of that by which claims are judged.
+    """
+
+    def outcomes(r: Results, condition: str) -> np.ndarray:
+        return np.asarray(r.training[condition]["success"][:, LAST])
 
     def compute(results: Results) -> Measured | None:
         controls = [c for c in known if c in results.training]
+        condition = name or learner_of(results)
         if condition not in results.training or not controls:
             return None
         best = max(controls, key=lambda c: float(outcomes(results, c).mean()))
@@ -75,11 +80,17 @@ def learned(condition: str, known: tuple[str, ...] = UNREWARDED) -> Compute:
     return compute
 
 
+def learner_of(results: Results) -> str:
+    """Return the condition by which claims are judged."""
+    return LEARNER if LEARNER in results.training else "default"
+
+
 def sooner_than_planned(results: Results) -> Measured | None:
     """Measure the learner's decisions in an evaluation episode over the planner's, by seed."""
-    if not {LEARNER, PLANNER} <= results.evaluation.keys():
+    learner = learner_of(results)
+    if not {learner, PLANNER} <= results.evaluation.keys():
         return None
-    base, own = paired(results, PLANNER, LEARNER, _evaluation_steps)
+    base, own = paired(results, PLANNER, learner, _evaluation_steps)
     return Measured(bootstrap(own / base, bounds=NOT_NEGATIVE), len(own)) if len(own) else None
 
 
@@ -87,9 +98,10 @@ def success(episodes: slice) -> Compute:
     """Return what measures the learner's success in some episodes of training."""
 
     def compute(results: Results) -> Measured | None:
-        if LEARNER not in results.training:
+        learner = learner_of(results)
+        if learner not in results.training:
             return None
-        outcomes = results.training[LEARNER]["success"][:, episodes]
+        outcomes = results.training[learner]["success"][:, episodes]
         return Measured(rate(outcomes), len(outcomes)) if outcomes.size else None
 
     return compute
@@ -114,9 +126,10 @@ def contact_gained(results: Results) -> Measured | None:
         return np.asarray(contact[:, LAST].mean(axis=1) - contact[:, FIRST].mean(axis=1))
 
     known = [c for c, arrays in results.training.items() if "contact_fraction" in arrays]
-    if not {LEARNER, PLANNER} <= set(known):
+    learner = learner_of(results)
+    if not {learner, PLANNER} <= set(known):
         return None
-    base, own = paired(results, PLANNER, LEARNER, gained)
+    base, own = paired(results, PLANNER, learner, gained)
     return Measured(bootstrap(own - base), len(own)) if len(own) else None
 
 
@@ -217,7 +230,7 @@ def recovered(adapts: str) -> Compute:
 
 def worst_shape(results: Results) -> Measured | None:
     """Measure the success with the worst shape relative to that with the box of training."""
-    ratios = ratios_of(results, LEARNER)
+    ratios = ratios_of(results, learner_of(results))
     if not ratios:
         return None
     worst = least_ratio(ratios)

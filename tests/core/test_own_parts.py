@@ -14,7 +14,7 @@ from nested_agents.core.learners import LEARNERS
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.loop import control_loop, policy_seed
 from nested_agents.core.robot_agents import per_robot
-from nested_agents.core.single_agent import single_agent
+from nested_agents.core.single_agent import SingleAgent
 from nested_agents.core.sources import Sources
 from nested_agents.core.team import Team
 
@@ -128,7 +128,7 @@ def test_a_team_of_ones_own_parts(line_world, tmp_path) -> None:
 
 
 @pytest.mark.parametrize("name", ["auto", "exact", "sampling"])
-@pytest.mark.parametrize("view", [None, per_robot, single_agent])
+@pytest.mark.parametrize("view", [None, per_robot, SingleAgent])
 def test_a_scenario_of_few_members_is_learned(name: str, view, line_world) -> None:
     scenario = FewMembers(line_world(carts=2, wheels=1))
     seen = view(scenario) if view else scenario
@@ -139,7 +139,7 @@ def test_a_scenario_of_few_members_is_learned(name: str, view, line_world) -> No
     assert team.learner.theta.any()
 
 
-@pytest.mark.parametrize("view", [None, per_robot, single_agent])
+@pytest.mark.parametrize("view", [None, per_robot, SingleAgent])
 @pytest.mark.parametrize("rule", ["reward", "reward-and-value"])
 def test_rewards_that_are_not_predicted_cannot_decide(rule: str, view, line_world) -> None:
     scenario = FewMembers(line_world(carts=2, wheels=1))

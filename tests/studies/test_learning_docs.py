@@ -12,9 +12,17 @@ PAGE = ROOT / "docs" / "learning.md"
 COLUMNS = ("success last 5", "evaluation success", "evaluation steps")
 
 
-@pytest.mark.parametrize("name", ["learning-curve", "tasks", "told"])
-def test_tables(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    ("name", "columns"),
+    [
+        ("learning-curve", COLUMNS),
+        ("tasks", COLUMNS),
+        ("told", COLUMNS),
+        ("scaling", ("evaluation success", "all touch")),
+    ],
+)
+def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
     path = claims.PUBLISHED / f"{name}.json"
-    assert main(["table", str(path), "--columns", *COLUMNS, "--format", "markdown"]) == 0
+    assert main(["table", str(path), "--columns", *columns, "--format", "markdown"]) == 0
     table = capsys.readouterr().out
     assert table in PAGE.read_text(encoding="utf-8"), f"docs/learning.md: put in\n{table}"

@@ -1,8 +1,8 @@
 """Pictures of box pushing, drawn from recordings: one moment, or an episode as GIF or MP4.
 
 A recording is a mapping of arrays: ``robot_poses (T + 1, M, 3)``, ``box_pose (T + 1, 3)``,
-``goal_pose (3,)``, ``wheel_speeds (T + 1, n)``, ``contact (T + 1, M)``, ``reward (T,)``, optionally
-``failed (T + 1, n)``; and constants of no dimension: ``robot`` and ``box`` by name or described,
+``goal_pose (3,)``, ``wheel_speeds (T + 1, n)``, ``contact (T + 1, M)``, ``reward (T,)`` or
+``(T, n)``, optionally ``failed (T + 1, n)``; and constants of no dimension: ``robot`` and ``box`` by name or described,
 ``dt`` [s], optionally ``infrared`` described.
 
 Robots show their heading by a white nose, their wheels with the speed commanded, and turn solid in

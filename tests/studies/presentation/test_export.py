@@ -13,7 +13,7 @@ from nested_agents.studies.trials.trial import trials_of
 
 SPEC = Spec.of(
     made_up.SPEC.table()
-    | {"seeds": 2, "sweep": {"preset": ["default", "frozen"], "scenario.action_repeat": [8, 4]}}
+    | {"seeds": 2, "sweep": {"preset": ["own-value", "frozen"], "scenario.action_repeat": [8, 4]}}
 )
 
 

@@ -133,7 +133,7 @@ def test_seeds_may_be_added(finished):
     [
         ({"episodes": 9}, "episodes = 4 there, 9 here"),
         ({"seeds": 2}, "seeds = [0, 1, 2] there, [0, 1] here"),
-        ({"learner": {"discount": 0.5}}, "learner.discount = 0.95 there, 0.5 here (and 1 more)"),
+        ({"learner": {"discount": 0.5}}, "learner.discount = 0.97 there, 0.5 here (and 1 more)"),
         ({"sweep": {"preset": ["default"]}}, "conditions = ['default', 'frozen'] there"),
         ({"sweep": {"learner.kind": ["batch-td", "frozen"]}}, "conditions"),
         ({"evaluation": 3, "steps": 6}, "steps = 5 there, 6 here (and 1 more)"),

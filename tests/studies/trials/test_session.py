@@ -136,11 +136,11 @@ def test_weights_of_a_role_decide_for_any_number_of_agents():
 
 REFUSED = {
     "own weights": (
-        {"learner": {}, "curriculum": STAGES},
+        {"preset": "own-value", "learner": {}, "curriculum": STAGES},
         r"curriculum\.two: a team trained with 1 agents .*learner\.weights = 'own'",
     ),
     "own weights at the end": (
-        {"learner": {}, "curriculum": STAGES[1:]},
+        {"preset": "own-value", "learner": {}, "curriculum": STAGES[1:]},
         r"curriculum: a team trained with 2 agents over 'line-up' cannot act with 3",
     ),
     "another state space": (
@@ -152,7 +152,7 @@ REFUSED = {
         r"topology 'chain': .*\(stage 'one'\)$",
     ),
     "an evaluation": (
-        {"learner": {}, "evaluations": {"eight": {"carts": 8}}},
+        {"preset": "own-value", "learner": {}, "evaluations": {"eight": {"carts": 8}}},
         r"evaluations\.eight: a team trained with 3 agents .* share theirs$",
     ),
 }

@@ -69,13 +69,13 @@ def test_a_recording_has_a_frame_for_every_step_and_the_beginning(result):
     recording = result.recordings["last"]
     steps = result.rows[1].steps
     assert all(len(recording[name]) == steps + 1 for name in BoxPushing.recorded)
-    assert recording["reward"].shape == (steps,)
+    assert recording["reward"].shape == (steps, 4)
     assert recording["robot_poses"].shape == (steps + 1, 2, 3)
     assert recording["contact"].dtype == bool
     assert not recording["failed"].any()
     assert recording["wheel_speeds"].shape == (steps + 1, 4)
     assert (recording["wheel_speeds"][0] == 0.0).all()
-    assert recording["reward"].sum() == pytest.approx(result.rows[1].return_)
+    assert recording["reward"].mean(axis=1).sum() == pytest.approx(result.rows[1].return_)
     assert (str(recording["robot"]), str(recording["box"])) == ("e-puck", "square")
     infrared = InfraredSettings.model_validate_json(str(recording["infrared"]))
     assert infrared == InfraredSettings()
@@ -181,12 +181,15 @@ def test_evaluations_are_part_of_what_a_trial_is():
     assert one.identity == only(evaluations={}).identity
 
 
+OWN = SHORT | {"preset": "own-value"}
+
+
 @pytest.mark.parametrize(
     "change", [{"robots": 3}, {"robot": "four-wheel"}, {"state_space": "paper"}]
 )
 def test_a_team_is_not_evaluated_where_it_cannot_act(change):
     with pytest.raises(SpecError, match=r"evaluations\.other: a team trained with 4 agents"):
-        check(Spec.of(SHORT | {"evaluations": {"other": change}}))
-    several = SHORT | {"sweep": {"learner.ridge": [1.0, 2.0]}, "evaluations": {"other": change}}
+        check(Spec.of(OWN | {"evaluations": {"other": change}}))
+    several = OWN | {"sweep": {"learner.ridge": [1.0, 2.0]}, "evaluations": {"other": change}}
     with pytest.raises(SpecError, match=r"evaluations\.other: .* \(condition '1.0'\)$"):
         check(Spec.of(several))
