@@ -2,8 +2,8 @@
 
 A recording is a mapping of arrays: ``robot_poses (T + 1, M, 3)``, ``box_pose (T + 1, 3)``,
 ``goal_pose (3,)``, ``wheel_speeds (T + 1, n)``, ``contact (T + 1, M)``, ``reward (T,)`` or
-``(T, n)``, optionally ``failed (T + 1, n)``; and constants of no dimension: ``robot`` and ``box`` by name or described,
-``dt`` [s], optionally ``infrared`` described.
+``(T, n)``, optionally ``failed (T + 1, n)``; and constants of no dimension: ``robot`` and ``box``
+by name or described, ``dt`` [s], optionally ``infrared`` described.
 
 Robots show their heading by a white nose, their wheels with the speed commanded, and turn solid in
 contact; failed wheels are crossed out. The dashed outline is the goal pose; it and the box point
