@@ -1,8 +1,8 @@
 """The built-in hierarchies, each a pure function from agent names to a networkx graph.
 
-An edge leads from a superior to its subordinate, and every agent is a node. Agents are given in
-agent order; *groups* are the agents of one robot each. A graph becomes a
-`nested_agents.core.hierarchy.Hierarchy` in `nested_agents.topologies.build`.
+An edge leads from a superior to its subordinate, and every agent is a node; an undirected graph
+joins peers. Agents are given in agent order; *groups* are the agents of one robot each. A graph
+becomes a `nested_agents.core.hierarchy.Hierarchy` in `nested_agents.topologies.build`.
 """
 
 from __future__ import annotations
@@ -84,6 +84,18 @@ def independent(agents: Sequence[str]) -> nx.DiGraph:
     """
     graph = nx.DiGraph()
     graph.add_nodes_from(agents)
+    return graph
+
+
+def simultaneous(agents: Sequence[str]) -> nx.Graph:
+    """Return agents who are all peers: everybody considers everybody, nobody is told anything.
+
+    Examples
+    --------
+    >>> list(simultaneous(["a", "b", "c"]).edges)
+    [('a', 'b'), ('a', 'c'), ('b', 'c')]
+    """
+    graph: nx.Graph = nx.complete_graph(agents)
     return graph
 
 

@@ -171,6 +171,16 @@ class IndependentSettings(TopologySettings):
         return builders.independent(agents)
 
 
+class SimultaneousSettings(TopologySettings):
+    """Agents who decide at the same time: each considers what all others might do."""
+
+    kind: Literal["simultaneous"] = "simultaneous"
+
+    def build(self, agents: Sequence[str], groups: Groups) -> nx.Graph:
+        """Return the graph, which is undirected."""
+        return builders.simultaneous(agents)
+
+
 class EdgesSettings(TopologySettings):
     """Any hierarchy, edge by edge."""
 
@@ -271,6 +281,7 @@ TOPOLOGIES = SettingsRegistry(
         "star": f"{__name__}:StarSettings",
         "teams": f"{__name__}:TeamsSettings",
         "independent": f"{__name__}:IndependentSettings",
+        "simultaneous": f"{__name__}:SimultaneousSettings",
         "edges": f"{__name__}:EdgesSettings",
         "random": f"{__name__}:RandomSettings",
         "file": f"{__name__}:FileSettings",
@@ -336,7 +347,8 @@ def hierarchy_of(
             graph = settings.build(agents, named)
         else:
             graph = from_networkx(files.called(settings, agents, named), agents)
-        return Hierarchy(agents, graph.edges)
+        directed = graph.is_directed()
+        return Hierarchy(agents, graph.edges if directed else (), () if directed else graph.edges)
     except ValueError as error:
         said = str(error)
         for start in ("hierarchy: ", f"{settings.title}: ", f"topology {settings.title!r}: "):
