@@ -26,6 +26,7 @@ SCENARIOS = SettingsRegistry(
     "scenario",
     {
         "box-pushing": "nested_agents.scenarios.box_pushing.config:BoxPushingSettings",
+        "matrix-game": "nested_agents.scenarios.matrix_games.scenario:MatrixGameSettings",
         "line-up": "nested_agents.scenarios.line_up:LineUpSettings",
     },
     ScenarioSettings,

@@ -16,6 +16,8 @@ LEARNERS = SettingsRegistry(
         "td-lambda": f"{__name__}.td:TDLambdaSettings",
         "gradient-td": f"{__name__}.gradient:GradientTDSettings",
         "anova-td": f"{__name__}.anova:AnovaTDSettings",
+        "optimistic-td": f"{__name__}.optimistic:OptimisticTDSettings",
+        "fmq": f"{__name__}.fmq:FMQSettings",
         "frozen": f"{__name__}.frozen:FrozenSettings",
     },
     LearnerSettings,

@@ -3,8 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from time import perf_counter
 
-from ...core.loop import StepRecord, control_loop, world_seed
+from ...core.loop import (
+    EpisodicScenario,
+    StepRecord,
+    control_loop,
+    world_seed,
+)
 from ...core.protocols import Measure, RecordedScenario, measures_of
 from ...core.settings import ScenarioSettings
 from ...core.team import Team
@@ -81,8 +87,13 @@ class Session:
             and len(self.world.recorded) > 0
         )
         kept = self.trial.recorded if is_recorded else {}
+        acting = self.team if team is None else team
+        if observe is None and not kept and self._at_once(
+            self._own._replace(team=acting), episodes, first, phase
+        ):
+            return
         steps = control_loop(
-            self.scenario, self.team if team is None else team, episodes=episodes,
+            self.scenario, acting, episodes=episodes,
             steps=self.trial.steps, seed=self.trial.seed, first_episode=first,
         )  # fmt: skip
         for record in self._measured(steps, phase, measures_of(self.world), observe):
@@ -96,10 +107,10 @@ class Session:
                 self._watch.add(record)
                 self.deciding.append(record.deciding)
 
-    def evaluate(self, observe: Observer | None = None) -> None:
+    def evaluate(self, observe: Observer | None = None, phase: str = "evaluation") -> None:
         """Let the team act greedily on worlds of no training, and show every step to `observe`."""
         self._go_through_curriculum()
-        self._evaluate(self._own, "evaluation", observe)
+        self._evaluate(self._own, phase, observe)
 
     def evaluate_elsewhere(self, observers: Mapping[str, Observer] | None = None) -> None:
         """Evaluate in each of the trial's `evaluations`, whatever the others are.
@@ -144,8 +155,13 @@ class Session:
             self._own.take_over(reached, self.trial.settings.learner)
 
     def _evaluate(self, there: Arrangement, phase: str, observe: Observer | None) -> None:
+        episodes = self.trial.evaluation
+        if observe is None and self._at_once(
+            there, episodes, EVALUATION_WORLDS, phase, learn=False
+        ):
+            return
         steps = control_loop(
-            there.scenario, there.team, episodes=self.trial.evaluation,
+            there.scenario, there.team, episodes=episodes,
             steps=self.trial.steps, seed=self.trial.seed, first_episode=EVALUATION_WORLDS,
             learn=False,
         )  # fmt: skip
@@ -174,6 +190,28 @@ class Session:
                 observe(record)
             if record.last:
                 self._rows.append(meter.row())
+
+    def _at_once(
+        self, there: Arrangement, episodes: int, first: int, phase: str, *, learn: bool = True
+    ) -> bool:
+        """Run whole episodes compiled and keep their rows, or return that it cannot be done."""
+        scenario, trial = there.scenario, self.trial
+        if not isinstance(scenario, EpisodicScenario):
+            return False
+        for episode in range(first, first + episodes):
+            begin = perf_counter()
+            seed = world_seed(trial.seed, episode)
+            found = scenario.run_episode(there.team, seed, episode, trial.steps, learn=learn)
+            if found is None:
+                return False
+            if learn and there.team is self.team:
+                self._watch.seconds["decision"] += perf_counter() - begin
+                self.deciding.append((perf_counter() - begin) / found.steps)
+            number = episode if learn else episode - first
+            self._rows.append(
+                EpisodeRow(phase, number, found.steps, found.measures, found.return_)
+            )
+        return True
 
     def result(
         self,
