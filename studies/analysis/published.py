@@ -1,7 +1,7 @@
 """Results of a study as one small JSON file, with spec and seeds, fit to be committed or published.
 
-Rates are kept as one character an episode, steps and other measures in three decimals; returns are
-left out. Claims are always decided by results in this form, so the committed files give
+Rates are kept as one character an episode, steps and other measures in three decimals; where all
+are equal, as one number with the shape of the array; returns are left out. Claims are always decided by results in this form, so the committed files give
 the table that the run gave.
 """
 
@@ -22,9 +22,11 @@ from ..trials.measures import measures_from, tables
 from ..trials.trial import RESULTS_VERSION
 from .results import Arrays, Results
 
-SUCCESS_ALONE = ("ablation", "chain-order", "hierarchies", "scaling", "wheel-failure")
+SUCCESS_ALONE = ("ablation", "chain-order", "games", "hierarchies", "scaling", "wheel-failure")
 """Studies whose analysis asks for no other measure of an episode: of them no other is kept."""
 DECIMALS = 3
+FEW = 50
+"""Fewer values are always written one by one."""
 
 
 def dumps(outline: Outline, results: Results, version: int = RESULTS_VERSION) -> str:
@@ -86,7 +88,10 @@ def loads(text: str) -> Published:
     }
     seeds = {condition: tuple(found) for condition, found in content["seeds"].items()}
     numbers, usage = (
-        {c: {n: np.array(v) for n, v in named.items()} for c, named in content[key].items()}
+        {
+            c: {n: _unpacked(v, is_rate=False) for n, v in named.items()}
+            for c, named in content[key].items()
+        }
         for key in ("numbers", "usage")
     )
     training, evaluation = phases.get("training", {}), phases.get("evaluation", {})
@@ -139,20 +144,37 @@ def _kept(study: str, results: Results) -> tuple[Measure, ...]:
     return tuple(m for m in results.measures if m.name in wanted & held)
 
 
-def _packed(values: np.ndarray, *, is_rate: bool) -> list[Any]:
+Packed = list[Any] | dict[str, Any]
+"""An array as lists, or ``{"all": value, "shape": [...]}``."""
+
+
+def _packed(values: np.ndarray, *, is_rate: bool) -> Packed:
     if is_rate:
         return ["".join("1" if v else "0" for v in row) for row in values]
-    return np.round(values, DECIMALS).tolist()
+    rounded = np.round(values, DECIMALS)
+    return _constant(rounded) or rounded.tolist()
 
 
-def _unpacked(packed: list[Any], *, is_rate: bool) -> np.ndarray:
+def _unpacked(packed: Packed, *, is_rate: bool) -> np.ndarray:
+    if isinstance(packed, dict):
+        return np.full(packed["shape"], packed["all"])
     if is_rate:
         return np.array([[int(character) for character in row] for row in packed])
     return np.array(packed)
 
 
-def _rounded(named: Mapping[str, Arrays]) -> dict[str, dict[str, list[float]]]:
+def _constant(values: np.ndarray) -> dict[str, Any] | None:
+    """Return an array of equal values as one of them and its shape; None of others, and short."""
+    if values.size < FEW or not (values == values.flat[0]).all():
+        return None
+    return {"all": values.flat[0].item(), "shape": list(values.shape)}
+
+
+def _rounded(named: Mapping[str, Arrays]) -> dict[str, dict[str, Packed]]:
     return {
-        condition: {name: [float(f"{v:.5g}") for v in values] for name, values in arrays.items()}
+        condition: {
+            name: _constant(values) or [float(f"{v:.5g}") for v in values]
+            for name, values in arrays.items()
+        }
         for condition, arrays in named.items()
     }

@@ -205,8 +205,9 @@ class Session:
             if found is None:
                 return False
             if learn and there.team is self.team:
-                self._watch.seconds["decision"] += perf_counter() - begin
-                self.deciding.append((perf_counter() - begin) / found.steps)
+                spent = perf_counter() - begin
+                self._watch.seconds["decision"] += spent
+                self.deciding += [spent / found.steps] * found.steps
             number = episode if learn else episode - first
             self._rows.append(
                 EpisodeRow(phase, number, found.steps, found.measures, found.return_)
