@@ -74,7 +74,9 @@ class Hierarchy:
             raise ValueError(f"hierarchy: cycle {' -> '.join([*cycle, cycle[0]])}")
         self.agents = agents
         self.edges = tuple(sorted(graph.edges))
-        self.peers = tuple(sorted((min(p), max(p)) for p in ((index[a], index[b]) for a, b in sides)))
+        self.peers = tuple(
+            sorted((min(p), max(p)) for p in ((index[a], index[b]) for a, b in sides))
+        )
         """Pairs of peers, by index, each once."""
         self.order: tuple[int, ...] = tuple(nx.lexicographical_topological_sort(graph))
         beside: list[set[int]] = [set() for _ in agents]
@@ -119,7 +121,8 @@ class Hierarchy:
         """Return the same hierarchy with agent ``permutation[k]`` listed as k-th."""
         names = [self.agents[i] for i in permutation]
         edges, peers = (
-            [(self.agents[a], self.agents[b]) for a, b in pairs] for pairs in (self.edges, self.peers)
+            [(self.agents[a], self.agents[b]) for a, b in pairs]
+            for pairs in (self.edges, self.peers)
         )
         return Hierarchy(names, edges, peers)
 

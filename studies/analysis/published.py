@@ -1,7 +1,7 @@
 """Results of a study as one small JSON file, with spec and seeds, fit to be committed or published.
 
-Rates are kept as one character an episode, steps and other measures in three decimals; where all
-are equal, as one number with the shape of the array; returns are left out. Claims are always decided by results in this form, so the committed files give
+Rates are kept as one character an episode, steps and other measures in three decimals; returns are
+left out, and where there are thousands of short trials their times too. Claims are always decided by results in this form, so the committed files give
 the table that the run gave.
 """
 
@@ -25,8 +25,10 @@ from .results import Arrays, Results
 SUCCESS_ALONE = ("ablation", "chain-order", "games", "hierarchies", "scaling", "wheel-failure")
 """Studies whose analysis asks for no other measure of an episode: of them no other is kept."""
 DECIMALS = 3
-FEW = 50
-"""Fewer values are always written one by one."""
+UNTIMED = ("games",)
+"""Studies of thousands of trials, too short for the time of each to say anything."""
+FEW = 100
+"""Fewer rows, or values, are always written one by one."""
 
 
 def dumps(outline: Outline, results: Results, version: int = RESULTS_VERSION) -> str:
@@ -38,7 +40,7 @@ def dumps(outline: Outline, results: Results, version: int = RESULTS_VERSION) ->
         "spec": outline.table,
         "columns": results.columns,
         "measures": tables(measures),
-        "seeds": results.seeds,
+        "seeds": {c: _counted(found) for c, found in results.seeds.items()},
         "phases": {
             phase: {
                 condition: {
@@ -51,7 +53,7 @@ def dumps(outline: Outline, results: Results, version: int = RESULTS_VERSION) ->
             for phase, by_condition in results.phases.items()
         },
         "numbers": _rounded(results.numbers),
-        "usage": _rounded(results.usage),
+        "usage": {} if outline.study in UNTIMED else _rounded(results.usage),
     }
     lines = [f"{json.dumps(key)}: {json.dumps(value)}" for key, value in content.items()]
     return "{\n" + ",\n".join(lines) + "\n}\n"
@@ -86,7 +88,10 @@ def loads(text: str) -> Published:
         }
         for phase, by_condition in content["phases"].items()
     }
-    seeds = {condition: tuple(found) for condition, found in content["seeds"].items()}
+    seeds = {
+        condition: tuple(range(found) if isinstance(found, int) else found)
+        for condition, found in content["seeds"].items()
+    }
     numbers, usage = (
         {
             c: {n: _unpacked(v, is_rate=False) for n, v in named.items()}
@@ -144,19 +149,30 @@ def _kept(study: str, results: Results) -> tuple[Measure, ...]:
     return tuple(m for m in results.measures if m.name in wanted & held)
 
 
+def _counted(seeds: tuple[int, ...]) -> int | list[int]:
+    """Return many seeds from 0 on as their number."""
+    many = len(seeds) >= FEW and seeds == tuple(range(len(seeds)))
+    return len(seeds) if many else list(seeds)
+
+
 Packed = list[Any] | dict[str, Any]
-"""An array as lists, or ``{"all": value, "shape": [...]}``."""
+"""An array as lists; of many rows, as flags or one value for all, with its shape."""
 
 
 def _packed(values: np.ndarray, *, is_rate: bool) -> Packed:
-    if is_rate:
+    if is_rate and len(values) < FEW:
         return ["".join("1" if v else "0" for v in row) for row in values]
+    if is_rate:
+        flags = "".join("1" if v else "0" for v in values.flat)
+        return {"flags": flags, "shape": list(values.shape)}
     rounded = np.round(values, DECIMALS)
     return _constant(rounded) or rounded.tolist()
 
 
 def _unpacked(packed: Packed, *, is_rate: bool) -> np.ndarray:
     if isinstance(packed, dict):
+        if is_rate:
+            return np.array(list(map(int, packed["flags"]))).reshape(packed["shape"])
         return np.full(packed["shape"], packed["all"])
     if is_rate:
         return np.array([[int(character) for character in row] for row in packed])
@@ -164,7 +180,7 @@ def _unpacked(packed: Packed, *, is_rate: bool) -> np.ndarray:
 
 
 def _constant(values: np.ndarray) -> dict[str, Any] | None:
-    """Return an array of equal values as one of them and its shape; None of others, and short."""
+    """Return many equal values as one of them and their shape; None of others."""
     if values.size < FEW or not (values == values.flat[0]).all():
         return None
     return {"all": values.flat[0].item(), "shape": list(values.shape)}

@@ -88,8 +88,10 @@ class Session:
         )
         kept = self.trial.recorded if is_recorded else {}
         acting = self.team if team is None else team
-        if observe is None and not kept and self._at_once(
-            self._own._replace(team=acting), episodes, first, phase
+        if (
+            observe is None
+            and not kept
+            and self._at_once(self._own._replace(team=acting), episodes, first, phase)
         ):
             return
         steps = control_loop(
@@ -209,9 +211,7 @@ class Session:
                 self._watch.seconds["decision"] += spent
                 self.deciding += [spent / found.steps] * found.steps
             number = episode if learn else episode - first
-            self._rows.append(
-                EpisodeRow(phase, number, found.steps, found.measures, found.return_)
-            )
+            self._rows.append(EpisodeRow(phase, number, found.steps, found.measures, found.return_))
         return True
 
     def result(

@@ -138,5 +138,3 @@ def _side_by_side(cases: list[Case]) -> Iterator[str]:
             cells = (by_place.get((setting, system), {}).get(plays) for system in systems)
             shown = "".join(f"{two_figures(float(e.value)) if e else '-':>4}" for e in cells)
             yield f"{', '.join(setting):{widest}}{shown}"
-
-

@@ -11,7 +11,7 @@ from nested_agents.scenarios.matrix_games.plays import parts_of
 from nested_agents.studies.spec.conditions import ConditionSettings
 from nested_agents.studies.trials.trial import build
 
-PLAYS = 80
+PLAYS = 40
 FULL = {"joint": 2, "own": 1, "above": 2}
 
 
