@@ -99,6 +99,36 @@ def simultaneous(agents: Sequence[str]) -> nx.Graph:
     return graph
 
 
+def coordination_graph(
+    agents: Sequence[str],
+    shape: Literal["line", "ring"] = "line",
+    edges: Iterable[Sequence[str]] | None = None,
+) -> nx.Graph:
+    """Return peers on a line or a ring in agent order, or the given pairs of peers.
+
+    Raises
+    ------
+    ValueError
+        If a pair is given twice, or names an unknown agent.
+
+    Examples
+    --------
+    >>> list(coordination_graph(["a", "b", "c"], "ring").edges)
+    [('a', 'b'), ('a', 'c'), ('b', 'c')]
+    """
+    graph = nx.Graph()
+    graph.add_nodes_from(agents)
+    if edges is not None:
+        pairs = [tuple(sorted(pair)) for pair in edges]
+        Hierarchy(agents, [], pairs)  # raises and names what is wrong
+        graph.add_edges_from(pairs)
+        return graph
+    nx.add_path(graph, agents)
+    if shape == "ring" and len(agents) > 2:
+        graph.add_edge(agents[-1], agents[0])
+    return graph
+
+
 def teams(members: Sequence[Member], link: Literal["chain", "star"] = "chain") -> nx.DiGraph:
     """Return nested teams: the leaders of a team's members form a chain, or a star.
 

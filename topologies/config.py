@@ -181,6 +181,33 @@ class SimultaneousSettings(TopologySettings):
         return builders.simultaneous(agents)
 
 
+class CoordinationGraphSettings(TopologySettings):
+    """Peers on a line, on a ring or as listed, who decide at the same time."""
+
+    kind: Literal["coordination-graph"] = "coordination-graph"
+    shape: Literal["line", "ring"] = "line"
+    """In agent order; on a ring the last is a peer of the first."""
+    edges: tuple[tuple[str, str], ...] | None = None
+    """Pairs of peers in place of a shape."""
+
+    argument: ClassVar[str] = "line|ring|A-B,B-C,..."
+
+    @classmethod
+    def parsed(cls, argument: str) -> Self:
+        """Read the shape, or pairs of names as ``a-b,b-c``."""
+        if argument in ("line", "ring"):
+            return cls.model_validate({"shape": argument})
+        pairs = [tuple(name.strip() for name in part.split("-")) for part in argument.split(",")]
+        for pair in pairs:
+            if len(pair) != 2 or not all(pair):
+                raise ValueError(f"must be line, ring, or pairs a-b, received {'-'.join(pair)!r}")
+        return cls.model_validate({"edges": tuple(pairs)})
+
+    def build(self, agents: Sequence[str], groups: Groups) -> nx.Graph:
+        """Return the graph, which is undirected."""
+        return builders.coordination_graph(agents, self.shape, self.edges)
+
+
 class EdgesSettings(TopologySettings):
     """Any hierarchy, edge by edge."""
 
@@ -282,6 +309,7 @@ TOPOLOGIES = SettingsRegistry(
         "teams": f"{__name__}:TeamsSettings",
         "independent": f"{__name__}:IndependentSettings",
         "simultaneous": f"{__name__}:SimultaneousSettings",
+        "coordination-graph": f"{__name__}:CoordinationGraphSettings",
         "edges": f"{__name__}:EdgesSettings",
         "random": f"{__name__}:RandomSettings",
         "file": f"{__name__}:FileSettings",

@@ -18,6 +18,7 @@ from . import TOPOLOGIES, TopologySettings, build, builders, files, parse
 from .checks import check_legible
 from .config import (
     ChainSettings,
+    CoordinationGraphSettings,
     EdgesSettings,
     FileSettings,
     PerRobotSettings,
@@ -121,6 +122,8 @@ def named_by(settings: TopologySettings) -> tuple[str, ...]:
         names = builders.names_of(settings.members)
     elif isinstance(settings, EdgesSettings):
         names = [name for edge in settings.edges for name in edge] + list(settings.alone)
+    elif isinstance(settings, CoordinationGraphSettings) and settings.edges is not None:
+        names = [name for pair in settings.edges for name in pair]
     elif isinstance(settings, FileSettings):
         names = [str(node) for node in files.read_graph(settings.path)]
     check_legible(names)

@@ -18,6 +18,8 @@ LEARNERS = SettingsRegistry(
         "anova-td": f"{__name__}.anova:AnovaTDSettings",
         "optimistic-td": f"{__name__}.optimistic:OptimisticTDSettings",
         "fmq": f"{__name__}.fmq:FMQSettings",
+        "sparse-cooperative": f"{__name__}.sparse_cooperative:SparseCooperativeSettings",
+        "vdn": f"{__name__}.vdn:ValueDecompositionSettings",
         "frozen": f"{__name__}.frozen:FrozenSettings",
     },
     LearnerSettings,

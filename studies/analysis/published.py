@@ -1,8 +1,8 @@
 """Results of a study as one small JSON file, with spec and seeds, fit to be committed or published.
 
 Rates are kept as one character an episode, steps and other measures in three decimals; returns are
-left out, and where there are thousands of short trials their times too. Claims are always decided by results in this form, so the committed files give
-the table that the run gave.
+left out, and where there are thousands of short trials their times too. Claims are always decided
+by results in this form, so the committed files give the table that the run gave.
 """
 
 from __future__ import annotations

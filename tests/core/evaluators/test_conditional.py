@@ -59,7 +59,7 @@ def test_it_is_saved_and_loaded(tmp_path):
 
 
 def test_sampling_refuses_it():
-    with pytest.raises(ValueError, match="'conditional': sampling evaluates .* use exact"):
+    with pytest.raises(ValueError, match=r"'conditional': sampling evaluates .* use exact"):
         team_of("sampling")
 
 
