@@ -158,13 +158,14 @@ class Session:
 
     def _evaluate(self, there: Arrangement, phase: str, observe: Observer | None) -> None:
         episodes = self.trial.evaluation
+        most = self.trial.evaluation_steps or self.trial.steps
         if observe is None and self._at_once(
-            there, episodes, EVALUATION_WORLDS, phase, learn=False
+            there, episodes, EVALUATION_WORLDS, most, phase, learn=False
         ):
             return
         steps = control_loop(
             there.scenario, there.team, episodes=episodes,
-            steps=self.trial.steps, seed=self.trial.seed, first_episode=EVALUATION_WORLDS,
+            steps=most, seed=self.trial.seed, first_episode=EVALUATION_WORLDS,
             learn=False,
         )  # fmt: skip
         measures = measures_of(there.world)
@@ -194,16 +195,23 @@ class Session:
                 self._rows.append(meter.row())
 
     def _at_once(
-        self, there: Arrangement, episodes: int, first: int, phase: str, *, learn: bool = True
+        self,
+        there: Arrangement,
+        episodes: int,
+        first: int,
+        steps: int,
+        phase: str,
+        *,
+        learn: bool = True,
     ) -> bool:
         """Run whole episodes compiled and keep their rows, or return that it cannot be done."""
-        scenario, trial = there.scenario, self.trial
+        scenario = there.scenario
         if not isinstance(scenario, EpisodicScenario):
             return False
         for episode in range(first, first + episodes):
             begin = perf_counter()
-            seed = world_seed(trial.seed, episode)
-            found = scenario.run_episode(there.team, seed, episode, trial.steps, learn=learn)
+            seed = world_seed(self.trial.seed, episode)
+            found = scenario.run_episode(there.team, seed, episode, steps, learn=learn)
             if found is None:
                 return False
             if learn and there.team is self.team:
