@@ -119,7 +119,7 @@ def coordination_graph(
     graph = nx.Graph()
     graph.add_nodes_from(agents)
     if edges is not None:
-        pairs = [tuple(sorted(pair)) for pair in edges]
+        pairs = [(min(a, b), max(a, b)) for a, b in edges]
         Hierarchy(agents, [], pairs)  # raises and names what is wrong
         graph.add_edges_from(pairs)
         return graph
