@@ -53,8 +53,8 @@ class _Step(NamedTuple):
     """The elimination of one agent."""
 
     agent: int
-    parts: tuple[tuple[int, tuple[int, ...]], ...]
-    """Tables that it takes part in, by number, each with its shape among the agents concerned."""
+    parts: tuple[tuple[int, tuple[int, ...], tuple[int, ...]], ...]
+    """Tables that it takes part in: number, order of axes, shape among the agents concerned."""
     beside: tuple[int, ...]
     """The others concerned: axes of the table that is left, its own axis was the last."""
 

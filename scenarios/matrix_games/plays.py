@@ -12,7 +12,7 @@ It knows exact enumeration by an agent's own value, with all teammate models and
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -27,14 +27,24 @@ from ...core.loop import EpisodeSummary
 from ...core.team import Team
 from .kernel import DECREASING, GREEDY, SAMPLED, Deciding, Exploring, Learning, play
 
-if TYPE_CHECKING:
-    from .scenario import MatrixGame
-
 TEAMMATES = ("best-response", "uniform", "empirical", "conditional")
 """Teammate models in the order of the kernel."""
 NONE: FloatArray = np.zeros((0, 0))
 STILL = Learning(False, 0.0, 1.0, 0.0, NONE, NONE, NONE, NONE)
 NO_EXPLORATION = Exploring(GREEDY, False, False, 0.0, 0.0, 0.0)
+
+
+class Game(Protocol):
+    """What is asked of a game, see `nested_agents.scenarios.matrix_games.scenario.MatrixGame`."""
+
+    payoffs: FloatArray
+    optimal: FloatArray
+    is_stochastic: bool
+    rng: np.random.Generator
+
+    def states_after(self, joint_actions: IntArray) -> FloatArray:
+        """Return the states ``(..., n, d)`` after joint actions ``(..., n)``."""
+        ...
 
 
 class Parts(NamedTuple):
@@ -45,7 +55,7 @@ class Parts(NamedTuple):
     learning: Learning
 
 
-def parts_of(game: MatrixGame, team: Team, *, learn: bool) -> Parts | None:
+def parts_of(game: Game, team: Team, *, learn: bool) -> Parts | None:
     """Return what a team is made of; None if it has a part that the kernel does not know."""
     if type(team.evaluator) is not ExactEnumeration or not _is_table(team.evaluator):
         return None
@@ -56,7 +66,7 @@ def parts_of(game: MatrixGame, team: Team, *, learn: bool) -> Parts | None:
     return Parts(_deciding(game, team, team.evaluator), exploring, learning)
 
 
-def run(game: MatrixGame, team: Team, parts: Parts, plays: int) -> EpisodeSummary:
+def run(game: Game, team: Team, parts: Parts, plays: int) -> EpisodeSummary:
     """Run an episode that has begun."""
     n, learner = len(team.hierarchy), team.learner
     joints, paid = np.zeros((2, n), dtype=np.int64), np.zeros(2)
@@ -96,7 +106,7 @@ def _is_table(evaluator: ExactEnumeration) -> bool:
     return own and rules.compact and at_actions and rules.terms == (whole,)
 
 
-def _deciding(game: MatrixGame, team: Team, evaluator: ExactEnumeration) -> Deciding:
+def _deciding(game: Game, team: Team, evaluator: ExactEnumeration) -> Deciding:
     n, a = len(team.hierarchy), evaluator.n_actions
     below, above = np.zeros((2, n, n), dtype=np.int64)
     for i in range(n):
