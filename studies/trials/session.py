@@ -88,15 +88,13 @@ class Session:
         )
         kept = self.trial.recorded if is_recorded else {}
         acting = self.team if team is None else team
-        if (
-            observe is None
-            and not kept
-            and self._at_once(self._own._replace(team=acting), episodes, first, phase)
-        ):
+        there, steps_each = self._own._replace(team=acting), self.trial.steps
+        whole = observe is None and not kept
+        if whole and self._at_once(there, episodes, first, steps_each, phase):
             return
         steps = control_loop(
             self.scenario, acting, episodes=episodes,
-            steps=self.trial.steps, seed=self.trial.seed, first_episode=first,
+            steps=steps_each, seed=self.trial.seed, first_episode=first,
         )  # fmt: skip
         for record in self._measured(steps, phase, measures_of(self.world), observe):
             if record.episode in kept:
