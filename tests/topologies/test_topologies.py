@@ -101,7 +101,7 @@ REFUSED = {
     "nothing.json": "topology 'nothing.json': No such file or directory",
     "file:x.csv": "topology 'x.csv': suffix must be .graphml or .json",
     "nothing.py:f": "topology 'nothing.py:f': nothing.py: No such file or directory",
-    "chian": "topology 'chian': did you mean 'chain'? known: chain, edges, file,",
+    "chian": "topology 'chian': did you mean 'chain'? known: chain, coordination-graph, edges,",
     "": "topology '': known: chain,",
     "single-agent": "topology 'single-agent': is no hierarchy of 4 agents; see `arrange`",
     "per-robot": "topology 'per-robot': is no hierarchy of 4 agents; see `arrange`",

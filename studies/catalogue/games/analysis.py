@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from string import ascii_uppercase
 from textwrap import wrap
-from typing import Any, ClassVar
+from typing import Any
 
 from ...analysis.results import Results
 from ...analysis.statistics import Estimate, rate
@@ -86,7 +86,11 @@ class Games:
     table: tuple[Summary, ...]
     cases: tuple[Case, ...]
     notes: tuple[str, ...]
-    headline: ClassVar[str] = "optimal"
+
+    @property
+    def headline(self) -> str:
+        """What a report speaks of first: the evaluation after all plays."""
+        return titled(max((max(case.found) for case in self.cases), default=0))
 
 
 def analyse(results: Results) -> Games:
