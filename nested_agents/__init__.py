@@ -63,7 +63,7 @@ _PLACES = {
     "policy_seed": ("core.loop", "policy_seed"),
     "rate": ("studies.analysis.statistics", "rate"),
     "run_trial": ("studies.trials.session", "run_trial"),
-    "state_variable": ("scenarios.box_pushing.states.variables", "state_variable"),
+    "state_variable": ("scenarios.state_variables", "state_variable"),
 }
 
 __all__ = ["__version__", *_PLACES]

@@ -17,6 +17,7 @@ from ..failures.settings import (
     Stuck,
     Weak,
 )
+from ..state_variables import referred
 
 CONTROL_PERIOD = 0.064
 """Time between commands to the wheels [s]; the basic time step of the e-puck in Webots."""
@@ -254,13 +255,9 @@ class BoxPushingSettings(ScenarioSettings):
     @field_validator("state_space", mode="before")
     @classmethod
     def _by_name(cls, value: object) -> object:
-        from .states.variables import STATE_VARIABLES, StateVariable
+        from .states.variables import STATE_VARIABLES
 
-        if not isinstance(value, list | tuple):
-            return value
-        return tuple(
-            STATE_VARIABLES.reference_to(v) if isinstance(v, StateVariable) else v for v in value
-        )
+        return referred(STATE_VARIABLES, value)
 
     @model_validator(mode="after")
     def _believes(self) -> Self:
