@@ -93,6 +93,5 @@ class Pooling:
             (self._common, pooled.common, pooled.firsts[:1]),
         ):
             if part is not None:
-                seen = states[agents[:, None], :, part.columns].transpose(0, 2, 1)
-                total += part.rules.each(theta, seen).sum(axis=0)
+                total += part.rules.total(theta, states, agents, part.columns)
         return total / len(pooled.agents)

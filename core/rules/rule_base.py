@@ -201,6 +201,30 @@ class RuleBase:
             return kernels.each_compact(theta, states, self.layout)
         return kernels.each_dense(theta, states, self.layout)
 
+    def total(
+        self, theta: FloatArray, states: FloatArray, agents: IntArray, columns: IntArray
+    ) -> FloatArray:
+        """Return the sum ``(s,)`` of f over k agents, each by its row of theta ``(k, n_rules)``.
+
+        Shapes are trusted: evaluators call this many times at every decision.
+
+        Parameters
+        ----------
+        theta
+            Consequent weights of these agents.
+        states
+            ``(n, s, d)`` states of all agents.
+        agents
+            ``(k,)`` which agents.
+        columns
+            Which of the variables are those of this rule base.
+        """
+        if self.compact:
+            found: FloatArray = kernels.total_compact(theta, states, agents, columns, self.layout)
+            return found
+        seen = states[agents[:, None], :, columns].transpose(0, 2, 1)
+        return self.each(theta, seen).sum(axis=0)
+
     def td_update(
         self,
         theta: FloatArray,

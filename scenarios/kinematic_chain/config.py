@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, field_validator
 
@@ -14,6 +15,10 @@ PERIOD = 0.1
 """Time between two decisions [s]."""
 REACH = 1.0
 """Length of the whole arm [m]."""
+RIDGE = 0.1
+"""Ridge of a joint's regression that learns best, for every joint that shares its weights."""
+DISCOUNT = 0.8
+"""Discount that learns best: a goal is some twenty decisions away."""
 
 
 class RewardSettings(Settings):
@@ -108,6 +113,17 @@ class KinematicChainSettings(ScenarioSettings):
         from .variables import CHAIN_VARIABLES
 
         return referred(CHAIN_VARIABLES, value)
+
+    def suited(self, preset: str) -> Mapping[str, Any]:
+        """Return what learns best here: little regularisation, and little foresight.
+
+        The ridge weighs against the squared errors of all joints that share weights, so that it
+        grows with their number.
+        """
+        sharing = {"default": self.joints, "own-value": 1}
+        if preset not in sharing:
+            return {}
+        return {"learner": {"ridge": RIDGE * sharing[preset], "discount": DISCOUNT}}
 
     @property
     def onset(self) -> int | None:

@@ -67,8 +67,7 @@ def _compact_value(theta, lay: Layout, functions, room) -> float:  # type: ignor
 
 
 @njit(cache=True)
-def _values(theta, states, lay: Layout, out) -> None:  # type: ignore[no-untyped-def]
-    functions, room = _room(lay)
+def _values(theta, states, lay: Layout, functions, room, out) -> None:  # type: ignore[no-untyped-def]
     for s in range(len(states)):
         _pairs_of(states[s], 0, lay, functions)
         out[s] = _compact_value(theta, lay, functions, room)
@@ -77,8 +76,9 @@ def _values(theta, states, lay: Layout, out) -> None:  # type: ignore[no-untyped
 @njit(cache=True)
 def values_compact(theta: FloatArray, states: FloatArray, packed: Packed) -> FloatArray:
     """Return f ``(m,)`` of states ``(m, d)``, triangular partitions."""
-    out = np.empty(len(states))
-    _values(theta, states, unpack(packed), out)
+    out, lay = np.empty(len(states)), unpack(packed)
+    functions, room = _room(lay)
+    _values(theta, states, lay, functions, room, out)
     return out
 
 
@@ -86,8 +86,26 @@ def values_compact(theta: FloatArray, states: FloatArray, packed: Packed) -> Flo
 def each_compact(theta: FloatArray, states: FloatArray, packed: Packed) -> FloatArray:
     """Return f ``(n, s)`` of states ``(n, s, d)``, each by its row of theta ``(n, n_rules)``."""
     out, lay = np.empty(states.shape[:2]), unpack(packed)
+    functions, room = _room(lay)
     for i in range(len(states)):
-        _values(theta[i], states[i], lay, out[i])
+        _values(theta[i], states[i], lay, functions, room, out[i])
+    return out
+
+
+@njit(cache=True)
+def total_compact(
+    theta: FloatArray, states: FloatArray, agents: IntArray, columns: IntArray, packed: Packed
+) -> FloatArray:
+    """Return the sum ``(s,)`` of f over some agents, see `RuleBase.total`."""
+    out, lay = np.zeros(states.shape[1]), unpack(packed)
+    functions, room = _room(lay)
+    x = np.empty(len(columns))
+    for i in range(len(agents)):
+        for s in range(len(out)):
+            for j in range(len(columns)):
+                x[j] = states[agents[i], s, columns[j]]
+            _pairs_of(x, 0, lay, functions)
+            out[s] += _compact_value(theta[i], lay, functions, room)
     return out
 
 
