@@ -30,12 +30,15 @@ class Premises:
         What joints perceive.
     length
         Of a link [m].
+    top_speed
+        Greatest speed of a joint [rad/s].
     reward
         ``reward(distance (m,), approach (m,)) -> (m,)``.
     """
 
     states: ChainStates
     length: float
+    top_speed: float
     reward: Callable[[FloatArray, FloatArray], FloatArray]
 
 
@@ -71,13 +74,15 @@ class ChainPrediction:
     ) -> None:
         self.premises, self.angles, self.speeds, self.turns = premises, angles, speeds, turns
         self.goal, self.before = goal, before
+        self.shares = speeds / premises.top_speed
+        """The speeds as fractions of the greatest."""
         self._joints = np.arange(len(angles))
 
     def seen(self, joint_actions: IntArray) -> ChainView:
         """Return the situations after joint actions ``(m, n)``."""
         angles = self.angles + self.turns[self._joints, joint_actions]
         places = postures_of(angles, self.premises.length)
-        speeds = self.speeds[self._joints, joint_actions]
+        speeds = self.shares[self._joints, joint_actions]
         return ChainView(places, angles, speeds, self.goal, self.before)
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
@@ -144,9 +149,9 @@ class ChainSuperposition:
         prediction = self._prediction
         turns, speeds = (
             np.tile((shares * each).sum(axis=1), (each.shape[1], 1))
-            for each in (prediction.turns, prediction.speeds)
+            for each in (prediction.turns, prediction.shares)
         )
-        turns[:, agent], speeds[:, agent] = prediction.turns[agent], prediction.speeds[agent]
+        turns[:, agent], speeds[:, agent] = prediction.turns[agent], prediction.shares[agent]
         angles = prediction.angles + turns
         places = postures_of(angles, prediction.premises.length)
         expected = (shares[:, :, None] * self.contributions).sum(axis=(0, 1))

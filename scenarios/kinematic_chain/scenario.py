@@ -74,8 +74,8 @@ class KinematicChain:
         self._least, self._most = np.full(n, -np.inf), np.full(n, np.inf)
         if settings.joint_limit is not None:
             self._least[1:], self._most[1:] = -settings.joint_limit, settings.joint_limit
-        self._states = ChainStates(settings.state_space, settings.top_speed)
-        self._premises = Premises(self._states, self.length, self._reward)
+        self._states = ChainStates(settings.state_space)
+        self._premises = Premises(self._states, self.length, settings.top_speed, self._reward)
         self._failures = Failures(settings.failures, self.agents, self._limits)
         # What an informed prediction knows of the next step, while the others tell of the last.
         self._known = Failures(settings.failures, self.agents, self._limits)
@@ -226,6 +226,10 @@ class KinematicChain:
     def _observe(self, before: float) -> FloatArray:
         """Return the states ``(n, d)`` of all agents: the error observation layer."""
         view = ChainView(
-            self._places()[None], self._angles[None], self._speeds[None], self._goal, before
+            self._places()[None],
+            self._angles[None],
+            self._speeds[None] / self.settings.top_speed,
+            self._goal,
+            before,
         )
         return self._states.sensed(view)[0]

@@ -30,7 +30,8 @@ CHAIN_VARIABLES = Registry("chain variable", {name: f"{_PLACE}:{name}" for name 
 """State variables by the name that specs use."""
 
 SPEEDS = (-1.0, -0.5, 0.0, 0.5, 1.0)
-"""Centres of the own speed, as fractions of the greatest."""
+"""Centres of the own speed, as a fraction of the greatest: arms of any length share it."""
+SPEED = Variable("speed", "1", -1.0, 1.0, centres=SPEEDS)
 
 
 class ChainStates:
@@ -41,8 +42,6 @@ class ChainStates:
     names
         Of the variables, see `CHAIN_VARIABLES`. The compiled ones are trusted; what functions of
         users return is checked.
-    top_speed
-        Greatest speed of a joint [rad/s].
 
     Raises
     ------
@@ -50,7 +49,7 @@ class ChainStates:
         If one is unknown or named twice, or there is none; one line.
     """
 
-    def __init__(self, names: Sequence[str], top_speed: float) -> None:
+    def __init__(self, names: Sequence[str]) -> None:
         self._things = [found(CHAIN_VARIABLES, name) for name in names]
         variables = tuple(thing.variable for thing in self._things)
         distinct = {"speed", *(variable.name for variable in variables)}
@@ -58,10 +57,8 @@ class ChainStates:
             raise ValueError(
                 f"scenario.state_space = {list(names)}: variables must be distinct and at least one"
             )
-        centres = tuple(top_speed * fraction for fraction in SPEEDS)
-        speed = Variable("speed", "rad/s", -top_speed, top_speed, centres=centres)
         common = tuple(thing.variable.name for thing in self._things if thing.common)
-        self.space = StateSpace("+".join(names), (speed, *variables), 1, common)
+        self.space = StateSpace("+".join(names), (SPEED, *variables), 1, common)
         own = [k for k, name in enumerate(names) if name not in COMPILED]
         self._own = [(1 + k, self._things[k]) for k in own]
         self._rows = np.array([-1] + [_row(name) for name in names])

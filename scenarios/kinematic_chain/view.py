@@ -21,7 +21,7 @@ class ChainView:
     angles
         ``(m, n)`` joint angles [rad].
     speeds
-        ``(m, n)`` commanded speeds of the joints [rad/s].
+        ``(m, n)`` commanded speeds of the joints, as fractions of the greatest.
     goal
         ``(2,)`` where the tip is to be [m].
     before
