@@ -65,11 +65,12 @@ class _Stage:
         n, failed = len(hurry), recording["failed"][step].astype(bool)
         size = 9.0 if n <= 8 else 5.0 if n <= 32 else 3.0
         axes, joints = self.axes, places[:-1]
+        x, y = joints.T
         self._moving = [
             *axes.plot(*tips.T, color=TIP, lw=1, alpha=0.7, zorder=1),
             *axes.plot(*places.T, color=LINK, lw=2.5 if n <= 16 else 1.5, zorder=3),
             axes.scatter(
-                *joints.T, c=hurry, cmap="Greys", vmin=0.0, vmax=1.0, s=size**2, edgecolors=LINK,
+                x, y, c=hurry, cmap="Greys", vmin=0.0, vmax=1.0, s=size**2, edgecolors=LINK,
                 linewidths=1.0, zorder=4,
             ),
             *axes.plot(*joints[failed].T, "x", color=FAILED, ms=size + 3, mew=2.5, zorder=5),

@@ -56,8 +56,10 @@ class ChainView:
 
     def guarded(self) -> ChainView:
         """Return the same situations, not to be written to."""
-        arrays = (self.places, self.angles, self.speeds, self.goal)
-        return ChainView(*(_fixed(array.view()) for array in arrays), self.before)
+        places, angles, speeds, goal = (
+            _fixed(array.view()) for array in (self.places, self.angles, self.speeds, self.goal)
+        )
+        return ChainView(places, angles, speeds, goal, self.before)
 
 
 def _fixed(array: FloatArray) -> FloatArray:

@@ -182,16 +182,16 @@ def resolve(
     if not isinstance(name, str) or name not in PRESETS:
         said = now_called("preset", name) or closest(name, PRESETS)
         raise SpecError(f"preset = {show(name)}: {said}{where}")
-    said = [tables, override.tables if override else {}]
-    said += [nested(key, value) for key, value in point.items() if key != "preset"]
-    table = _laid([PRESETS[name].table, *said])
+    own_layers = [tables, override.tables if override else {}]
+    own_layers += [nested(key, value) for key, value in point.items() if key != "preset"]
+    table = _laid([PRESETS[name].table, *own_layers])
     scenario = _validated({"scenario": table["scenario"]}, where).scenario
     if suited := scenario.suited(name):
-        table = _laid([PRESETS[name].table, suited, *said])
+        table = _laid([PRESETS[name].table, suited, *own_layers])
     return _validated(table, where)
 
 
-def _laid(layers: Sequence[TomlTable]) -> TomlTable:
+def _laid(layers: Sequence[Mapping[str, Any]]) -> TomlTable:
     """Return the table of layers, each over the one before, the first over the defaults."""
     table = ConditionSettings().model_dump()
     for layer in layers:
