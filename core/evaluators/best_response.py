@@ -180,5 +180,5 @@ def _with(joint_action: IntArray, agents: tuple[int, ...], actions: IntArray) ->
     """Return the joint action ``(n,)`` with the `actions` ``(m, k)`` of k agents: ``(m, n)``."""
     joint = np.empty((len(actions), len(joint_action)), dtype=np.int64)
     joint[:] = joint_action
-    joint[:, list(agents)] = actions
+    joint[:, agents] = actions
     return joint

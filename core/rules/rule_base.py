@@ -202,28 +202,25 @@ class RuleBase:
         return kernels.each_dense(theta, states, self.layout)
 
     def total(
-        self, theta: FloatArray, states: FloatArray, agents: IntArray, columns: IntArray
+        self,
+        weights: tuple[FloatArray, FloatArray, FloatArray],
+        agents: IntArray,
+        firsts: IntArray,
+        kinds: tuple[IntArray, IntArray, IntArray],
+        own: FloatArray,
+        shared: FloatArray,
     ) -> FloatArray:
-        """Return the sum ``(s,)`` of f over k agents, each by its row of theta ``(k, n_rules)``.
+        """Return the summed value ``(m,)`` of some agents, see `core.rules.kernels.total_compact`.
 
-        Shapes are trusted: evaluators call this many times at every decision.
-
-        Parameters
-        ----------
-        theta
-            Consequent weights of these agents.
-        states
-            ``(n, s, d)`` states of all agents.
-        agents
-            ``(k,)`` which agents.
-        columns
-            Which of the variables are those of this rule base.
+        Shapes are trusted: an evaluator calls this many times at every decision. Where all rules
+        are active, each agent is valued by itself.
         """
         if self.compact:
-            found: FloatArray = kernels.total_compact(theta, states, agents, columns, self.layout)
-            return found
-        seen = states[agents[:, None], :, columns].transpose(0, 2, 1)
-        return self.each(theta, seen).sum(axis=0)
+            return kernels.total_compact(weights, agents, firsts, kinds, own, shared, self.layout)
+        body = np.repeat(np.arange(len(shared)), np.diff(firsts))
+        states = np.concatenate([own[agents], shared[body]], axis=2)
+        total: FloatArray = kernels.each_dense(weights[0], states, self.layout).sum(axis=0)
+        return total
 
     def td_update(
         self,
