@@ -11,7 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ..analysis.comparison import LEVEL, Difference
+from ..analysis.comparison import Difference
+from ..analysis.paired_tests import LEVEL
 from .figures import COLOURS, SETTINGS
 
 

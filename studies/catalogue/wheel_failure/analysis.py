@@ -23,11 +23,11 @@ import numpy as np
 from ....core.learners.frozen import FrozenSettings
 from ....core.learners.learner import LearnerSettings
 from ....core.team import Team
-from ...analysis.comparison import Array, Difference
-from ...analysis.paired_tests import holm, paired_permutation
+from ...analysis.comparison import Array, Difference, adjusted
 from ...analysis.results import Arrays, Results
 from ...analysis.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, rates
 from ...analysis.summary import Summary
+from ...analysis.verdicts import power_lines
 from ...spec.conditions import label_but
 from ...spec.errors import SpecError
 from ...spec.spec import Spec
@@ -197,7 +197,7 @@ def analyse(results: Results) -> WheelFailures:
     gains = _gains(courses)
     notes = ["Named after the colon is what adapts to the failure."] if courses else []
     notes += ["\nsuccess at the end against nothing adapting (p adjusted):"] if gains else []
-    notes += [f"  {gain.condition}: {gain.shown}" for gain in gains]
+    notes += [f"  {gain.condition}: {gain.shown}" for gain in gains] + power_lines(gains)
     curves = tuple(rates(course.success) for course in courses)
     return WheelFailures(tuple(map(_summary, courses)), courses, curves, gains, tuple(notes))
 
@@ -269,10 +269,6 @@ def _gains(courses: tuple[Course, ...]) -> tuple[Difference, ...]:
         ends = [
             c.end.mean(axis=1)[[c.seeds.index(seed) for seed in shared]] for c in (course, base)
         ]
-        raw = paired_permutation(*ends)
-        found.append((course, len(shared), bootstrap(ends[0] - ends[1], bounds=(-1, 1)), raw))
-    adjusted = holm([raw for *_, raw in found])
-    return tuple(
-        Difference(f"{course.fault}, {course.adapts}", "end", seeds, estimate, float(p))
-        for (course, seeds, estimate, _), p in zip(found, adjusted, strict=True)
-    )
+        estimate = bootstrap(ends[0] - ends[1], bounds=(-1, 1))
+        found.append(Difference.of(f"{course.fault}, {course.adapts}", "end", *ends, estimate))
+    return adjusted(found)
