@@ -102,7 +102,7 @@ def run_study(
         if retry_failed:
             store.forget_failed()
         pending = store.pending(trials)
-        for note in store.notes:
+        for note in (*store.notes, *spec.doubts()):
             observer.note(note)
         if pending:
             observer.announce(spec, directory, workers.processes)

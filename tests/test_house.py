@@ -22,7 +22,7 @@ ALLOWED = {
 }
 STUDIES = (
     "spec", "trials", "store", "workers", "analysis", "presentation", "catalogue", "run",
-    "claims", "cost", "explain", "report", "cli",
+    "claims", "cost", "explain", "report", "api", "cli",
 )  # fmt: skip
 """The rooms of studies/, each of which may import those before it."""
 MAX_BYTES = 1_000_000

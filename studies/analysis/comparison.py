@@ -82,7 +82,8 @@ def differences(
     reference: str,
     conditions: Sequence[str],
     measures: Mapping[str, Callable[[Results, str], ArrayLike]],
-    bounds: tuple[float, float] = (-np.inf, np.inf),
+    *,
+    of_rates: bool = True,
 ) -> tuple[Difference, ...]:
     """Compare conditions with a reference by several measures at once.
 
@@ -94,17 +95,28 @@ def differences(
         Labels; conditions that share fewer than two seeds with the reference are left out.
     measures
         By title, what gives the values ``(n_seeds,)`` of a condition.
-    bounds
-        The least and the greatest difference that there can be, see `bootstrap`.
+    of_rates
+        Whether these are success rates.
     """
     found = []
     for title, values in measures.items():
         for condition in conditions:
             base, other = paired(results, reference, condition, values)
             if len(base) >= 2:
-                estimate = bootstrap(other - base, bounds=bounds)
+                estimate = paired_difference(other, base, of_rates=of_rates)
                 found.append(Difference.of(condition, title, other, base, estimate))
     return adjusted(found)
+
+
+def paired_difference(own: Array, base: Array, *, of_rates: bool) -> Estimate:
+    """Return the mean difference of paired values ``(n_seeds,)`` with its 95 % interval.
+
+    By bootstrap over seeds; of rates that differ alike for every seed, as of independent ones: the
+    interval of a bootstrap would have no width.
+    """
+    if of_rates and np.ptp(own - base) == 0.0:
+        return difference(own[:, None], base[:, None])
+    return bootstrap(own - base, bounds=(-1.0, 1.0) if of_rates else (-np.inf, np.inf))
 
 
 def paired(

@@ -136,8 +136,9 @@ def deviation_of(samples: Sequence[ArrayLike], *, of_rates: bool) -> float | Non
 
     Examples
     --------
-    >>> round(deviation_of([[1.0] * 5], of_rates=True), 2), deviation_of([[2.0] * 5], of_rates=False)
-    (0.18, None)
+    >>> round(deviation_of([[1.0] * 5], of_rates=True), 2)
+    0.18
+    >>> deviation_of([[2.0] * 5], of_rates=False)
     """
     arrays = [np.asarray(sample, dtype=float) for sample in samples]
     arrays = [array for array in arrays if len(array) > 1]

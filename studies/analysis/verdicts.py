@@ -27,10 +27,15 @@ def told(found: Sequence[Difference], words: tuple[str, str] = WORDS) -> Iterato
     for word, sign in zip(words, (-1, 1), strict=True):
         for d in ranked:
             if d.p < LEVEL and d.estimate.value * sign > 0:
-                yield f"  {word}: {d.condition}, {d.shown}"
+                yield from _line(word, d)
     for d in ranked:
         if d.p >= LEVEL:
-            yield f"  no significant difference: {d.condition}, {d.shown}"
+            yield from _line("no significant difference", d)
+
+
+def _line(verdict: str, d: Difference) -> list[str]:
+    text = f"{verdict}: {d.condition}, {d.shown}"
+    return wrap(text, WIDTH, initial_indent="  ", subsequent_indent="    ", break_on_hyphens=False)
 
 
 def power_lines(
@@ -59,14 +64,14 @@ def power_lines(
 def power_text(
     seeds: int, comparisons: int, deviation: float | None, smallest: float | None
 ) -> list[str]:
-    """Return lines on what paired seeds can tell, given the deviation of their differences.
+    r"""Return lines on what paired seeds can tell, given the deviation of their differences.
 
     Examples
     --------
-    >>> print(*power_text(5, 2, 0.25, 0.2), sep="\\n")
+    >>> print(*power_text(5, 2, 0.25, 0.2), sep="\n")
     Power: 5 seeds and 2 comparisons cannot give an adjusted p below .05, whatever
       the outcome. It needs at least 7 seeds; for a difference of .20, about 18.
-    >>> print(*power_text(20, 1, 0.25, 0.2), sep="\\n")
+    >>> print(*power_text(20, 1, 0.25, 0.2), sep="\n")
     Power: with 20 seeds, a difference of .17 is found with probability .80. For a
       difference of .20 it takes about 15 seeds.
     """

@@ -24,7 +24,9 @@ PROGRAM = "nested-agents"
 COMMANDS: dict[str, str] = {
     "demo": "Train two e-Pucks to push a box: table, figures and replay.",
     "run": "Run the study of a spec, or continue it.",
+    "plan": "Tell what a study will take and what it can find, before it is run.",
     "table": "Print what a study found: conditions against estimates.",
+    "compare": "Compare conditions of one study or several, with the power to find differences.",
     "results": "Print what every episode of a study measured.",
     "status": "Tell how far a study is, what failed, and how long is left.",
     "retry": "Run the failed trials of a study again.",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,8 @@ from ..store.durable import replacing
 
 SUFFIXES = (".svg", ".png", ".pdf")
 """Formats that figures are written in."""
+USUAL = ("png", "svg")
+"""Those that figures of a study are written in unless said otherwise."""
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Distinct to colour-blind readers (Okabe and Ito 2008); the palest is left out."""
 STYLES = ("-", (0, (5, 2)), (0, (1, 1.2)), (0, (6, 1.5, 1, 1.5)))
@@ -26,9 +28,12 @@ SETTINGS: dict[str, Any] = {
 }
 
 
-def save(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
-    """Write figures as PNG and SVG into an existing folder, by their names; return the paths."""
-    paths = [folder / f"{name}.{suffix}" for name in figures for suffix in ("png", "svg")]
+def save(figures: Mapping[str, Figure], folder: Path, formats: Sequence[str] = USUAL) -> list[Path]:
+    """Write figures into an existing folder, by their names; return the paths.
+
+    `formats` are suffixes without a dot.
+    """
+    paths = [folder / f"{name}.{suffix}" for name in figures for suffix in formats]
     for path in paths:
         write(figures[path.stem], path)
     return paths

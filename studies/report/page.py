@@ -9,7 +9,7 @@ import jinja2
 from markupsafe import Markup
 
 from ..analysis.results import read
-from ..catalogue.study import load_study
+from ..catalogue.study import analysed, load_study
 from ..claims.claims import judge
 from ..claims.table import result
 from ..presentation.tables import tabulate
@@ -43,9 +43,8 @@ def page(directory: Path) -> str:
         version = store.meta("results_version")
         sources = store.sources()
     with sources.active():
-        study = load_study(outline.study)
-        analysis = study.analyse(results)
-        drawn = study.draw(analysis) if analysis.table else {}
+        analysis = analysed(outline.study, results)
+        drawn = load_study(outline.study).draw(analysis) if analysis.table else {}
     return _template().render(
         study=outline.study,
         extent=words.extent(outline),

@@ -103,8 +103,8 @@ REFUSED = {
     "nothing.py:f": "topology 'nothing.py:f': nothing.py: No such file or directory",
     "chian": "topology 'chian': did you mean 'chain'? known: chain, edges, file,",
     "": "topology '': known: chain,",
-    "single-agent": "topology 'single-agent': is no hierarchy of 4 agents; see `arrange`",
-    "per-robot": "topology 'per-robot': is no hierarchy of 4 agents; see `arrange`",
+    "single-agent": "topology 'single-agent': is not of these 4 agents; see `arrange`",
+    "per-robot": "topology 'per-robot': is not of these 4 agents; see `arrange`",
 }
 
 

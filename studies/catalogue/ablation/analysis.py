@@ -52,7 +52,7 @@ def analyse(results: Results) -> Ablation:
     }
     found: tuple[Difference, ...] = ()
     if conditions:
-        found = differences(results, conditions[0], conditions[1:], measures, bounds=(-1.0, 1.0))
+        found = differences(results, conditions[0], conditions[1:], measures)
     by_place = {(d.condition, d.measure): d.estimate for d in found}
     unknown = Estimate(*(np.asarray(value) for value in (0.0, np.nan, np.nan)))
     table = []

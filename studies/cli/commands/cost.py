@@ -65,8 +65,8 @@ def command(
     from ....core.cost import Problem
     from ...cost.cost import MOST_OPERATIONS, cost_rows
     from ...cost.table import written
+    from ...presentation.progress import say
     from ...spec.errors import SpecError
-    from ..display import say
 
     try:
         problem = Problem(rules, actions, iterations)
