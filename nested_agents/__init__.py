@@ -59,6 +59,7 @@ _PLACES = {
     "bootstrap": ("studies.analysis.statistics", "bootstrap"),
     "build_hierarchy": ("topologies", "build"),
     "check_scenario": ("scenarios.checking.checker", "check_scenario"),
+    "cost_table": ("studies.api.costs", "cost_table"),
     "control_loop": ("core.loop", "control_loop"),
     "detectable": ("studies.analysis.power", "detectable"),
     "greatest": ("core.exploration", "greatest"),

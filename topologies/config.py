@@ -218,13 +218,13 @@ class RandomSettings(TopologySettings):
 
 
 class FileSettings(TopologySettings):
-    """A graph from a GraphML or JSON file."""
+    """A graph or nested teams from a GraphML, JSON or TOML file."""
 
     kind: Literal["file"] = "file"
     path: str
     """Of the file, relative to the spec."""
 
-    argument: ClassVar[str] = "PATH.graphml|PATH.json"
+    argument: ClassVar[str] = "PATH.graphml|PATH.json|PATH.toml"
 
     @classmethod
     def parsed(cls, argument: str) -> Self:
@@ -238,7 +238,27 @@ class FileSettings(TopologySettings):
 
     def build(self, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
         """Return the graph."""
-        return from_networkx(files.read_graph(self.path), agents)
+        found = self.content
+        if isinstance(found, TopologySettings):
+            return found.build(agents, groups)
+        return from_networkx(found, agents)
+
+    @property
+    def content(self) -> nx.DiGraph | TopologySettings:
+        """What the file holds: a graph, or another topology.
+
+        Raises
+        ------
+        ValueError
+            If it holds neither.
+        """
+        found = files.read(self.path)
+        if isinstance(found, nx.Graph):
+            return found
+        try:
+            return parse(found)
+        except ValueError as error:
+            raise ValueError(f"{self.path}: {error}") from None
 
 
 class SingleAgentSettings(TopologySettings):

@@ -1,8 +1,8 @@
 """What a study will take and what it can find, before anything is spent on it.
 
-A few short episodes of every condition are run to see what a step takes, on a seed that no study
-reports. Deciding and simulating take a time per step. Learning may take one per step, too, and one
-per step kept so far: a regression over all of training grows with the square of its length.
+Two episodes of every condition are run to see what a step takes, on a seed that no study reports.
+Deciding and simulating take a time per step. Learning may take one per step, too, and one per step
+kept so far: a regression over all of training grows with the square of its length.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from textwrap import wrap
 from typing import Any
 
 import numpy as np
+from scipy.optimize import nnls
 
 from ..analysis.power import SMALLEST, USUAL_DEVIATION, detectable, seeds_for
 from ..analysis.verdicts import WIDTH, power_text
@@ -30,8 +31,8 @@ from ..workers.worker import CORES
 
 SEED = 10_000
 """Of the trials that are tried out."""
-EPISODES, STEPS = 3, 40
-"""Tried of every condition, after a first episode in which code is compiled."""
+EPISODES = 2
+"""Tried of every condition; one that is cut short goes before them, in which code is compiled."""
 QUICK = 0.25
 """Share of its steps that an episode takes if the goal is reached early."""
 
@@ -47,7 +48,7 @@ class Pace:
     learning
         Seconds of learning for a step of the episode that has ended.
     regression
-        The same for a step of all episodes before.
+        The same for every step that is kept by then.
     bytes
         What the team holds [bytes], and how much more for every step of training.
     """
@@ -71,7 +72,8 @@ class Pace:
         """
         acting = self.acting * steps * (sum(training) + evaluations)
         learning = sum(
-            self.learning * steps * n + self.regression * steps * n * (n + 1) / 2 for n in training
+            self.learning * steps * n + self.regression * steps**2 * n * (n + 1) / 2
+            for n in training
         )
         return acting + learning
 
@@ -228,10 +230,9 @@ def _taken(
 
 def paced(trial: Trial) -> Pace:
     """Return what a condition's trials take, by trying one of them out."""
-    tried = replace(
-        trial, seed=SEED, episodes=1 + EPISODES, steps=min(STEPS, trial.steps), curriculum=()
-    )
-    session = Session(tried)
+    Session(replace(trial, seed=SEED, episodes=1, steps=2, curriculum=())).train(1)
+    session = Session(replace(trial, seed=SEED, episodes=EPISODES, curriculum=()))
+    held = _bytes(session)
     acting: list[float] = []
     learning: list[list[float]] = []
 
@@ -242,20 +243,13 @@ def paced(trial: Trial) -> Pace:
         seconds = record.transition.info.get("seconds", {})
         acting.append(record.deciding + sum(seconds.values()))
 
-    session.train(1, observe=note)
-    held = _bytes(session)
-    begun = len(acting)
-    session.train(EPISODES, 1, observe=note)
+    session.train(EPISODES, observe=note)
     steps = np.array([len(episode) for episode in learning], dtype=float)
     taken = np.array([sum(episode) for episode in learning])
-    # The first episode compiles: its steps are kept, what they took says nothing.
-    kept = np.cumsum(steps)[1:]
-    design = np.stack([steps[1:], kept], axis=1)
-    per_step, per_kept = np.maximum(np.linalg.lstsq(design, taken[1:], rcond=None)[0], 0.0)
-    more = max(_bytes(session) - held, 0.0) / max(steps[1:].sum(), 1.0)
-    return Pace(
-        float(np.mean(acting[begun:])), float(per_step), float(per_kept), (held, float(more))
-    )
+    # An episode of T steps takes T (a + b N) to learn from, N being the steps kept by its end.
+    (per_step, per_kept), _ = nnls(np.stack([steps, steps * np.cumsum(steps)], axis=1), taken)
+    more = max(_bytes(session) - held, 0.0) / steps.sum()
+    return Pace(float(np.mean(acting)), float(per_step), float(per_kept), (held, float(more)))
 
 
 def _bytes(session: Session) -> float:

@@ -264,11 +264,27 @@ def label_but(columns: Mapping[str, Any], keys: Collection[str]) -> str:
 
 
 def _brief(value: object) -> str:
-    """Return a value for a label: a long list is cut, and distinguished by a checksum."""
+    """Return a value for a label.
+
+    A table is called by its name, or its kind; without these it is told from others by a checksum,
+    as is a list that is cut.
+
+    Examples
+    --------
+    >>> _brief({"name": "kite", "vertices": [[0, 0]]}), _brief({"vertices": [[0, 0]]})
+    ('kite', 'described 4d2285')
+    """
     text = str(_scalar(value))
+    if isinstance(value, Mapping):
+        named = value.get("name", value.get("kind") if len(value) == 1 else None)
+        return str(named) if named else f"described {_checksum(text)}"
     if isinstance(value, str) or len(text) <= 60:
         return text
-    return f"{text[:50]}... {hashlib.sha256(text.encode(errors='replace')).hexdigest()[:6]}"
+    return f"{text[:50]}... {_checksum(text)}"
+
+
+def _checksum(text: str) -> str:
+    return hashlib.sha256(text.encode(errors="replace")).hexdigest()[:6]
 
 
 def _scalar(value: object) -> object:

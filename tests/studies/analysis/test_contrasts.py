@@ -32,7 +32,7 @@ def test_the_reference_is_the_first_condition_or_a_named_one() -> None:
     assert len(contrasts(results).differences) == 3
     last = list(results.columns)[-1]
     found = contrasts(results, reference=last)
-    assert [d.condition for d in found.significant][0] == first
+    assert found.significant[0].condition == first
     assert {d.condition for d in found.significant} == set(list(results.columns)[:3])
 
 
