@@ -106,6 +106,8 @@ def run_study(
             observer.note(note)
         if pending:
             observer.announce(spec, directory, workers.processes)
+        if pending and not workers.processes:
+            observer.note("there is no worker yet: waiting for one")
         try:
             with closing(run_trials(pending, store, run_trial, workers)) as outcomes:
                 observer.follow(outcomes, len(trials), len(trials) - len(pending))

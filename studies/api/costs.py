@@ -7,11 +7,8 @@ from dataclasses import dataclass
 from html import escape
 
 from ...core.cost import Problem
-from ..cost.cost import CostRow, cost_rows
+from ..cost.cost import PAPER, CostRow, cost_rows
 from ..cost.table import written
-
-PAPER = Problem(5**7, 4, 450)
-"""|S|, |A| and L of the paper's experiment."""
 
 
 @dataclass(frozen=True)

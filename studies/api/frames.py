@@ -23,7 +23,7 @@ EPISODE_COLUMNS = {
     "condition": ("", "label of the condition"),
     "seed": ("1", "seed of the trial"),
     "phase": ("", "training, evaluation, training:STAGE or evaluation:NAME"),
-    "episode": ("1", "number of the episode in its phase, from 1"),
+    "episode": ("1", "number of the episode in its phase, from 0"),
     "steps": ("1", "decisions until the episode ended"),
     "return": ("1", "sum of the rewards, not discounted; mean over agents"),
 }
@@ -61,9 +61,8 @@ def trials(parts: Iterable[Part], keep: Keep) -> DataFrame:
 
 
 def episodes(parts: Iterable[Part], keep: Keep) -> DataFrame:
-    """Return one row per episode of every finished trial; episodes are counted from 1."""
+    """Return one row per episode of every finished trial; episodes are counted from 0."""
     frame, measures = _frame(parts, lambda store: store.episodes(), keep)
-    frame["episode"] += 1
     for measure in measures:
         if measure.is_rate and frame[measure.name].notna().all():
             frame[measure.name] = frame[measure.name].astype(bool)

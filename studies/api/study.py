@@ -94,7 +94,7 @@ class StudyResults:
 
     @property
     def episodes(self) -> DataFrame:
-        """One row per episode, counted from 1, and a column per measure; needs pandas.
+        """One row per episode, counted from 0, and a column per measure; needs pandas.
 
         What its columns are, and their units, stands in ``episodes.attrs["columns"]``.
         """

@@ -7,7 +7,10 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from ..store.durable import replacing
 
@@ -53,6 +56,16 @@ def write(figure: Figure, path: Path) -> None:
     metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(path.suffix)
     with mpl.rc_context(SETTINGS), replacing(path) as file:  # type: ignore[arg-type]
         figure.savefig(file, format=path.suffix[1:], dpi=150, metadata=metadata)
+
+
+def log_axis(axes: Axes) -> None:
+    """Let the vertical axis be logarithmic, its ticks plain numbers: 0.5, 1, 2, 5."""
+    axes.set_yscale("log")
+    low, high = axes.get_ylim()
+    few = np.log10(high / low) < 3.0
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,)))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{y:,.10g}"))
+    axes.yaxis.set_minor_formatter(NullFormatter())
 
 
 def check_suffix(path: Path) -> None:

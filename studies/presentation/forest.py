@@ -81,6 +81,10 @@ def _legend(figure: Figure, panels: Sequence[Panel]) -> None:
             ("white", "no significant difference"),
         )
     ]
+    handles += [
+        Line2D([], [], color=colour, linewidth=1.5, label=f"{word} than the reference")
+        for colour, word in zip(COLOURS, ("higher", "lower"), strict=False)
+    ]
     seeds = sorted({line.seeds for panel in panels for line in panel.lines})
     counted = f"{seeds[0]}" if len(seeds) == 1 else f"{seeds[0]} to {seeds[-1]}"
     title = f"means over {counted} seeds, bars: 95 % intervals"

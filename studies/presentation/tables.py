@@ -151,16 +151,17 @@ def _latex(titles: Sequence[str], rows: Sequence[Row]) -> str:
         "% needs \\usepackage{booktabs}; 95 % intervals in brackets",
         rf"\begin{{tabular}}{{lr{'r' * len(titles)}}}",
         r"\toprule",
-        " & ".join(["condition", "seeds", *map(_escaped, titles)]) + r" \\",
+        " & ".join(["condition", "seeds", *map(escaped, titles)]) + r" \\",
         r"\midrule",
     ]
     for condition, seeds, cells in rows:
         # After a line's end LaTeX would take a leading bracket for an option.
-        name = "{}" * condition.startswith(("[", "*")) + _escaped(condition)
+        name = "{}" * condition.startswith(("[", "*")) + escaped(condition)
         numbers = (f"${c.bracketed(MATHS_SPACE)}$" if c else "--" for c in cells)
         lines.append(" & ".join([name, str(seeds), *numbers]) + r" \\")
     return "\n".join([*lines, r"\bottomrule", r"\end{tabular}"]) + "\n"
 
 
-def _escaped(text: str) -> str:
+def escaped(text: str) -> str:
+    """Return text as LaTeX needs it."""
     return "".join(LATEX.get(character, character) for character in text)

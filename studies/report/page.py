@@ -51,7 +51,7 @@ def page(directory: Path) -> str:
         compared=", ".join(next(iter(outline.columns.values()))),
         standing=words.standing(len(trials), counts["done"], counts["failed"]),
         complete=counts["done"] == len(trials),
-        verdict=words.contest(analysis.table, getattr(analysis, "headline", None)),
+        verdict=words.verdicts(analysis),
         notes=list(getattr(analysis, "notes", ())),
         table=tabulate(analysis.table),
         claims=[

@@ -62,7 +62,9 @@ def measure(trial: Trial) -> TrialResult:
     session.train(trial.episodes - onset, onset, phase=KEPT, team=kept)
     session.evaluate()
     session.evaluate_elsewhere()
-    return session.result({"onset": float(onset)})
+    begun = sorted({f.episode for f in getattr(trial.settings.scenario, "failures", ())} - {onset})
+    later = {f"onset.{k}": float(episode) for k, episode in enumerate(begun, 2)}
+    return session.result({"onset": float(onset), **later})
 
 
 def check(spec: Spec) -> None:
@@ -112,7 +114,9 @@ class Course:
     adapts
         What does, see `ADAPTS`; `training` or `weights kept` if self-models were not swept.
     onset
-        Episode in which the wheel fails.
+        Episode in which the first wheel fails.
+    onsets
+        Episodes in which any does.
     success
         ``(n_seeds, n_episodes)`` from the start of training.
     seeds
@@ -122,6 +126,7 @@ class Course:
     fault: str
     adapts: str
     onset: int
+    onsets: tuple[int, ...]
     success: Array
     steps: Array
     seeds: tuple[int, ...]
@@ -209,7 +214,9 @@ def courses_of(results: Results) -> list[Course]:
     for condition, training in results.training.items():
         if condition not in kept:
             continue
-        onset = int(results.numbers[condition]["onset"][0])
+        numbers = results.numbers[condition]
+        onset = int(numbers["onset"][0])
+        onsets = tuple(int(v[0]) for name, v in numbers.items() if name.startswith("onset"))
         fault, enabled = _twin(condition, results.columns.get(condition, {}))
         for phase in (KEPT, "training"):
             after = kept[condition] if phase == KEPT else {}
@@ -221,7 +228,7 @@ def courses_of(results: Results) -> list[Course]:
             }
             found.append(
                 Course(
-                    fault, ADAPTS.get((enabled, phase), phase), onset,
+                    fault, ADAPTS.get((enabled, phase), phase), onset, onsets,
                     arrays["success"].astype(float), arrays["steps"].astype(float),
                     results.seeds[condition],
                 )

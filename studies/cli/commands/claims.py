@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 @click.option(
     "--format",
     "form",
-    type=Choice(["table", "json", "markdown"]),
+    type=Choice(["table", "json", "markdown", "latex"]),
     default="table",
     help="How to print the table.",
 )

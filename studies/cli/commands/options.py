@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from ..arguments import Assignments, Choice, File, Text, Whole
+from ..arguments import Assignments, Choice, File, Several, Text, Whole
 
 directory = click.argument("directory", type=File(), metavar="DIR")
 """An existing study."""
@@ -59,6 +59,16 @@ changes = click.option(
     help='Lay values over the spec: --set learner.ridge=1 "seeds=[3, 5]". May be repeated.',
 )
 """Assignments laid over a spec, see `nested_agents.studies.spec.overlay.assignment`."""
+
+figures = click.option(
+    "--figures",
+    cls=Several,
+    type=Choice(["png", "svg", "pdf"]),
+    metavar="png|svg|pdf...",
+    default=("png", "svg"),
+    help="Formats of the figures.",
+)
+"""What figures of a study are written as."""
 
 plot = click.option(
     "--plot", type=File(), metavar="PATH", help="A figure to write: SVG, PNG or PDF by suffix."

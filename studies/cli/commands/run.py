@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 @options.address
 @options.accept_code
 @options.trust
+@options.figures
 @options.changes
 def command(
     spec: Path,
@@ -38,6 +39,7 @@ def command(
     address: str | None,
     accept_code: bool,
     trust: bool,
+    figures: tuple[str, ...],
     changes: tuple[str, ...],
 ) -> int:
     """Run the study of a spec; the same command again continues it.
@@ -68,4 +70,5 @@ def command(
         backend=backend,
         address=address,
         accept_code=accept_code,
+        formats=figures,
     )
