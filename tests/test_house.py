@@ -21,7 +21,7 @@ ALLOWED = {
     "studies": {"studies", "core", "topologies", "scenarios"},
 }
 STUDIES = (
-    "spec", "trials", "store", "workers", "analysis", "presentation", "catalogue", "run",
+    "spec", "trials", "store", "workers", "analysis", "presentation", "catalogue", "loggers", "run",
     "claims", "cost", "explain", "report", "api", "cli",
 )  # fmt: skip
 """The rooms of studies/, each of which may import those before it."""

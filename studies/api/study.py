@@ -294,6 +294,7 @@ def run(
     accept_code: bool = False,
     progress: bool = True,
     observer: Observer | None = None,
+    loggers: Sequence[str] = (),
 ) -> StudyResults:
     """Run what is left of a study and return what it found; the same call again continues it.
 
@@ -304,7 +305,7 @@ def run(
     out
         Where the study is kept; made if it does not exist. Every trial is kept the moment it
         finishes.
-    jobs, backend, address, retry_failed, accept_code
+    jobs, backend, address, retry_failed, accept_code, loggers
         As those of `nested_agents.studies.run.run_study`.
     progress
         Whether to show how it goes.
@@ -329,7 +330,7 @@ def run(
     told = observer or (Terminal() if progress else Silent())
     with run_study(
         spec, out, jobs=jobs, backend=backend, address=address, retry_failed=retry_failed,
-        accept_code=accept_code, observer=told,
+        accept_code=accept_code, observer=told, loggers=loggers,
     ) as store:  # fmt: skip
         found = _of(store)
     if found.failed and observer is None:

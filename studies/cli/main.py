@@ -28,6 +28,7 @@ COMMANDS: dict[str, str] = {
     "table": "Print what a study found: conditions against estimates.",
     "compare": "Compare conditions of one study or several, with the power to find differences.",
     "results": "Print what every episode of a study measured.",
+    "watch": "Watch a study while it runs: trials, learning curves, time left, failures.",
     "status": "Tell how far a study is, what failed, and how long is left.",
     "retry": "Run the failed trials of a study again.",
     "export": "Write what a study holds as files for other programs.",

@@ -24,12 +24,13 @@ def run_and_show(
     retry_failed: bool = False,
     accept_code: bool = False,
     formats: tuple[str, ...] = figures.USUAL,
+    loggers: tuple[str, ...] = (),
 ) -> int:
     """Run what is left of a study, print its table, draw its figures.
 
     Parameters
     ----------
-    spec, directory, jobs, backend, address, retry_failed, accept_code
+    spec, directory, jobs, backend, address, retry_failed, accept_code, loggers
         As those of `run_study`.
     replay
         Whether to draw a replay of the first condition's first seed.
@@ -43,7 +44,7 @@ def run_and_show(
     """
     study = run(
         spec, directory, jobs=jobs, backend=backend, address=address, retry_failed=retry_failed,
-        accept_code=accept_code, observer=Terminal(),
+        accept_code=accept_code, observer=Terminal(), loggers=loggers,
     )  # fmt: skip
     replays = _replays(study) if replay and not study.failed else []
     display.print_study(study)

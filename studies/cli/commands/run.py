@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..arguments import Command, File
+from ..arguments import Command, File, Several, Text
 from . import options
 
 if TYPE_CHECKING:
@@ -30,6 +30,14 @@ if TYPE_CHECKING:
 @options.accept_code
 @options.trust
 @options.figures
+@click.option(
+    "--log",
+    "loggers",
+    cls=Several,
+    type=Text(),
+    metavar="file.py:NAME...",
+    help="Tell this logger of every finished trial, as for TensorBoard or MLflow.",
+)
 @options.changes
 def command(
     spec: Path,
@@ -40,6 +48,7 @@ def command(
     accept_code: bool,
     trust: bool,
     figures: tuple[str, ...],
+    loggers: tuple[str, ...],
     changes: tuple[str, ...],
 ) -> int:
     """Run the study of a spec; the same command again continues it.
@@ -71,4 +80,5 @@ def command(
         address=address,
         accept_code=accept_code,
         formats=figures,
+        loggers=loggers,
     )
