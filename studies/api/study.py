@@ -33,6 +33,7 @@ from ..analysis.verdicts import power_text
 from ..catalogue.study import analysed, load_study
 from ..presentation.progress import Terminal
 from ..presentation.tables import SummaryTable, tabulate
+from ..presentation.words import count
 from ..run import Observer, Silent, run_study
 from ..spec.errors import SpecError
 from ..spec.outline import Outline
@@ -334,7 +335,9 @@ def run(
     ) as store:  # fmt: skip
         found = _of(store)
     if found.failed and observer is None:
-        warnings.warn(f"{len(found.failed)} trials failed: study.failed says why", stacklevel=2)
+        warnings.warn(
+            f"{count(len(found.failed), 'trial')} failed: study.failed says why", stacklevel=2
+        )
     return found
 
 

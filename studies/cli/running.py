@@ -7,6 +7,7 @@ from pathlib import Path
 from ..api.study import StudyResults, run
 from ..presentation import figures
 from ..presentation.progress import Terminal, say
+from ..presentation.words import count
 from ..spec.errors import SpecError
 from ..spec.spec import Spec
 from ..workers.workers import Backend
@@ -52,7 +53,7 @@ def run_and_show(
     folder.mkdir(exist_ok=True)
     display.print_places(directory, figures.save(study.figures, folder, formats), replays)
     if study.failed:
-        say(f"{len(study.failed)} trials failed: nested-agents status {directory}")
+        say(f"{count(len(study.failed), 'trial')} failed: nested-agents status {directory}")
     return 1 if study.failed else 0
 
 

@@ -135,7 +135,7 @@ def test_what_holds_no_study_is_refused_in_one_line(tmp_path) -> None:
 def test_failed_trials_are_warned_of(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(learning_curve, "measure", made_up.failing)
     monkeypatch.setattr(studies_run, "check", lambda spec: made_up.MEASURES)
-    with pytest.warns(UserWarning, match=r"1 trials failed: study\.failed says why"):
+    with pytest.warns(UserWarning, match=r"1 trial failed: study\.failed says why"):
         study = na.run(TABLE, tmp_path / "out", jobs=1, progress=False)
     ((condition, seed, error),) = study.failed
     assert (condition, seed) == ("frozen", 1)
