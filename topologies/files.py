@@ -25,8 +25,7 @@ def read(path: str) -> nx.DiGraph | dict[str, Any]:
 
     JSON and TOML hold ``{"edges": [["a", "b"], ...], "alone": [...]}``, or networkx's node-link
     format; or a table with the key ``kind``, or of nested teams with the key ``members``, perhaps
-    under ``topology``. A JSON list is one of nested teams. In GraphML an agent is named by its
-    node's id.
+    under ``topology``. In GraphML an agent is named by its node's id.
 
     Returns
     -------
@@ -121,8 +120,6 @@ def _name(builder: Builder) -> str:
 
 def _table_of(content: Any) -> dict[str, Any] | None:
     """Return the topology's table that a file holds; None if it must be a graph."""
-    if isinstance(content, list):
-        content = {"members": content}
     if isinstance(content, dict) and isinstance(content.get("topology"), dict):
         content = content["topology"]
     if not isinstance(content, dict) or not {"kind", "members"} & content.keys():
