@@ -8,7 +8,8 @@ Three campaigns, each drawn from a seed:
   real workers;
 - *flips*: one bit of one file of a finished study is flipped. Commands that read must print what
   they printed before, or name the file; a run must end with the rows and recordings of the sound
-  study. A file may also be cut short or be a folder;
+  study. A file may also be cut short or be a folder. With ``--every-byte`` every byte of a small
+  database is tried;
 - *hostile input*: specs, files of topologies and polygons, mutated or absurd. Each is accepted or
   refused in one line, within seconds.
 
@@ -241,6 +242,22 @@ def flips(number: int, rng: random.Random, folder: Path) -> Counter[str]:
     return tally
 
 
+def every_byte(rng: random.Random, folder: Path) -> Counter[str]:
+    """Flip a bit in every byte of the database, one after the other, and read the study."""
+    adversary, tally = Adversary(folder, rng), Counter[str]()
+    path = adversary.study / DATABASE
+    sound = path.read_bytes()
+    for at in range(len(sound)):
+        tally["flips"] += 1
+        data = bytearray(sound)
+        data[at] ^= 1 << rng.randrange(8)
+        path.write_bytes(data)
+        for line in adversary.lines()[:2]:
+            tally["reads"] += 1
+            tally[_read(adversary, line, path)] += 1
+    return tally
+
+
 def _read(adversary: Adversary, line: str, path: Path) -> str:
     try:
         said = adversary.command(line)
@@ -464,6 +481,7 @@ def main() -> int:
     parser.add_argument("--kills", type=int, default=100, metavar="N", help="0: none")
     parser.add_argument("--flips", type=int, default=2000, metavar="N", help="0: none")
     parser.add_argument("--hostile", type=int, default=600, metavar="N", help="0: none")
+    parser.add_argument("--every-byte", action="store_true", help="takes a quarter of an hour")
     parser.add_argument("--seed", type=int, default=20)
     options = parser.parse_args()
     durable.os.fsync = lambda _: None  # type: ignore[attr-defined]  # no power fails here
@@ -472,7 +490,10 @@ def main() -> int:
         "flipped bits": lambda rng, folder: flips(options.flips, rng, folder),
         "files cut short, folders in their place": obstacles,
         "hostile input": lambda rng, folder: hostile(options.hostile, rng, folder),
+        "a bit of every byte of the database": every_byte,
     }
+    if not options.every_byte:
+        del campaigns["a bit of every byte of the database"]
     if not options.kills:
         del campaigns["kill -9"]
     if not options.flips:

@@ -103,6 +103,29 @@ def states_of_all(prediction: Prediction, joint_actions: IntArray) -> FloatArray
 
 
 @runtime_checkable
+class GroupPrediction(TeamPrediction, Protocol):
+    """A prediction that tells what is an agent's own and what the agents of a group share."""
+
+    def states_by_group(self, joint_actions: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Return the own variables ``(n, m, n_own)`` and the shared ones ``(G, m, d - n_own)``."""
+        ...
+
+
+def states_by_group(
+    prediction: Prediction,
+    joint_actions: IntArray,
+    groups: tuple[tuple[int, ...], ...],
+    n_own: int,
+) -> tuple[FloatArray, FloatArray]:
+    """Return what `GroupPrediction.states_by_group` does, of any prediction."""
+    if hasattr(prediction, "states_by_group"):
+        found: tuple[FloatArray, FloatArray] = prediction.states_by_group(joint_actions)
+        return found
+    states = states_of_all(prediction, joint_actions)
+    return states[:, :, :n_own], states[[group[0] for group in groups], :, n_own:]
+
+
+@runtime_checkable
 class TabulatedPrediction(Prediction, Protocol):
     """A prediction that has tables of all joint actions: quick where few agents are free."""
 

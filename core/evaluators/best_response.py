@@ -178,6 +178,7 @@ class BestResponse(Aggregation):
 
 def _with(joint_action: IntArray, agents: tuple[int, ...], actions: IntArray) -> IntArray:
     """Return the joint action ``(n,)`` with the `actions` ``(m, k)`` of k agents: ``(m, n)``."""
-    joint = np.tile(joint_action, (len(actions), 1))
-    joint[:, list(agents)] = actions
+    joint = np.empty((len(actions), len(joint_action)), dtype=np.int64)
+    joint[:] = joint_action
+    joint[:, agents] = actions
     return joint

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..arrays import FloatArray, IntArray
 from ..hierarchy import Hierarchy
-from ..protocols import Prediction, RewardPrediction, states_of_all
+from ..protocols import Prediction, RewardPrediction
 from ..settings import Settings
 from .pooled import Pooled, Pooling
 
@@ -179,8 +179,10 @@ class Aggregation:
         """Return whether every action must come to zero: nothing is learned yet, or ever."""
         if self.problem.rule != "value":
             return False
-        concerned = [deliberation.weights[i] for i in self.concerned[deliberation.agent]]
-        return not any(weights[:64].any() or weights.any() for weights in concerned)
+        if len(self.concerned[deliberation.agent]) > 1:
+            return not self._pooled(deliberation).weights[0].any()
+        weights = deliberation.own_weights
+        return not (weights[:64].any() or weights.any())
 
     def worth(self, deliberation: Deliberation, joint_actions: IntArray) -> FloatArray:
         """Return what joint actions ``(m, n)`` are worth to the deciding agent, ``(m,)``."""
@@ -194,8 +196,8 @@ class Aggregation:
                 states = prediction.states(deliberation.agent, joint_actions)
                 values = self.rules.values(deliberation.own_weights, states)
             else:
-                states = states_of_all(prediction, joint_actions)
-                values = self._pooling.mean(self._pooled(deliberation), states)
+                pooled = self._pooled(deliberation)
+                values = self._pooling.mean(pooled, prediction, joint_actions)
         return self.combine(rewards, values)
 
     def _pooled(self, deliberation: Deliberation) -> Pooled:

@@ -13,28 +13,28 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..arrays import FloatArray, IntArray
+from ..protocols import Prediction, states_by_group
 
 if TYPE_CHECKING:
     from ..rules.rule_base import RuleBase
 
 
-class _Part(NamedTuple):
-    """Terms whose variables the same agents share."""
-
-    rules: RuleBase
-    columns: IntArray
-    """Which of the state variables these terms are of."""
-    places: IntArray
-    """Where their consequents stand in theta."""
-
-
 class Pooled(NamedTuple):
-    """The consequent weights of several agents, summed where they see the same; see `Pooling`."""
+    """The consequent weights of k agents of b bodies, summed where they see the same.
 
-    own: FloatArray
-    bodies: FloatArray
-    common: FloatArray
+    Attributes
+    ----------
+    weights
+        Of the agents ``(k, n_rules)``, of their bodies ``(b, n_rules)``, of all ``(1, n_rules)``.
+    agents, bodies
+        Which they are.
+    firsts
+        ``(b + 1,)`` the first agent of every body among them, and k.
+    """
+
+    weights: tuple[FloatArray, FloatArray, FloatArray]
     agents: IntArray
+    bodies: IntArray
     firsts: IntArray
 
 
@@ -50,49 +50,28 @@ class Pooling:
     """
 
     def __init__(self, rules: RuleBase, groups: tuple[tuple[int, ...], ...]) -> None:
+        self._rules, self._groups = rules, groups
         self._body_of = np.array([g for g, group in enumerate(groups) for _ in group])
-        kinds = [rules.shared_by(term) for term in rules.terms]
-        self._own, self._bodies, self._common = (
-            self._part(rules, [t for t, of in enumerate(kinds) if of == kind])
+        sharing = [rules.shared_by(term) for term in rules.terms]
+        own, body, common = (
+            np.array([t for t, by in enumerate(sharing) if by == kind], dtype=np.int64)
             for kind in ("agent", "body", "all")
         )
-
-    @staticmethod
-    def _part(rules: RuleBase, which: list[int]) -> _Part | None:
-        from ..rules.rule_base import RuleBase
-
-        if not which:
-            return None
-        begins = np.concatenate([[0], np.cumsum(rules.sizes)])
-        places = np.concatenate([np.arange(begins[t], begins[t + 1]) for t in which])
-        columns = sorted({j for t in which for j in rules.terms[t]})
-        terms = [tuple(columns.index(j) for j in rules.terms[t]) for t in which]
-        part = RuleBase([rules.partitions[j] for j in columns], terms)
-        return _Part(part, np.array(columns), places)
+        self._kinds = own, body, common
 
     def pooled(self, weights: Sequence[FloatArray], agents: IntArray) -> Pooled:
-        """Return the weights of some agents, summed; `weights` are those of all agents."""
+        """Return the weights of some agents in agent order; `weights` are those of all agents."""
         theta = np.array([weights[i] for i in agents], dtype=float)
         bodies, firsts = np.unique(self._body_of[agents], return_index=True)
-        moves = (self._body_of[agents] == bodies[:, None]).astype(float)
-        none = np.zeros((0, 0))
-        return Pooled(
-            none if self._own is None else np.ascontiguousarray(theta[:, self._own.places]),
-            none if self._bodies is None else moves @ theta[:, self._bodies.places],
-            none if self._common is None else theta[:, self._common.places].sum(axis=0)[None],
-            agents,
-            agents[firsts],
-        )
+        summed = np.add.reduceat(theta, firsts, axis=0), theta.sum(axis=0)[None]
+        return Pooled((theta, *summed), agents, bodies, np.append(firsts, len(agents)))
 
-    def mean(self, pooled: Pooled, states: FloatArray) -> FloatArray:
-        """Return the mean value ``(m,)`` of the pooled agents in states ``(n, m, d)`` of all."""
-        total = np.zeros(states.shape[1])
-        for part, theta, agents in (
-            (self._own, pooled.own, pooled.agents),
-            (self._bodies, pooled.bodies, pooled.firsts),
-            (self._common, pooled.common, pooled.firsts[:1]),
-        ):
-            if part is not None:
-                seen = states[agents[:, None], :, part.columns].transpose(0, 2, 1)
-                total += part.rules.each(theta, seen).sum(axis=0)
+    def mean(self, pooled: Pooled, prediction: Prediction, joint_actions: IntArray) -> FloatArray:
+        """Return the mean value ``(m,)`` of the pooled agents after joint actions ``(m, n)``."""
+        own, shared = states_by_group(prediction, joint_actions, self._groups, self._rules.n_own)
+        if len(pooled.bodies) < len(shared):
+            shared = shared[pooled.bodies]
+        total = self._rules.total(
+            pooled.weights, pooled.agents, pooled.firsts, self._kinds, own, shared
+        )
         return total / len(pooled.agents)

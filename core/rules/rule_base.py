@@ -201,6 +201,27 @@ class RuleBase:
             return kernels.each_compact(theta, states, self.layout)
         return kernels.each_dense(theta, states, self.layout)
 
+    def total(
+        self,
+        weights: tuple[FloatArray, FloatArray, FloatArray],
+        agents: IntArray,
+        firsts: IntArray,
+        kinds: tuple[IntArray, IntArray, IntArray],
+        own: FloatArray,
+        shared: FloatArray,
+    ) -> FloatArray:
+        """Return the summed value ``(m,)`` of some agents, see `core.rules.kernels.total_compact`.
+
+        Shapes are trusted: an evaluator calls this many times at every decision. Where all rules
+        are active, each agent is valued by itself.
+        """
+        if self.compact:
+            return kernels.total_compact(weights, agents, firsts, kinds, own, shared, self.layout)
+        body = np.repeat(np.arange(len(shared)), np.diff(firsts))
+        states = np.concatenate([own[agents], shared[body]], axis=2)
+        total: FloatArray = kernels.each_dense(weights[0], states, self.layout).sum(axis=0)
+        return total
+
     def td_update(
         self,
         theta: FloatArray,

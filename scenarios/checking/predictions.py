@@ -14,11 +14,13 @@ import numpy as np
 from ...core.arrays import FloatArray, IntArray
 from ...core.protocols import (
     Blocks,
+    GroupPrediction,
     RewardPrediction,
     Scenario,
     TabulatedPrediction,
     TeamPrediction,
     groups_of,
+    states_by_group,
 )
 
 MOST_JOINT_ACTIONS = 4**8
@@ -54,18 +56,28 @@ def fault_of_prediction(
     if isinstance(prediction, TeamPrediction):
         together = prediction.states_of_all(joint_actions)
         wanted["states of all agents"] = together, (len(scenario.agents), m, d)
+    groups, n_own = groups_of(scenario), scenario.state_space.n_own
+    own, shared = states_by_group(prediction, joint_actions, groups, n_own)
+    wanted["own variables of all agents"] = own, (len(scenario.agents), m, n_own)
+    wanted["shared variables of all groups"] = shared, (len(groups), m, d - n_own)
     for name, (value, shape) in wanted.items():
         if np.shape(value) != shape:
             return f"predicted {name} of shape {np.shape(value)}, must be {shape}"
         if not np.isfinite(value).all():
             return f"predicted {name} are not finite"
+    alone = np.array([prediction.states(i, joint_actions) for i in range(len(scenario.agents))])
+    body = np.repeat(np.arange(len(groups)), [len(group) for group in groups])
+    by_group = np.concatenate([np.asarray(own), np.asarray(shared)[body]], axis=2)
+    grouped = isinstance(prediction, GroupPrediction)
+    found = [("states_by_group" if grouped else "shared variables of a group", by_group)]
     if isinstance(prediction, TeamPrediction):
-        alone = np.array([prediction.states(i, joint_actions) for i in range(len(together))])
-        wrong = ~_close(apart(scenario, np.asarray(together), alone), alone)
+        found.insert(0, ("states_of_all", np.asarray(together)))
+    for source, states in found:
+        wrong = ~_close(apart(scenario, states, alone), alone)
         if wrong.any():
             agent, _, j = np.argwhere(wrong)[0]
             name = scenario.state_space.variables[j].name
-            return f"states_of_all and states differ in {name} of agent {agent}"
+            return f"{source} and states differ in {name} of agent {agent}"
     if isinstance(prediction, TabulatedPrediction):
         return _wrong_tables(scenario, prediction, rng)
     return None

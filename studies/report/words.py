@@ -62,7 +62,9 @@ def extent(outline: Outline) -> str:
     """Return what a study consists of."""
     after = ""
     if outline.evaluation:
+        longest = outline.table.get("evaluation_steps")
         after = f", {count(outline.evaluation, 'evaluation episode')} after them"
+        after += f" of up to {count(longest, 'step')}" if longest else ""
         elsewhere = len(outline.table.get("evaluations", ()))
         each = "another scenario" if elsewhere == 1 else f"each of {elsewhere} other scenarios"
         after += f" and as many in {each}" if elsewhere else ""

@@ -35,7 +35,7 @@ def difference(old: Spec, old_settings: Mapping[str, Mapping[str, Any]], new: Sp
 def _differences(
     old: Spec, old_settings: Mapping[str, Mapping[str, Any]], new: Spec
 ) -> Iterator[str]:
-    for name in ("study", "episodes", "steps", "evaluation"):
+    for name in ("study", "episodes", "steps", "evaluation", "evaluation_steps"):
         before, after = getattr(old, name), getattr(new, name)
         if before != after:
             yield f"{name} = {show(before)} there, {show(after)} here"

@@ -1,6 +1,7 @@
 """The spec of a study, as it stands in a TOML file.
 
-``study``, ``preset``, ``seeds``, ``episodes``, ``steps``, ``evaluation``, then the tables
+``study``, ``preset``, ``seeds``, ``episodes``, ``steps``, ``evaluation``,
+``evaluation_steps``, then the tables
 ``[scenario]``, ``[topology]``, ``[learner]``, laid over the preset. What is compared:
 ``[[overrides]]``, further tables by name, and ``[sweep]``, lists of values by dotted key; the
 conditions are their combinations. ``[[curriculum]]`` are stages of training before that of the
@@ -65,6 +66,8 @@ class Spec(Settings):
     """Most decisions in an episode."""
     evaluation: Annotated[int, Field(ge=0, le=1_000_000)] = 10
     """Episodes after training in which nothing is explored and nothing learned."""
+    evaluation_steps: Length | None = None
+    """Most decisions in an episode of evaluation; as in training unless it is said."""
     scenario: Mapping[str, Any] = Field(default_factory=dict)
     """Laid over the preset's scenario."""
     topology: Mapping[str, Any] = Field(default_factory=dict)

@@ -144,9 +144,10 @@ class Session:
             self._own.take_over(reached, self.trial.settings.learner)
 
     def _evaluate(self, there: Arrangement, phase: str, observe: Observer | None) -> None:
+        most = self.trial.evaluation_steps or self.trial.steps
         steps = control_loop(
             there.scenario, there.team, episodes=self.trial.evaluation,
-            steps=self.trial.steps, seed=self.trial.seed, first_episode=EVALUATION_WORLDS,
+            steps=most, seed=self.trial.seed, first_episode=EVALUATION_WORLDS,
             learn=False,
         )  # fmt: skip
         measures = measures_of(there.world)

@@ -26,7 +26,7 @@ from .measures import joined
 
 RESULTS_VERSION = 4
 """Raise it when the code changes so that the same trial gives other results."""
-PLAIN = ("study", "condition", "seed", "episodes", "steps", "evaluation")
+PLAIN = ("study", "condition", "seed", "episodes", "steps", "evaluation", "evaluation_steps")
 """What of a trial any process can read as it is."""
 
 
@@ -42,7 +42,7 @@ class Trial:
         Label of its condition; a name only, no part of its identity.
     settings
         What the condition consists of.
-    seed, episodes, steps, evaluation
+    seed, episodes, steps, evaluation, evaluation_steps
         As in `Spec`.
     evaluations
         Names and scenarios in which the trained team is evaluated beside its own.
@@ -61,6 +61,7 @@ class Trial:
     evaluation: int
     evaluations: tuple[tuple[str, ScenarioSettings], ...] = ()
     curriculum: tuple[Stage, ...] = ()
+    evaluation_steps: int | None = None
     sources: Sources = field(default_factory=Sources, compare=False)
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -85,6 +86,8 @@ class Trial:
             "steps": self.steps,
             "evaluation": self.evaluation,
         }
+        if self.evaluation_steps is not None:
+            content["evaluation_steps"] = self.evaluation_steps
         if self.evaluations:
             content["evaluations"] = [
                 [name, scenario.model_dump(mode="json")] for name, scenario in self.evaluations
@@ -157,6 +160,7 @@ def trials_of(spec: Spec) -> tuple[Trial, ...]:
             evaluation=spec.evaluation,
             evaluations=condition.evaluations,
             curriculum=condition.curriculum,
+            evaluation_steps=spec.evaluation_steps,
             sources=spec.sources,
         )
         for seed in spec.seeds

@@ -9,7 +9,7 @@ less than `NEGLIGIBLE`: firing strengths sum to one, so that a value of the pape
 its 5^5 such parts, changes by less than 1e-12 of the largest weight.
 """
 
-from .compact import active_compact, each_compact, td_compact, values_compact
+from .compact import active_compact, each_compact, td_compact, total_compact, values_compact
 from .dense import values_dense
 from .enumeration import Tried, enumerate_contracted, enumerate_dense, enumerate_looked_up
 from .few_states import each_dense, td_dense
@@ -36,6 +36,7 @@ __all__ = [
     "td_compact",
     "td_dense",
     "td_update",
+    "total_compact",
     "unpack",
     "values_compact",
     "values_dense",

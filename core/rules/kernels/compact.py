@@ -67,28 +67,111 @@ def _compact_value(theta, lay: Layout, functions, room) -> float:  # type: ignor
 
 
 @njit(cache=True)
-def _values(theta, states, lay: Layout, out) -> None:  # type: ignore[no-untyped-def]
-    functions, room = _room(lay)
-    for s in range(len(states)):
-        _pairs_of(states[s], 0, lay, functions)
-        out[s] = _compact_value(theta, lay, functions, room)
+def _add_values(  # type: ignore[no-untyped-def]
+    theta, which: IntArray, own, own_rows: IntArray, shared, shared_rows: IntArray, skipped: int,
+    lay: Layout, total,
+) -> None:  # fmt: skip
+    """Add to a total ``(m,)`` what some terms are worth in m states.
+
+    Arrays are taken out of tuples before the loops: to do so within costs more than the arithmetic.
+
+    Parameters
+    ----------
+    theta
+        ``(n_rules,)`` consequent weights.
+    which
+        Indices of terms.
+    own, own_rows
+        Rows of own variables, and which of them belongs to each state ``(m,)``.
+    shared, shared_rows, skipped
+        Rows of variables from the one numbered `skipped` on, likewise.
+    lay
+        Layout, triangular partitions.
+    total
+        ``(m,)``, changed.
+    """
+    (lows, highs, shares), (rules, strengths) = _room(lay)
+    counts, terms, lengths, offsets = lay.counts, lay.terms, lay.lengths, lay.offsets
+    needed = np.zeros(len(counts), np.bool_)
+    for t in which:
+        for v in range(lengths[t]):
+            needed[terms[t, v]] = True
+    for s in range(len(total)):
+        mine, theirs = own_rows[s], shared_rows[s]
+        for j in range(len(needed)):
+            if needed[j]:
+                x = own[mine, j] if j < lay.n_own else shared[theirs, j - skipped]
+                lows[j], highs[j], shares[j] = pair(j, x, lay)
+        value = 0.0
+        for t in which:
+            at, j = offsets[t], terms[t, 0]
+            if lengths[t] == 1:
+                low, high = theta[at + lows[j]], theta[at + highs[j]]
+                value += low + shares[j] * (high - low)
+                continue
+            rules[0], strengths[0], size = 0, 1.0, 1
+            for v in range(lengths[t]):  # as `_corners`
+                j = terms[t, v]
+                m, low, high, share = counts[j], lows[j], highs[j], shares[j]
+                for c in range(size):
+                    rules[size + c], strengths[size + c] = rules[c] * m + high, strengths[c] * share
+                    rules[c], strengths[c] = rules[c] * m + low, strengths[c] * (1.0 - share)
+                size *= 2
+            for c in range(size):
+                value += strengths[c] * theta[at + rules[c]]
+        total[s] += value
 
 
 @njit(cache=True)
 def values_compact(theta: FloatArray, states: FloatArray, packed: Packed) -> FloatArray:
     """Return f ``(m,)`` of states ``(m, d)``, triangular partitions."""
-    out = np.empty(len(states))
-    _values(theta, states, unpack(packed), out)
-    return out
+    return each_compact(theta[None], states[None], packed)[0]
 
 
 @njit(cache=True)
 def each_compact(theta: FloatArray, states: FloatArray, packed: Packed) -> FloatArray:
     """Return f ``(n, s)`` of states ``(n, s, d)``, each by its row of theta ``(n, n_rules)``."""
-    out, lay = np.empty(states.shape[:2]), unpack(packed)
+    out, lay = np.zeros(states.shape[:2]), unpack(packed)
+    terms, rows = np.arange(len(lay.lengths)), np.arange(states.shape[1])
     for i in range(len(states)):
-        _values(theta[i], states[i], lay, out[i])
+        _add_values(theta[i], terms, states[i], rows, states[i], rows, 0, lay, out[i])
     return out
+
+
+@njit(cache=True)
+def total_compact(  # type: ignore[no-untyped-def]
+    weights, agents: IntArray, firsts: IntArray, kinds, own: FloatArray, shared: FloatArray,
+    packed: Packed,
+) -> FloatArray:  # fmt: skip
+    """Return the summed value ``(m,)`` of agents, each thing that they share valued once.
+
+    Parameters
+    ----------
+    weights
+        Consequent weights of the k agents ``(k, n_rules)``, of their b bodies ``(b, n_rules)``
+        and of all ``(1, n_rules)``: those that see the same are summed.
+    agents, firsts
+        ``(k,)`` and ``(b + 1,)``: the agents, and the first of each body among them.
+    kinds
+        The terms of own variables, of variables of the body, and of those common to all.
+    own, shared
+        Own variables ``(n, m, n_own)`` of all agents, shared ones ``(b, m, d - n_own)`` of the
+        bodies.
+    packed
+        Layout, triangular partitions.
+    """
+    of_agents, of_bodies, of_all = weights
+    of_own, of_body, of_common = kinds
+    lay, m = unpack(packed), own.shape[1]
+    rows, n_own = np.arange(m), lay.n_own
+    mine, theirs, common = np.zeros(m), np.zeros(m), np.zeros(m)
+    for b in range(len(shared)):
+        for i in range(firsts[b], firsts[b + 1]):
+            a = agents[i]
+            _add_values(of_agents[i], of_own, own[a], rows, shared[b], rows, n_own, lay, mine)
+        _add_values(of_bodies[b], of_body, own[0], rows, shared[b], rows, n_own, lay, theirs)
+    _add_values(of_all[0], of_common, own[0], rows, shared[0], rows, n_own, lay, common)
+    return mine + theirs + common
 
 
 @njit(cache=True)
@@ -136,26 +219,25 @@ def looked_up(  # type: ignore[no-untyped-def]
 ) -> FloatArray:
     """Return f of joint-action indices from block tables: every active rule is looked up."""
     n_local = len(own_rows) if len(own_rows) else len(own)
-    out = np.empty(len(indices))
-    functions, room = _room(lay)
-    # The own block with which a shared one was last valued, and the value.
+    # The own block with which a shared one was last met, and the number of that pair.
     known = np.full(len(shared) if len(shared_rows) else 0, -1)
-    memory, last = np.empty(len(known)), -1
+    number = np.empty(len(known), np.int64)
+    mine, theirs = np.empty(len(indices), np.int64), np.empty(len(indices), np.int64)
+    pair_of, n_pairs = np.empty(len(indices), np.int64), 0
     for c in range(len(indices)):
         local = indices[c] // divisor % n_local
-        mine = own_rows[local] if len(own_rows) else local
+        a = own_rows[local] if len(own_rows) else local
         row = shared_rows[indices[c]] if len(shared_rows) else indices[c]
-        if len(known) and known[row] == mine:
-            out[c] = memory[row]
+        if len(known) and known[row] == a:
+            pair_of[c] = number[row]
             continue
-        if mine != last:
-            _pairs_of(own[mine], 0, lay, functions)
-            last = mine
-        _pairs_of(shared[row], lay.n_own, lay, functions)
-        out[c] = _compact_value(theta, lay, functions, room)
+        mine[n_pairs], theirs[n_pairs], pair_of[c] = a, row, n_pairs
         if len(known):
-            known[row], memory[row] = mine, out[c]
-    return out
+            known[row], number[row] = a, n_pairs
+        n_pairs += 1
+    values, n_own = np.zeros(n_pairs), lay.n_own
+    _add_values(theta, np.arange(len(lay.lengths)), own, mine, shared, theirs, n_own, lay, values)
+    return values[pair_of]
 
 
 @njit(cache=True, fastmath={"contract"})

@@ -49,13 +49,13 @@ def pair(j: int, x: float, lay: Layout) -> tuple[int, int, float]:
     """Return the two neighbouring triangular functions (lower, upper) and the upper's strength."""
     x = _wrapped(j, x, lay)
     m = lay.counts[j]
-    knots = lay.knots[j]
+    knots = lay.knots  # rows are not taken out: that costs more than what is done with them
     # On a circle x lies between the last centre of the left copy and the first of the right one.
     first, last = (m - 1, 2 * m - 1) if lay.periods[j] > 0.0 else (0, m - 2)
     k = first
-    while k < last and x >= knots[k + 1]:
+    while k < last and x >= knots[j, k + 1]:
         k += 1
-    share = min(max((x - knots[k]) / (knots[k + 1] - knots[k]), 0.0), 1.0)
+    share = min(max((x - knots[j, k]) / (knots[j, k + 1] - knots[j, k]), 0.0), 1.0)
     lower, upper = k, k + 1
     if lower >= m:
         lower -= m

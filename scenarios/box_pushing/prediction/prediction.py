@@ -21,7 +21,7 @@ from .additive import PushSuperposition
 from .belief import outcomes
 from .push import PushModel, push
 from .situation import Premises, Situation
-from .wheel_commands import WheelCommands, choices_of, twist_table, wheel_commands_of
+from .wheel_commands import WheelCommands, choices_of, speeds_of, twist_table, wheel_commands_of
 
 
 class BoxPrediction:
@@ -43,7 +43,7 @@ class BoxPrediction:
     def __init__(self, situation: Situation, model: PushModel, premises: Premises) -> None:
         self.situation, self.model, self.premises = situation, model, premises
         # What was asked for last, and what is known of own blocks, by agent.
-        self._last: tuple[IntArray, View] | None = None
+        self._last: tuple[bytes, View] | None = None
         self._own: dict[int, tuple[FloatArray, IntArray]] = {}
 
     @cached_property
@@ -73,16 +73,21 @@ class BoxPrediction:
 
     def _view_again(self, choices: IntArray) -> View:
         """Return the view of `choices`: the last one, if they are the same."""
-        if self._last is None or not np.array_equal(self._last[0], choices):
-            self._last = choices, self._view(choices)
+        told = choices.tobytes()
+        if self._last is None or self._last[0] != told:
+            self._last = told, self._view(choices)
         return self._last[1]
 
     def seen(self, robots: FloatArray, box: FloatArray, gaps: FloatArray, seconds: float) -> View:
         """Return a view of situations that the present leads to in `seconds`."""
+        periods, outline = seconds / self.premises.hold, self.premises.outline
+        return View(robots, box, gaps, self.situation.goal, self._before, periods, outline)
+
+    @cached_property
+    def _before(self) -> float:
+        """How far the box is from the goal now [m]."""
         goal, now = self.situation.goal, self.situation.box
-        before = float(np.hypot(goal[0] - now[0], goal[1] - now[1]))
-        periods = seconds / self.premises.hold
-        return View(robots, box, gaps, goal, before, periods, self.premises.outline)
+        return float(np.hypot(goal[0] - now[0], goal[1] - now[1]))
 
     def _choices(self, joint_actions: IntArray) -> IntArray:
         """Return the wheel command ``(m, M)`` of each robot in joint actions ``(m, n)``."""
@@ -122,8 +127,8 @@ class BoxPrediction:
         return poses
 
     @cached_property
-    def _shared(self) -> list[FloatArray]:
-        """The shared block ``(m, d - n_own)`` of every robot in the situations of the table."""
+    def _shared(self) -> FloatArray:
+        """The shared blocks ``(M, m, d - n_own)`` in the situations of the table."""
         return self.premises.space.shared_of(self._table[0], range(len(self.situation.groups)))
 
     def robot_of(self, agent: int) -> int:
@@ -175,20 +180,25 @@ class BoxPrediction:
 
     def states_of_all(self, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(n, m, d)`` of all agents for joint actions ``(m, n)``."""
+        own, shared = self.states_by_group(joint_actions)
+        return np.concatenate([own, shared[[robot for robot, _ in self._places]]], axis=2)
+
+    def states_by_group(self, joint_actions: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Return the next own variables of all agents and the shared ones of all robots.
+
+        ``(n, m, n_own)`` and ``(M, m, d - n_own)``, for joint actions ``(m, n)``.
+        """
         choices = self._choices(joint_actions)
         view = self._view_again(choices)
-        shared = self.premises.space.shared_of(view, range(len(self.situation.groups)))
-        n, n_own = len(self._places), self.premises.space.space.n_own
-        found = np.empty((n, len(choices), self.premises.space.space.n_variables))
-        if self.premises.space.own_needs_pose:
-            for agent, states in enumerate(found):
-                states[:, :n_own] = self._own_after(agent, choices, view)
-        else:
-            speeds = self.wheel_commands.speeds[np.arange(choices.shape[1]), choices]
-            own = self.premises.space.own(np.zeros((0, 3)), speeds.reshape(-1), self.situation.goal)
-            found[:, :, :n_own] = own.reshape(len(choices), n, n_own).swapaxes(0, 1)
-        found[:, :, n_own:] = np.asarray(shared)[[robot for robot, _ in self._places]]
-        return found
+        space = self.premises.space
+        shared = space.shared_of(view, range(choices.shape[1]))
+        n, m = len(self._places), len(choices)
+        if space.own_needs_pose:
+            own = np.array([self._own_after(agent, choices, view) for agent in range(n)])
+            return own, shared
+        speeds = speeds_of(choices, self.wheel_commands.speeds)
+        own = space.own(np.zeros((0, 3)), speeds.reshape(-1), self.situation.goal)
+        return own.reshape(n, m, -1), shared
 
     def _own_after(self, agent: int, choices: IntArray, view: View) -> FloatArray:
         """Return the own variables ``(m, n_own)`` of an agent after wheel commands ``(m, M)``."""

@@ -49,12 +49,12 @@ class BoxStateSpace:
     alike: bool = False
     listed: Listed | None = None
 
-    def shared_of(self, view: View, robots: Sequence[int]) -> list[FloatArray]:
-        """Return the shared block ``(m, d - n_own)`` of each robot, fast for many situations."""
+    def shared_of(self, view: View, robots: Sequence[int]) -> FloatArray:
+        """Return the shared blocks ``(k, m, d - n_own)`` of k robots, fast for many situations."""
         if self.alike:
-            return [self.shared(view, robots[0])] * len(robots)
+            return np.stack([self.shared(view, robots[0])] * len(robots))
         if self.listed is None:
-            return [self.shared(view, r) for r in robots]
+            return np.stack([self.shared(view, r) for r in robots])
         return self.listed.predicted(view, robots)
 
     def is_own(self, variable: str) -> bool:
@@ -96,18 +96,18 @@ class Listed:
         ]
         return np.stack(columns, axis=1)
 
-    def predicted(self, view: View, robots: Sequence[int]) -> list[FloatArray]:
-        """Return the shared block ``(m, variables)`` of each robot, compiled where it can be."""
+    def predicted(self, view: View, robots: Sequence[int]) -> FloatArray:
+        """Return the shared blocks ``(k, m, variables)`` of robots, compiled where it can be."""
         compiled = self._columns.of(view, robots)
         if not self.functions:
-            return list(compiled)
+            return compiled
         blocks = np.empty((len(robots), len(view.box), len(self._things)))
         blocks[:, :, self._is_compiled] = compiled
         columns, guarded = np.flatnonzero(~self._is_compiled), view.guarded()
         for block, robot in zip(blocks, robots, strict=True):
             for column, function in zip(columns, self.functions, strict=True):
                 block[:, column] = function.checked(guarded, robot)
-        return list(blocks)
+        return blocks
 
 
 def _paper_own(poses: FloatArray, speeds: FloatArray, goal: FloatArray) -> FloatArray:

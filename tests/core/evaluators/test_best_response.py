@@ -5,6 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 
+from nested_agents.core.arrays import FloatArray
 from nested_agents.core.evaluators.auto import AutoSettings
 from nested_agents.core.evaluators.best_response import BestResponse, BestResponseSettings
 from nested_agents.core.evaluators.evaluator import (
@@ -144,13 +145,21 @@ def test_agents_below_answer_to_what_is_decided_above(world, rules) -> None:
         assert joint[3] == first
 
 
+class Remembered:
+    """A prediction that leads to the same states whatever is done."""
+
+    def __init__(self, states: FloatArray) -> None:
+        self.states_of_all = lambda joint_actions: states
+
+
+@pytest.mark.parametrize("membership", ["triangular", "sigmoid"])
 @pytest.mark.parametrize("order", [1, 2, 3])
-def test_pooled_means_are_means(order: int) -> None:
+def test_pooled_means_are_means(order: int, membership: str) -> None:
     names = ("own", "mine", "ours", "common")
     space = StateSpace(
         "demo", tuple(Variable(name, "m", 0.0, 1.0) for name in names), 1, ("ours", "common")
     )
-    rules = RuleBase.build(space, RuleBaseSettings(order=order))
+    rules = RuleBase.build(space, RuleBaseSettings(order=order, membership=membership))
     rng = np.random.default_rng(order)
     groups, agents = ((0, 1), (2, 3), (4, 5)), np.array([1, 2, 3, 5])
     states = rng.uniform(size=(6, 7, 4))
@@ -159,7 +168,8 @@ def test_pooled_means_are_means(order: int) -> None:
     theta = rng.normal(size=(6, rules.n_rules))
     pooling = Pooling(rules, groups)
     expected = np.mean([rules.values(theta[i], states[i]) for i in agents], axis=0)
-    found = pooling.mean(pooling.pooled(list(theta), agents), states)
+    pooled, joint_actions = pooling.pooled(list(theta), agents), np.zeros((7, 6), dtype=int)
+    found = pooling.mean(pooled, Remembered(states), joint_actions)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
 
 

@@ -116,6 +116,14 @@ def test_evaluation_with_other_agents_leaves_the_rest_of_a_trial_as_it_is(taught
     assert alone.rows == tuple(r for r in taught.rows if r.phase != "evaluation:same")
 
 
+def test_episodes_of_evaluation_may_be_longer_than_those_of_training():
+    table = {"preset": "frozen", "steps": 3, "evaluations": {"same": {}}}
+    trial = only(**table, evaluation_steps=5)
+    steps = {row.phase: row.steps for row in run_trial(pickle.loads(pickle.dumps(trial))).rows}
+    assert steps == {"training": 3, "evaluation": 5, "evaluation:same": 5}
+    assert len({t.identity for t in (trial, only(**table), only(**table, evaluation_steps=4))}) == 3
+
+
 def test_weights_of_a_role_decide_for_any_number_of_agents():
     """One cart is enough to learn that carts go to the line."""
     trained = only(
