@@ -58,19 +58,19 @@ class Pace:
     regression: float
     bytes: tuple[float, float]
 
-    def seconds(self, steps: float, training: Sequence[int], evaluations: int) -> float:
+    def seconds(self, steps: float, training: Sequence[int], evaluation: float) -> float:
         """Return the time of a trial whose episodes take so many steps.
 
         Parameters
         ----------
         steps
-            Of an episode.
+            Of an episode of training.
         training
             Episodes of training, stage by stage.
-        evaluations
-            Episodes of all evaluations.
+        evaluation
+            Steps of all evaluations together.
         """
-        acting = self.acting * steps * (sum(training) + evaluations)
+        acting = self.acting * (steps * sum(training) + evaluation)
         learning = sum(
             self.learning * steps * n + self.regression * steps**2 * n * (n + 1) / 2
             for n in training
@@ -220,8 +220,10 @@ def _taken(
             training = [*(stage.episodes for stage in trial.curriculum), trial.episodes]
             evaluations = trial.evaluation * (1 + len(trial.evaluations))
             pace = paced(trial)
-            for i, steps in enumerate((QUICK * trial.steps, trial.steps)):
-                spent[i] += len(spec.seeds) * pace.seconds(steps, training, evaluations)
+            evaluated = evaluations * (trial.evaluation_steps or trial.steps)
+            for i, share in enumerate((QUICK, 1.0)):
+                seconds = pace.seconds(share * trial.steps, training, share * evaluated)
+                spent[i] += len(spec.seeds) * seconds
             held, more = pace.bytes
             largest = max(largest, held + more * trial.steps * sum(training))
     longest = spent / processes
@@ -230,7 +232,10 @@ def _taken(
 
 def paced(trial: Trial) -> Pace:
     """Return what a condition's trials take, by trying one of them out."""
-    Session(replace(trial, seed=SEED, episodes=1, steps=2, curriculum=())).train(1)
+    alone = replace(trial, seed=SEED, curriculum=(), evaluations=(), evaluation_steps=None)
+    warming = Session(replace(alone, episodes=1, steps=2, evaluation=1))
+    warming.train(1)
+    warming.evaluate()
     session = Session(replace(trial, seed=SEED, episodes=EPISODES, curriculum=()))
     held = _bytes(session)
     acting: list[float] = []
@@ -249,7 +254,8 @@ def paced(trial: Trial) -> Pace:
     # An episode of T steps takes T (a + b N) to learn from, N being the steps kept by its end.
     (per_step, per_kept), _ = nnls(np.stack([steps, steps * np.cumsum(steps)], axis=1), taken)
     more = max(_bytes(session) - held, 0.0) / steps.sum()
-    return Pace(float(np.mean(acting)), float(per_step), float(per_kept), (held, float(more)))
+    # The median: what else a machine does now and then is not the study's.
+    return Pace(float(np.median(acting)), float(per_step), float(per_kept), (held, float(more)))
 
 
 def _bytes(session: Session) -> float:
