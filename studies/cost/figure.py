@@ -56,8 +56,8 @@ def draw(rows: Sequence[CostRow], path: Path) -> None:
             axes.grid(alpha=0.25)
         handles = _legend(list(series), measured)
         longest = max(len(str(handle.get_label())) for handle in handles)
-        # A letter is about 0.07 in wide, the sample of a line and its margins 0.6 in.
-        columns = int(figure.get_figwidth() / (0.07 * longest + 0.6))
+        # A letter is about 0.06 in wide, the sample of a line and its margins 0.5 in.
+        columns = int(figure.get_figwidth() / (0.06 * longest + 0.5))
         figure.legend(handles=handles, loc="outside lower center", ncols=max(1, min(4, columns)))
         write(figure, path)
 
