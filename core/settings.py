@@ -95,6 +95,14 @@ class ScenarioSettings(Settings):
         """Return what looks like a slip of the pen, a line each, such as a size in another unit."""
         return ()
 
+    def suited(self, preset: str) -> Mapping[str, Any]:
+        """Return what this scenario lays over a preset: its ``learner`` and ``topology`` tables.
+
+        A preset is made for box pushing; what learns best elsewhere may be something else, and
+        depend on the settings. What a spec says itself lies over both. Nothing by default.
+        """
+        return {}
+
     @property
     def onset(self) -> int | None:
         """Episode in which something is scheduled to change, such as a failure; none: never."""
