@@ -6,21 +6,21 @@ argument may be. A further topology is one settings class and one line in `TOPOL
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import networkx as nx
 import numpy as np
-from pydantic import Field, ValidationError
+from pydantic import Field
 from typing_extensions import TypeAliasType
 
 from ..core import sources
 from ..core.hierarchy import Hierarchy
 from ..core.protocols import Scenario, groups_of
-from ..core.refusals import rule
-from ..core.registry import Plugged, SettingsRegistry, closest
+from ..core.refusals import closest
+from ..core.registry import Plugged, SettingsRegistry
 from ..core.robot_agents import per_robot
-from ..core.settings import Fraction, Settings
+from ..core.settings import Fraction, Settings, SettingsError, tuples
 from ..core.single_agent import SingleAgent
 from . import builders, files
 from .builders import from_networkx
@@ -48,11 +48,11 @@ class TopologySettings(Settings):
     @property
     def title(self) -> str:
         """What it is called in complaints."""
-        return self.kind
+        return self.kind or type(self).__name__
 
     def build(self, agents: Sequence[str], groups: Groups) -> Any:
         """Return the graph over named agents, given by group too."""
-        raise ValueError(f"is no hierarchy of {len(agents)} agents; see `arrange`")
+        raise ValueError(f"is not of these {len(agents)} agents; see `arrange`")
 
     def arrange(self, scenario: Scenario) -> tuple[Scenario, Hierarchy]:
         """Return a scenario and the hierarchy of its agents.
@@ -80,7 +80,7 @@ class ChainSettings(TopologySettings):
     def parsed(cls, argument: str) -> Self:
         """Read the order: a word, or all names separated by commas."""
         if argument in ("listed", "reversed", "interleaved"):
-            return cls.model_validate({"order": argument})
+            return cls(**{"order": argument})
         names = _names(argument)
         if not all(names):
             raise ValueError(f"order must be written a,b,c, received {argument!r}")
@@ -152,7 +152,7 @@ class TeamsSettings(TopologySettings):
     @classmethod
     def parsed(cls, argument: str) -> Self:
         """Read the link."""
-        return cls.model_validate({"link": argument})
+        return cls(**{"link": argument})
 
     def build(self, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
         """Return the graph."""
@@ -227,7 +227,7 @@ class EdgesSettings(TopologySettings):
             if len(part) > 2 or not all(part):
                 raise ValueError(f"an edge must be written a>b, received {'>'.join(part)!r}")
         edges = tuple(part for part in parts if len(part) == 2)
-        return cls.model_validate({"edges": edges, "alone": [p[0] for p in parts if len(p) == 1]})
+        return cls(**{"edges": edges, "alone": [p[0] for p in parts if len(p) == 1]})
 
     def build(self, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
         """Return the graph."""
@@ -255,13 +255,13 @@ class RandomSettings(TopologySettings):
 
 
 class FileSettings(TopologySettings):
-    """A graph from a GraphML or JSON file."""
+    """A graph or nested teams from a GraphML, JSON or TOML file."""
 
     kind: Literal["file"] = "file"
     path: str
     """Of the file, relative to the spec."""
 
-    argument: ClassVar[str] = "PATH.graphml|PATH.json"
+    argument: ClassVar[str] = "PATH.graphml|PATH.json|PATH.toml"
 
     @classmethod
     def parsed(cls, argument: str) -> Self:
@@ -275,7 +275,27 @@ class FileSettings(TopologySettings):
 
     def build(self, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
         """Return the graph."""
-        return from_networkx(files.read_graph(self.path), agents)
+        found = self.content
+        if isinstance(found, TopologySettings):
+            return found.build(agents, groups)
+        return from_networkx(found, agents)
+
+    @property
+    def content(self) -> nx.DiGraph | TopologySettings:
+        """What the file holds: a graph, or another topology.
+
+        Raises
+        ------
+        ValueError
+            If it holds neither.
+        """
+        found = files.read(self.path)
+        if isinstance(found, nx.Graph):
+            return found
+        try:
+            return parse(found)
+        except ValueError as error:
+            raise ValueError(f"{self.path}: {error}") from None
 
 
 class SingleAgentSettings(TopologySettings):
@@ -321,11 +341,12 @@ TOPOLOGIES = SettingsRegistry(
 """Topologies by name."""
 
 
-def parse(text: str) -> TopologySettings:
-    """Read a topology from a string.
+def parse(text: str | Mapping[str, Any]) -> TopologySettings:
+    """Read a topology from a string, or from a table as it stands in a spec.
 
-    Besides ``"kind"`` and ``"kind:argument"``, a graph file, a ``file.py:function`` and the name of
-    an installed package's topology stand for themselves.
+    Besides ``"kind"`` and ``"kind:argument"``, a file of a graph or of such a table, a
+    ``file.py:function`` and the name of an installed package's topology stand for themselves. A
+    table without a kind that has `members` is one of teams.
 
     Raises
     ------
@@ -336,7 +357,13 @@ def parse(text: str) -> TopologySettings:
     --------
     >>> parse("tree:3"), parse("chain")
     (TreeSettings(kind='tree', branching=3), ChainSettings(kind='chain', order='listed'))
+    >>> parse({"members": [["a", "b"], ["c"]]}).members
+    (('a', 'b'), ('c',))
     """
+    if isinstance(text, Mapping):
+        return _of_table(text)
+    if not isinstance(text, str):
+        raise ValueError(f"topology {text!r}: must be a name, a file or a table")
     kind, colon, argument = text.partition(":")
     try:
         if kind in TOPOLOGIES.built_in:
@@ -349,12 +376,27 @@ def parse(text: str) -> TopologySettings:
             found = TOPOLOGIES.parsed(text)
             assert isinstance(found, TopologySettings)
             return found
-    except ValidationError as error:
-        raise ValueError(f"topology {text!r}: {_one_line(error)}") from None
+    except SettingsError as error:
+        raise ValueError(f"topology {text!r}: {error.problem}") from None
     except ValueError as error:
         raise ValueError(f"topology {text!r}: {error}") from None
     known = closest(kind, TOPOLOGIES.names())
     raise ValueError(f"topology {text!r}: {known}, or a file")
+
+
+def _of_table(table: Mapping[str, Any]) -> TopologySettings:
+    """Return the settings of a table."""
+    kind = table.get("kind", "teams" if "members" in table else None)
+    if not isinstance(kind, str):
+        raise ValueError(f"topology.kind = {kind!r}: {closest(kind, TOPOLOGIES.names())}")
+    try:
+        found = TOPOLOGIES.model(kind)(**{**tuples(dict(table)), "kind": kind})
+    except SettingsError as error:
+        raise ValueError(f"topology.{error.problem}") from None
+    except ValueError as error:
+        raise ValueError(f"topology.kind = {kind!r}: {error}") from None
+    assert isinstance(found, TopologySettings)
+    return found
 
 
 Topology = Annotated[TopologySettings, Plugged(TOPOLOGIES, parse)]
@@ -393,18 +435,6 @@ def _integer(text: str, what: str) -> int:
         return int(text)
     except ValueError:
         raise ValueError(f"{what} = {text!r}: must be a whole number") from None
-
-
-def _one_line(error: ValidationError) -> str:
-    problems = []
-    for problem in error.errors():
-        where, value = ".".join(str(part) for part in problem["loc"]), problem["input"]
-        if problem["type"] == "missing":
-            problems.append(f"{where}: missing")
-        else:
-            said = rule(problem["msg"])
-            problems.append(f"{where} = {value!r}: {said}" if where else said)
-    return "; ".join(problems)
 
 
 def _named(agents: Sequence[str], groups: Sequence[Any]) -> Groups:

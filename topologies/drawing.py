@@ -73,7 +73,7 @@ def draw(
     axes.text(
         centre,
         bottom + 0.17,
-        _note(hierarchy),
+        _note(hierarchy, groups),
         ha="center",
         va="center",
         fontsize=7.5,
@@ -173,14 +173,18 @@ def _implied(hierarchy: Hierarchy) -> set[tuple[int, int]]:
     return set(hierarchy.edges) - set(nx.transitive_reduction(nx.DiGraph(hierarchy.edges)).edges)
 
 
-def _note(hierarchy: Hierarchy) -> str:
+def _note(hierarchy: Hierarchy, groups: Sequence[Sequence[int]] | None) -> str:
     if hierarchy.peers:
         return "lines: peers, who decide at the same time"
     implied = len(_implied(hierarchy))
     grey = "grey arrows: implied by the others"
     hidden = f"{implied} edges implied by the others are not shown"
-    notes = ["numbers: order of decision", hidden if implied > MOST_IMPLIED else grey]
-    return "; ".join(notes[: 2 if implied else 1])
+    notes = ["numbers: order of decision"]
+    if groups and max(map(len, groups)) > 1:
+        notes.append("colours: robots")
+    if implied:
+        notes.append(hidden if implied > MOST_IMPLIED else grey)
+    return "; ".join(notes)
 
 
 def _arrows(axes, hierarchy: Hierarchy, places: FloatArray) -> None:  # type: ignore[no-untyped-def]

@@ -14,7 +14,7 @@ from typing import Any, Literal
 from ..core.cost import below_counts
 from ..core.hierarchy import Hierarchy
 from ..core.robot_agents import MOST_ACTIONS, robot_of
-from . import TOPOLOGIES, TopologySettings, build, builders, files, parse
+from . import TOPOLOGIES, TopologySettings, build, builders, parse
 from .checks import check_legible
 from .config import (
     ChainSettings,
@@ -125,7 +125,10 @@ def named_by(settings: TopologySettings) -> tuple[str, ...]:
     elif isinstance(settings, CoordinationGraphSettings) and settings.edges is not None:
         names = [name for pair in settings.edges for name in pair]
     elif isinstance(settings, FileSettings):
-        names = [str(node) for node in files.read_graph(settings.path)]
+        found = settings.content
+        if isinstance(found, TopologySettings):
+            return named_by(found)
+        names = [str(node) for node in found]
     check_legible(names)
     return tuple(dict.fromkeys(names))
 

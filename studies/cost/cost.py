@@ -47,6 +47,8 @@ from ...topologies.view import team_of
 from ..analysis.statistics import Estimate
 
 MEMBERSHIPS = 5
+PAPER = Problem(5**7, 4, 450)
+"""|S|, |A| and L of the paper's experiment."""
 RULES = MEMBERSHIPS**2
 """|S| of an agent in what is counted and timed."""
 LEARNER = TDLambdaSettings(
