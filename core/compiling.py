@@ -1,4 +1,8 @@
-"""Compilation of kernels, cached on disk until anything changes that they are made of.
+"""Compilation of kernels: at their first call, by one process at a time, cached on disk.
+
+numba takes a second to import and a kernel seconds to compile, so that neither is done before a
+kernel is called: commands that only read never do. Of several processes that need the same kernel
+one compiles it and the others take it from the cache.
 
 numba takes a cached kernel for good as long as the file of the kernel is what it was. A kernel is
 also made of the kernels that it calls and of the constants that it reads, wherever they come from:
@@ -7,32 +11,116 @@ here the files that its own file imports, and those that these import, count as 
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
 import hashlib
 import re
+import threading
 from collections.abc import Callable, Iterator
-from functools import cache
+from functools import cache, cached_property, update_wrapper
 from pathlib import Path
-from typing import Any, TypeVar
-
-import numba
+from types import CodeType, ModuleType
+from typing import Any, TypeVar, cast
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 IMPORT = re.compile(r"^\s*from (\.+)([\w.]*) import ", re.MULTILINE)
 """An import inside the package; the house rules know no other."""
 
+LOCK = "compiling.lock"
+"""The file beside cached kernels that a process holds while it compiles."""
 
-def njit(**options: Any) -> Callable[[F], F]:
-    """Return `numba.njit`, with a cache that knows all that a kernel is made of."""
+_threads = threading.RLock()
 
-    def decorate(function: F) -> F:
-        compiled = numba.njit(**options)(function)
-        file = getattr(getattr(compiled, "_cache", None), "_cache_file", None)
+
+class Kernel:
+    """A function that is compiled when it is first called.
+
+    Parameters
+    ----------
+    function
+        What to compile.
+    options
+        Of `numba.njit`.
+    """
+
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+        update_wrapper(self, function)
+        self.py_func, self._options = function, options
+        self._ready: Callable[..., Any] | None = None
+
+    @cached_property
+    def compiled(self) -> Any:
+        """What numba makes of the function; the kernels that it calls are made first."""
+        import numba
+
+        here = self.py_func.__globals__
+        names = set(_names(self.py_func.__code__))
+        for name in names & here.keys():
+            if isinstance(here[name], Kernel):
+                here[name] = here[name].compiled
+            elif isinstance(here[name], ModuleType):
+                for inner in names & vars(here[name]).keys():
+                    thing = getattr(here[name], inner)
+                    if isinstance(thing, Kernel):
+                        setattr(here[name], inner, thing.compiled)
+        compiled = numba.njit(**self._options)(self.py_func)
+        file = _cache_file(compiled)
         if file is not None:  # interpreted kernels, NUMBA_DISABLE_JIT=1, have none
-            file._source_stamp = (file._source_stamp, stamp(Path(function.__code__.co_filename)))
+            source = Path(self.py_func.__code__.co_filename)
+            file._source_stamp = (file._source_stamp, stamp(source))
         return compiled
 
+    def __call__(self, *args: Any) -> Any:
+        """Call the compiled function."""
+        if self._ready is not None:
+            return self._ready(*args)
+        with _threads:
+            compiled = self.compiled
+            with _alone(_cache_file(compiled)):
+                found = compiled(*args)
+            self._ready = compiled
+        return found
+
+    def __getattr__(self, name: str) -> Any:
+        """Return what the compiled function has, as its statistics."""
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return getattr(self.compiled, name)
+
+
+def njit(**options: Any) -> Callable[[F], F]:
+    """Return a decorator like `numba.njit` that compiles at the first call, see `Kernel`."""
+
+    def decorate(function: F) -> F:
+        return cast(F, Kernel(function, options))
+
     return decorate
+
+
+def _names(code: CodeType) -> Iterator[str]:
+    yield from code.co_names
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _names(constant)
+
+
+def _cache_file(compiled: Any) -> Any:
+    """Return numba's index of cached versions; interpreted and uncached functions have none."""
+    return getattr(getattr(compiled, "_cache", None), "_cache_file", None)
+
+
+@contextlib.contextmanager
+def _alone(file: Any) -> Iterator[None]:
+    """Let no other process compile; without a folder that can be written to, all may."""
+    with contextlib.ExitStack() as stack:
+        if file is not None:
+            with contextlib.suppress(OSError):
+                folder = Path(file._cache_path)
+                folder.mkdir(parents=True, exist_ok=True)
+                lock = stack.enter_context((folder / LOCK).open("w"))
+                fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
 
 
 def stamp(path: Path) -> str:

@@ -84,7 +84,7 @@ class RuleBase:
         if self.n_rules > MOST_RULES:
             raise ValueError(f"rule base: {self.n_rules} rules, allowed {MOST_RULES} at most")
         self.layout = kernels.layout(self.partitions, self.terms, n_own)
-        # Not worth compiling it for; interpreted kernels, NUMBA_DISABLE_JIT=1, are plain already.
+        # Not worth compiling it for.
         lay = getattr(kernels.unpack, "py_func", kernels.unpack)(self.layout)
         self.n_parts = int(lay.row_sizes @ lay.part_sizes)
         self.dtype = np.dtype(dtype)

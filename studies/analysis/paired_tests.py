@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import stats
+import scipy
 
 Array = NDArray[np.float64]
 
@@ -52,7 +52,7 @@ def friedman(values: ArrayLike, permutations: int = 9999, seed: int = 0) -> Frie
     n, k = array.shape
     if n < 2 or k < 2:
         raise ValueError(f"friedman: {n} seeds x {k} conditions, allowed: 2 x 2 or more")
-    ranks = stats.rankdata(array, axis=1) - (k + 1) / 2
+    ranks = scipy.stats.rankdata(array, axis=1) - (k + 1) / 2
     spread = (ranks**2).sum() / (k - 1)  # per-seed variance summed: what ties leave of the ranks
     if spread == 0.0:
         return Friedman(0.0, 1.0, 0.0)

@@ -12,13 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import stats
+import scipy
+from scipy import special
 
 Array = NDArray[np.float64]
 
 STATISTICS: dict[str, Callable[[Array], Array]] = {
     "mean": lambda x: np.mean(x, axis=-1),
-    "iqm": lambda x: stats.trim_mean(x, 0.25, axis=-1),
+    "iqm": lambda x: scipy.stats.trim_mean(x, 0.25, axis=-1),
     "median": lambda x: np.median(x, axis=-1),
 }
 """Statistics of the last axis by name; the interquartile mean leaves out a quarter at each end."""
@@ -120,7 +121,7 @@ def _bounded(
     least, greatest = bounds
     low, high = np.clip(low, *bounds), np.clip(high, *bounds)
     if np.isfinite(greatest - least):
-        z = stats.norm.ppf(0.5 + level / 2.0)
+        z = special.ndtri(0.5 + level / 2.0)
         reach = (greatest - least) * z**2 / (n_runs + z**2)
         low = np.where(value >= greatest, np.minimum(low, greatest - reach), low)
         high = np.where(value <= least, np.maximum(high, least + reach), high)
@@ -136,13 +137,13 @@ def _student(strata: list[Array], level: float) -> Array:
     shares = np.divide(parts, variance, out=np.zeros_like(parts), where=variance > 0)
     # Where nothing varies the interval has no width, with any degrees of freedom.
     degrees = 1.0 / np.maximum((shares**2 / freedom).sum(axis=0), 1e-300)
-    return np.asarray(stats.t.ppf(0.5 + level / 2.0, degrees) * np.sqrt(variance))
+    return np.asarray(special.stdtrit(degrees, 0.5 + level / 2.0) * np.sqrt(variance))
 
 
 def _tail(level: float, n_runs: int) -> float:
     """Return the share of resamples beyond either end of an interval."""
-    reach = stats.t.ppf(0.5 + level / 2.0, n_runs - 1) * np.sqrt(n_runs / (n_runs - 1))
-    return float(stats.norm.sf(reach))
+    reach = special.stdtrit(n_runs - 1, 0.5 + level / 2.0) * np.sqrt(n_runs / (n_runs - 1))
+    return float(special.ndtr(-reach))
 
 
 def rate(outcomes: ArrayLike, level: float = 0.95) -> Estimate:
@@ -180,7 +181,7 @@ def rate(outcomes: ArrayLike, level: float = 0.95) -> Estimate:
         alike = (np.clip(effect, 1.0, n_episodes) - 1.0) / (n_episodes - 1)
     alike = (ALIKE + rarer * alike) / (ALIKE + rarer)
     n = array.size / (1.0 + (n_episodes - 1) * alike)
-    z = stats.norm.ppf(0.5 + level / 2.0)
+    z = special.ndtri(0.5 + level / 2.0)
     centre = (p + z**2 / (2.0 * n)) / (1.0 + z**2 / n)
     half = z / (1.0 + z**2 / n) * np.sqrt(p * (1.0 - p) / n + z**2 / (4.0 * n**2))
     low, high = np.clip([centre - half, centre + half], 0.0, 1.0)

@@ -16,7 +16,7 @@ from textwrap import wrap
 from typing import Any
 
 import numpy as np
-from scipy.optimize import nnls
+import scipy
 
 from ..analysis.power import SMALLEST, USUAL_DEVIATION, detectable, seeds_for
 from ..analysis.verdicts import WIDTH, power_text
@@ -252,7 +252,9 @@ def paced(trial: Trial) -> Pace:
     steps = np.array([len(episode) for episode in learning], dtype=float)
     taken = np.array([sum(episode) for episode in learning])
     # An episode of T steps takes T (a + b N) to learn from, N being the steps kept by its end.
-    (per_step, per_kept), _ = nnls(np.stack([steps, steps * np.cumsum(steps)], axis=1), taken)
+    (per_step, per_kept), _ = scipy.optimize.nnls(
+        np.stack([steps, steps * np.cumsum(steps)], axis=1), taken
+    )
     more = max(_bytes(session) - held, 0.0) / steps.sum()
     # The median: what else a machine does now and then is not the study's.
     return Pace(float(np.median(acting)), float(per_step), float(per_kept), (held, float(more)))

@@ -23,7 +23,7 @@ from statistics import median
 from typing import Literal
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from ...core.cost import Problem, below_counts, is_chain
 from ...core.decision import Decision
@@ -263,8 +263,8 @@ def exponent(
     if not points:
         return None
     x, y = zip(*points, strict=True)
-    fit = stats.linregress(x, y)
-    half = stats.t.ppf(0.5 + level / 2, len(points) - 2) * fit.stderr
+    fit = scipy.stats.linregress(x, y)
+    half = scipy.stats.t.ppf(0.5 + level / 2, len(points) - 2) * fit.stderr
     value, low, high = (np.asarray(v) for v in (fit.slope, fit.slope - half, fit.slope + half))
     return Estimate(value, low, high)
 
