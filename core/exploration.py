@@ -166,8 +166,11 @@ class BurstExploration(ExplorationSettings):
 
     kind: Literal["burst"] = "burst"
     rate: Fraction = 0.3
+    """Fraction of explorative decisions in the first episode."""
     decay: Fraction = 0.75
+    """Factor on that fraction from episode to episode."""
     floor: Fraction = 0.02
+    """Fraction of explorative decisions below which it does not fall."""
     team_limit: Positive | None = None
     """Agents that explore at a time, at most, in the mean: in a large team somebody else disturbs
     always; none: no limit."""
