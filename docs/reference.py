@@ -134,8 +134,8 @@ def keys() -> Iterator[str]:
     yield "# Keys of a spec\n"
     yield "This page is made from the settings models that check every spec, and from the text"
     yield "beside their fields. `nested-agents keys scenario.box` prints any part of it in a"
-    yield "terminal. A key is written in the table of its heading. *Required* means that there is no"
-    yield "default; *none* is the absence of a value, and cannot be written in TOML.\n"
+    yield "terminal. A key is written in the table of its heading. *Required* means that there is"
+    yield "no default; *none* is the absence of a value, and cannot be written in TOML.\n"
     for one in tables():
         yield f"## {code(one.heading) if one.name else 'The top of a spec'}\n"
         yield f"{prose(one.summary)}\n"
