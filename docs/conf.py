@@ -1,5 +1,6 @@
 """Sphinx configuration."""
 
+import re
 import sys
 from importlib.metadata import version as installed_version
 from pathlib import Path
@@ -54,3 +55,16 @@ html_title = f"nested-agents {release}"
 html_theme_options = {"navigation_with_keys": True}
 html_static_path = ["_static"]
 html_css_files = ["tables.css"]
+
+
+def escape_bars(app, what, name, thing, options, lines):
+    """Keep sizes of sets, |S|, from being taken for substitutions outside of literal text."""
+    for i, line in enumerate(lines):
+        parts = line.split("``")
+        parts[::2] = [re.sub(r"\|(\w+)\|", r"\|\1\|", part) for part in parts[::2]]
+        lines[i] = "``".join(parts)
+
+
+def setup(app):
+    """Connect what is above."""
+    app.connect("autodoc-process-docstring", escape_bars)
