@@ -243,8 +243,9 @@ def api() -> Iterator[str]:
         thing = getattr(nested_agents, name)
         said = "" if isinstance(thing, Measure) else (thing.__doc__ or "")
         first = prose(" ".join(said.strip().partition("\n\n")[0].split()))
-        role = f"{{py:obj}}`{name} <nested_agents.{module}.{attribute}>`"
-        rows.append((role, first.replace("*", "\\*"), f"`{module}`"))
+        home = getattr(thing, "__module__", f"nested_agents.{module}")
+        role = f"{{py:obj}}`{name} <{home}.{attribute}>`"
+        rows.append((role, first.replace("*", "\\*"), code(home.removeprefix("nested_agents."))))
     yield from table(("name", "meaning", "module"), rows)
     yield "```{toctree}\n:maxdepth: 1\n"
     yield from MODULES
