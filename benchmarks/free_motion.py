@@ -15,7 +15,7 @@ from scipy.linalg import expm
 
 from nested_agents.scenarios.box_pushing.config import CONTROL_PERIOD, Failure
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
-from nested_agents.scenarios.box_pushing.world.failures import Failures
+from nested_agents.scenarios.box_pushing.world.failures import WheelFailures
 from nested_agents.scenarios.box_pushing.world.robots import (
     ROBOTS,
     RobotSpec,
@@ -44,13 +44,13 @@ def found(robot: RobotSpec, failure: dict[str, Any] | None) -> Any:
     return np.array([cos * vx + sin * vy, cos * vy - sin * vx, omega])
 
 
-def start(robot: RobotSpec, failure: dict[str, Any] | None) -> tuple[World, Failures]:
+def start(robot: RobotSpec, failure: dict[str, Any] | None) -> tuple[World, WheelFailures]:
     """Return a robot far from any box, and its failure."""
     world = World([robot], BOXES["square"])
     world.place(np.array([[-2.0, 0.0, 0.0]]), np.zeros(3))
     agents = [f"robot1.{name}" for name in robot.wheel_names]
     settings = [] if failure is None else [TypeAdapter(Failure).validate_python(failure)]
-    ill = Failures(settings, agents, np.full(len(agents), robot.max_speed))
+    ill = WheelFailures(settings, agents, np.full(len(agents), robot.max_speed))
     world.set_grip(ill.grip)
     return world, ill
 

@@ -41,6 +41,14 @@ class ScenarioSettings(Settings):
         """
         return located(self.factory)(self)
 
+    def suited(self, preset: str) -> Mapping[str, Any]:
+        """Return what this scenario lays over a preset: its ``learner`` and ``topology`` tables.
+
+        A preset is made for box pushing; what learns best elsewhere may be something else, and
+        depend on the settings. What a spec says itself lies over both. Nothing by default.
+        """
+        return {}
+
     @property
     def onset(self) -> int | None:
         """Episode in which something is scheduled to change, such as a failure; none: never."""

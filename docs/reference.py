@@ -17,6 +17,7 @@ from nested_agents.scenarios import SCENARIOS
 from nested_agents.scenarios.box_pushing.states.variables import STATE_VARIABLES
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
+from nested_agents.scenarios.kinematic_chain.variables import CHAIN_VARIABLES
 from nested_agents.studies.cli.main import COMMANDS
 from nested_agents.studies.cli.main import nested_agents as program
 from nested_agents.studies.spec.keys import tables
@@ -69,6 +70,8 @@ NUMBERS = (
     ("touching.BOX.robotN", "1", "share of contact of a robot, in the evaluation with a box"),
     ("onset", "1", "episode in which the first failure begins"),
 )  # fmt: skip
+VARIABLES = {"box-pushing": STATE_VARIABLES, "kinematic-chain": CHAIN_VARIABLES}
+"""State variables by the scenario that has them."""
 MODULES = {
     "core": ("How agents perceive, predict, decide and learn, and what that costs.", (
         "hierarchy", "spaces", "protocols", "team", "loop", "decision", "exploration",
@@ -86,7 +89,9 @@ MODULES = {
         "box_pushing.states.variables", "box_pushing.states.state_spaces",
         "box_pushing.prediction.predictors", "box_pushing.world.boxes",
         "box_pushing.world.robots", "box_pushing.world.failures",
-        "box_pushing.pictures.rendering", "line_up", "checking.checker",
+        "box_pushing.pictures.rendering", "kinematic_chain.config", "kinematic_chain.scenario",
+        "kinematic_chain.view", "kinematic_chain.variables", "line_up", "failures.settings",
+        "state_variables", "checking.checker",
     )),
     "studies": ("What is measured, compared and drawn.", (
         "run", "spec.spec", "spec.keys", "spec.presets", "trials.trial", "trials.session",
@@ -163,14 +168,21 @@ def keys() -> Iterator[str]:
     yield "## Boxes, robots and state variables by name\n"
     yield f"Boxes: {', '.join(map(code, BOXES))}.\n"
     yield f"Robots: {', '.join(map(code, ROBOTS))}.\n"
-    yield from table(
-        ("state variable", "unit", "range", "meaning"),
-        (
-            (code(name), v.variable.unit, f"{v.variable.low:.3g} to {v.variable.high:.3g}",
-             prose((v.function.__doc__ or "").partition("\n\n")[0].replace("\n    ", " ")))
-            for name, v in ((n, STATE_VARIABLES.find(n)) for n in STATE_VARIABLES.built_in)
-        ),
-    )  # fmt: skip
+    for kind, registry in VARIABLES.items():
+        yield f"State variables of `{kind}`, beside the speed of the agent's own actuator:\n"
+        named = ((name, registry.find(name)) for name in registry.built_in)
+        yield from table(
+            ("state variable", "unit", "range", "meaning"),
+            (
+                (
+                    code(name),
+                    v.variable.unit,
+                    f"{v.variable.low:.3g} to {v.variable.high:.3g}",
+                    prose(" ".join((v.function.__doc__ or "").partition("\n\n")[0].split())),
+                )
+                for name, v in named
+            ),
+        )
 
 
 def columns() -> Iterator[str]:

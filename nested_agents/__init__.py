@@ -27,6 +27,7 @@ _PLACES = {
     "Blocks": ("core.protocols", "Blocks"),
     "BoxPushing": ("scenarios.box_pushing.scenario", "BoxPushing"),
     "BoxPushingSettings": ("scenarios.box_pushing.config", "BoxPushingSettings"),
+    "ChainView": ("scenarios.kinematic_chain.view", "ChainView"),
     "Counts": ("core.evaluators.evaluator", "Counts"),
     "DecisionProblem": ("core.evaluators.evaluator", "DecisionProblem"),
     "Deliberation": ("core.evaluators.evaluator", "Deliberation"),
@@ -35,6 +36,8 @@ _PLACES = {
     "FrozenSettings": ("core.learners.frozen", "FrozenSettings"),
     "GradientTDSettings": ("core.learners.gradient", "GradientTDSettings"),
     "Hierarchy": ("core.hierarchy", "Hierarchy"),
+    "KinematicChain": ("scenarios.kinematic_chain.scenario", "KinematicChain"),
+    "KinematicChainSettings": ("scenarios.kinematic_chain.config", "KinematicChainSettings"),
     "LearnerSettings": ("core.learners", "LearnerSettings"),
     "LineUpSettings": ("scenarios.line_up", "LineUpSettings"),
     "Measure": ("core.protocols", "Measure"),
@@ -63,7 +66,7 @@ _PLACES = {
     "policy_seed": ("core.loop", "policy_seed"),
     "rate": ("studies.analysis.statistics", "rate"),
     "run_trial": ("studies.trials.session", "run_trial"),
-    "state_variable": ("scenarios.box_pushing.states.variables", "state_variable"),
+    "state_variable": ("scenarios.state_variables", "state_variable"),
 }
 
 __all__ = ["__version__", *_PLACES]

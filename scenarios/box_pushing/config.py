@@ -7,13 +7,23 @@ from typing import Annotated, ClassVar, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from ...core.settings import NonNegative, Positive, ScenarioSettings, Settings
+from ..failures.settings import (
+    Delayed,
+    FailureSettings,
+    Names,
+    Noisy,
+    Reversed,
+    Seized,
+    Stuck,
+    Weak,
+)
+from ..state_variables import referred
 
 CONTROL_PERIOD = 0.064
 """Time between commands to the wheels [s]; the basic time step of the e-puck in Webots."""
 
 Periods = Annotated[int, Field(ge=1, le=10_000)]
 """Control periods: ten minutes at most."""
-Index = Annotated[int, Field(ge=0)]
 
 
 class RewardSettings(Settings):
@@ -48,87 +58,55 @@ class RewardSettings(Settings):
     """Whether R1 counts under Condition 3 as printed; without it robots do not hover."""
 
 
-class FailureSettings(Settings):
-    """What fails, and from when to when; see `box_pushing.world.failures`.
+class WheelFailure(FailureSettings):
+    """Wheels that fail; see `nested_agents.scenarios.failures`."""
 
-    A failure begins at its step of its episode and lasts, from episode to episode, until its end;
-    evaluation comes after all training.
-    """
+    part: ClassVar[str] = "wheels"
 
-    wheels: Annotated[tuple[str, ...], Field(min_length=1)]
+    wheels: Names
     """Wheels by agent name or pattern: ``robot1.left``, ``robot1.*``, ``*.left``; one or a list."""
-    episode: Index = 0
-    """Episode in which it begins, counted from 0."""
-    step: Index = 0
-    """Step of that episode at which it begins."""
-    end_episode: Index | None = None
-    """Episode in which it ends; none: it lasts."""
-    end_step: Index = 0
-    """Step of that episode at which it ends."""
-
-    @field_validator("wheels", mode="before")
-    @classmethod
-    def _one(cls, value: object) -> object:
-        return (value,) if isinstance(value, str) else value
-
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
-        if self.end_episode is None and self.end_step:
-            raise ValueError("end_step needs an end_episode")
-        end = self.end_episode, self.end_step
-        if end[0] is not None and end <= (self.episode, self.step):
-            raise ValueError(f"its end {end} must come after its begin {self.episode, self.step}")
-        return self
 
 
-class SeizedSettings(FailureSettings):
+class SeizedSettings(Seized, WheelFailure):
     """The wheel does not turn."""
 
     kind: Literal["seized"] = "seized"
 
 
-class FreeSettings(FailureSettings):
+class FreeSettings(WheelFailure):
     """The wheel has no drive and turns freely."""
 
     kind: Literal["free"] = "free"
 
 
-class WeakSettings(FailureSettings):
+class WeakSettings(Weak, WheelFailure):
     """The wheel turns at a fraction of its command."""
 
     kind: Literal["weak"] = "weak"
-    gain: Annotated[float, Field(gt=0, lt=1)] = 0.3
-    """Fraction of its command at which the wheel turns."""
 
 
-class ReversedSettings(FailureSettings):
+class ReversedSettings(Reversed, WheelFailure):
     """The wheel turns against its command."""
 
     kind: Literal["reversed"] = "reversed"
 
 
-class StuckSettings(FailureSettings):
+class StuckSettings(Stuck, WheelFailure):
     """The wheel turns at one speed whatever its command."""
 
     kind: Literal["stuck"] = "stuck"
-    speed: Annotated[float, Field(ge=-1, le=1)] = 0.5
-    """Speed at which the wheel turns, as a fraction of the greatest."""
 
 
-class DelayedSettings(FailureSettings):
-    """The wheel carries out its commands too late."""
+class DelayedSettings(Delayed, WheelFailure):
+    """The wheel carries out its commands too late, by control periods of 64 ms."""
 
     kind: Literal["delayed"] = "delayed"
-    periods: Annotated[int, Field(ge=1, le=1000)] = 8
-    """Control periods of 64 ms by which commands are late."""
 
 
-class NoisySettings(FailureSettings):
+class NoisySettings(Noisy, WheelFailure):
     """The wheel turns at its command plus noise."""
 
     kind: Literal["noisy"] = "noisy"
-    deviation: Annotated[float, Field(gt=0, le=1)] = 0.3
-    """Standard deviation of the noise, as a fraction of the greatest speed."""
 
 
 Failure = Annotated[
@@ -283,13 +261,9 @@ class BoxPushingSettings(ScenarioSettings):
     @field_validator("state_space", mode="before")
     @classmethod
     def _by_name(cls, value: object) -> object:
-        from .states.variables import STATE_VARIABLES, StateVariable
+        from .states.variables import STATE_VARIABLES
 
-        if not isinstance(value, list | tuple):
-            return value
-        return tuple(
-            STATE_VARIABLES.reference_to(v) if isinstance(v, StateVariable) else v for v in value
-        )
+        return referred(STATE_VARIABLES, value)
 
     @model_validator(mode="after")
     def _believes(self) -> Self:

@@ -27,7 +27,7 @@ from .starts import place
 from .states.state_spaces import state_space_for
 from .states.view import View
 from .world.boxes import box_for, growth
-from .world.failures import Failures
+from .world.failures import WheelFailures
 from .world.infrared import InfraredSpec, strongest_reading
 from .world.robots import nominal_effect, robot_for
 from .world.world import World, WorldState
@@ -111,7 +111,9 @@ class BoxPushing:
         self._model = push_model(settings.predictor, robots, self.box, settings.belief)
         self._playground = World(robots, self.box) if settings.predictor == "exact" else None
         self._failures = (
-            Failures(settings.failures, self.agents, self._limits) if settings.failures else None
+            WheelFailures(settings.failures, self.agents, self._limits)
+            if settings.failures
+            else None
         )
         paid = settings.reward.model_copy(update={"r1": settings.reward.r1 / self._unit})
         self._task = Task(paid, self._unit * settings.tolerance, settings.orientation_tolerance)

@@ -42,15 +42,26 @@ class Bodies:
 def table(bodies: Bodies, wheels: Sequence[str]) -> Iterator[str]:
     """Yield the effects of every robot's wheels, row by row and moment by moment."""
     for r, own in enumerate(by_robot(bodies, wheels)):
-        names = [name.partition(".")[2].replace("-", "-\n") for name in own]
+        names = [name.rpartition(".")[2].replace("-", "-\n") for name in own]
         wide, lines = headed([*names, "constant"], 8)
         for i, line in enumerate(lines):
-            yield ((f"robot {r + 1}" if i == len(lines) - 1 else "").ljust(16) + line).rstrip()
+            yield ((body_name(own, r) if i == len(lines) - 1 else "").ljust(16) + line).rstrip()
         for row, (name, _) in enumerate(ROWS):
+            if not any(effects[r][row].any() for effects in bodies.moments.values()):
+                continue  # a joint can but turn
             for moment, effects in bodies.moments.items():
                 values = "".join(f"{v:+.2f}".rjust(wide) for v in effects[r][row])
                 yield f"{name if moment == 'built' else '':<9}{moment:<7}{values}"
         yield ""
+
+
+def body_name(own: Sequence[str], number: int) -> str:
+    """Return how a body is called: by its number, or like the one agent that it is.
+
+    >>> body_name(["robot1.left", "robot1.right"], 0), body_name(["joint2"], 1)
+    ('robot 1', 'joint2')
+    """
+    return f"robot {number + 1}" if "." in own[0] else own[0]
 
 
 def headed(names: Sequence[str], least: int) -> tuple[int, list[str]]:

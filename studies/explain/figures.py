@@ -19,7 +19,7 @@ from ...scenarios.box_pushing.config import BoxPushingSettings
 from ...scenarios.box_pushing.world.boxes import BoxSpec, box_for
 from ...scenarios.box_pushing.world.robots import robot_for
 from ..presentation.figures import COLOURS, SETTINGS, STYLES
-from .body import ROWS, Bodies, by_robot
+from .body import ROWS, Bodies, body_name, by_robot
 from .policy import AROUND, MOVES, Field
 from .rules import exponent, labels, percent, strongest_pairs
 from .team import Explained
@@ -190,22 +190,26 @@ def _outline(box: BoxSpec) -> Outline:
 def _bodies(wheels: tuple[str, ...], bodies: Bodies) -> Figure:
     moments = bodies.moments
     robots = min(len(moments["built"]), MOST_BODIES)
+    every = [effect for effects in moments.values() for effect in effects]
+    # What no body does is not drawn: a joint can but turn.
+    rows = [k for k in range(len(ROWS)) if any(effect[k, :-1].any() for effect in every)]
     figure = Figure(figsize=(8.0, 1.9 * robots + 0.6), layout="constrained")
-    panels = figure.subplots(robots, len(ROWS), squeeze=False)
+    panels = figure.subplots(robots, len(rows), squeeze=False)
     # All robots on one scale, and ahead and left too, which have one unit.
     extent = {unit: [0.0] for _, unit in ROWS}
-    for effect in (effect for effects in moments.values() for effect in effects):
+    for effect in every:
         for row, (_, unit) in enumerate(ROWS):
             extent[unit] += effect[row, :-1].tolist()
     limits = {name: (1.08 * min(extent[unit]), 1.08 * max(extent[unit])) for name, unit in ROWS}
     for r, (axes_row, own) in enumerate(zip(panels, by_robot(bodies, wheels), strict=False)):
         names = [name.rpartition(".")[2] for name in own]
-        for row, (axes, (name, unit)) in enumerate(zip(axes_row, ROWS, strict=True)):
+        for axes, row in zip(axes_row, rows, strict=True):
+            name, unit = ROWS[row]
             _bars(axes, names, {m: effects[r][row, :-1] for m, effects in moments.items()})
             axes.set_ylim(limits[name])
             if r == 0:
                 axes.set_title(f"{name} [{unit} per m/s]", loc="left")
-        axes_row[0].set_ylabel(f"robot {r + 1}")
+        axes_row[0].set_ylabel(body_name(own, r))
     handles, titles = panels[0][0].get_legend_handles_labels()
     figure.legend(handles, titles, loc="outside lower center", ncols=3, frameon=False)
     return figure

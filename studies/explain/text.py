@@ -124,8 +124,9 @@ def _bodies(found: Explained) -> Iterator[str]:
         "after": "after all training",
     }
     yield from _wrapped(
-        "What a wheel does to the motion of its robot, per m/s of its commanded speed: metres per "
-        "second ahead and to the left, radians per second. Wheels that are driven alike most of "
+        "What a wheel does to the motion of its robot, or a joint to itself, per unit of its "
+        "commanded speed: metres per second ahead and to the left, radians per second. Wheels that "
+        "are driven alike most of "
         "the time are hardly distinguished. Shown: "
         f"{', '.join(moments[m] for m in bodies.moments)}."
     )

@@ -2,7 +2,7 @@
 
 Every override by name is crossed with its own sweep and with the spec's; without overrides the
 spec's tables alone are. Layers, each over the one before: the defaults of the settings, the preset,
-the spec's tables, the override's tables, the point of the sweeps.
+what the scenario lays over it, the spec's tables, the override's tables, the point of the sweeps.
 """
 
 from __future__ import annotations
@@ -185,13 +185,22 @@ def resolve(
     if not isinstance(name, str) or name not in PRESETS:
         said = now_called("preset", name) or closest(name, PRESETS)
         raise SpecError(f"preset = {show(name)}: {said}{where}")
-    layers = [PRESETS[name].table, tables, override.tables if override else {}]
-    layers += [nested(key, value) for key, value in point.items() if key != "preset"]
+    own_layers = [tables, override.tables if override else {}]
+    own_layers += [nested(key, value) for key, value in point.items() if key != "preset"]
+    table = _laid([PRESETS[name].table, *own_layers])
+    scenario = _validated({"scenario": table["scenario"]}, where).scenario
+    if suited := scenario.suited(name):
+        table = _laid([PRESETS[name].table, suited, *own_layers])
+    return _validated(table, where)
+
+
+def _laid(layers: Sequence[Mapping[str, Any]]) -> TomlTable:
+    """Return the table of layers, each over the one before, the first over the defaults."""
     table = ConditionSettings().model_dump()
     for layer in layers:
         expanded = {key: section(key, value) for key, value in layer.items()}
         table = overlay(table, expanded, ConditionSettings)
-    return _validated(table, where)
+    return table
 
 
 def _beside(

@@ -69,6 +69,8 @@ class Table:
         Dotted, as ``learner.rule_base``; empty for the top of a spec.
     kind
         The ``kind`` that it must have for these keys; empty: any.
+    within
+        The ``kind`` of the table above that it belongs to; empty: any.
     summary
         The first line of the docstring of its model.
     model
@@ -79,6 +81,7 @@ class Table:
 
     name: str
     kind: str
+    within: str
     summary: str
     model: type[Settings]
     keys: tuple[Key, ...]
@@ -92,7 +95,8 @@ class Table:
     def heading(self) -> str:
         """How it begins in a spec: ``[learner], kind = "frozen"``."""
         kind = f', kind = "{self.kind}"' if self.kind else ""
-        return (f"[{self.name}]" if self.name else "top of the spec") + kind
+        within = f', of "{self.within}"' if self.within else ""
+        return (f"[{self.name}]" if self.name else "top of the spec") + kind + within
 
 
 def tables() -> tuple[Table, ...]:
@@ -106,8 +110,8 @@ def tables() -> tuple[Table, ...]:
     """
     own: list[tuple[str, type[Settings]]]
     own = [("", Spec), ("overrides", Override), ("curriculum", StageSettings)]
-    heads = [_table(name, "", model, {}) for name, model in own]
-    return (*heads, *_below(ConditionSettings, "", set()))
+    heads = [_table(name, ("", ""), model, {}) for name, model in own]
+    return (*heads, *_below(ConditionSettings, "", "", set()))
 
 
 def keys_below(prefix: str) -> tuple[Table, ...]:
@@ -130,16 +134,16 @@ def keys_below(prefix: str) -> tuple[Table, ...]:
     return tuple(found)
 
 
-def _below(model: type[Settings], name: str, seen: set[Any]) -> Iterator[Table]:
+def _below(model: type[Settings], name: str, within: str, seen: set[Any]) -> Iterator[Table]:
     """Yield the tables that the fields of a model hold, at any depth, each once."""
     for field, info in model.model_fields.items():
         place = f"{name}.{field}" if name else field
         for base, kinds in _families(info):
             if base is not None:
-                yield from _held(base, place, "", {}, seen)
+                yield from _held(base, place, ("", within), {}, seen)
             inherited = {} if base is None else base.model_fields
             for kind, held in kinds:
-                yield from _held(held, place, kind, inherited, seen)
+                yield from _held(held, place, (kind, within), inherited, seen)
 
 
 def _families(info: FieldInfo) -> Iterator[tuple[Any, list[tuple[str, type[Settings]]]]]:
@@ -171,18 +175,24 @@ def _common(models: Iterable[type[Settings]]) -> type[Settings] | None:
 
 
 def _held(
-    model: type[Settings], name: str, kind: str, base: Mapping[str, FieldInfo], seen: set[Any]
+    model: type[Settings],
+    name: str,
+    kinds: tuple[str, str],
+    base: Mapping[str, FieldInfo],
+    seen: set[Any],
 ) -> Iterator[Table]:
     if (name, model) in seen:
         return
     seen.add((name, model))
-    table = _table(name, kind, model, base)
-    if table.keys or kind:
+    table = _table(name, kinds, model, base)
+    if table.keys or table.kind:
         yield table
-    yield from _below(model, name, seen)
+    yield from _below(model, name, kinds[0] or kinds[1], seen)
 
 
-def _table(name: str, kind: str, model: type[Settings], base: Mapping[str, FieldInfo]) -> Table:
+def _table(
+    name: str, kinds: tuple[str, str], model: type[Settings], base: Mapping[str, FieldInfo]
+) -> Table:
     told = meanings(model)
     keys = tuple(
         _key(field, info, told.get(field, ""))
@@ -190,7 +200,7 @@ def _table(name: str, kind: str, model: type[Settings], base: Mapping[str, Field
         if field != "kind" and not (field in base and base[field].default == info.default)
     )
     summary = (inspect.getdoc(model) or "").partition("\n\n")[0]
-    return Table(name, kind, " ".join(summary.split()), model, keys)
+    return Table(name, *kinds, " ".join(summary.split()), model, keys)
 
 
 @cache

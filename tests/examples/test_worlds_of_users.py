@@ -1,4 +1,4 @@
-"""The tank and the arm as studies: from their files alone, through kill -9, on Dask, moved away."""
+"""The tank as a study: from its file alone, through kill -9, on Dask, moved away."""
 
 import os
 import shutil
@@ -45,7 +45,7 @@ def has_begun(study: Path) -> bool:
 
 @pytest.mark.parametrize(
     ("name", "measure", "change"),
-    [("tank", "missing_l", "scenario.pumps=2"), ("arm", "final_distance", "scenario.links=2")],
+    [("tank", "missing_l", "scenario.pumps=2")],
 )
 def test_a_world_from_a_file(name: str, measure: str, change: str, tmp_path: Path) -> None:
     for suffix in ("py", "toml"):

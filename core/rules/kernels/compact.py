@@ -164,14 +164,16 @@ def total_compact(  # type: ignore[no-untyped-def]
     of_own, of_body, of_common = kinds
     lay, m = unpack(packed), own.shape[1]
     rows, n_own = np.arange(m), lay.n_own
-    mine, theirs, common = np.zeros(m), np.zeros(m), np.zeros(m)
+    mine, theirs, total = np.zeros(m), np.zeros(m), np.zeros(m)
     for b in range(len(shared)):
         for i in range(firsts[b], firsts[b + 1]):
             a = agents[i]
             _add_values(of_agents[i], of_own, own[a], rows, shared[b], rows, n_own, lay, mine)
         _add_values(of_bodies[b], of_body, own[0], rows, shared[b], rows, n_own, lay, theirs)
-    _add_values(of_all[0], of_common, own[0], rows, shared[0], rows, n_own, lay, common)
-    return mine + theirs + common
+    _add_values(of_all[0], of_common, own[0], rows, shared[0], rows, n_own, lay, total)
+    for s in range(m):
+        total[s] = mine[s] + theirs[s] + total[s]
+    return total
 
 
 @njit(cache=True)
@@ -237,7 +239,10 @@ def looked_up(  # type: ignore[no-untyped-def]
         n_pairs += 1
     values, n_own = np.zeros(n_pairs), lay.n_own
     _add_values(theta, np.arange(len(lay.lengths)), own, mine, shared, theirs, n_own, lay, values)
-    return values[pair_of]
+    out = np.empty(len(indices))
+    for c in range(len(indices)):
+        out[c] = values[pair_of[c]]
+    return out
 
 
 @njit(cache=True, fastmath={"contract"})

@@ -37,10 +37,14 @@ class Tried(NamedTuple):
 
 @njit(cache=True)
 def _indices(tried, places, joint_action):  # type: ignore[no-untyped-def]
-    given = 0
+    given, (rows, m) = 0, tried.shape
     for i in range(len(joint_action)):
         given += places[i] * joint_action[i]
-    return (tried + given).ravel()
+    indices = np.empty(rows * m, np.int64)
+    for a in range(rows):
+        for c in range(m):
+            indices[a * m + c] = tried[a, c] + given
+    return indices
 
 
 @njit(cache=True)
@@ -50,7 +54,9 @@ def _aggregate(values, n_own: int, below, probabilities):  # type: ignore[no-unt
     out = np.empty(n_own)
     if not len(probabilities):
         for a in range(n_own):
-            out[a] = values[a * m : (a + 1) * m].max()
+            out[a] = values[a * m]
+            for c in range(a * m + 1, (a + 1) * m):
+                out[a] = max(out[a], values[c])
         return out
     joint, size = np.ones(m), 1
     for agent in below:
@@ -60,7 +66,9 @@ def _aggregate(values, n_own: int, below, probabilities):  # type: ignore[no-unt
             for a in range(n_actions):
                 joint[c * n_actions + a] = one * probabilities[agent, a]
         size *= n_actions
-    total = joint.sum()
+    total = 0.0
+    for c in range(m):
+        total += joint[c]
     for a in range(n_own):
         mean = 0.0
         for c in range(m):

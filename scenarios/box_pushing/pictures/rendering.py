@@ -18,7 +18,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-import imageio.v2 as imageio
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -28,25 +27,21 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Patch, PathPatch, Polygon, Rectangle
 from matplotlib.path import Path as Curve
 from matplotlib.transforms import Affine2D
-from numpy.typing import NDArray
-from PIL import Image
 
 from ....core.arrays import FloatArray
+from ...movies import Pixels, film
 from ..config import InfraredSettings
 from ..world.boxes import BoxSpec, box_for
 from ..world.infrared import InfraredSpec, infrared_readings, sensor_directions
 from ..world.robots import RobotSpec, robot_for
 
 Recording = Mapping[str, FloatArray]
-Pixels = NDArray[np.uint8]
 
 SIDES = (800, 480)
 """Width and height of a picture in pixels: multiples of 16, as video codecs want them."""
 AXES = (0.09, 0.11, 0.89, 0.81)
 """Left, bottom, width and height of the axes as fractions of the picture."""
 DPI = 100
-MOST_FRAMES = 120
-"""Longer episodes are thinned out to this many frames."""
 LEAST_RADIUS, WHEELS_FROM = 3.5, 6.0
 """Radius of a robot in pixels, at least, and from which on its wheels are drawn."""
 MARGIN = 0.04
@@ -259,31 +254,10 @@ def animate(recording: Recording, path: Path, speed: float = 4.0, *, sensors: bo
     ValueError
         If the suffix is neither ``.gif`` nor ``.mp4``.
     """
-    if path.suffix not in (".gif", ".mp4"):
-        raise ValueError(f"animation: suffix {path.suffix!r} of {path.name}, allowed .gif or .mp4")
     stage = _Stage(recording, sensors=sensors)
-    last = len(recording["box_pose"]) - 1
-    steps = np.unique(np.linspace(0, last, min(last + 1, MOST_FRAMES)).round().astype(int))
-    frames = []
-    for step in steps:
-        stage.draw(int(step))
-        frames.append(stage.pixels())
-    seconds = float(recording["dt"]) / speed
-    partial = path.with_name(f".{path.stem}.partial{path.suffix}")
-    write = _write_gif if path.suffix == ".gif" else _write_mp4
-    write(partial, frames, seconds)
-    partial.replace(path)
 
+    def drawn(step: int) -> Pixels:
+        stage.draw(step)
+        return stage.pixels()
 
-def _write_gif(path: Path, frames: list[Pixels], seconds: float) -> None:
-    # One palette for all frames: colours do not flicker, and it is found only once.
-    palette = Image.fromarray(frames[-1]).quantize(128)
-    images = [
-        Image.fromarray(f).quantize(palette=palette, dither=Image.Dither.NONE) for f in frames
-    ]
-    durations = [round(1000 * seconds)] * (len(images) - 1) + [1500]
-    images[0].save(path, save_all=True, append_images=images[1:], duration=durations, loop=0)
-
-
-def _write_mp4(path: Path, frames: list[Pixels], seconds: float) -> None:
-    imageio.mimwrite(path, frames, fps=1 / seconds, macro_block_size=16)  # type: ignore[arg-type]
+    film(drawn, len(recording["box_pose"]) - 1, float(recording["dt"]) / speed, path)

@@ -16,7 +16,7 @@ import numpy as np
 from ....core.arrays import FloatArray
 from ....core.compiling import njit
 from ..world.robots import RobotSpec, resistance
-from .push import PushModel, push
+from .push import PushModel, pushed
 
 CONSTANTS = ("load per stiffness", "load per grip", "contact friction")
 """The ground friction of the box over the stiffness of the wheels' servos, and over that of their
@@ -102,10 +102,10 @@ def outcomes(  # type: ignore[no-untyped-def]
     asked, choices = np.expand_dims(twists, 1), np.zeros((1, n), np.int64)
     for p in range(len(constants)):
         model = believing(belief, constants[p])
-        after, boxes, _ = push(robots, box, asked, choices, seconds, model)
-        _twist(box, boxes[0], seconds, found[p, 0])
+        after, boxes, _ = pushed(robots, box, asked, choices, seconds, model)
+        _twist(box, boxes[:, 0], seconds, found[p, 0])
         for r in range(n):
-            _twist(robots[r], after[0, r], seconds, found[p, r + 1])
+            _twist(robots[r], after[r, :, 0], seconds, found[p, r + 1])
     return found
 
 

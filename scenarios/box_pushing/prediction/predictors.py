@@ -24,7 +24,7 @@ from ....core.arrays import FloatArray, IntArray
 from ..config import CONTROL_PERIOD, BeliefSettings
 from ..states.view import View
 from ..world.boxes import BoxSpec
-from ..world.failures import Failures
+from ..world.failures import WheelFailures
 from ..world.robots import RobotSpec, compliance
 from ..world.world import World, WorldState
 from .prediction import BoxPrediction
@@ -75,7 +75,7 @@ class Future:
 
     world: World
     state: WorldState
-    failures: Failures | None
+    failures: WheelFailures | None
     step: int
     hold: int
 

@@ -57,15 +57,14 @@ class PushModel(NamedTuple):
     contact_friction: float
 
 
-@njit(cache=True, error_model="numpy")
-def push(  # type: ignore[no-untyped-def]
+def push(
     robots: FloatArray,
     box: FloatArray,
     twists: FloatArray,
     choices: IntArray,
     seconds: float,
     model: PushModel,
-):
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Predict poses after `seconds` for many combinations of robot twists.
 
     Parameters
@@ -88,6 +87,23 @@ def push(  # type: ignore[no-untyped-def]
     tuple
         Robot poses ``(m, M, 3)``, box poses ``(m, 3)`` and gaps ``(m, M)`` [m]; in memory the
         combinations stand next to each other.
+    """
+    after, boxes, gaps = pushed(robots, box, twists, choices, seconds, model)
+    return after.transpose(2, 0, 1), boxes.T, gaps.T
+
+
+@njit(cache=True, error_model="numpy")
+def pushed(  # type: ignore[no-untyped-def]
+    robots: FloatArray,
+    box: FloatArray,
+    twists: FloatArray,
+    choices: IntArray,
+    seconds: float,
+    model: PushModel,
+):
+    """Return what `push` does with the combinations last: ``(M, 3, m)``, ``(3, m)``, ``(M, m)``.
+
+    Transposing within a kernel would take as long to compile as half of the arithmetic.
     """
     m, n = choices.shape
     out_robots, out_box, out_gaps = np.empty((n, 3, m)), np.empty((3, m)), np.empty((n, m))
@@ -123,8 +139,9 @@ def push(  # type: ignore[no-untyped-def]
                 for j in range(3):
                     out_robots[r, j, first + k] = bodies[r, j * LANES + k]
         for j in range(3):
-            out_box[j, first : first + used] = shared[j * LANES : j * LANES + used]
-    return out_robots.transpose(2, 0, 1), out_box.T, out_gaps.T
+            for k in range(used):  # slices that are assigned take seconds to compile
+                out_box[j, first + k] = shared[j * LANES + k]
+    return out_robots, out_box, out_gaps
 
 
 @njit(cache=True, error_model="numpy")

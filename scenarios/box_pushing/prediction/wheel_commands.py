@@ -75,20 +75,30 @@ def wheel_commands_of(commands: FloatArray, effects: FloatArray, merge: bool) ->
     n, w, a = commands.shape
     # Per wheel the distinct speeds in increasing order, and which of them each action commands.
     told, number = np.zeros((n, w, a)), np.empty((n, w, a), np.int64)
-    sizes = np.ones((n, w), np.int64)
+    sizes = np.empty((n, w), np.int64)
     counts = np.ones(n, np.int64)
     for r in range(n):
         for j in range(w):
-            ordered = np.sort(commands[r, j])
-            told[r, j, 0] = ordered[0]
-            for k in range(1, a):
-                if ordered[k] != ordered[k - 1]:
-                    told[r, j, sizes[r, j]] = ordered[k]
-                    sizes[r, j] += 1
+            # By insertion: of so few speeds that is quick, and quick to compile.
+            sizes[r, j] = 0
             for k in range(a):
-                number[r, j, k] = np.searchsorted(told[r, j, : sizes[r, j]], commands[r, j, k])
+                speed, place = commands[r, j, k], sizes[r, j]
+                while place > 0 and told[r, j, place - 1] > speed:
+                    place -= 1
+                if place > 0 and told[r, j, place - 1] == speed:
+                    continue
+                for later in range(sizes[r, j], place, -1):
+                    told[r, j, later] = told[r, j, later - 1]
+                told[r, j, place] = speed
+                sizes[r, j] += 1
+            for k in range(a):
+                for place in range(sizes[r, j]):
+                    if told[r, j, place] == commands[r, j, k]:
+                        number[r, j, k] = place
             counts[r] *= sizes[r, j]
-    most, n_indices = counts.max(), a**w
+    most, n_indices = 0, a**w
+    for count in counts:
+        most = max(most, count)
     speeds, twists = np.zeros((n, most, w)), np.zeros((n, most, 3))
     which, level = np.empty((n, n_indices), np.int64), np.empty((n, w, n_indices), np.int64)
     n_distinct = np.zeros(n, np.int64)
@@ -168,7 +178,9 @@ def twist_table(commands: WheelCommands) -> tuple[IntArray, IntArray]:
     The combinations are wheel commands ``(m, M)``, the indices number them, ``(A ** n,)``.
     """
     n, n_indices = commands.which.shape
-    rows = commands.n_distinct.prod()
+    rows = 1
+    for distinct in commands.n_distinct:
+        rows *= distinct
     choices = np.empty((rows, n), np.int64)
     for c in range(rows):
         rest = c

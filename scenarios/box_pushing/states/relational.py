@@ -14,7 +14,7 @@ from math import pi
 import numpy as np
 
 from ....core.arrays import FloatArray
-from .variables import StateFunction, StateVariable, state_variable
+from ...state_variables import StateFunction, StateVariable, state_variable
 from .view import View, wrap
 
 AWAY = 0.03

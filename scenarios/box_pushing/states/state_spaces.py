@@ -17,8 +17,9 @@ import numpy as np
 
 from ....core.arrays import FloatArray
 from ....core.spaces import StateSpace, Variable
+from ...state_variables import found
 from .kernels import COMPILED, Columns
-from .variables import found
+from .variables import STATE_VARIABLES
 from .view import View, wrap
 
 
@@ -79,7 +80,7 @@ class Listed:
     """
 
     def __init__(self, names: Sequence[str]) -> None:
-        things = [found(name) for name in names]
+        things = [found(STATE_VARIABLES, name) for name in names]
         is_compiled = np.array([name in COMPILED for name in names], dtype=bool)
         self.variables = tuple(thing.variable for thing in things)
         self.common = tuple(thing.variable.name for thing in things if thing.common)

@@ -56,6 +56,11 @@ class View:
         goal = _fixed(self.goal.view())
         return View(robots, box, gaps, goal, self.before, self.periods, self.outline)
 
+    @property
+    def n_situations(self) -> int:
+        """How many situations there are."""
+        return len(self.box)
+
     @cached_property
     def distance(self) -> FloatArray:
         """Distance ``(m,)`` of the box from the goal [m]."""

@@ -13,9 +13,10 @@ from __future__ import annotations
 
 import re
 import tracemalloc
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -148,18 +149,22 @@ class Scaling:
         their logarithms over all sizes.
     notes
         Those, for printing.
+    bodies
+        What is counted: ``robots``, or what a spec sweeps in place of them.
     """
 
     table: tuple[Summary, ...]
     points: tuple[Point, ...]
     exponents: dict[str, dict[str, float]]
     notes: tuple[str, ...]
+    bodies: str
 
 
 def analyse(results: Results) -> Scaling:
     """Estimate; 95 % intervals, seeds as the unit of sampling. Times are per step."""
     points, table = [], []
     sizes = {c: int(results.numbers[c]["robots"][0]) for c in results.training}
+    bodies = _counted(results.columns, sizes)
     for condition, training in results.training.items():
         numbers, usage = results.numbers[condition], results.usage[condition]
         steps = training["steps"].sum(axis=1)
@@ -178,7 +183,7 @@ def analyse(results: Results) -> Scaling:
         if "all_touching" in numbers:
             values["all touch"] = bootstrap(numbers["all_touching"], bounds=(0, 1))
         agents, passed = (int(numbers[n][0]) for n in ("agents", "messages"))
-        evaluator = _without_robots(condition, sizes)
+        evaluator = _without_size(condition, sizes, bodies)
         period = float(numbers["period_s"][0]) if "period_s" in numbers else None
         points.append(Point(evaluator, sizes[condition], agents, passed, period, values))
         shown = {n: values[n] for n in (*COLUMNS[:1], *evaluations, *COLUMNS[1:]) if n in values}
@@ -188,19 +193,35 @@ def analyse(results: Results) -> Scaling:
         f"\n{evaluator}: " + ", ".join(f"{what} ~ n^{power:.2f}" for what, power in by_what.items())
         for evaluator, by_what in exponents.items()
     ]
-    notes += _passed(points)
-    return Scaling(tuple(table), tuple(points), exponents, tuple(notes))
+    notes += _passed(points, bodies)
+    return Scaling(tuple(table), tuple(points), exponents, tuple(notes), bodies)
 
 
-def _without_robots(condition: str, sizes: dict[str, int]) -> str:
-    """Return a condition's label without its number of robots, which may be all it says."""
-    if all(label == str(robots) for label, robots in sizes.items()):
+def _counted(columns: Mapping[str, Mapping[str, Any]], sizes: Mapping[str, int]) -> str:
+    """Return what a spec sweeps for the number of bodies; robots if it is not known.
+
+    >>> _counted({"2": {"scenario.joints": 2}, "8": {"scenario.joints": 8}}, {"2": 2, "8": 8})
+    'joints'
+    """
+    keys = dict.fromkeys(key for own in columns.values() for key in own)
+    swept = (
+        key.removeprefix("scenario.")
+        for key in keys
+        if key.startswith("scenario.")
+        and all(columns.get(c, {}).get(key) == size for c, size in sizes.items())
+    )
+    return next(swept, "robots")
+
+
+def _without_size(condition: str, sizes: Mapping[str, int], bodies: str) -> str:
+    """Return a condition's label without its number of bodies, which may be all it says."""
+    if all(label == str(size) for label, size in sizes.items()):
         return "default"
     parts = condition.split(", ")
-    return ", ".join(part for part in parts if part != f"robots={sizes[condition]}")
+    return ", ".join(part for part in parts if part != f"{bodies}={sizes[condition]}")
 
 
-def _passed(points: list[Point]) -> list[str]:
+def _passed(points: list[Point], bodies: str) -> list[str]:
     """Return lines that say how many messages are passed, one per number where all agree."""
     lines = []
     for robots in dict.fromkeys(p.robots for p in points):
@@ -210,7 +231,7 @@ def _passed(points: list[Point]) -> list[str]:
                 labels.setdefault((p.agents, p.messages), []).append(p.evaluator)
         for (agents, passed), own in labels.items():
             whose = f" ({'; '.join(own)})" if len(labels) > 1 else ""
-            lines.append(f"{robots} robots{whose}: {agents} agents, {passed} messages a step")
+            lines.append(f"{robots} {bodies}{whose}: {agents} agents, {passed} messages a step")
     return lines
 
 

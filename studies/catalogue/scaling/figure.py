@@ -49,7 +49,7 @@ def figure_of(analysis: Scaling) -> Figure:
         for axes in panels.flat:
             scale_axis(axes, sizes)
         for axes in panels[-1]:
-            axes.set_xlabel("robots")
+            axes.set_xlabel(analysis.bodies)
         title = "means over seeds, bars: 95 % intervals; dotted: the decision period"
         add_legend(figure, evaluators, title)
         return figure

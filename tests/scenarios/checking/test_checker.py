@@ -22,12 +22,12 @@ from nested_agents.scenarios.box_pushing.config import (
     NoisySettings,
     SeizedSettings,
 )
-from nested_agents.scenarios.box_pushing.states.variables import StateVariable
 from nested_agents.scenarios.checking.checker import CHECKS, ScenarioError, check_scenario
 from nested_agents.scenarios.checking.frames import random_actions
 from nested_agents.scenarios.checking.predictions import fault_of_prediction
 from nested_agents.scenarios.checking.sensing import fault_of_exact
 from nested_agents.scenarios.line_up import LEAD, LineUp, LineUpPrediction, LineUpSettings
+from nested_agents.scenarios.state_variables import StateVariable
 from nested_agents.studies.cli.main import main
 
 FAILURES = (

@@ -64,7 +64,7 @@ def the_key(name: str) -> Key:
 @pytest.mark.parametrize(
     ("name", "kind", "default", "allowed", "unit"),
     [
-        ("scenario.tolerance", "number", "0.05", "> 0", "m"),
+        ("scenario.termination_radius", "number", "1.5", "> 0", "m"),
         ("scenario.start", "text", '"medium"', '"easy", "medium", "hard"', ""),
         ("scenario.robots", "whole number", "2", ">= 1, <= 64", ""),
         ("scenario.box.holes", "list of list of pair of number", "[]", "at least 3 of them", "m"),

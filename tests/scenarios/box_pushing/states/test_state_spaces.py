@@ -15,9 +15,10 @@ from nested_agents.scenarios.box_pushing.states.state_spaces import (
     listed,
     state_space_for,
 )
-from nested_agents.scenarios.box_pushing.states.variables import STATE_VARIABLES, found
+from nested_agents.scenarios.box_pushing.states.variables import STATE_VARIABLES
 from nested_agents.scenarios.box_pushing.states.view import View, wrap
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
+from nested_agents.scenarios.state_variables import found
 
 GOAL = np.array([1.0, 0.0, 0.0])
 SQUARE = BOXES["square"].outline
@@ -208,7 +209,7 @@ def test_a_state_space_may_be_listed() -> None:
 
 def test_columns_are_those_of_names_that_the_kernel_knows() -> None:
     assert set(COMPILED) == set(STATE_VARIABLES.built_in)
-    assert all(found(name).variable.name == name for name in COMPILED)
+    assert all(found(STATE_VARIABLES, name).variable.name == name for name in COMPILED)
     with pytest.raises(AssertionError, match="not all of them are compiled"):
         Columns(["gap", "_COURSE"])
 

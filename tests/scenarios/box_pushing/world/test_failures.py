@@ -1,4 +1,4 @@
-"""Failures: what wheels do by hand, when, their effect on free motion against theory."""
+"""WheelFailures: what wheels do by hand, when, their effect on free motion against theory."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ from nested_agents.core.loop import world_seed
 from nested_agents.scenarios import BoxPushing, BoxPushingSettings
 from nested_agents.scenarios.box_pushing.config import Failure, FailureSettings
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
-from nested_agents.scenarios.box_pushing.world.failures import Failures
+from nested_agents.scenarios.box_pushing.world.failures import WheelFailures
 from nested_agents.scenarios.box_pushing.world.robots import (
     ROBOTS,
     RobotSpec,
@@ -29,8 +29,8 @@ def failure(kind: str, wheels: str = "robot1.left", **table: Any) -> FailureSett
     return TypeAdapter(Failure).validate_python(table)
 
 
-def failures(*settings: FailureSettings) -> Failures:
-    return Failures(settings, WHEELS, np.full(4, 2.0))
+def failures(*settings: FailureSettings) -> WheelFailures:
+    return WheelFailures(settings, WHEELS, np.full(4, 2.0))
 
 
 def scenario(*settings: FailureSettings, **table: Any) -> BoxPushing:
@@ -172,7 +172,7 @@ def free_twist(robot: RobotSpec, settings: FailureSettings, speeds: FloatArray) 
     world = World([robot], BOXES["square"])
     world.place(np.array([[-1.0, 0.0, 0.3]]), np.zeros(3))
     agents = [f"robot1.{name}" for name in robot.wheel_names]
-    ill = Failures([settings], agents, np.full(len(agents), robot.max_speed))
+    ill = WheelFailures([settings], agents, np.full(len(agents), robot.max_speed))
     world.set_grip(ill.grip)
     for held in ill.driven(speeds, 40):
         world.advance(held, 1)
@@ -222,7 +222,7 @@ def test_free_motion_with_a_free_wheel(robot: RobotSpec) -> None:
 def test_a_noisy_wheel_does_on_average_what_it_is_told() -> None:
     robot = ROBOTS["e-puck"]
     world = World([robot], BOXES["square"])
-    ill = Failures([failure("noisy", "*")], ["robot1.left", "robot1.right"], np.full(2, 0.13))
+    ill = WheelFailures([failure("noisy", "*")], ["robot1.left", "robot1.right"], np.full(2, 0.13))
     ahead = []
     for seed in range(40):
         world.place(np.array([[-2.0, 0.0, 0.0]]), np.zeros(3))

@@ -1,0 +1,1 @@
+"""A planar arm whose joints are agents: they bring its tip to a goal."""

@@ -1,0 +1,146 @@
+"""The settings of the kinematic chain, as they stand in the ``[scenario]`` table of a spec."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import Field, field_validator
+
+from ...core.settings import NonNegative, Positive, ScenarioSettings, Settings
+from ..failures.settings import FailureSettings, Names, Reversed, Seized, Stuck, Weak
+from ..state_variables import referred
+
+PERIOD = 0.1
+"""Time between two decisions [s]."""
+REACH = 1.0
+"""Length of the whole arm [m]."""
+RIDGE = 0.1
+"""Ridge of a joint's regression that learns best, for every joint that shares its weights."""
+DISCOUNT = 0.8
+"""Discount that learns best: a goal is some twenty decisions away."""
+
+
+class RewardSettings(Settings):
+    """The constants of the reward, in the spirit of Eq. 15-17; distances in metres.
+
+    It is paid to all agents alike. Coming nearer must pay far less than being there: an arm that
+    is paid for approaching alone learns to circle round the goal.
+    """
+
+    c1: NonNegative = 0.01
+    """At the goal."""
+    c2: NonNegative = 0.003
+    """For coming nearer, times ``exp(-r2 distance)``."""
+    r2: NonNegative = 1.5
+    """Per metre of the tip's distance from the goal."""
+    least_approach: NonNegative = 0.001
+    """By how much the tip must have come nearer in a decision for that [m]."""
+    receding: float = -0.005
+    """Otherwise."""
+
+
+class JointFailure(FailureSettings):
+    """Joints that fail; see `nested_agents.scenarios.failures`."""
+
+    part: ClassVar[str] = "joints"
+
+    joints: Names
+    """Joints by agent name or pattern: ``joint2``, ``joint*``; one or a list."""
+
+
+class LockedSettings(Seized, JointFailure):
+    """The joint does not turn."""
+
+    kind: Literal["locked"] = "locked"
+
+
+class WeakSettings(Weak, JointFailure):
+    """The joint turns at a fraction of its command."""
+
+    kind: Literal["weak"] = "weak"
+
+
+class ReversedSettings(Reversed, JointFailure):
+    """The joint turns against its command."""
+
+    kind: Literal["reversed"] = "reversed"
+
+
+class StuckSettings(Stuck, JointFailure):
+    """The joint turns at one speed whatever its command."""
+
+    kind: Literal["stuck"] = "stuck"
+
+
+Failure = Annotated[
+    LockedSettings | WeakSettings | ReversedSettings | StuckSettings, Field(discriminator="kind")
+]
+"""Any failure's settings, distinguished by `kind`."""
+
+
+class KinematicChainSettings(ScenarioSettings):
+    """A planar arm of ``joints`` links of equal length, 1 m in all, its base at the origin."""
+
+    kind: Literal["kinematic-chain"] = "kinematic-chain"
+    factory: ClassVar[str] = f"{__package__}.scenario:KinematicChain"
+    joints: Annotated[int, Field(ge=2, le=64)] = 4
+    """Number of joints, an agent each."""
+    joint_limit: Annotated[float, Field(gt=0, le=3.141592653589793)] | None = None
+    """Greatest angle of every joint but the base, either way [rad]; none: links pass each other."""
+    failures: tuple[Failure, ...] = ()
+    """Failures of joints, as ``[[scenario.failures]]`` tables."""
+    predictor: Literal["nominal", "informed"] = "nominal"
+    """Whether predictions take every joint for what it was built as, or are told of failures."""
+    state_space: tuple[str, ...] = ("bearing", "distance", "approach")
+    """State variables beside the speed of the own joint, by name, one's own included; see
+    `kinematic_chain.variables`."""
+    reward: RewardSettings = RewardSettings()
+    """The constants of the reward."""
+    speed: Positive = 0.6
+    """Greatest speed of a joint [rad/s], in arms of few joints; see `top_speed`."""
+    speed_of_all: Positive = 5.0
+    """Greatest speed of all joints added up [rad/s]."""
+    speed_increment: Annotated[float, Field(gt=0, le=1)] = 0.5
+    """What increase and decrease change, as a fraction of the greatest speed."""
+    tolerance: Positive = 0.02
+    """Distance of the tip from the goal that counts as reached [m]."""
+    most_decisions: Annotated[int, Field(ge=1, le=1_000_000)] = 150
+    """Decisions after which an episode is broken off."""
+
+    @field_validator("state_space", mode="before")
+    @classmethod
+    def _by_name(cls, value: object) -> object:
+        from .variables import CHAIN_VARIABLES
+
+        return referred(CHAIN_VARIABLES, value)
+
+    def suited(self, preset: str) -> Mapping[str, Any]:
+        """Return what learns best here: little regularisation, and little foresight.
+
+        The ridge weighs against the squared errors of all joints that share weights, so that it
+        grows with their number.
+        """
+        sharing = {"default": self.joints, "own-value": 1}
+        if preset not in sharing:
+            return {}
+        return {"learner": {"ridge": RIDGE * sharing[preset], "discount": DISCOUNT}}
+
+    @property
+    def onset(self) -> int | None:
+        """Episode in which the first joint fails; none: none does."""
+        return min((failure.episode for failure in self.failures), default=None)
+
+    @property
+    def period(self) -> float:
+        """Seconds for which a decision is held."""
+        return PERIOD
+
+    @property
+    def top_speed(self) -> float:
+        """Greatest speed of a joint [rad/s]: the more joints, the slower each.
+
+        >>> KinematicChainSettings(joints=4).top_speed, KinematicChainSettings(joints=50).top_speed
+        (0.6, 0.1)
+        """
+        return min(self.speed, self.speed_of_all / self.joints)

@@ -1,0 +1,117 @@
+"""Pictures of the kinematic chain, drawn from recordings: one moment, or an episode as GIF or MP4.
+
+A recording is a mapping of arrays: ``angles (T + 1, n)`` [rad], ``speeds (T + 1, n)`` [rad/s],
+``failed (T + 1, n)``, ``goal (2,)`` [m], and constants of no dimension: ``reach`` and ``tolerance``
+[m], ``top_speed`` [rad/s], ``dt`` [s].
+
+Links are drawn from the base, a black square, to the tip, an orange dot with the trail of where it
+has been. Joints are the darker the faster they are told to turn; failed ones are crossed out. The
+dashed ring is the goal, as wide as the tolerance; the pale circle is the reach of the arm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+
+from ...core.arrays import FloatArray
+from ..movies import Pixels, film
+from .kinematics import postures_of
+
+Recording = Mapping[str, FloatArray]
+
+SIDE = 480
+"""Width and height of a picture in pixels."""
+DPI = 100
+# Colour-blind-safe (Okabe and Ito 2008), as in the pictures of box pushing.
+LINK, TIP, GOAL, FAILED = "#0072B2", "#E69F00", "#555555", "#B00020"
+
+
+class _Stage:
+    """A figure on which any moment of a recording can be drawn."""
+
+    def __init__(self, recording: Recording) -> None:
+        self.recording = recording
+        angles, reach = recording["angles"], float(recording["reach"])
+        self.places = postures_of(angles, reach / angles.shape[1])
+        self.figure = Figure(figsize=(SIDE / DPI, SIDE / DPI), dpi=DPI)
+        self.canvas = FigureCanvasAgg(self.figure)
+        self.axes = self.figure.add_axes((0.15, 0.1, 0.83, 0.83))
+        self.axes.set_aspect("equal")
+        self.axes.set_xlim(-1.05 * reach, 1.05 * reach)
+        self.axes.set_ylim(-1.05 * reach, 1.05 * reach)
+        self.axes.set_xlabel("x [m]")
+        self.axes.set_ylabel("y [m]")
+        self.axes.add_patch(Circle((0, 0), reach, fill=False, ec="#dddddd", lw=1))
+        goal, ring = recording["goal"], max(float(recording["tolerance"]), 0.02 * reach)
+        self.axes.add_patch(Circle(tuple(goal), ring, fill=False, ec=GOAL, ls="--", lw=1.5))
+        self.axes.plot(0, 0, "s", color="black", ms=7, zorder=2)
+        self._moving: list[Artist] = []
+
+    def draw(self, step: int) -> None:
+        """Draw the moment after `step` steps."""
+        for artist in self._moving:
+            artist.remove()
+        recording, places = self.recording, self.places[step]
+        tips = self.places[: step + 1, -1]
+        away = np.hypot(*(recording["goal"] - places[-1]))
+        hurry = np.abs(recording["speeds"][step]) / float(recording["top_speed"])
+        n, failed = len(hurry), recording["failed"][step].astype(bool)
+        size = 9.0 if n <= 8 else 5.0 if n <= 32 else 3.0
+        axes, joints = self.axes, places[:-1]
+        x, y = joints.T
+        self._moving = [
+            *axes.plot(*tips.T, color=TIP, lw=1, alpha=0.7, zorder=1),
+            *axes.plot(*places.T, color=LINK, lw=2.5 if n <= 16 else 1.5, zorder=3),
+            axes.scatter(
+                x, y, c=hurry, cmap="Greys", vmin=0.0, vmax=1.0, s=size**2, edgecolors=LINK,
+                linewidths=1.0, zorder=4,
+            ),
+            *axes.plot(*joints[failed].T, "x", color=FAILED, ms=size + 3, mew=2.5, zorder=5),
+            *axes.plot(*places[-1], "o", color=TIP, ms=6, zorder=6),
+        ]  # fmt: skip
+        axes.set_title(f"step {step}: tip {100 * away:.0f} cm from the goal", loc="left")
+
+    def pixels(self) -> Pixels:
+        """Return what is drawn as ``(height, width, 3)`` bytes."""
+        self.canvas.draw()
+        return np.asarray(self.canvas.buffer_rgba())[..., :3].copy()
+
+
+def picture(recording: Recording, step: int) -> Pixels:
+    """Return the moment after `step` steps as ``(height, width, 3)`` bytes."""
+    stage = _Stage(recording)
+    stage.draw(step)
+    return stage.pixels()
+
+
+def animate(recording: Recording, path: Path, speed: float = 1.0) -> None:
+    """Draw an episode as an animation, GIF or MP4 by the suffix of `path`.
+
+    Parameters
+    ----------
+    recording
+        The episode.
+    path
+        Where to write; an unfinished animation never bears this name.
+    speed
+        How many times faster than real time it plays; thinned-out episodes play faster still.
+
+    Raises
+    ------
+    ValueError
+        If the suffix is neither ``.gif`` nor ``.mp4``.
+    """
+    stage = _Stage(recording)
+
+    def drawn(step: int) -> Pixels:
+        stage.draw(step)
+        return stage.pixels()
+
+    film(drawn, len(recording["angles"]) - 1, float(recording["dt"]) / speed, path)

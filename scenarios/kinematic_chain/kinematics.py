@@ -1,0 +1,70 @@
+"""Kinematics of a planar chain of links, and what its joints see of the goal; compiled.
+
+A posture is an array ``(n,)`` of joint angles [rad], each counted from the direction of the link
+before; the first one from the x axis. Joint i stands where link i begins, so that joint 0 is the
+base at the origin. The *tip* is the end of the last link.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...core.compiling import njit
+
+
+@njit(cache=True)
+def ends_of(angles, length):  # type: ignore[no-untyped-def]
+    """Return all joints and the tip ``(n + 1, 2)`` of a posture ``(n,)``, links of `length`."""
+    n = len(angles)
+    places = np.zeros((n + 1, 2))
+    heading = 0.0
+    for i in range(n):
+        heading += angles[i]
+        places[i + 1, 0] = places[i, 0] + length * np.cos(heading)
+        places[i + 1, 1] = places[i, 1] + length * np.sin(heading)
+    return places
+
+
+@njit(cache=True)
+def postures_of(angles, length):  # type: ignore[no-untyped-def]
+    """Return the joints and tips ``(m, n + 1, 2)`` of postures ``(m, n)``."""
+    places = np.empty((len(angles), angles.shape[1] + 1, 2))
+    for k in range(len(angles)):
+        places[k] = ends_of(angles[k], length)
+    return places
+
+
+@njit(cache=True)
+def jacobian_of(places):  # type: ignore[no-untyped-def]
+    """Return how the tip moves ``(n, 2)`` as each joint turns, given `ends_of` a posture [m/rad].
+
+    A joint turns all that is behind it: the tip moves at right angles to the line from the joint.
+    """
+    n = len(places) - 1
+    moves = np.empty((n, 2))
+    for i in range(n):
+        moves[i, 0] = places[i, 1] - places[n, 1]
+        moves[i, 1] = places[n, 0] - places[i, 0]
+    return moves
+
+
+@njit(cache=True)
+def turned_about(places, turns):  # type: ignore[no-untyped-def]
+    """Return by how much the tip moves ``(n, A, 2)`` when one joint alone turns.
+
+    Parameters
+    ----------
+    places
+        ``(n + 1, 2)`` joints and tip before.
+    turns
+        ``(n, A)`` by how much each joint may turn [rad].
+    """
+    n, choices = turns.shape
+    moves = np.empty((n, choices, 2))
+    for i in range(n):
+        x, y = places[n, 0] - places[i, 0], places[n, 1] - places[i, 1]
+        for a in range(choices):
+            cos, sin = np.cos(turns[i, a]) - 1.0, np.sin(turns[i, a])
+            moves[i, a, 0] = cos * x - sin * y
+            moves[i, a, 1] = sin * x + cos * y
+    return moves

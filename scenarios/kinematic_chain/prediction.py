@@ -1,0 +1,161 @@
+"""What joint actions lead to: exactly if joints do what they are believed to do, and as sums.
+
+A decision turns every joint by its speed times the period, or up to its limit. What each of its
+actions would turn it by is found once; a joint action is then one posture. For many joints the tip
+is also had to first order: what a joint contributes is how far the tip moves as that joint alone
+departs from the mean of its possible turns, exactly, on a circle about it. Contributions add up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ...core.arrays import FloatArray, IntArray
+from .kinematics import ends_of, postures_of, turned_about
+from .variables import ChainStates
+from .view import ChainView
+
+
+@dataclass(frozen=True)
+class Premises:
+    """What predictions of one arm have in common.
+
+    Attributes
+    ----------
+    states
+        What joints perceive.
+    length
+        Of a link [m].
+    top_speed
+        Greatest speed of a joint [rad/s].
+    reward
+        ``reward(distance (m,), approach (m,)) -> (m,)``.
+    """
+
+    states: ChainStates
+    length: float
+    top_speed: float
+    reward: Callable[[FloatArray, FloatArray], FloatArray]
+
+
+class ChainPrediction:
+    """Prediction of one decision; a `nested_agents.core.protocols.TeamPrediction` and more.
+
+    It knows rewards, can be had as sums, and serves self-models, every joint being a body.
+
+    Parameters
+    ----------
+    premises
+        What predictions of the arm have in common.
+    angles
+        ``(n,)`` the present posture [rad].
+    speeds
+        ``(n, A)`` speed that each action of each joint commands [rad/s].
+    turns
+        ``(n, A)`` by how much it turns the joint [rad].
+    goal
+        ``(2,)`` [m].
+    before
+        Present distance of the tip from the goal [m].
+    """
+
+    def __init__(
+        self,
+        premises: Premises,
+        angles: FloatArray,
+        speeds: FloatArray,
+        turns: FloatArray,
+        goal: FloatArray,
+        before: float,
+    ) -> None:
+        self.premises, self.angles, self.speeds, self.turns = premises, angles, speeds, turns
+        self.goal, self.before = goal, before
+        self.shares = speeds / premises.top_speed
+        """The speeds as fractions of the greatest."""
+        self._joints = np.arange(len(angles))
+
+    def seen(self, joint_actions: IntArray) -> ChainView:
+        """Return the situations after joint actions ``(m, n)``."""
+        angles = self.angles + self.turns[self._joints, joint_actions]
+        places = postures_of(angles, self.premises.length)
+        speeds = self.shares[self._joints, joint_actions]
+        return ChainView(places, angles, speeds, self.goal, self.before)
+
+    def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
+        """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
+        return self.premises.states.predicted(self.seen(joint_actions), agent, 1)[0]
+
+    def states_of_all(self, joint_actions: IntArray) -> FloatArray:
+        """Return the next states ``(n, m, d)`` of all agents for joint actions ``(m, n)``."""
+        return self.premises.states.predicted(self.seen(joint_actions), 0, len(self.angles))
+
+    def rewards(self, joint_actions: IntArray) -> FloatArray:
+        """Return the rewards ``(m,)`` of joint actions ``(m, n)``."""
+        view = self.seen(joint_actions)
+        return self.premises.reward(view.distance, view.approach)
+
+    @property
+    def groups(self) -> tuple[tuple[int, ...], ...]:
+        """Agents by body: every joint alone."""
+        return tuple((i,) for i in range(len(self.angles)))
+
+    def commands(self, joint_action: IntArray) -> FloatArray:
+        """Return the joint speeds ``(n,)`` that a joint action ``(n,)`` would command [rad/s]."""
+        return self.speeds[self._joints, joint_action]
+
+    def slips(self, joint_action: IntArray) -> FloatArray:
+        """Return by how much contact changes the joints' motion ``(n, 3)``: not at all."""
+        return np.zeros((len(self.angles), 3))
+
+    @cached_property
+    def alike(self) -> IntArray:
+        """The first action of each joint that comes to the same ``(n, A)``."""
+        same = self.speeds[:, :, None] == self.speeds[:, None, :]
+        return same.argmax(axis=2)
+
+    @cached_property
+    def superposition(self) -> ChainSuperposition:
+        """The prediction as sums of what joints contribute."""
+        return ChainSuperposition(self)
+
+
+class ChainSuperposition:
+    """A `nested_agents.core.protocols.Superposition` of the kinematic chain.
+
+    The sum is how far the tip moves away from the mean posture. Of those joints whose actions are
+    known, and of the deciding one, kinematics are exact: only what may yet be decided adds up.
+
+    Parameters
+    ----------
+    prediction
+        What is approximated.
+    """
+
+    def __init__(self, prediction: ChainPrediction) -> None:
+        self._prediction = prediction
+        self._mean = prediction.turns.mean(axis=1)
+        mean = ends_of(prediction.angles + self._mean, prediction.premises.length)
+        self.contributions: FloatArray = turned_about(mean, prediction.turns - self._mean[:, None])
+        self.alike: IntArray = prediction.alike
+
+    def states(
+        self, agent: int, local: IntArray, sums: FloatArray, shares: FloatArray
+    ) -> FloatArray:
+        """Return the next states ``(m, d)`` of `agent`, see the protocol."""
+        prediction = self._prediction
+        turns, speeds = (
+            np.tile((shares * each).sum(axis=1), (each.shape[1], 1))
+            for each in (prediction.turns, prediction.shares)
+        )
+        turns[:, agent], speeds[:, agent] = prediction.turns[agent], prediction.shares[agent]
+        angles = prediction.angles + turns
+        places = postures_of(angles, prediction.premises.length)
+        expected = (shares[:, :, None] * self.contributions).sum(axis=(0, 1))
+        places = places[local]
+        places[:, -1] += sums - expected - self.contributions[agent, local]
+        view = ChainView(places, angles[local], speeds[local], prediction.goal, prediction.before)
+        return prediction.premises.states.predicted(view, agent, 1)[0]

@@ -1,0 +1,235 @@
+"""The kinematic chain: joints of a planar arm that learn to bring its tip to a goal.
+
+An agent for every degree of freedom is the earlier application of the paper's method ([28, 29]).
+The scenario joins the arm, the task (goal, reward, end of an episode), the sensing (states) and the
+servo layer, which turns actions into speeds of joints. Joints are servo-driven and have no mass:
+they turn at the speed that they are told, unless they fail or reach their limit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from ...core.arrays import BoolArray, FloatArray, IntArray
+from ...core.protocols import SUCCESS, Measure, Transition
+from ...core.spaces import ActionSet, StateSpace
+from ..failures.schedule import Failures
+from .config import PERIOD, REACH, KinematicChainSettings
+from .kinematics import postures_of
+from .prediction import ChainPrediction, Premises
+from .variables import ChainStates
+from .view import ChainView
+
+MEASURES = (
+    SUCCESS,
+    Measure("final_distance_m", "final distance", "m", "distance_m", better="lower", least=0.0),
+)
+LEAST_WAY = 0.25
+"""Distance of the tip from the goal at the start, at least [m]."""
+GOAL_RADII = (0.15, 0.95)
+"""Least and greatest distance of the goal from the base [m]."""
+MOST_BEND = 2.5
+"""Greatest angle of a joint behind the base at the start [rad]."""
+
+
+class KinematicChain:
+    """A planar arm; a `nested_agents.core.protocols.Scenario` that can be drawn.
+
+    It is predicted exactly and as sums, and open to self-models.
+
+    Parameters
+    ----------
+    settings
+        See `KinematicChainSettings`.
+
+    Raises
+    ------
+    ValueError
+        If a state variable is unknown, or a failure names a joint that there is not.
+
+    Examples
+    --------
+    >>> scenario = KinematicChainSettings(joints=3).build()
+    >>> scenario.agents, scenario.reset(0).shape
+    (('joint1', 'joint2', 'joint3'), (3, 4))
+    """
+
+    measures = MEASURES
+    recorded = ("angles", "speeds", "failed")
+
+    def __init__(self, settings: KinematicChainSettings) -> None:
+        self.settings = settings
+        n = settings.joints
+        self.agents = tuple(f"joint{i + 1}" for i in range(n))
+        self.roles = ("joint",) * n
+        self.groups = tuple((i,) for i in range(n))
+        self.action_set = ActionSet()
+        self.length = REACH / n
+        self._limits = np.full(n, settings.top_speed)
+        self._least, self._most = np.full(n, -np.inf), np.full(n, np.inf)
+        if settings.joint_limit is not None:
+            self._least[1:], self._most[1:] = -settings.joint_limit, settings.joint_limit
+        self._states = ChainStates(settings.state_space)
+        self._premises = Premises(self._states, self.length, settings.top_speed, self._reward)
+        self._failures = Failures(settings.failures, self.agents, self._limits)
+        # What an informed prediction knows of the next step, while the others tell of the last.
+        self._known = Failures(settings.failures, self.agents, self._limits)
+        self._goal: FloatArray = np.zeros(2)
+        self._angles: FloatArray = np.zeros(n)
+        self._speeds: FloatArray = np.zeros(n)
+        self._step = 0
+
+    @property
+    def superposes(self) -> bool:
+        """Whether predictions can be had to first order: always."""
+        return True
+
+    @property
+    def state_space(self) -> StateSpace:
+        """The state variables of every agent."""
+        return self._states.space
+
+    def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
+        """Bend the arm at random, and put the goal within its reach; return states ``(n, d)``.
+
+        Goals are spread evenly over the area. Failures are scheduled by the number of the
+        `episode`.
+        """
+        rng, n = np.random.default_rng(seed), len(self.agents)
+        bend = min(MOST_BEND, 3.0 * np.sqrt(2.0 / n), self.settings.joint_limit or np.inf)
+        self._angles = np.append(rng.uniform(-np.pi, np.pi), rng.uniform(-bend, bend, n - 1))
+        self._speeds, self._step = np.zeros(n), 0
+        tip = self._places()[-1]
+        while True:
+            radius = np.sqrt(rng.uniform(GOAL_RADII[0] ** 2, GOAL_RADII[1] ** 2))
+            course = rng.uniform(-np.pi, np.pi)
+            self._goal = radius * np.array([np.cos(course), np.sin(course)])
+            if np.hypot(*(self._goal - tip)) >= LEAST_WAY:
+                break
+        for failures in (self._failures, self._known):
+            failures.begin(seed, episode)
+        return self._observe(self._distance())
+
+    def step(self, joint_action: IntArray) -> Transition:
+        """Turn the joints for one decision period, observe and reward."""
+        begin = perf_counter()
+        before, angles = self._distance(), self._angles
+        self._failures.strike(self._step)
+        unit = self.settings.speed_increment * self._limits
+        self._speeds = self.action_set.apply(self._speeds, joint_action, unit, self._limits)
+        held = self._failures.driven(self._speeds, periods=1)[0]
+        self._angles = np.clip(angles + PERIOD * held, self._least, self._most)
+        self._step += 1
+        moved = perf_counter()
+        states, measured = self._observe(before), self.measure()
+        away = np.array([measured["distance_m"]])
+        terminated = bool(away[0] < self.settings.tolerance)
+        truncated = not terminated and self._step >= self.settings.most_decisions
+        motions = np.zeros((len(angles), 3))
+        motions[:, 2] = (self._angles - angles) / PERIOD
+        paid = float(self._reward(away, before - away)[0])
+        measured["seconds"] = {"physics": moved - begin, "sensors": perf_counter() - moved}
+        return Transition(states, paid, terminated, truncated, measured, motions)
+
+    @property
+    def nominal_effects(self) -> tuple[FloatArray, ...]:
+        """Per joint the ``(3, 2)`` effect of its speed: as a body it can but turn."""
+        return (np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]]),) * len(self.agents)
+
+    def predict(self) -> ChainPrediction:
+        """Predict from the present state, by joints as built or, if told, as they are."""
+        if self.settings.predictor == "nominal":
+            return self.predict_with(self.nominal_effects)
+        return self.predict_with(self._actual_effects())
+
+    def predict_with(self, effects: Sequence[FloatArray]) -> ChainPrediction:
+        """Predict from the present state, believing in these effects ``(3, 2)`` of the joints."""
+        gains, offsets = np.array([effect[2] for effect in effects]).T
+        every = np.tile(np.arange(len(self.action_set))[:, None], len(self.agents))
+        unit = self.settings.speed_increment * self._limits
+        speeds = self.action_set.apply(self._speeds, every, unit, self._limits)
+        after = np.clip(self._angles + PERIOD * (gains * speeds + offsets), self._least, self._most)
+        turns = np.ascontiguousarray((after - self._angles).T)
+        return ChainPrediction(
+            self._premises, self._angles, np.ascontiguousarray(speeds.T), turns, self._goal,
+            self._distance(),
+        )  # fmt: skip
+
+    def _actual_effects(self) -> tuple[FloatArray, ...]:
+        """Return the effects of the joints in the coming step: all failures are linear."""
+        self._known.strike(self._step)
+        offsets = self._known.driven(np.zeros(len(self.agents)), periods=1)[0]
+        gains = (self._known.driven(self._limits, periods=1)[0] - offsets) / self._limits
+        return tuple(
+            np.array([[0.0, 0.0], [0.0, 0.0], [gain, offset]])
+            for gain, offset in zip(gains, offsets, strict=True)
+        )
+
+    def with_exact_prediction(self) -> KinematicChain:
+        """Return an arm alike whose predictions are told of failures: the others are exact."""
+        return type(self)(self.settings.model_copy(update={"predictor": "informed"}))
+
+    def measure(self) -> dict[str, Any]:
+        """Return posture ``angles`` (n,) [rad], ``speeds`` (n,) as commanded [rad/s] and more.
+
+        ``tip`` and ``goal`` (2,), ``distance_m`` between them, ``failed`` (n,) joints.
+        """
+        return {
+            "angles": self._angles.copy(),
+            "speeds": self._speeds.copy(),
+            "failed": self.failed,
+            "tip": self._places()[-1].copy(),
+            "goal": self._goal,
+            "distance_m": self._distance(),
+        }
+
+    @property
+    def failed(self) -> BoolArray:
+        """Whether each joint is under a failure now, ``(n,)``."""
+        return self._failures.failed.copy()
+
+    def constants_of_episode(self) -> Mapping[str, Any]:
+        """Return the goal of the episode, and what is drawn."""
+        return {
+            "goal": self._goal,
+            "dt": PERIOD,
+            "reach": REACH,
+            "tolerance": self.settings.tolerance,
+            "top_speed": self.settings.top_speed,
+        }
+
+    def animate(self, recording: Mapping[str, FloatArray], path: Path) -> None:
+        """Draw a recorded episode as an animation, GIF or MP4 by the suffix of `path`."""
+        from .drawing import animate
+
+        animate(recording, path)
+
+    def _reward(self, distance: FloatArray, approach: FloatArray) -> FloatArray:
+        """Return the reward ``(m,)``, given distance and how much nearer the tip has come [m]."""
+        s = self.settings.reward
+        nearer = np.where(approach > s.least_approach, s.c2 * np.exp(-s.r2 * distance), s.receding)
+        return np.where(distance < self.settings.tolerance, s.c1, nearer)
+
+    def _places(self) -> FloatArray:
+        """Return joints and tip ``(n + 1, 2)`` [m]."""
+        places: FloatArray = postures_of(self._angles[None], self.length)[0]
+        return places
+
+    def _distance(self) -> float:
+        return float(np.hypot(*(self._goal - self._places()[-1])))
+
+    def _observe(self, before: float) -> FloatArray:
+        """Return the states ``(n, d)`` of all agents: the error observation layer."""
+        view = ChainView(
+            self._places()[None],
+            self._angles[None],
+            self._speeds[None] / self.settings.top_speed,
+            self._goal,
+            before,
+        )
+        return self._states.sensed(view)[0]

@@ -1,0 +1,116 @@
+"""Scripted controllers of a kinematic chain: what robotics would do, as controls of learning.
+
+Both are evaluators, so that a spec can name them; they know the kinematics and the goal, and learn
+nothing::
+
+    [learner]
+    kind = "frozen"
+    decision.evaluator = "nested_agents.scenarios.kinematic_chain.scripted:DampedLeastSquares"
+
+Joints decide in the order of the hierarchy. Each finds by how much it should turn, given what those
+above it have decided, and takes the action that comes nearest to it.
+
+- `DampedLeastSquares` (Nakamura and Hanafusa 1986; Wampler 1986): with J the ``(2, k)`` Jacobian of
+  the k joints that are free and e what is left of the tip's error, the turns are
+  ``J' (J J' + damping^2)^-1 e``, slowed down until the fastest joint can follow.
+- `CyclicCoordinateDescent` (Wang and Chen 1991): each joint turns until the tip lies on the line
+  from the joint to the goal.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from ...core.arrays import FloatArray, IntArray
+from ...core.evaluators import EvaluatorSettings
+from ...core.evaluators.evaluator import Counts, DecisionProblem, Deliberation
+from .kinematics import ends_of, jacobian_of
+from .prediction import ChainPrediction
+
+
+class _Scripted(ABC):
+    """What the two share: the action whose turn is nearest to the one that is wanted."""
+
+    def __init__(self, settings: EvaluatorSettings, problem: DecisionProblem) -> None:
+        self.problem, self.counts = problem, Counts()
+
+    def values(self, deliberation: Deliberation) -> FloatArray:
+        """Return the value ``(A,)`` of each action: how near its turn comes, negative.
+
+        Raises
+        ------
+        ValueError
+            If the scenario is no kinematic chain.
+        """
+        prediction, agent = deliberation.prediction, deliberation.agent
+        if not isinstance(prediction, ChainPrediction):
+            raise ValueError(
+                f"learner.decision.evaluator: {type(self).__name__} moves a kinematic-chain only"
+            )
+        above = np.array(self.problem.hierarchy.above(agent), dtype=np.int64)
+        turns = np.zeros(len(prediction.angles))
+        turns[above] = prediction.turns[above, deliberation.joint_action[above]]
+        places = ends_of(prediction.angles + turns, prediction.premises.length)
+        wanted = self._wanted(prediction, agent, above, places)
+        values: FloatArray = -np.abs(prediction.turns[agent] - wanted)
+        return values
+
+    @abstractmethod
+    def _wanted(
+        self, prediction: ChainPrediction, agent: int, above: IntArray, places: FloatArray
+    ) -> float:
+        """Return the turn that is wanted of a joint [rad].
+
+        `places` are the joints and the tip ``(n + 1, 2)`` once those above have turned.
+        """
+
+
+class DampedLeastSquares(_Scripted):
+    """Turns all free joints together along the damped least-squares solution."""
+
+    class Settings(EvaluatorSettings):
+        """The settings of the controller."""
+
+        damping: Annotated[float, Field(gt=0)] = 0.05
+        """In metres per radian: large where the arm is stretched and joints would race."""
+
+    def __init__(self, settings: Settings, problem: DecisionProblem) -> None:
+        super().__init__(settings, problem)
+        self._damping = settings.damping
+
+    def _wanted(
+        self, prediction: ChainPrediction, agent: int, above: IntArray, places: FloatArray
+    ) -> float:
+        least, most = prediction.turns.min(axis=1), prediction.turns.max(axis=1)
+        free = most > least
+        free[above] = False
+        if not free[agent]:
+            return 0.0
+        moves = jacobian_of(places)
+        drift = np.where(free, 0.0, prediction.turns.mean(axis=1))
+        drift[above] = 0.0
+        error = prediction.goal - places[-1] - drift @ moves
+        own = moves[free]
+        square = own.T @ own + self._damping**2 * np.eye(2)
+        turns = own @ np.linalg.solve(square, error)
+        reach = np.maximum(np.abs(least), np.abs(most))[free]
+        slower = min(1.0, float((reach / np.maximum(np.abs(turns), 1e-12)).min()))
+        return slower * float(turns[np.count_nonzero(free[:agent])])
+
+
+class CyclicCoordinateDescent(_Scripted):
+    """Turns one joint after the other towards the goal, as if the others stood still."""
+
+    class Settings(EvaluatorSettings):
+        """The settings of the controller: there is nothing to set."""
+
+    def _wanted(
+        self, prediction: ChainPrediction, agent: int, above: IntArray, places: FloatArray
+    ) -> float:
+        x, y = places[-1] - places[agent]
+        ahead, aside = prediction.goal - places[agent]
+        return float(np.arctan2(x * aside - y * ahead, x * ahead + y * aside))

@@ -1,0 +1,92 @@
+"""State variables by name: what a joint perceives beside its own speed.
+
+A state variable is a function of a `ChainView` and the number of a joint from 0, see
+`nested_agents.scenarios.state_variables`. One of your own is written as the built-in ones are, and
+a spec names it ``"mine.py:height"``::
+
+    from nested_agents import ChainView, state_variable
+
+    @state_variable("m", -1.0, 1.0)
+    def height(view: ChainView, joint: int):
+        return view.places[:, joint, 1]
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...core.arrays import FloatArray
+from ...core.registry import Registry
+from ...core.spaces import StateSpace, Variable
+from ..state_variables import found
+from .kernels import COMPILED, columns
+from .view import ChainView
+
+_PLACE = "nested_agents.scenarios.kinematic_chain.relational"
+
+CHAIN_VARIABLES = Registry("chain variable", {name: f"{_PLACE}:{name}" for name in COMPILED})
+"""State variables by the name that specs use."""
+
+SPEEDS = (-1.0, -0.5, 0.0, 0.5, 1.0)
+"""Centres of the own speed, as a fraction of the greatest: arms of any length share it."""
+SPEED = Variable("speed", "1", -1.0, 1.0, centres=SPEEDS)
+
+
+class ChainStates:
+    """The states of joints: the own speed, and variables in the order in which they are listed.
+
+    Parameters
+    ----------
+    names
+        Of the variables, see `CHAIN_VARIABLES`. The compiled ones are trusted; what functions of
+        users return is checked.
+
+    Raises
+    ------
+    ValueError
+        If one is unknown or named twice, or there is none; one line.
+    """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self._things = [found(CHAIN_VARIABLES, name) for name in names]
+        variables = tuple(thing.variable for thing in self._things)
+        distinct = {"speed", *(variable.name for variable in variables)}
+        if not names or len(distinct) <= len(names):
+            raise ValueError(
+                f"scenario.state_space = {list(names)}: variables must be distinct and at least one"
+            )
+        common = tuple(thing.variable.name for thing in self._things if thing.common)
+        self.space = StateSpace("+".join(names), (SPEED, *variables), 1, common)
+        own = [k for k, name in enumerate(names) if name not in COMPILED]
+        self._own = [(1 + k, self._things[k]) for k in own]
+        self._rows = np.array([-1] + [_row(name) for name in names])
+
+    def sensed(self, view: ChainView) -> FloatArray:
+        """Return the states ``(m, n, d)`` of all joints, by the functions alone."""
+        n, guarded = view.angles.shape[1], view.guarded()
+        return np.stack(
+            [
+                np.stack([view.speeds[:, i], *(t.checked(guarded, i) for t in self._things)], -1)
+                for i in range(n)
+            ],
+            axis=1,
+        )
+
+    def predicted(self, view: ChainView, first: int, count: int) -> FloatArray:
+        """Return the states ``(count, m, d)`` of joints from `first` on, compiled if possible."""
+        states: FloatArray = columns(
+            view.places, view.angles, view.speeds, view.goal, view.before, first, count, self._rows
+        )
+        if self._own:
+            guarded = view.guarded()
+            for column, thing in self._own:
+                for i in range(count):
+                    states[i, :, column] = thing.checked(guarded, first + i)
+        return states
+
+
+def _row(name: str) -> int:
+    """Return which compiled column a variable is; beyond the last if it is none."""
+    return COMPILED.index(name) if name in COMPILED else len(COMPILED)

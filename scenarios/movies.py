@@ -1,0 +1,59 @@
+"""Animations of recorded episodes: frames that a scenario draws, written as GIF or MP4."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import imageio.v2 as imageio
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+Pixels = NDArray[np.uint8]
+"""A picture ``(height, width, 3)``; sides are multiples of 16, as video codecs want them."""
+MOST_FRAMES = 120
+"""Longer episodes are thinned out to this many frames."""
+
+
+def film(draw: Callable[[int], Pixels], last: int, seconds: float, path: Path) -> None:
+    """Write an animation, GIF or MP4 by the suffix of `path`.
+
+    Parameters
+    ----------
+    draw
+        Draws the moment after so many steps.
+    last
+        Number of the last step.
+    seconds
+        For which a frame is shown; the last frame of a GIF is shown for longer.
+    path
+        Where to write; an unfinished animation never bears this name.
+
+    Raises
+    ------
+    ValueError
+        If the suffix is neither ``.gif`` nor ``.mp4``.
+    """
+    if path.suffix not in (".gif", ".mp4"):
+        raise ValueError(f"animation: suffix {path.suffix!r} of {path.name}, allowed .gif or .mp4")
+    steps = np.unique(np.linspace(0, last, min(last + 1, MOST_FRAMES)).round().astype(int))
+    frames = [draw(int(step)) for step in steps]
+    partial = path.with_name(f".{path.stem}.partial{path.suffix}")
+    write = _write_gif if path.suffix == ".gif" else _write_mp4
+    write(partial, frames, seconds)
+    partial.replace(path)
+
+
+def _write_gif(path: Path, frames: list[Pixels], seconds: float) -> None:
+    # One palette for all frames: colours do not flicker, and it is found only once.
+    palette = Image.fromarray(frames[-1]).quantize(128)
+    images = [
+        Image.fromarray(f).quantize(palette=palette, dither=Image.Dither.NONE) for f in frames
+    ]
+    durations = [round(1000 * seconds)] * (len(images) - 1) + [1500]
+    images[0].save(path, save_all=True, append_images=images[1:], duration=durations, loop=0)
+
+
+def _write_mp4(path: Path, frames: list[Pixels], seconds: float) -> None:
+    imageio.mimwrite(path, frames, fps=1 / seconds, macro_block_size=16)  # type: ignore[arg-type]

@@ -1,0 +1,129 @@
+"""State variables by name: functions of what is seen, whatever the scenario.
+
+A state variable is a function of a view and of the number of a body (a robot, a joint), vectorised
+over the situations that the view holds; the same function serves sensing, where there is one
+situation, and prediction, where there are many. It must depend on nothing else: ``nested-agents
+check`` finds out where it means two things. What a view is, and which variables are built in, is
+the scenario's business: each has a registry and a view of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from ..core.arrays import FloatArray
+from ..core.registry import Registry
+from ..core.spaces import Variable
+
+
+class Situations(Protocol):
+    """What any view tells."""
+
+    @property
+    def n_situations(self) -> int:
+        """How many situations it holds."""
+        ...
+
+
+StateFunction = Callable[[Any, int], FloatArray]
+"""The values ``(m,)`` of a variable for one body in the ``m`` situations of a view."""
+
+
+@dataclass(frozen=True)
+class StateVariable:
+    """A state variable and how to compute it.
+
+    Attributes
+    ----------
+    variable
+        Its name, unit, range and membership centres.
+    function
+        ``function(view, body) -> (m,)``.
+    common
+        Whether it is the same for all bodies.
+    """
+
+    variable: Variable
+    function: StateFunction
+    common: bool = False
+
+    def __call__(self, view: Any, body: int) -> FloatArray:
+        """Return the values ``(m,)`` for a body."""
+        return self.function(view, body)
+
+    def checked(self, view: Situations, body: int) -> FloatArray:
+        """Return the values ``(m,)`` of a function that is not known to be sound.
+
+        Raises
+        ------
+        ValueError
+            If it returns anything but one finite number per situation.
+        """
+        found: FloatArray = np.asarray(self.function(view, body))
+        name, m = self.variable.name, view.n_situations
+        if found.shape != (m,):
+            raise ValueError(f"state variable {name!r}: shape {found.shape}, must be {(m,)}")
+        if found.dtype.kind not in "fiu" or not np.isfinite(found).all():
+            raise ValueError(f"state variable {name!r}: not all of its values are finite numbers")
+        return found
+
+
+def state_variable(
+    unit: str,
+    low: float,
+    high: float,
+    *,
+    periodic: bool = False,
+    centres: tuple[float, ...] = (),
+    labels: tuple[str, ...] = (),
+    common: bool = False,
+) -> Callable[[StateFunction], StateVariable]:
+    """Make a function of a view and a body a state variable of the function's name.
+
+    Parameters are those of `nested_agents.core.spaces.Variable`, and `common`: whether it is the
+    same for all bodies, which makes decisions by the values of many agents faster. What the
+    function is given is read-only.
+
+    Examples
+    --------
+    >>> @state_variable("m", 0.0, 0.5)
+    ... def closest(view, robot):
+    ...     return view.gaps.min(axis=1)
+    >>> closest.variable.name
+    'closest'
+    """
+
+    def described(function: StateFunction) -> StateVariable:
+        name: Any = getattr(function, "__name__", None)
+        variable = Variable(name, unit, low, high, periodic, centres, labels)
+        return StateVariable(variable, function, common)
+
+    return described
+
+
+def found(registry: Registry, name: str) -> StateVariable:
+    """Return a state variable of a registry by name, or by where it is.
+
+    Raises
+    ------
+    ValueError
+        If there is none; one line.
+    """
+    try:
+        thing = registry.find(name)
+        if not isinstance(thing, StateVariable):
+            raise ValueError(f"is no state variable, but a {type(thing).__name__}")
+    except ValueError as error:
+        raise ValueError(f"scenario.state_space: {name!r}: {error}") from None
+    return thing
+
+
+def referred(registry: Registry, names: object) -> object:
+    """Return a list of state variables with the objects in it replaced by their names."""
+    if not isinstance(names, list | tuple):
+        return names
+    return tuple(registry.reference_to(v) if isinstance(v, StateVariable) else v for v in names)

@@ -1,0 +1,40 @@
+"""docs/kinematic_chain.md holds the tables that the committed results give, and specs that are."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from nested_agents.studies.claims import claims
+from nested_agents.studies.cli.main import main
+from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.trials.trial import check
+
+ROOT = Path(__file__).resolve().parents[2]
+TEXT = (ROOT / "docs" / "kinematic_chain.md").read_text(encoding="utf-8")
+REACHED = ("success", "evaluation success", "decide [ms]")
+
+
+@pytest.mark.parametrize(
+    ("name", "columns"),
+    [
+        ("arms", REACHED),
+        ("long-arms", REACHED),
+        ("arm-transfer", ("evaluation success", "success, eight", "success, sixteen")),
+    ],
+)
+def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
+    path = claims.PUBLISHED / f"{name}.json"
+    assert main(["table", str(path), "--columns", *columns, "--format", "markdown"]) == 0
+    table = capsys.readouterr().out
+    assert table in TEXT, f"docs/kinematic_chain.md: put in\n{table}"
+
+
+@pytest.mark.parametrize("spec", re.findall(r"```toml\n(.*?)```", TEXT, flags=re.DOTALL))
+def test_specs_can_be_built(spec: str) -> None:
+    check(Spec.parse(spec))
+
+
+@pytest.mark.parametrize("path", re.findall(r"nested-agents run (studies/\S+)", TEXT))
+def test_the_catalogue_has_what_it_names(path: str) -> None:
+    check(Spec.load(ROOT / path))
