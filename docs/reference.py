@@ -146,15 +146,15 @@ def keys() -> Iterator[str]:
         yield f"{prose(one.summary)}\n"
         if one.keys:
             yield from table(
-                ("key", "type", "default", "allowed", "unit", "meaning"),
+                ("key", "meaning", "unit", "default", "type", "allowed"),
                 (
                     (
                         code(k.name),
-                        k.type,
-                        code(k.default),
-                        code(k.allowed),
-                        k.unit,
                         prose(k.meaning),
+                        k.unit,
+                        code(k.default),
+                        k.type,
+                        code(k.allowed),
                     )
                     for k in one.keys
                 ),

@@ -32,6 +32,8 @@ from .spec import Spec
 UNIT = re.compile(r"\[(m|m/s|kg|rad|s|N per m/s|m/s per m/s)\]")
 """How the text beside a field names its unit."""
 TYPES = {bool: "true or false", int: "whole number", float: "number", str: "text", Any: "any"}
+MOST_TOLD = 10**9
+"""A bound beyond it is that of a machine's integers, and no help to anybody."""
 COMPARISONS = ((Ge, "ge", ">="), (Gt, "gt", ">"), (Le, "le", "<="), (Lt, "lt", "<"))
 
 
@@ -300,7 +302,7 @@ def _allowed(annotation: Any) -> Iterator[str]:
 def _bounds(metadata: Any) -> Iterator[str]:
     for item in metadata:
         for cls, attribute, sign in COMPARISONS:
-            if isinstance(item, cls):
+            if isinstance(item, cls) and getattr(item, attribute) <= MOST_TOLD:
                 yield f"{sign} {getattr(item, attribute):,}"
         if isinstance(item, MinLen):
             yield f"at least {item.min_length} of them"
