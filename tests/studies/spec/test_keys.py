@@ -83,7 +83,7 @@ def test_the_command(capsys: pytest.CaptureFixture[str], monkeypatch) -> None:
     monkeypatch.setenv("COLUMNS", "80")
     assert main(["keys", "scenario.infrared.reach"]) == 0
     assert capsys.readouterr().out == (
-        "[scenario.infrared]\n"
+        '[scenario.infrared], of "box-pushing"\n'
         "reach = 0.06: number, > 0, [m]\n"
         "    Distance beyond which they read 0 [m]; the e-Puck's are useful up to about 6\n"
         "    cm.\n"
