@@ -19,7 +19,8 @@ class Decision(Settings):
     random. f of an after-state contains its reward already: the sum weighs the reward twice."""
     teammates: Teammates = "best-response"
     """What the agents below are expected to do: the best for this agent, anything with equal
-    probability, or what they were seen to do so far (the paper's "stochastically observing")."""
+    probability, what they were seen to do so far (the paper's "stochastically observing"), or what
+    they were seen to do when this agent did the same as it considers now (``conditional``)."""
     value_of: ValueOf = "own"
     """Whose value decides: the agent's own; the mean of its own and those of the agents below it;
     or the mean of all agents'."""

@@ -157,6 +157,53 @@ class EpsilonDecreasingBoltzmann:
         return int(rng.choice(len(values), p=boltzmann(values, self.temperature)))
 
 
+class BoltzmannExploration(ExplorationSettings):
+    """Actions drawn from the Boltzmann distribution (Eq. 14) while its temperature falls.
+
+    ``T(t) = 1 + T_max exp(-s t)`` after t steps; the defaults are those of Kapetanakis and Kudenko
+    (2002) for games of 1,000 plays.
+    """
+
+    kind: Literal["boltzmann"] = "boltzmann"
+    max_temperature: Positive = 500.0
+    """T_max."""
+    decay: NonNegative = 0.006
+    """s per step."""
+
+    def build(self, n_agents: int) -> Explorer:
+        """Return the explorer of a team."""
+        return Boltzmann(self)
+
+
+class Boltzmann:
+    """Samples the Boltzmann distribution; the clock counts the steps of the whole run."""
+
+    def __init__(self, settings: BoltzmannExploration) -> None:
+        self.settings = settings
+        self.memory: FloatArray = np.zeros(1)
+
+    @property
+    def temperature(self) -> float:
+        """T(t) = 1 + T_max exp(-s t)."""
+        s = self.settings
+        return 1.0 + s.max_temperature * float(np.exp(-s.decay * self.memory[0]))
+
+    def begin_episode(self) -> None:
+        """Go on counting."""
+
+    def take_over(self, former: Boltzmann) -> None:
+        """Go on with the clock."""
+        self.memory[:] = former.memory
+
+    def advance(self) -> None:
+        """Let the clock tick."""
+        self.memory[0] += 1.0
+
+    def choose(self, agent: int, values: FloatArray, rng: np.random.Generator) -> int:
+        """Draw an action."""
+        return int(rng.choice(len(values), p=boltzmann(values, self.temperature)))
+
+
 class BurstExploration(ExplorationSettings):
     """Random actions that are held for a while, at a rate that falls from episode to episode.
 
@@ -233,6 +280,7 @@ EXPLORATIONS = SettingsRegistry(
     {
         "burst": f"{__name__}:BurstExploration",
         "paper": f"{__name__}:PaperExploration",
+        "boltzmann": f"{__name__}:BoltzmannExploration",
     },
     ExplorationSettings,
 )

@@ -9,17 +9,21 @@ one of three classes:
 - *unseen*: neither; it is taken to perform the neutral action, maintain, even if it has decided.
 
 In the paper's chain nobody is unseen.
+
+*Peers* are joined by an undirected edge: they decide at the same time. Each considers all actions
+of the other, as if it were below, and neither is told what the other does. Peers make joint-action
+learners (everybody is everybody's peer) and coordination graphs (few are).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import networkx as nx
 
 
 class Hierarchy:
-    """A directed acyclic graph over agents.
+    """A directed acyclic graph over agents, some of whom may be peers.
 
     Parameters
     ----------
@@ -27,41 +31,40 @@ class Hierarchy:
         Distinct agent names; their order is the agent order.
     edges
         Pairs (superior, subordinate) of names.
+    peers
+        Pairs of names of those who decide at the same time, each pair once.
 
     Raises
     ------
     ValueError
         If an agent is named twice or unknown, an edge occurs twice, leads to itself, or closes a
-        cycle. The message names it.
+        cycle, or two peers are superior and subordinate. The message names it.
 
     Examples
     --------
     >>> chain = Hierarchy(["a", "b", "c"], [("a", "b"), ("b", "c")])
     >>> chain.order, chain.below(0), chain.above(2)
     ((0, 1, 2), (1, 2), (0, 1))
+    >>> both = Hierarchy(["a", "b"], [], peers=[("a", "b")])
+    >>> both.below(0), both.below(1), both.above(1)
+    ((1,), (0,), ())
     """
 
-    def __init__(self, agents: Sequence[str], edges: Iterable[tuple[str, str]]) -> None:
+    def __init__(
+        self,
+        agents: Sequence[str],
+        edges: Iterable[tuple[str, str]],
+        peers: Iterable[tuple[str, str]] = (),
+    ) -> None:
         agents, edges = tuple(agents), [(str(a), str(b)) for a, b in edges]
         if not agents:
             raise ValueError("hierarchy: no agents")
         for name in agents:
             if agents.count(name) > 1:
                 raise ValueError(f"hierarchy: agent {name!r} is named more than once")
-        known = set(agents)
-        seen: set[tuple[str, str]] = set()
-        for edge in edges:
-            for name in edge:
-                if name not in known:
-                    raise ValueError(
-                        f"hierarchy: edge {_arrow(edge)} names unknown agent {name!r}, known: "
-                        f"{', '.join(agents)}"
-                    )
-            if edge[0] == edge[1]:
-                raise ValueError(f"hierarchy: agent {edge[0]!r} cannot be its own superior")
-            if edge in seen:
-                raise ValueError(f"hierarchy: edge {_arrow(edge)} is given more than once")
-            seen.add(edge)
+        sides = [(str(a), str(b)) for a, b in peers]
+        _check_edges(edges, agents, _arrow, "superior")
+        _check_edges([tuple(sorted(pair)) for pair in sides], agents, _line, "peer")
         index = {name: i for i, name in enumerate(agents)}
         graph = nx.DiGraph()
         graph.add_nodes_from(range(len(agents)))
@@ -71,8 +74,19 @@ class Hierarchy:
             raise ValueError(f"hierarchy: cycle {' -> '.join([*cycle, cycle[0]])}")
         self.agents = agents
         self.edges = tuple(sorted(graph.edges))
+        self.peers = tuple(
+            sorted((min(p), max(p)) for p in ((index[a], index[b]) for a, b in sides))
+        )
+        """Pairs of peers, by index, each once."""
         self.order: tuple[int, ...] = tuple(nx.lexicographical_topological_sort(graph))
-        self._below = tuple(tuple(sorted(nx.descendants(graph, i))) for i in graph)
+        beside: list[set[int]] = [set() for _ in agents]
+        for a, b in self.peers:
+            if nx.has_path(graph, a, b) or nx.has_path(graph, b, a):
+                pair = _line((agents[a], agents[b]))
+                raise ValueError(f"hierarchy: peers {pair} are superior and subordinate, too")
+            beside[a].add(b)
+            beside[b].add(a)
+        self._below = tuple(tuple(sorted(nx.descendants(graph, i) | beside[i])) for i in graph)
         self._above = tuple(tuple(sorted(nx.ancestors(graph, i))) for i in graph)
         self.depth: int = nx.dag_longest_path_length(graph) + 1
         """Number of agents on the longest path."""
@@ -81,11 +95,13 @@ class Hierarchy:
         return len(self.agents)
 
     def __repr__(self) -> str:
-        named = ", ".join(_arrow((self.agents[a], self.agents[b])) for a, b in self.edges)
+        pairs = [_arrow((self.agents[a], self.agents[b])) for a, b in self.edges]
+        pairs += [_line((self.agents[a], self.agents[b])) for a, b in self.peers]
+        named = ", ".join(pairs)
         return f"Hierarchy({len(self)} agents: {named or 'no edges'})"
 
     def below(self, agent: int) -> tuple[int, ...]:
-        """Return all agents that `agent` can see: its descendants, in agent order."""
+        """Return all agents that `agent` can see: descendants and peers, in agent order."""
         return self._below[agent]
 
     def above(self, agent: int) -> tuple[int, ...]:
@@ -104,8 +120,38 @@ class Hierarchy:
     def permuted(self, permutation: Sequence[int]) -> Hierarchy:
         """Return the same hierarchy with agent ``permutation[k]`` listed as k-th."""
         names = [self.agents[i] for i in permutation]
-        return Hierarchy(names, [(self.agents[a], self.agents[b]) for a, b in self.edges])
+        edges, peers = (
+            [(self.agents[a], self.agents[b]) for a, b in pairs]
+            for pairs in (self.edges, self.peers)
+        )
+        return Hierarchy(names, edges, peers)
 
 
-def _arrow(edge: tuple[str, str]) -> str:
+def _check_edges(
+    edges: Sequence[tuple[str, ...]],
+    agents: tuple[str, ...],
+    shown: Callable[[tuple[str, ...]], str],
+    kind: str,
+) -> None:
+    """Refuse an edge of an unknown agent, to itself, or given twice."""
+    known, seen = set(agents), set()
+    for edge in edges:
+        for name in edge:
+            if name not in known:
+                raise ValueError(
+                    f"hierarchy: edge {shown(edge)} names unknown agent {name!r}, known: "
+                    f"{', '.join(agents)}"
+                )
+        if edge[0] == edge[1]:
+            raise ValueError(f"hierarchy: agent {edge[0]!r} cannot be its own {kind}")
+        if edge in seen:
+            raise ValueError(f"hierarchy: edge {shown(edge)} is given more than once")
+        seen.add(edge)
+
+
+def _arrow(edge: tuple[str, ...]) -> str:
     return f"{edge[0]} -> {edge[1]}"
+
+
+def _line(edge: tuple[str, ...]) -> str:
+    return f"{edge[0]} - {edge[1]}"

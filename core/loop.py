@@ -9,9 +9,10 @@ Recording, progress and plotting consume the records; none of them enters the lo
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from time import perf_counter
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -48,6 +49,30 @@ class StepRecord:
     last: bool
     deciding: float
     learning: float
+
+
+class EpisodeSummary(NamedTuple):
+    """What a whole episode came to."""
+
+    steps: int
+    measures: Mapping[str, float]
+    """Values of the scenario's measures by name."""
+    return_: float
+    """Sum of the rewards."""
+
+
+@runtime_checkable
+class EpisodicScenario(Scenario, Protocol):
+    """A scenario that runs whole episodes of some teams at once, compiled."""
+
+    def run_episode(
+        self, team: Team, seed: np.random.SeedSequence, episode: int, steps: int, *, learn: bool
+    ) -> EpisodeSummary | None:
+        """Run an episode, and leave scenario and team as `control_loop` would.
+
+        None, and nothing is changed, if the team has parts that it does not know.
+        """
+        ...
 
 
 def world_seed(seed: int, episode: int) -> np.random.SeedSequence:

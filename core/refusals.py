@@ -2,7 +2,40 @@
 
 from __future__ import annotations
 
+import difflib
 import re
+from collections.abc import Collection, Iterable, Mapping, Sequence
+
+from pydantic import ValidationError
+
+Keys = tuple[int | str, ...]
+"""Where a value stands: keys of tables, and indices of lists."""
+
+
+def closest(name: object, known: Iterable[str]) -> str:
+    """Return "did you mean ...?" if a known name is near, and the known names in any case.
+
+    Examples
+    --------
+    >>> closest("chian", ["chain", "tree"])
+    "did you mean 'chain'? known: chain, tree"
+    """
+    known = sorted(known)
+    near = difflib.get_close_matches(str(name), known, n=1)
+    hint = f"did you mean {near[0]!r}? " if near else ""
+    return f"{hint}known: {', '.join(known) or 'none'}"
+
+
+def mistaken(key: object, known: Collection[str]) -> str:
+    """Return "; did you mean ...?" if a key that refuses its value is nearly another one's name.
+
+    Examples
+    --------
+    >>> mistaken("robot", ["robot", "robots", "box"]), mistaken("box", ["robot", "box"])
+    ("; did you mean 'robots'?", '')
+    """
+    near = difflib.get_close_matches(str(key), set(known) - {str(key)}, n=1, cutoff=0.85)
+    return f"; did you mean {near[0]!r}?" if near else ""
 
 
 def rule(message: str) -> str:
@@ -24,3 +57,51 @@ def rule(message: str) -> str:
         .replace("less than or equal to", "at most")
         .replace("greater than or equal to", "at least")
     )
+
+
+def one_line(error: ValidationError, data: Mapping[str, object], known: Collection[str]) -> str:
+    """Return one line on the first thing that pydantic found wrong.
+
+    Parameters
+    ----------
+    error
+        What pydantic raised.
+    data
+        The table that it validated.
+    known
+        The keys that the table may have.
+    """
+    problems = [(place(e["loc"], data), e) for e in error.errors(include_url=False)]
+    keys, first = problems[0]
+    path = dotted(keys)
+    if first["type"] == "missing":
+        return f"{path}: missing" if keys else f"{first['loc'][-1]}: missing"
+    if first["type"] == "extra_forbidden":
+        top = closest(keys[-1], known) if len(keys) == 1 else ""
+        return f"{path} = {first['input']!r}: unknown key; {top}".removesuffix("; ")
+    # The members of a union complain one by one about the same place: say what any would take.
+    rules = dict.fromkeys(rule(e["msg"]) for keys_, e in problems if keys_ == keys)
+    said = ", or ".join(rules) + (mistaken(keys[0], known) if len(keys) == 1 else "")
+    return f"{path} = {first['input']!r}: {said}" if keys else said
+
+
+def place(loc: Sequence[int | str], data: object) -> Keys:
+    """Drop from pydantic's path what names a member of a union rather than a key of the table."""
+    keys: list[int | str] = []
+    for index, item in enumerate(loc):
+        inside = isinstance(data, Mapping) and item in data
+        listed = isinstance(data, Sequence) and isinstance(item, int) and item < len(data)
+        if inside or (listed and not isinstance(data, str)):
+            keys.append(item)
+            data = data[item]  # type: ignore[index]
+        elif index == len(loc) - 1 and isinstance(data, Mapping) and not keys:
+            keys.append(item)
+    return tuple(keys)
+
+
+def dotted(keys: Keys) -> str:
+    """Return where a value stands as it is written: ``overrides[1].learner.ridge``."""
+    path = ""
+    for key in keys:
+        path += f"[{key}]" if isinstance(key, int) else f".{key}"
+    return path.lstrip(".").replace("\n", " ")

@@ -13,10 +13,9 @@ thing. A class with a nested ``Settings`` stands for the model that builds it.
 
 from __future__ import annotations
 
-import difflib
 import os
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, Literal, cast
@@ -26,21 +25,8 @@ from pydantic_core import PydanticCustomError, core_schema
 
 from . import sources
 from .places import located
+from .refusals import closest as closest
 from .settings import Settings, tuples
-
-
-def closest(name: object, known: Iterable[str]) -> str:
-    """Return "did you mean ...?" if a known name is near, and the known names in any case.
-
-    Examples
-    --------
-    >>> closest("chian", ["chain", "tree"])
-    "did you mean 'chain'? known: chain, tree"
-    """
-    known = sorted(known)
-    near = difflib.get_close_matches(str(name), known, n=1)
-    hint = f"did you mean {near[0]!r}? " if near else ""
-    return f"{hint}known: {', '.join(known) or 'none'}"
 
 
 class Registry:

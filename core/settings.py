@@ -7,21 +7,71 @@ ranges when it is built; every field is documented beside it, with its unit.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from .places import located
+from .refusals import one_line
 
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
 
 
-class Settings(BaseModel):
-    """A frozen model that refuses unknown keys."""
+class SettingsError(ValueError):
+    """Settings that cannot be made: one line that names the field, the value, what is allowed.
+
+    Attributes
+    ----------
+    problem
+        The line without the name of the settings.
+    """
+
+    def __init__(self, name: str, problem: str) -> None:
+        super().__init__(f"{name}: {problem}")
+        self.problem = problem
+
+
+if TYPE_CHECKING:
+    from pydantic._internal._model_construction import ModelMetaclass
+else:
+    ModelMetaclass = type(BaseModel)
+
+
+class _Made(ModelMetaclass):
+    """What calling a settings class does: what is refused is told in one line, not in pydantic's.
+
+    Tables are validated without being called, so nothing changes there.
+    """
+
+    def __call__(cls: Any, *args: Any, **table: Any) -> Any:  # noqa: N805 - of a metaclass
+        try:
+            return cls.made(*args, **table)
+        except ValidationError as error:
+            problem = one_line(error, table, cls.model_fields)
+            raise SettingsError(cls.__name__, problem) from None
+
+
+class Settings(BaseModel, metaclass=_Made):
+    """A frozen model that refuses unknown keys.
+
+    Examples
+    --------
+    >>> class Cart(Settings):
+    ...     wheels: int = 2
+    >>> Cart(wheel=4)
+    Traceback (most recent call last):
+    nested_agents.core.settings.SettingsError: Cart: wheel = 4: unknown key; did you mean
+    'wheels'? known: wheels
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    @classmethod
+    def made(cls, **table: Any) -> Any:
+        """Return the settings that calling the class with keywords makes."""
+        return type(BaseModel).__call__(cls, **table)
 
 
 class ScenarioSettings(Settings):
@@ -40,6 +90,10 @@ class ScenarioSettings(Settings):
             If there can be none of these settings; one line.
         """
         return located(self.factory)(self)
+
+    def doubts(self) -> tuple[str, ...]:
+        """Return what looks like a slip of the pen, a line each, such as a size in another unit."""
+        return ()
 
     def suited(self, preset: str) -> Mapping[str, Any]:
         """Return what this scenario lays over a preset: its ``learner`` and ``topology`` tables.

@@ -27,7 +27,7 @@ FOLDER = "sources"
 """Where a study keeps copies, below its own directory."""
 MOST_BYTES = 1_000_000
 """Of a file; a larger one is no program."""
-GRAPHS = (".graphml", ".json")
+GRAPHS = (".graphml", ".json", ".toml")
 """Suffixes of files that hold a hierarchy."""
 
 

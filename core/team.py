@@ -10,7 +10,7 @@ import numpy as np
 
 from .arrays import FloatArray, IntArray
 from .calibration import Calibration
-from .evaluators.evaluator import DecisionProblem, Deliberation, Evaluator
+from .evaluators.evaluator import NOTHING_GIVEN, DecisionProblem, Deliberation, Evaluator
 from .exploration import Explorer, Greedy, SuccessorExplorer
 from .hierarchy import Hierarchy
 from .learners.learner import Learner, LearnerSettings, SuccessorLearner
@@ -76,8 +76,13 @@ class Team:
         self.rows = rows
         self.self_model, self.calibration = self_model, calibration
         self.rng = np.random.Generator(np.random.PCG64(seed))
-        # How often each agent was seen to take each action; one of each to begin with.
-        self._seen: FloatArray = np.ones((len(hierarchy), len(action_set)))
+        self.seen: FloatArray = np.ones((len(hierarchy), len(action_set)))
+        """How often each agent was seen to take each action, one of each to begin with."""
+        shape = (len(hierarchy), len(action_set)) * 2
+        problem = getattr(evaluator, "problem", None)
+        conditional = isinstance(problem, DecisionProblem) and problem.teammates == "conditional"
+        self.given: FloatArray = np.ones(shape if conditional else (0, 0, 0, 0))
+        """The same given each action of another ``(n, A, n, A)``, if the evaluator asks for it."""
         self._greedy: Explorer = Greedy()
         # Agents in the order of decision, each with those before it that it does not see.
         order = hierarchy.order
@@ -192,7 +197,7 @@ class Team:
         if self.evaluator is None:
             return self.rng.integers(n_actions, size=n)
         explorer = self.explorer if explore else self._greedy
-        frequencies = self._seen / self._seen.sum(axis=1, keepdims=True)
+        frequencies = self.seen / self.seen.sum(axis=1, keepdims=True)
         theta = self.learner.theta
         weights = [theta[row] for row in self.rows]
         joint = np.full(n, self.action_set.neutral)
@@ -201,13 +206,25 @@ class Team:
             if len(unseen):  # decided, but not above: taken to maintain
                 known = joint.copy()
                 known[unseen] = self.action_set.neutral
-            deliberation = Deliberation(i, known, prediction, weights, frequencies, self.rng)
+            deliberation = Deliberation(
+                i, known, prediction, weights, frequencies, self.rng, self._given_by(i)
+            )
             values = self.evaluator.values(deliberation)
             joint[i] = explorer.choose(i, values, self.rng)
         if explore:
             explorer.advance()
-            self._seen[np.arange(n), joint] += 1.0
+            every = np.arange(n)
+            self.seen[every, joint] += 1.0
+            if self.given.size:
+                self.given[every[:, None], joint[:, None], every, joint] += 1.0
         return joint
+
+    def _given_by(self, agent: int) -> FloatArray:
+        """Return how often all took each action ``(A, n, A)`` given each action of an agent."""
+        if not self.given.size:
+            return NOTHING_GIVEN
+        counts = self.given[agent]
+        return counts / counts.sum(axis=2, keepdims=True)
 
     def adapt(self, prediction: Prediction, joint_action: IntArray, transition: Transition) -> None:
         """Revise self-model and constants by what `joint_action` did, against what was predicted.
@@ -253,7 +270,8 @@ class Team:
 
         It goes on with its weights and experience, with how often agents of each row were seen to
         take each action, with its exploration and its random numbers; with self-model and
-        calibration if the bodies are alike, which otherwise begin anew.
+        calibration if the bodies are alike, and with conditional frequencies if the agents are as
+        many, which otherwise begin anew.
 
         Parameters
         ----------
@@ -275,9 +293,11 @@ class Team:
         learner.take_over(former.learner, rows)
         explorer.take_over(former.explorer)
         self.rng.bit_generator.state = former.rng.bit_generator.state
-        self._seen = np.stack(
-            [former._seen[former.rows == rows[row]].mean(axis=0) for row in self.rows]
+        self.seen = np.stack(
+            [former.seen[former.rows == rows[row]].mean(axis=0) for row in self.rows]
         )
+        if self.given.shape == former.given.shape:
+            self.given = former.given.copy()
         if self.self_model is not None and former.self_model is not None:
             self.self_model.take_over(former.self_model)
         if self.calibration is not None and former.calibration is not None:
@@ -313,7 +333,8 @@ class Team:
         return {
             "generator": np.array(generator, dtype=np.uint64),
             "explorer": self.explorer.memory,
-            "seen": self._seen,
+            "seen": self.seen,
+            **({"given": self.given} if self.given.size else {}),
             **learner,
         }
 
@@ -340,7 +361,9 @@ class Team:
             "uinteger": words[5],
         }
         self.explorer.memory[:] = arrays["explorer"]
-        self._seen = arrays["seen"].copy()
+        self.seen = arrays["seen"].copy()
+        if self.given.size:
+            self.given = arrays["given"].copy()
         self.learner.restore(_part(arrays, "learner."))
         if self.self_model is not None:
             self.self_model.restore(_part(arrays, "self_model."))

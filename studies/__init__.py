@@ -12,6 +12,7 @@ STUDIES = Registry(
         "wheel-failure": f"{__name__}.catalogue.wheel_failure",
         "scaling": f"{__name__}.catalogue.scaling",
         "hierarchies": f"{__name__}.catalogue.hierarchies",
+        "games": f"{__name__}.catalogue.games",
         "single-agent": f"{__name__}.catalogue.single_agent",
     },
 )

@@ -5,13 +5,14 @@ Nothing is printed here: who wants to see how it goes passes an `Observer`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Protocol
 
 from ..core.sources import is_reference
 from .catalogue.study import load_study, measured
+from .loggers import logged, make
 from .spec.spec import Spec
 from .store.store import Store
 from .trials.trial import check, trials_of
@@ -62,6 +63,7 @@ def run_study(
     retry_failed: bool = False,
     accept_code: bool = False,
     observer: Observer | None = None,
+    loggers: Sequence[str] = (),
 ) -> Iterator[Store]:
     """Run what is left of a study; then its store is open for as long as the context lasts.
 
@@ -79,6 +81,8 @@ def run_study(
         Whether to go on with a study although the installed code has changed.
     observer
         Who is told how it goes; None: nobody.
+    loggers
+        Who else is told of every trial, by name, see `nested_agents.studies.loggers`.
 
     Yields
     ------
@@ -102,13 +106,17 @@ def run_study(
         if retry_failed:
             store.forget_failed()
         pending = store.pending(trials)
-        for note in store.notes:
+        for note in (*store.notes, *spec.doubts()):
             observer.note(note)
         if pending:
             observer.announce(spec, directory, workers.processes)
+        if pending and not workers.processes:
+            observer.note("there is no worker yet: waiting for one")
         try:
             with closing(run_trials(pending, store, run_trial, workers)) as outcomes:
-                observer.follow(outcomes, len(trials), len(trials) - len(pending))
+                told = [make(name, spec, directory) for name in loggers] if pending else []
+                following = logged(outcomes, told, observer.note)
+                observer.follow(following, len(trials), len(trials) - len(pending))
         except KeyboardInterrupt:
             observer.note(
                 f"interrupted: {store.counts()['done']} of {len(trials)} trials are kept in "

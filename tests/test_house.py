@@ -21,8 +21,8 @@ ALLOWED = {
     "studies": {"studies", "core", "topologies", "scenarios"},
 }
 STUDIES = (
-    "spec", "trials", "store", "workers", "analysis", "presentation", "catalogue", "run",
-    "claims", "cost", "explain", "report", "cli",
+    "spec", "trials", "store", "workers", "analysis", "presentation", "catalogue", "loggers", "run",
+    "claims", "cost", "explain", "report", "api", "cli",
 )  # fmt: skip
 """The rooms of studies/, each of which may import those before it."""
 MAX_BYTES = 1_000_000

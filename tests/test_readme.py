@@ -33,12 +33,18 @@ def test_the_commands_exist(page: str) -> None:
         assert match is None or match[1] in COMMANDS
 
 
-def test_the_python_prints_its_episodes(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_python_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
     (code,) = blocks("README.md", "python")
     assert len([line for line in code.splitlines() if line]) <= 12
-    exec(code.replace("episodes=20, steps=200", "episodes=2, steps=3"), {})
-    lines = capsys.readouterr().out.splitlines()
-    assert [line.split(":")[0] for line in lines] == ["episode 0", "episode 1"]
+    small = "seeds=2, episodes=1, steps=4, evaluation=1"
+    assert "seeds=8, episodes=20, steps=200" in code
+    code = code.replace("seeds=8, episodes=20, steps=200", small).replace("jobs=2", "jobs=1")
+    exec(code, {})
+    assert "evaluation" in capsys.readouterr().out
+    assert (tmp_path / "out" / "leaders.pdf").is_file()
 
 
 def test_the_replay_is_small_and_the_version_is_one() -> None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from ..core.hierarchy import Hierarchy
 from .builders import from_networkx
@@ -10,7 +11,7 @@ from .config import TOPOLOGIES, Topology, TopologySettings, hierarchy_of, parse
 
 
 def build(
-    settings: TopologySettings,
+    settings: TopologySettings | str | Mapping[str, Any],
     agents: Sequence[str],
     groups: Sequence[Sequence[int]] | None = None,
 ) -> Hierarchy:
@@ -19,7 +20,8 @@ def build(
     Parameters
     ----------
     settings
-        Any topology's settings but those of agents for several wheels.
+        Any topology's settings but those of agents for several wheels; or a text or a table for
+        `parse`.
     agents
         Distinct names, in agent order.
     groups
@@ -38,7 +40,8 @@ def build(
     >>> build(parse("teams"), ["a1", "a2", "b1", "b2"], [(0, 1), (2, 3)])
     Hierarchy(4 agents: a1 -> a2, a1 -> b1, b1 -> b2)
     """
-    return hierarchy_of(settings, agents, groups)
+    made = settings if isinstance(settings, TopologySettings) else parse(settings)
+    return hierarchy_of(made, agents, groups)
 
 
 __all__ = [

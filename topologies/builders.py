@@ -1,8 +1,8 @@
 """The built-in hierarchies, each a pure function from agent names to a networkx graph.
 
-An edge leads from a superior to its subordinate, and every agent is a node. Agents are given in
-agent order; *groups* are the agents of one robot each. A graph becomes a
-`nested_agents.core.hierarchy.Hierarchy` in `nested_agents.topologies.build`.
+An edge leads from a superior to its subordinate, and every agent is a node; an undirected graph
+joins peers. Agents are given in agent order; *groups* are the agents of one robot each. A graph
+becomes a `nested_agents.core.hierarchy.Hierarchy` in `nested_agents.topologies.build`.
 """
 
 from __future__ import annotations
@@ -84,6 +84,48 @@ def independent(agents: Sequence[str]) -> nx.DiGraph:
     """
     graph = nx.DiGraph()
     graph.add_nodes_from(agents)
+    return graph
+
+
+def simultaneous(agents: Sequence[str]) -> nx.Graph:
+    """Return agents who are all peers: everybody considers everybody, nobody is told anything.
+
+    Examples
+    --------
+    >>> list(simultaneous(["a", "b", "c"]).edges)
+    [('a', 'b'), ('a', 'c'), ('b', 'c')]
+    """
+    graph: nx.Graph = nx.complete_graph(agents)
+    return graph
+
+
+def coordination_graph(
+    agents: Sequence[str],
+    shape: Literal["line", "ring"] = "line",
+    edges: Iterable[Sequence[str]] | None = None,
+) -> nx.Graph:
+    """Return peers on a line or a ring in agent order, or the given pairs of peers.
+
+    Raises
+    ------
+    ValueError
+        If a pair is given twice, or names an unknown agent.
+
+    Examples
+    --------
+    >>> list(coordination_graph(["a", "b", "c"], "ring").edges)
+    [('a', 'b'), ('a', 'c'), ('b', 'c')]
+    """
+    graph = nx.Graph()
+    graph.add_nodes_from(agents)
+    if edges is not None:
+        pairs = [(min(a, b), max(a, b)) for a, b in edges]
+        Hierarchy(agents, [], pairs)  # raises and names what is wrong
+        graph.add_edges_from(pairs)
+        return graph
+    nx.add_path(graph, agents)
+    if shape == "ring" and len(agents) > 2:
+        graph.add_edge(agents[-1], agents[0])
     return graph
 
 

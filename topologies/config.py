@@ -6,21 +6,21 @@ argument may be. A further topology is one settings class and one line in `TOPOL
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 import networkx as nx
 import numpy as np
-from pydantic import Field, ValidationError
+from pydantic import Field
 from typing_extensions import TypeAliasType
 
 from ..core import sources
 from ..core.hierarchy import Hierarchy
 from ..core.protocols import Scenario, groups_of
-from ..core.refusals import rule
-from ..core.registry import Plugged, SettingsRegistry, closest
+from ..core.refusals import closest
+from ..core.registry import Plugged, SettingsRegistry
 from ..core.robot_agents import per_robot
-from ..core.settings import Fraction, Settings
+from ..core.settings import Fraction, Settings, SettingsError, tuples
 from ..core.single_agent import SingleAgent
 from . import builders, files
 from .builders import from_networkx
@@ -48,11 +48,11 @@ class TopologySettings(Settings):
     @property
     def title(self) -> str:
         """What it is called in complaints."""
-        return self.kind
+        return self.kind or type(self).__name__
 
     def build(self, agents: Sequence[str], groups: Groups) -> Any:
         """Return the graph over named agents, given by group too."""
-        raise ValueError(f"is no hierarchy of {len(agents)} agents; see `arrange`")
+        raise ValueError(f"is not of these {len(agents)} agents; see `arrange`")
 
     def arrange(self, scenario: Scenario) -> tuple[Scenario, Hierarchy]:
         """Return a scenario and the hierarchy of its agents.
@@ -80,7 +80,7 @@ class ChainSettings(TopologySettings):
     def parsed(cls, argument: str) -> Self:
         """Read the order: a word, or all names separated by commas."""
         if argument in ("listed", "reversed", "interleaved"):
-            return cls.model_validate({"order": argument})
+            return cls(**{"order": argument})
         names = _names(argument)
         if not all(names):
             raise ValueError(f"order must be written a,b,c, received {argument!r}")
@@ -154,7 +154,7 @@ class TeamsSettings(TopologySettings):
     @classmethod
     def parsed(cls, argument: str) -> Self:
         """Read the link."""
-        return cls.model_validate({"link": argument})
+        return cls(**{"link": argument})
 
     def build(self, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
         """Return the graph."""
@@ -171,6 +171,43 @@ class IndependentSettings(TopologySettings):
     def build(self, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
         """Return the graph."""
         return builders.independent(agents)
+
+
+class SimultaneousSettings(TopologySettings):
+    """Agents who decide at the same time: each considers what all others might do."""
+
+    kind: Literal["simultaneous"] = "simultaneous"
+
+    def build(self, agents: Sequence[str], groups: Groups) -> nx.Graph:
+        """Return the graph, which is undirected."""
+        return builders.simultaneous(agents)
+
+
+class CoordinationGraphSettings(TopologySettings):
+    """Peers on a line, on a ring or as listed, who decide at the same time."""
+
+    kind: Literal["coordination-graph"] = "coordination-graph"
+    shape: Literal["line", "ring"] = "line"
+    """In agent order; on a ring the last is a peer of the first."""
+    edges: tuple[tuple[str, str], ...] | None = None
+    """Pairs of peers in place of a shape."""
+
+    argument: ClassVar[str] = "line|ring|A-B,B-C,..."
+
+    @classmethod
+    def parsed(cls, argument: str) -> Self:
+        """Read the shape, or pairs of names as ``a-b,b-c``."""
+        if argument in ("line", "ring"):
+            return cls.model_validate({"shape": argument})
+        pairs = [tuple(name.strip() for name in part.split("-")) for part in argument.split(",")]
+        for pair in pairs:
+            if len(pair) != 2 or not all(pair):
+                raise ValueError(f"must be line, ring, or pairs a-b, received {'-'.join(pair)!r}")
+        return cls.model_validate({"edges": tuple(pairs)})
+
+    def build(self, agents: Sequence[str], groups: Groups) -> nx.Graph:
+        """Return the graph, which is undirected."""
+        return builders.coordination_graph(agents, self.shape, self.edges)
 
 
 class EdgesSettings(TopologySettings):
@@ -192,7 +229,7 @@ class EdgesSettings(TopologySettings):
             if len(part) > 2 or not all(part):
                 raise ValueError(f"an edge must be written a>b, received {'>'.join(part)!r}")
         edges = tuple(part for part in parts if len(part) == 2)
-        return cls.model_validate({"edges": edges, "alone": [p[0] for p in parts if len(p) == 1]})
+        return cls(**{"edges": edges, "alone": [p[0] for p in parts if len(p) == 1]})
 
     def build(self, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
         """Return the graph."""
@@ -221,13 +258,13 @@ class RandomSettings(TopologySettings):
 
 
 class FileSettings(TopologySettings):
-    """A graph from a GraphML or JSON file."""
+    """A graph or nested teams from a GraphML, JSON or TOML file."""
 
     kind: Literal["file"] = "file"
     path: str
     """Path of the file, relative to the spec."""
 
-    argument: ClassVar[str] = "PATH.graphml|PATH.json"
+    argument: ClassVar[str] = "PATH.graphml|PATH.json|PATH.toml"
 
     @classmethod
     def parsed(cls, argument: str) -> Self:
@@ -241,7 +278,27 @@ class FileSettings(TopologySettings):
 
     def build(self, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
         """Return the graph."""
-        return from_networkx(files.read_graph(self.path), agents)
+        found = self.content
+        if isinstance(found, TopologySettings):
+            return found.build(agents, groups)
+        return from_networkx(found, agents)
+
+    @property
+    def content(self) -> nx.DiGraph | TopologySettings:
+        """What the file holds: a graph, or another topology.
+
+        Raises
+        ------
+        ValueError
+            If it holds neither.
+        """
+        found = files.read(self.path)
+        if isinstance(found, nx.Graph):
+            return found
+        try:
+            return parse(found)
+        except ValueError as error:
+            raise ValueError(f"{self.path}: {error}") from None
 
 
 class SingleAgentSettings(TopologySettings):
@@ -274,6 +331,8 @@ TOPOLOGIES = SettingsRegistry(
         "star": f"{__name__}:StarSettings",
         "teams": f"{__name__}:TeamsSettings",
         "independent": f"{__name__}:IndependentSettings",
+        "simultaneous": f"{__name__}:SimultaneousSettings",
+        "coordination-graph": f"{__name__}:CoordinationGraphSettings",
         "edges": f"{__name__}:EdgesSettings",
         "random": f"{__name__}:RandomSettings",
         "file": f"{__name__}:FileSettings",
@@ -285,11 +344,12 @@ TOPOLOGIES = SettingsRegistry(
 """Topologies by name."""
 
 
-def parse(text: str) -> TopologySettings:
-    """Read a topology from a string.
+def parse(text: str | Mapping[str, Any]) -> TopologySettings:
+    """Read a topology from a string, or from a table as it stands in a spec.
 
-    Besides ``"kind"`` and ``"kind:argument"``, a graph file, a ``file.py:function`` and the name of
-    an installed package's topology stand for themselves.
+    Besides ``"kind"`` and ``"kind:argument"``, a file of a graph or of such a table, a
+    ``file.py:function`` and the name of an installed package's topology stand for themselves. A
+    table without a kind that has `members` is one of teams.
 
     Raises
     ------
@@ -300,7 +360,13 @@ def parse(text: str) -> TopologySettings:
     --------
     >>> parse("tree:3"), parse("chain")
     (TreeSettings(kind='tree', branching=3), ChainSettings(kind='chain', order='listed'))
+    >>> parse({"members": [["a", "b"], ["c"]]}).members
+    (('a', 'b'), ('c',))
     """
+    if isinstance(text, Mapping):
+        return _of_table(text)
+    if not isinstance(text, str):
+        raise ValueError(f"topology {text!r}: must be a name, a file or a table")
     kind, colon, argument = text.partition(":")
     try:
         if kind in TOPOLOGIES.built_in:
@@ -313,12 +379,27 @@ def parse(text: str) -> TopologySettings:
             found = TOPOLOGIES.parsed(text)
             assert isinstance(found, TopologySettings)
             return found
-    except ValidationError as error:
-        raise ValueError(f"topology {text!r}: {_one_line(error)}") from None
+    except SettingsError as error:
+        raise ValueError(f"topology {text!r}: {error.problem}") from None
     except ValueError as error:
         raise ValueError(f"topology {text!r}: {error}") from None
     known = closest(kind, TOPOLOGIES.names())
     raise ValueError(f"topology {text!r}: {known}, or a file")
+
+
+def _of_table(table: Mapping[str, Any]) -> TopologySettings:
+    """Return the settings of a table."""
+    kind = table.get("kind", "teams" if "members" in table else None)
+    if not isinstance(kind, str):
+        raise ValueError(f"topology.kind = {kind!r}: {closest(kind, TOPOLOGIES.names())}")
+    try:
+        found = TOPOLOGIES.model(kind)(**{**tuples(dict(table)), "kind": kind})
+    except SettingsError as error:
+        raise ValueError(f"topology.{error.problem}") from None
+    except ValueError as error:
+        raise ValueError(f"topology.kind = {kind!r}: {error}") from None
+    assert isinstance(found, TopologySettings)
+    return found
 
 
 Topology = Annotated[TopologySettings, Plugged(TOPOLOGIES, parse)]
@@ -339,7 +420,8 @@ def hierarchy_of(
             graph = settings.build(agents, named)
         else:
             graph = from_networkx(files.called(settings, agents, named), agents)
-        return Hierarchy(agents, graph.edges)
+        directed = graph.is_directed()
+        return Hierarchy(agents, graph.edges if directed else (), () if directed else graph.edges)
     except ValueError as error:
         said = str(error)
         for start in ("hierarchy: ", f"{settings.title}: ", f"topology {settings.title!r}: "):
@@ -356,18 +438,6 @@ def _integer(text: str, what: str) -> int:
         return int(text)
     except ValueError:
         raise ValueError(f"{what} = {text!r}: must be a whole number") from None
-
-
-def _one_line(error: ValidationError) -> str:
-    problems = []
-    for problem in error.errors():
-        where, value = ".".join(str(part) for part in problem["loc"]), problem["input"]
-        if problem["type"] == "missing":
-            problems.append(f"{where}: missing")
-        else:
-            said = rule(problem["msg"])
-            problems.append(f"{where} = {value!r}: {said}" if where else said)
-    return "; ".join(problems)
 
 
 def _named(agents: Sequence[str], groups: Sequence[Any]) -> Groups:

@@ -73,7 +73,7 @@ def draw(
     axes.text(
         centre,
         bottom + 0.17,
-        _note(hierarchy),
+        _note(hierarchy, groups),
         ha="center",
         va="center",
         fontsize=7.5,
@@ -91,9 +91,14 @@ def positions(hierarchy: Hierarchy) -> FloatArray:
     """Return where the agents are drawn, ``(n, 2)`` [in], y downwards.
 
     A level holds the agents that are equally many steps, on the longest way, from the top. Levels
-    are columns; every `COLUMNS` of them the picture folds and runs back below.
+    are columns; every `COLUMNS` of them the picture folds and runs back below. Peers are on a
+    circle.
     """
     n = len(hierarchy)
+    if hierarchy.peers:  # all lines between agents on a circle can be seen
+        radius = max(0.9, 1.15 * WIDTH / (2.0 * np.sin(np.pi / max(n, 2))))
+        turns = 2.0 * np.pi * np.arange(n) / n
+        return radius * np.stack([np.sin(turns), -np.cos(turns)], axis=1)
     if not hierarchy.edges:
         rows = max(1, round(n**0.5))
         grid = np.array([[i // rows * ACROSS, i % rows * DOWN] for i in range(n)], dtype=float)
@@ -168,17 +173,26 @@ def _implied(hierarchy: Hierarchy) -> set[tuple[int, int]]:
     return set(hierarchy.edges) - set(nx.transitive_reduction(nx.DiGraph(hierarchy.edges)).edges)
 
 
-def _note(hierarchy: Hierarchy) -> str:
+def _note(hierarchy: Hierarchy, groups: Sequence[Sequence[int]] | None) -> str:
+    if hierarchy.peers:
+        return "lines: peers, who decide at the same time"
     implied = len(_implied(hierarchy))
     grey = "grey arrows: implied by the others"
     hidden = f"{implied} edges implied by the others are not shown"
-    notes = ["numbers: order of decision", hidden if implied > MOST_IMPLIED else grey]
-    return "; ".join(notes[: 2 if implied else 1])
+    notes = ["numbers: order of decision"]
+    if groups and max(map(len, groups)) > 1:
+        notes.append("colours: robots")
+    if implied:
+        notes.append(hidden if implied > MOST_IMPLIED else grey)
+    return "; ".join(notes)
 
 
 def _arrows(axes, hierarchy: Hierarchy, places: FloatArray) -> None:  # type: ignore[no-untyped-def]
     from matplotlib.patches import FancyArrowPatch
 
+    for a, b in hierarchy.peers:
+        ends = places[[a, b]]
+        axes.plot(ends[:, 0], -ends[:, 1], color="#444444", linewidth=0.8, zorder=1)
     implied = _implied(hierarchy)
     shown = [e for e in hierarchy.edges if len(implied) <= MOST_IMPLIED or e not in implied]
     for edge in shown:

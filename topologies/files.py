@@ -1,4 +1,4 @@
-"""Hierarchies that users bring: graph files, Python files, installed packages.
+"""Hierarchies that users bring: files of graphs and teams, Python files, installed packages.
 
 A user's topology is a function ``(agents, groups) -> graph``. It is given the names of the agents
 and the same names by group (robot), and returns a networkx DiGraph over all agents, or pairs
@@ -8,6 +8,7 @@ and the same names by group (robot), and returns a networkx DiGraph over all age
 from __future__ import annotations
 
 import json
+import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Protocol
@@ -19,27 +20,37 @@ from ..core import sources
 from .checks import check_legible, shown, with_edges
 
 
-def read_graph(path: str) -> nx.DiGraph:
-    """Read a graph from GraphML or JSON, distinguished by suffix.
+def read(path: str) -> nx.DiGraph | dict[str, Any]:
+    """Read a graph, or a topology as it stands in a spec, from GraphML, JSON or TOML by suffix.
 
-    JSON holds ``{"edges": [["a", "b"], ...], "alone": [...]}``, or networkx's node-link format.
-    In GraphML an agent is named by its node's id.
+    JSON and TOML hold ``{"edges": [["a", "b"], ...], "alone": [...]}``, or networkx's node-link
+    format; or a table with the key ``kind``, or of nested teams with the key ``members``, perhaps
+    under ``topology``. In GraphML an agent is named by its node's id.
+
+    Returns
+    -------
+    networkx.DiGraph or dict
+        The graph, or the table.
 
     Raises
     ------
     ValueError
-        If the file cannot be read or holds no graph.
+        If the file cannot be read or holds neither.
     """
     suffix = Path(path).suffix
     if suffix not in sources.GRAPHS:
-        raise ValueError(f"{path}: suffix must be .graphml or .json")
+        raise ValueError(f"{path}: suffix must be .graphml, .json or .toml")
     text = sources.active().text(path)
     try:
         if suffix == ".graphml":
             _check_graphml(text)
             graph = nx.parse_graphml(text)
         else:
-            graph = _graph_of(json.loads(text, parse_constant=_no_name))
+            as_toml = suffix == ".toml"
+            content = tomllib.loads(text) if as_toml else json.loads(text, parse_constant=_no_name)
+            if (table := _table_of(content)) is not None:
+                return table
+            graph = _graph_of(content)
         check_legible(graph)
     except RecursionError:
         raise ValueError(f"{path} holds no graph: it is nested too deeply") from None
@@ -105,6 +116,29 @@ def _returned(
 
 def _name(builder: Builder) -> str:
     return builder.title.rpartition(":")[2]
+
+
+def _table_of(content: Any) -> dict[str, Any] | None:
+    """Return the topology's table that a file holds; None if it must be a graph."""
+    if isinstance(content, dict) and isinstance(content.get("topology"), dict):
+        content = content["topology"]
+    if not isinstance(content, dict) or not {"kind", "members"} & content.keys():
+        return None
+    if content.get("kind") == "file":
+        raise ValueError("kind = 'file': a file cannot name another one")
+    if "members" in content:
+        _check_members(content["members"])
+    return content
+
+
+def _check_members(members: Any) -> None:
+    """Refuse nested teams that are not lists of lists of names."""
+    if not isinstance(members, list) or not members:
+        raise ValueError(f"members = {shown(members)}: must be a list of names and of such lists")
+    for member in members:
+        if not isinstance(member, str):
+            _check_members(member)
+    check_legible(member for member in members if isinstance(member, str))
 
 
 def _graph_of(content: Any) -> nx.DiGraph:

@@ -14,10 +14,11 @@ from typing import Any, Literal
 from ..core.cost import below_counts
 from ..core.hierarchy import Hierarchy
 from ..core.robot_agents import MOST_ACTIONS, robot_of
-from . import TOPOLOGIES, TopologySettings, build, builders, files, parse
+from . import TOPOLOGIES, TopologySettings, build, builders, parse
 from .checks import check_legible
 from .config import (
     ChainSettings,
+    CoordinationGraphSettings,
     EdgesSettings,
     FileSettings,
     PerRobotSettings,
@@ -121,8 +122,13 @@ def named_by(settings: TopologySettings) -> tuple[str, ...]:
         names = builders.names_of(settings.members)
     elif isinstance(settings, EdgesSettings):
         names = [name for edge in settings.edges for name in edge] + list(settings.alone)
+    elif isinstance(settings, CoordinationGraphSettings) and settings.edges is not None:
+        names = [name for pair in settings.edges for name in pair]
     elif isinstance(settings, FileSettings):
-        names = [str(node) for node in files.read_graph(settings.path)]
+        found = settings.content
+        if isinstance(found, TopologySettings):
+            return named_by(found)
+        names = [str(node) for node in found]
     check_legible(names)
     return tuple(dict.fromkeys(names))
 
@@ -205,6 +211,7 @@ def printed(shown: HierarchyView, form: Form) -> str:
             "topology": shown.text,
             "agents": names,
             "edges": [(names[a], names[b]) for a, b in hierarchy.edges],
+            "peers": [(names[a], names[b]) for a, b in hierarchy.peers],
             "order": [names[i] for i in hierarchy.order],
             "below": dict(zip(names, below, strict=True)),
             "depth": hierarchy.depth,
@@ -213,7 +220,10 @@ def printed(shown: HierarchyView, form: Form) -> str:
         lines = (f"{json.dumps(key)}: {json.dumps(value)}" for key, value in content.items())
         return "{" + ",\n ".join(lines) + "}"
     under = {i: [names[b] for a, b in hierarchy.edges if a == i] for i in range(n)}
-    rows = [("", "agent", "below", "tries", "subordinates")]
+    for a, b in hierarchy.peers:
+        under[a].append(names[b])
+        under[b].append(names[a])
+    rows = [("", "agent", "below", "tries", "peers" if hierarchy.peers else "subordinates")]
     for rank, i in enumerate(hierarchy.order):
         subordinates = ", ".join(under[i]) or "-"
         tried = readable(shown.tries[i])

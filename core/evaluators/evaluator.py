@@ -19,11 +19,15 @@ if TYPE_CHECKING:
 
 Rule = Literal["value", "reward", "reward-and-value"]
 """By what a joint action is valued."""
-Teammates = Literal["best-response", "uniform", "empirical"]
+Teammates = Literal["best-response", "uniform", "empirical", "conditional"]
 """The teammate model: what the agents below are expected to do."""
 
 ValueOf = Literal["own", "below", "team"]
 """Whose value decides: the agent's own, the mean of its own and those below it, or all agents'."""
+
+
+NOTHING_GIVEN: FloatArray = np.zeros((0, 0, 0))
+"""Conditional frequencies that nobody counts."""
 
 
 class Deliberation(NamedTuple):
@@ -43,6 +47,9 @@ class Deliberation(NamedTuple):
         ``(n, A)`` how often each agent was seen to take each action, rows summing to one.
     rng
         Source of randomness.
+    given
+        ``(A, n, A)`` the same frequencies, given each action of the deciding agent; counted where
+        the teammate model asks for it, else empty.
     """
 
     agent: int
@@ -51,6 +58,7 @@ class Deliberation(NamedTuple):
     weights: Sequence[FloatArray]
     frequencies: FloatArray
     rng: np.random.Generator
+    given: FloatArray = NOTHING_GIVEN
 
     @property
     def own_weights(self) -> FloatArray:
@@ -224,7 +232,12 @@ class Aggregation:
         return rewards + self.problem.discount * values
 
     def aggregate(self, values: FloatArray, probabilities: FloatArray | None) -> FloatArray:
-        """Return per row ``(A, m)`` the maximum, mean or weighted mean, by the teammate model."""
+        """Return per row ``(A, m)`` the maximum, mean or weighted mean, by the teammate model.
+
+        Probabilities are ``(m,)``, or ``(A, m)`` where they depend on the own action.
+        """
         if self.problem.teammates == "best-response":
             return values.max(axis=1)
+        if probabilities is not None and probabilities.ndim == 2:
+            return (values * probabilities).sum(axis=1)
         return values.mean(axis=1) if probabilities is None else values @ probabilities

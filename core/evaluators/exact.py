@@ -81,7 +81,8 @@ class ExactEnumeration(Aggregation):
         agent, problem = deliberation.agent, self.problem
         tabulated = bool(self._tried) and hasattr(deliberation.prediction, "blocks")
         own = len(self.concerned[agent]) == 1
-        if tabulated and own and problem.rule == "value":
+        conditional = problem.teammates == "conditional"
+        if tabulated and own and problem.rule == "value" and not conditional:
             tried = self._tried[agent]
             self.count(agent, tried.indices.size)
             empirical = problem.teammates == "empirical"
@@ -99,6 +100,8 @@ class ExactEnumeration(Aggregation):
         probabilities = None
         if problem.teammates == "empirical":
             probabilities = probabilities_of(deliberation.frequencies, below)
+        elif conditional:
+            probabilities = np.stack([probabilities_of(rows, below) for rows in deliberation.given])
         if tabulated and hasattr(deliberation.prediction, "reward_table"):
             table = self._by_tables(deliberation)
         else:

@@ -38,10 +38,20 @@ class Sampling(Aggregation):
     Drawn with equal probability, or from the empirical frequencies if these are the teammate model
     (then the plain mean estimates the weighted one). With no more joint actions than samples, all
     are tried.
+
+    Raises
+    ------
+    ValueError
+        If the teammate model is conditional on the own action.
     """
 
     def __init__(self, samples: int, problem: DecisionProblem) -> None:
         super().__init__(problem)
+        if problem.teammates == "conditional":
+            raise ValueError(
+                "learner.decision.teammates = 'conditional': sampling evaluates best-response, "
+                "uniform, empirical; use exact"
+            )
         self.samples = samples
 
     def values(self, deliberation: Deliberation) -> FloatArray:

@@ -62,7 +62,7 @@ class GradientTD(Online):
         from ..rules import kernels
 
         s, rules, rows = self.settings, self.rules, self.rows
-        delta = self._errors(states, rewards, entered)
+        delta = self.errors(self.theta, states, rewards, entered)
         expected = rules.each(self.of_agents(self.second), states[:, None])[:, 0]
         along = s.step_size * delta if s.correction == "tdc" else np.zeros_like(delta)
         kernels.td_update(
@@ -79,16 +79,3 @@ class GradientTD(Online):
         change = -s.second_step_size * expected
         kernels.add_features(self.second, rows, states, change, rules.layout)
         return 2 * self.theta.size
-
-    def _errors(
-        self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None
-    ) -> FloatArray:
-        """Return the TD errors ``(n,)`` (Eq. 7)."""
-        met = states[:, None]
-        if entered is not None:
-            met = np.empty((len(states), 2, states.shape[1]))
-            met[:, 0], met[:, 1] = states, entered
-        values = self.rules.each(self.of_agents(self.theta), met)
-        ahead = 0.0 if entered is None else self.discount * values[:, 1]
-        errors: FloatArray = rewards + ahead - values[:, 0]
-        return errors

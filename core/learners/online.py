@@ -40,6 +40,23 @@ class Online(ABC):
         """Return the row of every agent ``(n, n_rules)``, no copy if each has its own."""
         return weights if len(weights) == len(self.rows) else weights[self.rows]
 
+    def errors(
+        self,
+        weights: FloatArray,
+        states: FloatArray,
+        rewards: FloatArray,
+        entered: FloatArray | None,
+    ) -> FloatArray:
+        """Return the TD errors ``(n,)`` of `states` by rows of weights (Eq. 7)."""
+        met = states[:, None]
+        if entered is not None:
+            met = np.empty((len(states), 2, states.shape[1]))
+            met[:, 0], met[:, 1] = states, entered
+        values = self.rules.each(self.of_agents(weights), met)
+        ahead = 0.0 if entered is None else self.discount * values[:, 1]
+        found: FloatArray = rewards + ahead - values[:, 0]
+        return found
+
     def begin_episode(self) -> None:
         """Clear the traces."""
         if self._previous is not None:  # memory that is never written is never taken

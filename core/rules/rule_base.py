@@ -112,12 +112,13 @@ class RuleBase:
             one twice, or none.
         """
         names = [v.name for v in space.variables]
-        if settings.order > len(names):
+        order = len(names) if settings.order == "full" else settings.order
+        if order > len(names):
             raise ValueError(
-                f"learner.rule_base.order = {settings.order}, allowed 1 to {len(names)} in state "
+                f"learner.rule_base.order = {order}, allowed 1 to {len(names)} in state "
                 f"space {space.name!r}"
             )
-        terms = list(combinations(range(len(names)), settings.order))
+        terms = list(combinations(range(len(names)), order))
         for product in settings.products:
             unknown = [name for name in product if name not in names]
             if unknown:

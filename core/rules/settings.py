@@ -18,8 +18,9 @@ class RuleBaseSettings(Settings):
     """Membership functions per variable, spread evenly; none: the state space's own centres."""
     steepness: Positive = 8.0
     """Sigmoid slope times the distance of neighbouring centres (c_j of Eq. 6, dimensionless)."""
-    order: Annotated[int, Field(ge=1, le=12)] = 1
-    """Variables per rule: 1 sums one-variable rule bases, d is the paper's full product."""
+    order: Annotated[int, Field(ge=1, le=12)] | Literal["full"] = 1
+    """Variables per rule: 1 sums one-variable rule bases, d or ``full`` is the paper's product of
+    all variables."""
     products: tuple[tuple[str, ...], ...] = ()
     """Further products of variables by name, summed to those of `order`."""
     precision: Literal["float64", "float32"] = "float64"

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import (
+    Field,
+    SerializerFunctionWrapHandler,
+    field_validator,
+    model_serializer,
+    model_validator,
+)
 
 from ...core.settings import NonNegative, Positive, ScenarioSettings, Settings
 from ..failures.settings import (
@@ -18,6 +24,7 @@ from ..failures.settings import (
     Weak,
 )
 from ..state_variables import referred
+from . import units
 
 CONTROL_PERIOD = 0.064
 """Time between commands to the wheels [s]; the basic time step of the e-puck in Webots."""
@@ -125,7 +132,20 @@ Failure = Annotated[
 Vertices = Annotated[tuple[tuple[float, float], ...], Field(min_length=3)]
 
 
-class BoxSettings(Settings):
+class Described(Settings):
+    """Something of one's own, described by a table that may say what it is called."""
+
+    name: Annotated[str, Field(min_length=1, pattern=r"^[^\x00-\x1f\x7f]+$")] | None = None
+    """What labels call it; nothing depends on it."""
+
+    @model_serializer(mode="wrap")
+    def _without_no_name(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        # Without a name it is written as it ever was, and its trials are the same.
+        table: dict[str, Any] = write(self)
+        return {key: value for key, value in table.items() if key != "name" or value is not None}
+
+
+class BoxSettings(Described):
     """A box of one's own: ``box = { vertices = [[0, 0], [0.2, 0], [0.2, 0.1]] }``."""
 
     vertices: Vertices
@@ -154,7 +174,7 @@ class WheelSettings(Settings):
     """Position of the wheel to the left of the centre [m]."""
 
 
-class RobotSettings(Settings):
+class RobotSettings(Described):
     """A robot of one's own; what is not given is the e-Puck's."""
 
     wheels: Annotated[tuple[WheelSettings, ...], Field(min_length=1)]
@@ -270,6 +290,16 @@ class BoxPushingSettings(ScenarioSettings):
         if self.predictor != "push" and self.belief != BeliefSettings():
             raise ValueError(f"belief is for predictor = 'push', received {self.predictor!r}")
         return self
+
+    def doubts(self) -> tuple[str, ...]:
+        """Return sizes that are surely meant in another unit, a line each.
+
+        Examples
+        --------
+        >>> BoxPushingSettings(infrared={"reach": 60.0}).doubts()
+        ('scenario.infrared.reach = 60 m: perhaps meant in mm, 0.06 m',)
+        """
+        return tuple(units.doubts(self))
 
     @property
     def onset(self) -> int | None:

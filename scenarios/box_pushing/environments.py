@@ -215,6 +215,10 @@ class WheelsEnv(ParallelEnv):
         """
         if not self.agents:
             return {}, {}, {}, {}, {}
+        if set(actions) != set(self.agents):
+            missing = [name for name in self.agents if name not in actions]
+            said = f"{missing[0]!r} is missing" if missing else "there are agents that do not act"
+            raise ValueError(f"step: actions of {list(actions)}: {said}; agents: {self.agents}")
         joint = np.empty(len(self.game.scenario.agents), dtype=np.int64)
         for name in self.agents:
             joint[self.seats[name].wheels] = actions[name]

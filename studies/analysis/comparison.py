@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,9 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 from .paired_tests import holm, paired_permutation
 from .results import Results
 from .statistics import Estimate, bootstrap, rate
-
-LEVEL = 0.05
-"""What p must stay below for a difference to be called one."""
 
 Array = NDArray[np.float64]
 
@@ -30,21 +27,54 @@ class Difference:
         How many seeds both have finished.
     estimate
         The mean difference with its 95 % bootstrap interval.
+    raw
+        p of no difference, by permutation of signs.
     p
-        Of no difference, by permutation of signs; adjusted over all that were compared together.
+        The same, adjusted over all that were compared together, see `adjusted`.
+    sample
+        The differences of single seeds ``(n_seeds,)``.
     """
 
     condition: str
     measure: str
     seeds: int
     estimate: Estimate
+    raw: float
     p: float
+    sample: Array = field(repr=False, compare=False)
+
+    @classmethod
+    def of(
+        cls, condition: str, measure: str, own: Array, base: Array, estimate: Estimate
+    ) -> Difference:
+        """Test paired values ``(n_seeds,)`` of a condition and the reference; p is not adjusted."""
+        raw = paired_permutation(own, base)
+        return cls(condition, measure, len(own), estimate, raw, raw, own - base)
 
     @property
     def shown(self) -> str:
-        """Value, interval and p as text."""
-        e, p = self.estimate, f"p = {self.p:.2g}" if self.p >= 0.001 else "p < .001"
-        return f"{e.value:+.2f} [{e.low:+.2f}, {e.high:+.2f}], {p}"
+        """Value, interval, p as it is and adjusted, as text."""
+        e = self.estimate
+        interval = f"{_signed(e.value)} [{_signed(e.low)}, {_signed(e.high)}]"
+        return f"{interval}, {_p(self.p)} ({_p(self.raw, '')} unadjusted)"
+
+
+def _signed(value: ArrayLike) -> str:
+    """Return a difference with its sign, which rounding errors about 0 have not."""
+    text = f"{float(np.asarray(value)):+.2f}"
+    return "0.00" if text in ("+0.00", "-0.00") else text
+
+
+def _p(value: float, name: str = "p ") -> str:
+    if value < 0.001:
+        return f"{name}< .001"
+    return f"{name}{'= ' if name else ''}{value:.2g}"
+
+
+def adjusted(found: Sequence[Difference]) -> tuple[Difference, ...]:
+    """Return differences with p adjusted over all of them by Holm's method."""
+    ps = holm([d.raw for d in found])
+    return tuple(replace(d, p=float(p)) for d, p in zip(found, ps, strict=True))
 
 
 def differences(
@@ -52,6 +82,8 @@ def differences(
     reference: str,
     conditions: Sequence[str],
     measures: Mapping[str, Callable[[Results, str], ArrayLike]],
+    *,
+    of_rates: bool = True,
 ) -> tuple[Difference, ...]:
     """Compare conditions with a reference by several measures at once.
 
@@ -63,20 +95,28 @@ def differences(
         Labels; conditions that share fewer than two seeds with the reference are left out.
     measures
         By title, what gives the values ``(n_seeds,)`` of a condition.
+    of_rates
+        Whether these are success rates.
     """
     found = []
     for title, values in measures.items():
         for condition in conditions:
             base, other = paired(results, reference, condition, values)
             if len(base) >= 2:
-                estimate = bootstrap(other - base)
-                raw = paired_permutation(other, base)
-                found.append(Difference(condition, title, len(base), estimate, raw))
-    adjusted = holm([d.p for d in found])
-    return tuple(
-        Difference(d.condition, d.measure, d.seeds, d.estimate, float(p))
-        for d, p in zip(found, adjusted, strict=True)
-    )
+                estimate = paired_difference(other, base, of_rates=of_rates)
+                found.append(Difference.of(condition, title, other, base, estimate))
+    return adjusted(found)
+
+
+def paired_difference(own: Array, base: Array, *, of_rates: bool) -> Estimate:
+    """Return the mean difference of paired values ``(n_seeds,)`` with its 95 % interval.
+
+    By bootstrap over seeds; of rates that differ alike for every seed, as of independent ones: the
+    interval of a bootstrap would have no width.
+    """
+    if of_rates and np.ptp(own - base) == 0.0:
+        return difference(own[:, None], base[:, None])
+    return bootstrap(own - base, bounds=(-1.0, 1.0) if of_rates else (-np.inf, np.inf))
 
 
 def paired(

@@ -13,6 +13,11 @@ from scipy import stats
 
 Array = NDArray[np.float64]
 
+LEVEL = 0.05
+"""What p must stay below for a difference to be called one."""
+EXACT = 99_999
+"""Up to so many patterns of signs are all tried; beyond, as many are drawn."""
+
 
 @dataclass(frozen=True)
 class Friedman:
@@ -59,7 +64,7 @@ def friedman(values: ArrayLike, permutations: int = 9999, seed: int = 0) -> Frie
 
 
 def paired_permutation(
-    first: ArrayLike, second: ArrayLike, permutations: int = 99999, seed: int = 0
+    first: ArrayLike, second: ArrayLike, permutations: int = EXACT, seed: int = 0
 ) -> float:
     """Return the two-sided p of equal means of paired values ``(n_seeds,)``, by sign flips.
 

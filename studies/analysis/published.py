@@ -1,8 +1,8 @@
 """Results of a study as one small JSON file, with spec and seeds, fit to be committed or published.
 
 Rates are kept as one character an episode, steps and other measures in three decimals; returns are
-left out. Claims are always decided by results in this form, so the committed files give
-the table that the run gave.
+left out, and where there are thousands of short trials their times too. Claims are always decided
+by results in this form, so the committed files give the table that the run gave.
 """
 
 from __future__ import annotations
@@ -22,9 +22,13 @@ from ..trials.measures import measures_from, tables
 from ..trials.trial import RESULTS_VERSION
 from .results import Arrays, Results
 
-SUCCESS_ALONE = ("ablation", "chain-order", "hierarchies", "scaling", "wheel-failure")
+SUCCESS_ALONE = ("ablation", "chain-order", "games", "hierarchies", "scaling", "wheel-failure")
 """Studies whose analysis asks for no other measure of an episode: of them no other is kept."""
 DECIMALS = 3
+UNTIMED = ("games",)
+"""Studies of thousands of trials, too short for the time of each to say anything."""
+FEW = 100
+"""Fewer rows, or values, are always written one by one."""
 
 
 def dumps(outline: Outline, results: Results, version: int = RESULTS_VERSION) -> str:
@@ -36,7 +40,7 @@ def dumps(outline: Outline, results: Results, version: int = RESULTS_VERSION) ->
         "spec": outline.table,
         "columns": results.columns,
         "measures": tables(measures),
-        "seeds": results.seeds,
+        "seeds": {c: _counted(found) for c, found in results.seeds.items()},
         "phases": {
             phase: {
                 condition: {
@@ -49,7 +53,7 @@ def dumps(outline: Outline, results: Results, version: int = RESULTS_VERSION) ->
             for phase, by_condition in results.phases.items()
         },
         "numbers": _rounded(results.numbers),
-        "usage": _rounded(results.usage),
+        "usage": {} if outline.study in UNTIMED else _rounded(results.usage),
     }
     lines = [f"{json.dumps(key)}: {json.dumps(value)}" for key, value in content.items()]
     return "{\n" + ",\n".join(lines) + "\n}\n"
@@ -84,9 +88,15 @@ def loads(text: str) -> Published:
         }
         for phase, by_condition in content["phases"].items()
     }
-    seeds = {condition: tuple(found) for condition, found in content["seeds"].items()}
+    seeds = {
+        condition: tuple(range(found) if isinstance(found, int) else found)
+        for condition, found in content["seeds"].items()
+    }
     numbers, usage = (
-        {c: {n: np.array(v) for n, v in named.items()} for c, named in content[key].items()}
+        {
+            c: {n: _unpacked(v, is_rate=False) for n, v in named.items()}
+            for c, named in content[key].items()
+        }
         for key in ("numbers", "usage")
     )
     training, evaluation = phases.get("training", {}), phases.get("evaluation", {})
@@ -139,20 +149,48 @@ def _kept(study: str, results: Results) -> tuple[Measure, ...]:
     return tuple(m for m in results.measures if m.name in wanted & held)
 
 
-def _packed(values: np.ndarray, *, is_rate: bool) -> list[Any]:
-    if is_rate:
+def _counted(seeds: tuple[int, ...]) -> int | list[int]:
+    """Return many seeds from 0 on as their number."""
+    many = len(seeds) >= FEW and seeds == tuple(range(len(seeds)))
+    return len(seeds) if many else list(seeds)
+
+
+Packed = list[Any] | dict[str, Any]
+"""An array as lists; of many rows, as flags or one value for all, with its shape."""
+
+
+def _packed(values: np.ndarray, *, is_rate: bool) -> Packed:
+    if is_rate and len(values) < FEW:
         return ["".join("1" if v else "0" for v in row) for row in values]
-    return np.round(values, DECIMALS).tolist()
+    if is_rate:
+        flags = "".join("1" if v else "0" for v in values.flat)
+        return {"flags": flags, "shape": list(values.shape)}
+    rounded = np.round(values, DECIMALS)
+    return _constant(rounded) or rounded.tolist()
 
 
-def _unpacked(packed: list[Any], *, is_rate: bool) -> np.ndarray:
+def _unpacked(packed: Packed, *, is_rate: bool) -> np.ndarray:
+    if isinstance(packed, dict):
+        if is_rate:
+            return np.array(list(map(int, packed["flags"]))).reshape(packed["shape"])
+        return np.full(packed["shape"], packed["all"])
     if is_rate:
         return np.array([[int(character) for character in row] for row in packed])
     return np.array(packed)
 
 
-def _rounded(named: Mapping[str, Arrays]) -> dict[str, dict[str, list[float]]]:
+def _constant(values: np.ndarray) -> dict[str, Any] | None:
+    """Return many equal values as one of them and their shape; None of others."""
+    if values.size < FEW or not (values == values.flat[0]).all():
+        return None
+    return {"all": values.flat[0].item(), "shape": list(values.shape)}
+
+
+def _rounded(named: Mapping[str, Arrays]) -> dict[str, dict[str, Packed]]:
     return {
-        condition: {name: [float(f"{v:.5g}") for v in values] for name, values in arrays.items()}
+        condition: {
+            name: _constant(values) or [float(f"{v:.5g}") for v in values]
+            for name, values in arrays.items()
+        }
         for condition, arrays in named.items()
     }

@@ -2,7 +2,8 @@
 
 A study is a module, or a class, that offers these, and one line in `nested_agents.studies.STUDIES`
 or ``study = "mine.py:Mine"`` in a spec. It may also offer ``check(spec)``, which raises `SpecError`
-if the spec has not what it needs.
+if the spec has not what it needs; and ``NUMBERS``, names of the numbers of whole trials that its
+analysis rests on, so that trials of other studies that lack them are refused.
 """
 
 from __future__ import annotations
@@ -59,6 +60,26 @@ def load_study(name: str) -> Study:
     if missing:
         raise SpecError(f"study = {name!r}: has no {missing[0]}, needs {', '.join(PARTS)}")
     return cast(Study, study)
+
+
+def analysed(name: str, results: Results) -> Any:
+    """Return what a study makes of results, which may be those of another study.
+
+    Raises
+    ------
+    SpecError
+        If there is no such study, or trials lack what it rests on; one line.
+    """
+    study = load_study(name)
+    for needed in getattr(study, "NUMBERS", ()):
+        for condition in results.seeds:
+            here = (results.numbers.get(condition, {}), results.usage.get(condition, {}))
+            if not any(needed in numbers for numbers in here):
+                raise SpecError(
+                    f"study = {name!r}: needs {needed} of every trial, which those of "
+                    f"{condition!r} have not measured"
+                )
+    return study.analyse(results)
 
 
 def measured(trial: Trial) -> TrialResult:

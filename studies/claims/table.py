@@ -10,10 +10,11 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from ..presentation.tables import escaped
 from .claims import Finding
 from .measures import Measured
 
-Format = Literal["table", "json", "markdown"]
+Format = Literal["table", "json", "markdown", "latex"]
 
 COLOURS = {"holds": "green", "does not hold": "red", "not decided": "yellow"}
 
@@ -24,6 +25,8 @@ def print_claims(findings: Sequence[Finding], form: Format) -> None:
         print(json.dumps([_record(finding) for finding in findings], indent=1, allow_nan=False))
     elif form == "markdown":
         print(markdown(findings))
+    elif form == "latex":
+        print(latex(findings))
     else:
         _print_table(findings)
 
@@ -73,6 +76,22 @@ def markdown(findings: Sequence[Finding]) -> str:
         )  # fmt: skip
         lines.append("| " + " | ".join(str(cell) for cell in cells) + " |")
     return "\n".join(lines)
+
+
+def latex(findings: Sequence[Finding]) -> str:
+    """Return the table for LaTeX, which needs the packages booktabs and tabularx."""
+    lines = [
+        "% needs \\usepackage{booktabs,tabularx}; 95 % intervals in brackets",
+        r"\begin{tabularx}{\textwidth}{XXll}",
+        r"\toprule",
+        r"claim & measure, criterion & result & verdict \\",
+        r"\midrule",
+    ]
+    for finding in findings:
+        c = finding.claim
+        cells = (f"{c.text} ({c.place})", f"{c.measure}: {c.criterion}", result(finding))
+        lines.append(" & ".join(map(escaped, (*cells, finding.verdict))) + r" \\")
+    return "\n".join([*lines, r"\bottomrule", r"\end{tabularx}"])
 
 
 def _ends(found: Measured) -> tuple[float, float, float]:

@@ -53,6 +53,19 @@ class Whole(click.ParamType):
             self.fail(f"{quote(value)}: must be a whole number", param, ctx)
 
 
+class Number(click.ParamType):
+    """A number."""
+
+    name = "x"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the number."""
+        try:
+            return float(value)
+        except ValueError:
+            self.fail(f"{quote(value)}: must be a number", param, ctx)
+
+
 class Choice(click.Choice):
     """One of some words."""
 

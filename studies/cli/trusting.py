@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from ...core import trust
+from ..presentation.progress import say
 from ..store.store import Store
-from .display import say
 
 
 def trust_files(directory: Path) -> None:

@@ -4,6 +4,9 @@ The formulas (Eq. 18-23) count operations of a sweep over all states; the runnin
 state a step. What they share is the number of joint actions that every agent tries,
 ``|A| ** (1 + |below|)``, and the number of rules that value each: these are counted, and compared.
 
+In a coordination graph agents try joint actions of themselves and their peers, and decide by
+variable elimination, whose own operations are timed, but not counted.
+
 Counting and timing use the line-up scenario, whose prediction costs next to nothing, and sigmoid
 membership functions, with which every rule does fire.
 """
@@ -24,6 +27,7 @@ from scipy import stats
 
 from ...core.cost import Problem, below_counts, is_chain
 from ...core.decision import Decision
+from ...core.evaluators.coordination import VariableEliminationSettings
 from ...core.evaluators.exact import ExactSettings
 from ...core.learners.td import TDLambdaSettings
 from ...core.loop import control_loop, policy_seed
@@ -34,6 +38,7 @@ from ...scenarios.line_up import LineUpSettings
 from ...topologies import build, parse
 from ...topologies.config import (
     ChainSettings,
+    CoordinationGraphSettings,
     IndependentSettings,
     PerRobotSettings,
     SingleAgentSettings,
@@ -42,6 +47,8 @@ from ...topologies.view import team_of
 from ..analysis.statistics import Estimate
 
 MEMBERSHIPS = 5
+PAPER = Problem(5**7, 4, 450)
+"""|S|, |A| and L of the paper's experiment."""
 RULES = MEMBERSHIPS**2
 """|S| of an agent in what is counted and timed."""
 LEARNER = TDLambdaSettings(
@@ -49,6 +56,10 @@ LEARNER = TDLambdaSettings(
     decision=Decision(rule="value", evaluator=ExactSettings()),
 )
 """The learner that is counted and timed: the paper's, over the two variables of line-up."""
+COORDINATED = LEARNER.model_copy(
+    update={"decision": Decision(evaluator=VariableEliminationSettings())}
+)
+"""The same that decides by variable elimination, on coordination graphs."""
 MOST_OPERATIONS = 4 * 10**8
 """Rule evaluations a step beyond which nothing is measured: about a second a step."""
 LEAST_SECONDS, MOST_TIMES = 0.3, 100
@@ -191,7 +202,8 @@ def measure(text: str, n: int) -> Measured | None:
         scenario, hierarchy = settings.arrange(line_up)
         learner = _of_order(2 * n)
     else:
-        learner = LEARNER
+        is_graph = isinstance(settings, CoordinationGraphSettings)
+        learner = COORDINATED if is_graph else LEARNER
         hierarchy = build(settings, line_up.agents, pairs(n))
 
     _warm_up()

@@ -54,7 +54,11 @@ def draw(rows: Sequence[CostRow], path: Path) -> None:
             axes.yaxis.set_major_locator(MaxNLocator(integer=True, nbins=7))
             axes.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"$10^{{{y:g}}}$"))
             axes.grid(alpha=0.25)
-        figure.legend(handles=_legend(list(series), measured), loc="outside lower center", ncols=4)
+        handles = _legend(list(series), measured)
+        longest = max(len(str(handle.get_label())) for handle in handles)
+        # A letter is about 0.06 in wide, the sample of a line and its margins 0.5 in.
+        columns = int(figure.get_figwidth() / (0.06 * longest + 0.5))
+        figure.legend(handles=handles, loc="outside lower center", ncols=max(1, min(4, columns)))
         write(figure, path)
 
 

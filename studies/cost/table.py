@@ -16,7 +16,7 @@ from typing import Any, Literal
 from ...topologies.view import aligned, readable
 from ..analysis.statistics import Estimate
 from ..presentation.csv_text import write_csv
-from .cost import RULES, CostRow, Measured, exponent, fitted
+from .cost import PAPER, RULES, CostRow, Measured, exponent, fitted
 
 Form = Literal["table", "json", "csv", "latex"]
 
@@ -30,6 +30,10 @@ FORMULAS = (
 """Columns by name, with their heading."""
 MEASURED = ("formula", "counted", "rules valued", "updates", "ms", "MiB")
 """Headings of what was measured per step."""
+PRINTED = ("2.45e12", "1.1e27")
+"""Operations of four agents as the paper prints them (Section VIII)."""
+OF_THE_PAPER = PAPER.chain_closed_form(4)
+"""The same by Eq. 19, with the paper's |S|, |A| and L."""
 COUNTS = ("joint_actions", "rule_evaluations", "weight_updates")
 
 
@@ -113,9 +117,18 @@ def _table(rows: Sequence[CostRow]) -> str:
         cells.append([str(row.agents), row.topology, *values])
     lines = [*aligned(cells, "><>>>>>"), ""]
     lines.append("Operations: nested by Eq. 18, chains by Eq. 19 and 21; single agent by Eq. 23.")
+    lines += _printed(rows)
     if any(row.measured is not None for row in rows):
         lines += ["", *_measured(rows)]
     return "\n".join(lines)
+
+
+def _printed(rows: Sequence[CostRow]) -> list[str]:
+    """Return what the paper prints, if its case is among the rows."""
+    own = {row.nested_closed_form for row in rows if row.agents == 4}
+    if OF_THE_PAPER not in own:
+        return []
+    return [f"The paper prints {PRINTED[0]} (nested) and {PRINTED[1]} (single agent) for n = 4."]
 
 
 def _measured(rows: Sequence[CostRow]) -> list[str]:
@@ -179,6 +192,7 @@ def _tabular(
     rows: Sequence[CostRow], titles: Sequence[str], cells: Sequence[Sequence[str]]
 ) -> list[str]:
     lines = [
+        "% needs \\usepackage{booktabs}",
         rf"\begin{{tabular}}{{rl{'r' * len(titles)}}}",
         r"\toprule",
         " & ".join(["$n$", "topology", *titles]) + r" \\",

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from ..store.durable import replacing
 
 SUFFIXES = (".svg", ".png", ".pdf")
 """Formats that figures are written in."""
+USUAL = ("png", "svg")
+"""Those that figures of a study are written in unless said otherwise."""
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Distinct to colour-blind readers (Okabe and Ito 2008); the palest is left out."""
 STYLES = ("-", (0, (5, 2)), (0, (1, 1.2)), (0, (6, 1.5, 1, 1.5)))
@@ -26,9 +31,12 @@ SETTINGS: dict[str, Any] = {
 }
 
 
-def save(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
-    """Write figures as PNG and SVG into an existing folder, by their names; return the paths."""
-    paths = [folder / f"{name}.{suffix}" for name in figures for suffix in ("png", "svg")]
+def save(figures: Mapping[str, Figure], folder: Path, formats: Sequence[str] = USUAL) -> list[Path]:
+    """Write figures into an existing folder, by their names; return the paths.
+
+    `formats` are suffixes without a dot.
+    """
+    paths = [folder / f"{name}.{suffix}" for name in figures for suffix in formats]
     for path in paths:
         write(figures[path.stem], path)
     return paths
@@ -48,6 +56,16 @@ def write(figure: Figure, path: Path) -> None:
     metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(path.suffix)
     with mpl.rc_context(SETTINGS), replacing(path) as file:  # type: ignore[arg-type]
         figure.savefig(file, format=path.suffix[1:], dpi=150, metadata=metadata)
+
+
+def log_axis(axes: Axes) -> None:
+    """Let the vertical axis be logarithmic, its ticks plain numbers: 0.5, 1, 2, 5."""
+    axes.set_yscale("log")
+    low, high = axes.get_ylim()
+    few = np.log10(high / low) < 3.0
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,)))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{y:,.10g}"))
+    axes.yaxis.set_minor_formatter(NullFormatter())
 
 
 def check_suffix(path: Path) -> None:

@@ -11,7 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ..analysis.comparison import LEVEL, Difference
+from ..analysis.comparison import Difference
+from ..analysis.paired_tests import LEVEL
 from .figures import COLOURS, SETTINGS
 
 
@@ -79,6 +80,10 @@ def _legend(figure: Figure, panels: Sequence[Panel]) -> None:
             ("#444444", "significantly different (adjusted p < .05)"),
             ("white", "no significant difference"),
         )
+    ]
+    handles += [
+        Line2D([], [], color=colour, linewidth=1.5, label=f"{word} than the reference")
+        for colour, word in zip(COLOURS, ("higher", "lower"), strict=False)
     ]
     seeds = sorted({line.seeds for panel in panels for line in panel.lines})
     counted = f"{seeds[0]}" if len(seeds) == 1 else f"{seeds[0]} to {seeds[-1]}"

@@ -5,13 +5,17 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
+from html import escape
 
 import numpy as np
 
 from ..analysis.statistics import FEW, Estimate
-from ..analysis.summary import Summary, between, two_figures
+from ..analysis.summary import Summary
 from ..spec.errors import SpecError
+from .cells import Cell, Row, ends
 from .csv_text import write_csv
+from .terminal_tables import text_of
+from .words import count
 
 LATEX = {
     "\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_",
@@ -19,27 +23,7 @@ LATEX = {
 }  # fmt: skip
 """What LaTeX reads otherwise, and how it is written instead."""
 MATHS_SPACE = r"\;"
-
-
-@dataclass(frozen=True)
-class Cell:
-    """An estimate as text: its value, and the bounds of its interval, if they are known."""
-
-    value: str
-    bounds: tuple[str, str] | None
-
-    @property
-    def interval(self) -> str:
-        """The interval; nothing if it is not known."""
-        return between(*self.bounds) if self.bounds else ""
-
-    def bracketed(self, space: str) -> str:
-        """Return the value and, if it is known, its interval in brackets."""
-        return f"{self.value}{space}[{', '.join(self.bounds)}]" if self.bounds else self.value
-
-
-Row = tuple[str, int, tuple[Cell | None, ...]]
-"""Condition, number of seeds, and a cell per title; none where there is no estimate."""
+NOTHING = "no trial has finished"
 
 
 @dataclass(frozen=True)
@@ -53,7 +37,8 @@ class SummaryTable:
     rows
         Its lines.
     csv, latex, markdown
-        The whole table as text.
+        The whole table as text. Printed, it is as on a terminal of 80 columns; a notebook shows it
+        as HTML.
     """
 
     titles: tuple[str, ...]
@@ -68,6 +53,41 @@ class SummaryTable:
         if all(seeds >= FEW for _, seeds, _ in self.rows):
             return ""
         return f"Means of fewer than {FEW} seeds have Student's intervals, rates Wilson's."
+
+    def __str__(self) -> str:
+        if not self.rows:
+            return NOTHING
+        return "\n".join([text_of(self.titles, self.rows), "", *self.legend])
+
+    @property
+    def legend(self) -> list[str]:
+        """Lines that say what stands in the cells."""
+        return [
+            "Means over seeds, and below them their 95 % intervals.",
+            *filter(None, [self.remark]),
+        ]
+
+    @property
+    def html(self) -> str:
+        """The table as HTML."""
+        heads = "".join(f"<th>{escape(text)}</th>" for text in ("condition", *self.titles))
+        lines = []
+        for condition, seeds, cells in self.rows:
+            shown = (
+                f"{escape(c.value)}<br><small>{escape(c.interval) or '–'}</small>" if c else ""
+                for c in cells
+            )
+            first = f"<th>{escape(condition)}<br><small>{count(seeds, 'seed')}</small></th>"
+            lines.append(f"<tr>{first}{''.join(f'<td>{cell}</td>' for cell in shown)}</tr>")
+        body = "".join(lines) or f"<tr><td>{NOTHING}</td></tr>"
+        said = escape(" ".join(self.legend)) if self.rows else ""
+        return (
+            f"<table><thead><tr>{heads}</tr></thead><tbody>{body}</tbody></table>"
+            f"<p><small>{said}</small></p>"
+        )
+
+    def _repr_html_(self) -> str:
+        return self.html
 
 
 def tabulate(lines: Sequence[Summary], columns: Sequence[str] = ()) -> SummaryTable:
@@ -100,29 +120,22 @@ def tabulate(lines: Sequence[Summary], columns: Sequence[str] = ()) -> SummaryTa
 
 
 def _cell(estimate: Estimate | None) -> Cell | None:
-    if estimate is None:
-        return None
-    value, low, high = map(two_figures, _ends(estimate))
-    return Cell(value, None if np.isnan(estimate.low) else (low, high))
+    return None if estimate is None else Cell.of(estimate)
 
 
 def _csv(lines: Sequence[Summary], titles: Sequence[str]) -> str:
     file = io.StringIO()
-    ends = [f"{title}{end}" for title in titles for end in ("", " low", " high")]
+    heads = [f"{title}{end}" for title in titles for end in ("", " low", " high")]
     rows = []
     for line in lines:
         values: list[object] = [line.condition, line.seeds]
         for title in titles:
             estimate = line.estimates.get(title)
-            numbers = (np.nan,) * 3 if estimate is None else _ends(estimate)
+            numbers = (np.nan,) * 3 if estimate is None else ends(estimate)
             values += ["" if np.isnan(value) else repr(value) for value in numbers]
         rows.append(values)
-    write_csv(file, ["condition", "seeds", *ends], rows)
+    write_csv(file, ["condition", "seeds", *heads], rows)
     return file.getvalue()
-
-
-def _ends(estimate: Estimate) -> tuple[float, float, float]:
-    return float(estimate.value), float(estimate.low), float(estimate.high)
 
 
 def _markdown(titles: Sequence[str], rows: Sequence[Row]) -> str:
@@ -138,16 +151,17 @@ def _latex(titles: Sequence[str], rows: Sequence[Row]) -> str:
         "% needs \\usepackage{booktabs}; 95 % intervals in brackets",
         rf"\begin{{tabular}}{{lr{'r' * len(titles)}}}",
         r"\toprule",
-        " & ".join(["condition", "seeds", *map(_escaped, titles)]) + r" \\",
+        " & ".join(["condition", "seeds", *map(escaped, titles)]) + r" \\",
         r"\midrule",
     ]
     for condition, seeds, cells in rows:
         # After a line's end LaTeX would take a leading bracket for an option.
-        name = "{}" * condition.startswith(("[", "*")) + _escaped(condition)
+        name = "{}" * condition.startswith(("[", "*")) + escaped(condition)
         numbers = (f"${c.bracketed(MATHS_SPACE)}$" if c else "--" for c in cells)
         lines.append(" & ".join([name, str(seeds), *numbers]) + r" \\")
     return "\n".join([*lines, r"\bottomrule", r"\end{tabular}"]) + "\n"
 
 
-def _escaped(text: str) -> str:
+def escaped(text: str) -> str:
+    """Return text as LaTeX needs it."""
     return "".join(LATEX.get(character, character) for character in text)

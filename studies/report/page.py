@@ -9,7 +9,7 @@ import jinja2
 from markupsafe import Markup
 
 from ..analysis.results import read
-from ..catalogue.study import load_study
+from ..catalogue.study import analysed, load_study
 from ..claims.claims import judge
 from ..claims.table import result
 from ..presentation.tables import tabulate
@@ -43,16 +43,15 @@ def page(directory: Path) -> str:
         version = store.meta("results_version")
         sources = store.sources()
     with sources.active():
-        study = load_study(outline.study)
-        analysis = study.analyse(results)
-        drawn = study.draw(analysis) if analysis.table else {}
+        analysis = analysed(outline.study, results)
+        drawn = load_study(outline.study).draw(analysis) if analysis.table else {}
     return _template().render(
         study=outline.study,
         extent=words.extent(outline),
         compared=", ".join(next(iter(outline.columns.values()))),
         standing=words.standing(len(trials), counts["done"], counts["failed"]),
         complete=counts["done"] == len(trials),
-        verdict=words.contest(analysis.table, getattr(analysis, "headline", None)),
+        verdict=words.verdicts(analysis),
         notes=list(getattr(analysis, "notes", ())),
         table=tabulate(analysis.table),
         claims=[

@@ -6,6 +6,7 @@ import platform
 import re
 from collections.abc import Iterable, Sequence
 from importlib.metadata import version
+from typing import Any
 
 import numpy as np
 
@@ -83,6 +84,17 @@ def standing(total: int, done: int, failed: int) -> str:
     parts += [f"{failed} failed"] * bool(failed) + [f"{left} left"] * bool(left)
     what = "What follows is of those done." if done else "There is nothing to show yet."
     return f"{'Unfinished' if left else 'With failures'}: {', '.join(parts)}. {what}"
+
+
+def verdicts(analysis: Any) -> str:
+    """Return who fares best, of every group of conditions that are to be compared.
+
+    An analysis whose conditions differ in size, too, offers their summaries by size as `groups`.
+    """
+    headline = getattr(analysis, "headline", None)
+    groups = getattr(analysis, "groups", None) or {"": analysis.table}
+    said = {name: contest(lines, headline) for name, lines in groups.items()}
+    return " ".join(f"{name}: {text}" if name else text for name, text in said.items() if text)
 
 
 def contest(table: Sequence[Summary], headline: str | None) -> str:

@@ -30,6 +30,8 @@ from .presets import PRESETS
 from .renamed import now_called
 
 SECTIONS = ("scenario", "topology", "learner")
+LONGEST_TABLE = 40
+"""A longer table is not spelled out in labels [characters]."""
 
 
 class ConditionSettings(Settings):
@@ -276,11 +278,30 @@ def label_but(columns: Mapping[str, Any], keys: Collection[str]) -> str:
 
 
 def _brief(value: object) -> str:
-    """Return a value for a label: a long list is cut, and distinguished by a checksum."""
+    """Return a value for a label.
+
+    A table is called by its name; a long one without is told from others by a checksum, as is a
+    list that is cut.
+
+    Examples
+    --------
+    >>> kite = {"vertices": [[0, 0], [0.2, 0.1], [0.3, 0], [0.2, -0.1]]}
+    >>> _brief({"name": "kite", **kite}), _brief(kite), _brief({"branching": 2})
+    ('kite', 'described e5dea0', '{branching = 2}')
+    """
     text = str(_scalar(value))
+    if isinstance(value, Mapping):
+        if "name" in value:
+            return str(value["name"])
+        kind = value.get("kind", "described")
+        return text if len(text) <= LONGEST_TABLE else f"{kind} {_checksum(text)}"
     if isinstance(value, str) or len(text) <= 60:
         return text
-    return f"{text[:50]}... {hashlib.sha256(text.encode(errors='replace')).hexdigest()[:6]}"
+    return f"{text[:50]}... {_checksum(text)}"
+
+
+def _checksum(text: str) -> str:
+    return hashlib.sha256(text.encode(errors="replace")).hexdigest()[:6]
 
 
 def _scalar(value: object) -> object:

@@ -11,8 +11,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from ...core.refusals import rule
-from ...core.registry import closest
+from ...core.refusals import closest, dotted, mistaken, place, rule
 from .overlay import Slot, field_of, kind_of, model_at, models_of
 from .renamed import now_called
 
@@ -59,12 +58,12 @@ def explain(error: ValidationError, model: type[BaseModel], data: Mapping[str, A
     data
         The table as the user gave it.
     """
-    found = [(_place(e["loc"], data), e) for e in error.errors(include_url=False)]
+    found = [(place(e["loc"], data), e) for e in error.errors(include_url=False)]
     # Where a name or a table may stand and a table does, what is wrong is in the table.
-    place = found[0][0]
-    inside = [f for f in found if len(f[0]) > len(place) and f[0][: len(place)] == place]
+    start = found[0][0]
+    inside = [f for f in found if len(f[0]) > len(start) and f[0][: len(start)] == start]
     (keys, first) = (inside or found)[0]
-    path = _dotted(keys)
+    path = dotted(keys) or "spec"
     if first["type"] == "extra_forbidden":
         owner = _owner(keys[:-1], model, data)
         kind = f" for kind {kind_of(owner)!r}" if owner is not None and kind_of(owner) else ""
@@ -88,30 +87,11 @@ def explain(error: ValidationError, model: type[BaseModel], data: Mapping[str, A
         kinds = [kind_of(m) for m in models_of(getattr(slot, "annotation", slot))]
         return f"{path} = {show(value)}: {closest(value, [k for k in kinds if k])}"
     # The members of a union complain one by one about the same place: say what any would take.
-    rules = dict.fromkeys(rule(e["msg"]) for place, e in found if place == keys)
+    rules = dict.fromkeys(rule(e["msg"]) for there, e in found if there == keys)
     renamed = now_called(path, value)
-    return f"{path} = {show(value)}: {renamed or ', or '.join(rules)}"
-
-
-def _place(loc: Sequence[int | str], data: object) -> tuple[int | str, ...]:
-    """Drop from pydantic's path what names a member of a union rather than a key of the spec."""
-    keys: list[int | str] = []
-    for index, item in enumerate(loc):
-        inside = isinstance(data, Mapping) and item in data
-        listed = isinstance(data, Sequence) and isinstance(item, int) and item < len(data)
-        if inside or (listed and not isinstance(data, str)):
-            keys.append(item)
-            data = data[item]  # type: ignore[index]
-        elif index == len(loc) - 1 and isinstance(data, Mapping) and not keys:
-            keys.append(item)
-    return tuple(keys)
-
-
-def _dotted(keys: Sequence[int | str]) -> str:
-    path = ""
-    for key in keys:
-        path += f"[{key}]" if isinstance(key, int) else f".{key}"
-    return path.lstrip(".").replace("\n", " ") or "spec"
+    owner = _owner(keys[:-1], model, data) if keys else None
+    other = mistaken(keys[-1], owner.model_fields) if owner is not None else ""
+    return f"{path} = {show(value)}: {renamed or ', or '.join(rules) + other}"
 
 
 def _slot(keys: Sequence[int | str], model: type[BaseModel], data: Any) -> Slot:

@@ -5,14 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import networkx as nx
+
 from ...core.evaluators import EVALUATORS
 from ...core.exploration import EXPLORATIONS
+from ...core.hierarchy import Hierarchy
 from ...core.learners import LEARNERS
 from ...core.places import located
 from ...core.registry import Registry
 from ...core.settings import Settings
 from ...scenarios import SCENARIOS
 from ...topologies import TOPOLOGIES
+from ...topologies.config import EdgesSettings
 from .. import STUDIES
 from .errors import SpecError
 
@@ -49,10 +53,26 @@ def plain(value: Any, key: str = "") -> Any:
     registry = REGISTRIES.get(key.rpartition(".")[2])
     if isinstance(value, Settings):
         return _of_settings(value, registry)
+    if isinstance(value, Hierarchy | nx.Graph):
+        return plain(_edges(value))
+    if isinstance(getattr(value, "settings", None), Settings):  # of something that was built
+        return _of_settings(value.settings, registry)
     if isinstance(value, type) or callable(value) or hasattr(value, "function"):
         name = _name(value, registry or Registry("state variable", {}))
         return {"kind": name} if key in ("scenario", "learner", "topology") else name
     return value
+
+
+def _edges(graph: Hierarchy | nx.Graph) -> Settings:
+    """Return the topology of just these agents and edges."""
+    if isinstance(graph, Hierarchy):
+        agents: list[str] = list(graph.agents)
+        edges = [(graph.agents[a], graph.agents[b]) for a, b in graph.edges]
+    else:
+        agents, edges = list(map(str, graph)), [(str(a), str(b)) for a, b in graph.edges]
+    joined = {name for edge in edges for name in edge}
+    alone = tuple(name for name in agents if name not in joined)
+    return EdgesSettings(edges=tuple(edges), alone=alone)
 
 
 def _of_settings(settings: Settings, registry: Registry | None) -> Any:

@@ -44,12 +44,13 @@ class Spec(Settings):
     >>> spec.seeds, [condition.label for condition in spec.conditions()]
     ((0, 1, 2), ['default', 'frozen'])
 
-    Tables may be made by any Python, and hold settings models:
+    Keywords do as well. Tables may be made by any Python, and hold settings, classes, functions and
+    hierarchies:
 
     >>> from nested_agents.core.learners.td import TDLambdaSettings
     >>> ridges = [{"name": f"ridge {r}", "learner": {"ridge": r}} for r in (1.0, 100.0)]
     >>> online = {"name": "online", "learner": TDLambdaSettings(step_size=0.1, normalised=True)}
-    >>> [c.label for c in Spec.of({"overrides": [*ridges, online]}).conditions()]
+    >>> [c.label for c in Spec(overrides=[*ridges, online]).conditions()]
     ['ridge 1.0', 'ridge 100.0', 'online']
     """
 
@@ -115,6 +116,11 @@ class Spec(Settings):
         if len(set(map(repr, value))) < len(value):
             raise ValueError("must be a list of distinct seeds")
         return tuple(value)
+
+    @classmethod
+    def made(cls, **table: Any) -> Spec:
+        """Return the spec of keywords, see `of`."""
+        return cls.of(table)
 
     @classmethod
     def of(cls, table: Mapping[str, Any], sources: Sources | None = None) -> Spec:
@@ -223,6 +229,15 @@ class Spec(Settings):
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Spec:
         """Return a spec with some fields changed, and the conditions that then follow."""
         return Spec.of({**self.table(), **(update or {})}, self.sources)
+
+    def doubts(self) -> tuple[str, ...]:
+        """Return what looks like a slip of the pen, a line each: sizes in another unit."""
+        found: dict[str, None] = {}
+        for condition in self.conditions():
+            scenarios = [condition.settings.scenario, *(s for _, s in condition.evaluations)]
+            for scenario in (*scenarios, *(stage.scenario for stage in condition.curriculum)):
+                found |= dict.fromkeys(scenario.doubts())
+        return tuple(found)
 
     @property
     def sources(self) -> Sources:

@@ -3,8 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from time import perf_counter
 
-from ...core.loop import StepRecord, control_loop, world_seed
+from ...core.loop import (
+    EpisodicScenario,
+    StepRecord,
+    control_loop,
+    world_seed,
+)
 from ...core.protocols import Measure, RecordedScenario, measures_of
 from ...core.settings import ScenarioSettings
 from ...core.team import Team
@@ -81,9 +87,14 @@ class Session:
             and len(self.world.recorded) > 0
         )
         kept = self.trial.recorded if is_recorded else {}
+        acting = self.team if team is None else team
+        there, steps_each = self._own._replace(team=acting), self.trial.steps
+        whole = observe is None and not kept
+        if whole and self._at_once(there, episodes, first, steps_each, phase):
+            return
         steps = control_loop(
-            self.scenario, self.team if team is None else team, episodes=episodes,
-            steps=self.trial.steps, seed=self.trial.seed, first_episode=first,
+            self.scenario, acting, episodes=episodes,
+            steps=steps_each, seed=self.trial.seed, first_episode=first,
         )  # fmt: skip
         for record in self._measured(steps, phase, measures_of(self.world), observe):
             if record.episode in kept:
@@ -96,10 +107,10 @@ class Session:
                 self._watch.add(record)
                 self.deciding.append(record.deciding)
 
-    def evaluate(self, observe: Observer | None = None) -> None:
+    def evaluate(self, observe: Observer | None = None, phase: str = "evaluation") -> None:
         """Let the team act greedily on worlds of no training, and show every step to `observe`."""
         self._go_through_curriculum()
-        self._evaluate(self._own, "evaluation", observe)
+        self._evaluate(self._own, phase, observe)
 
     def evaluate_elsewhere(self, observers: Mapping[str, Observer] | None = None) -> None:
         """Evaluate in each of the trial's `evaluations`, whatever the others are.
@@ -144,9 +155,14 @@ class Session:
             self._own.take_over(reached, self.trial.settings.learner)
 
     def _evaluate(self, there: Arrangement, phase: str, observe: Observer | None) -> None:
+        episodes = self.trial.evaluation
         most = self.trial.evaluation_steps or self.trial.steps
+        if observe is None and self._at_once(
+            there, episodes, EVALUATION_WORLDS, most, phase, learn=False
+        ):
+            return
         steps = control_loop(
-            there.scenario, there.team, episodes=self.trial.evaluation,
+            there.scenario, there.team, episodes=episodes,
             steps=most, seed=self.trial.seed, first_episode=EVALUATION_WORLDS,
             learn=False,
         )  # fmt: skip
@@ -175,6 +191,34 @@ class Session:
                 observe(record)
             if record.last:
                 self._rows.append(meter.row())
+
+    def _at_once(
+        self,
+        there: Arrangement,
+        episodes: int,
+        first: int,
+        steps: int,
+        phase: str,
+        *,
+        learn: bool = True,
+    ) -> bool:
+        """Run whole episodes compiled and keep their rows, or return that it cannot be done."""
+        scenario = there.scenario
+        if not isinstance(scenario, EpisodicScenario):
+            return False
+        for episode in range(first, first + episodes):
+            begin = perf_counter()
+            seed = world_seed(self.trial.seed, episode)
+            found = scenario.run_episode(there.team, seed, episode, steps, learn=learn)
+            if found is None:
+                return False
+            if learn and there.team is self.team:
+                spent = perf_counter() - begin
+                self._watch.seconds["decision"] += spent
+                self.deciding += [spent / found.steps] * found.steps
+            number = episode if learn else episode - first
+            self._rows.append(EpisodeRow(phase, number, found.steps, found.measures, found.return_))
+        return True
 
     def result(
         self,

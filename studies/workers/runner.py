@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from ..store.running import Running
 from ..store.store import Store
-from ..trials.trial import Trial
+from ..trials.trial import Trial, TrialResult
 from .interrupts import undisturbed
 from .worker import Arrival, RunTrial
 from .workers import Workers
@@ -32,11 +32,14 @@ class Outcome:
         The traceback, if it failed.
     seconds
         How long it took.
+    result
+        What it measured, if it did not fail.
     """
 
     trial: Trial
     error: str | None
     seconds: float
+    result: TrialResult | None = None
 
 
 def run_trials(
@@ -87,4 +90,4 @@ def _keep(store: Store, arrival: Arrival) -> Outcome:
             store.fail(arrival.trial, arrival.error or "")
         else:
             store.save(arrival.trial, arrival.result, arrival.seconds)
-    return Outcome(arrival.trial, arrival.error, arrival.seconds)
+    return Outcome(arrival.trial, arrival.error, arrival.seconds, arrival.result)

@@ -4,7 +4,6 @@ from math import e, exp
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 
 from nested_agents.core.exploration import (
     BurstExploration,
@@ -15,6 +14,7 @@ from nested_agents.core.exploration import (
     boltzmann,
     greatest,
 )
+from nested_agents.core.settings import SettingsError
 
 VALUES = np.array([0.0, 3.0, 1.0, 2.0])
 
@@ -208,5 +208,5 @@ def test_settings_choose_the_explorer() -> None:
     ],
 )
 def test_settings_outside_their_range_are_refused(settings: type, values: dict) -> None:
-    with pytest.raises(ValidationError):
+    with pytest.raises(SettingsError):
         settings(**values)

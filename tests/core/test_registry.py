@@ -7,12 +7,11 @@ from types import ModuleType
 from typing import Annotated
 
 import pytest
-from pydantic import ValidationError
 
 from nested_agents.core import registry
 from nested_agents.core.hierarchy import Hierarchy
 from nested_agents.core.registry import Plugged, Registry, SettingsRegistry
-from nested_agents.core.settings import Settings
+from nested_agents.core.settings import Settings, SettingsError
 from nested_agents.core.sources import Sources
 
 CARTS = """
@@ -134,7 +133,7 @@ def test_a_class_with_settings_of_its_own_gets_them(carts: SettingsRegistry) -> 
         model = carts.model("mine.py:Cart")
         cart = model(wheels=4).build("red")  # type: ignore[attr-defined]
         assert (cart.wheels, cart.load, cart.colour) == (4, 1.0, "red")
-        with pytest.raises(ValidationError, match="Extra inputs are not permitted"):
+        with pytest.raises(SettingsError, match="legs = 2: unknown key"):
             model(legs=2)
 
 
@@ -169,7 +168,7 @@ def test_a_plugged_field_takes_names_tables_and_settings(carts: SettingsRegistry
             ({"kind": "rail", "load": "2"}, "valid number"),
             (3, "must be a name or a table"),
         ):
-            with pytest.raises(ValidationError, match=complaint):
+            with pytest.raises(ValueError, match=complaint):
                 Shop.model_validate({"cart": bad})
 
 
@@ -211,3 +210,17 @@ def test_an_object_without_a_place_is_refused(monkeypatch: pytest.MonkeyPatch) -
     for nameless in (lambda: None, 3):
         with pytest.raises(ValueError, match="has no name at the top of a file: write it to one"):
             things.reference_to(nameless)
+
+
+@pytest.mark.parametrize(
+    ("table", "complaint"),
+    [
+        ({"wheel": 3}, "CartSettings: wheel = 3: unknown key; known: kind, load"),
+        ({"load": "much"}, "CartSettings: load = 'much': must be a number"),
+    ],
+)
+def test_settings_made_in_python_refuse_in_one_line(table: dict, complaint: str) -> None:
+    with pytest.raises(SettingsError) as refusal:
+        CartSettings(**table)
+    assert str(refusal.value).startswith(complaint)
+    assert "\n" not in str(refusal.value)

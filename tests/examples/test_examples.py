@@ -54,3 +54,21 @@ def test_an_example_of_the_gallery_draws_a_figure(path: Path) -> None:
         runpy.run_path(str(path), run_name="__main__")
         assert len(plt.get_fignums()) == 1
         plt.close("all")
+
+
+def test_three_uses_in_thirty_lines(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = EXAMPLES / "notebook.py"
+    code = path.read_text(encoding="utf-8").split('"""\n', 2)[2]
+    assert len([line for line in code.splitlines() if line.strip() and line[0] != "#"]) <= 30
+    monkeypatch.setattr("sys.argv", ["notebook.py", str(tmp_path / "study")])
+    runpy.run_path(str(path), run_name="__main__")
+    out = capsys.readouterr().out
+    assert "Hierarchy(4 agents: robot1.left -> robot1.right, robot1.left -> robot2.left" in out
+    assert "It\n  needs at least 6 seeds" in out
+    assert "decision_median, less that of" in out
+    assert "The paper prints 2.45e12 (nested) and 1.1e27 (single agent) for n = 4." in out
+    assert r"\begin{tabular}{rlrrrrr}" in out
+    assert (tmp_path / "study" / "scaling.pdf").is_file()
+    assert (tmp_path / "study-own" / "report.html").is_file()

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 
 from nested_agents.core.protocols import (
     ExactlyPredictedScenario,
@@ -11,6 +10,7 @@ from nested_agents.core.protocols import (
     measures_of,
     roles_of,
 )
+from nested_agents.core.settings import SettingsError
 from nested_agents.scenarios import SCENARIOS
 from nested_agents.scenarios.line_up import LineUp, LineUpSettings
 
@@ -30,7 +30,7 @@ def test_it_is_a_scenario_like_any_other() -> None:
 
 @pytest.mark.parametrize("carts", [0, 10_001])
 def test_the_number_of_carts_is_limited(carts: int) -> None:
-    with pytest.raises(ValidationError, match="carts"):
+    with pytest.raises(SettingsError, match="carts"):
         LineUpSettings(carts=carts)
 
 

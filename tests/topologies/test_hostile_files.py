@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from nested_agents.studies.cli.main import main
-from nested_agents.topologies.files import read_graph
+from nested_agents.topologies.files import read
 
 GRAPHML = '<graphml xmlns="http://graphml.graphdrawing.org/xmlns"><graph edgedefault="directed">'
 HOSTILE = {
@@ -78,7 +78,7 @@ def test_files_of_other_systems_mean_the_same(
     for name, text in texts.items():
         other = "\ufeff" + text if change == "BOM" else text.replace("\n", change)
         (tmp_path / name).write_bytes(other.encode())
-        assert list(read_graph(name).edges) == [("a", "b"), ("b", "c")]
+        assert list(read(name).edges) == [("a", "b"), ("b", "c")]
 
 
 def test_damaged_files_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -102,7 +102,7 @@ def test_damaged_files_are_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
 def told(name: str) -> str | None:
     """Return why a file is refused; None if it is not."""
     try:
-        graph = read_graph(name)
+        graph = read(name)
     except ValueError as error:
         return str(error)
     assert all(isinstance(node, str | int) for node in graph)

@@ -99,12 +99,12 @@ REFUSED = {
     "edges:a>b>c,d": "topology 'edges:a>b>c,d': an edge must be written a>b, received 'a>b>c'",
     "random:-1": "topology 'random:-1': seed = -1: must be at least 0",
     "nothing.json": "topology 'nothing.json': No such file or directory",
-    "file:x.csv": "topology 'x.csv': suffix must be .graphml or .json",
+    "file:x.csv": "topology 'x.csv': suffix must be .graphml, .json or .toml",
     "nothing.py:f": "topology 'nothing.py:f': nothing.py: No such file or directory",
-    "chian": "topology 'chian': did you mean 'chain'? known: chain, edges, file,",
+    "chian": "topology 'chian': did you mean 'chain'? known: chain, coordination-graph, edges,",
     "": "topology '': known: chain,",
-    "single-agent": "topology 'single-agent': is no hierarchy of 4 agents; see `arrange`",
-    "per-robot": "topology 'per-robot': is no hierarchy of 4 agents; see `arrange`",
+    "single-agent": "topology 'single-agent': is not of these 4 agents; see `arrange`",
+    "per-robot": "topology 'per-robot': is not of these 4 agents; see `arrange`",
 }
 
 
@@ -242,7 +242,7 @@ def test_graph_files(tmp_path: Path, name: str) -> None:
         ("x.json", '{"edges": [["a", "b"], ["a", "b"]]}', "edge a -> b is given more than once"),
         ("x.json", '{"edges": [["a"]]}', "holds no graph: edges: .* must be a pair"),
         ("x.graphml", "nothing", "holds no graph: syntax error"),
-        ("x.csv", "a,b", "suffix must be .graphml or .json"),
+        ("x.csv", "a,b", "suffix must be .graphml, .json or .toml"),
     ],
 )
 def test_a_file_without_a_graph_is_refused(

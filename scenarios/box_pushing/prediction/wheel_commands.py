@@ -97,8 +97,9 @@ def wheel_commands_of(commands: FloatArray, effects: FloatArray, merge: bool) ->
                         number[r, j, k] = place
             counts[r] *= sizes[r, j]
     most, n_indices = 0, a**w
-    for count in counts:
-        most = max(most, count)
+    for r in range(n):
+        if counts[r] > most:
+            most = counts[r]
     speeds, twists = np.zeros((n, most, w)), np.zeros((n, most, 3))
     which, level = np.empty((n, n_indices), np.int64), np.empty((n, w, n_indices), np.int64)
     n_distinct = np.zeros(n, np.int64)

@@ -18,6 +18,7 @@ from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 
 from ....core.arrays import FloatArray
+from ....core.refusals import closest
 from ..config import BoxSettings
 from .geometry import Outline
 from .polygons import LARGEST, Moments, Vertices, centred, convex_pieces, moments, polygon_edges
@@ -247,7 +248,7 @@ def _described(box: str | BoxSettings) -> tuple[BoxSpec, bool | str]:
         )  # fmt: skip
         return described, box.grows
     if box not in BOXES:
-        raise ValueError(f"scenario.box = {box!r}, allowed {', '.join(sorted(BOXES))}")
+        raise ValueError(f"scenario.box = {box!r}: {closest(box, BOXES)}")
     return BOXES[box], True
 
 

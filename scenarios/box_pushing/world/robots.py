@@ -16,6 +16,7 @@ from math import isfinite, radians
 import numpy as np
 
 from ....core.arrays import FloatArray
+from ....core.refusals import closest
 from ..config import RobotSettings
 
 GRAVITY = 9.81
@@ -256,5 +257,5 @@ def robot_for(robot: str | RobotSettings) -> RobotSpec:
         }
         return RobotSpec(**described)
     if robot not in ROBOTS:
-        raise ValueError(f"scenario.robot = {robot!r}, allowed {', '.join(sorted(ROBOTS))}")
+        raise ValueError(f"scenario.robot = {robot!r}: {closest(robot, ROBOTS)}")
     return ROBOTS[robot]

@@ -13,10 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...analysis.comparison import LEVEL, Difference, differences
+from ...analysis.comparison import Difference, differences
 from ...analysis.results import Results
 from ...analysis.statistics import Estimate, rate
 from ...analysis.summary import Summary
+from ...analysis.verdicts import power_lines, told
 
 PHASES = ("training", "evaluation")
 """The measures: success rates in these phases."""
@@ -49,7 +50,9 @@ def analyse(results: Results) -> Ablation:
         for phase in PHASES
         if phase in results.phases
     }
-    found = differences(results, conditions[0], conditions[1:], measures) if conditions else ()
+    found: tuple[Difference, ...] = ()
+    if conditions:
+        found = differences(results, conditions[0], conditions[1:], measures)
     by_place = {(d.condition, d.measure): d.estimate for d in found}
     unknown = Estimate(*(np.asarray(value) for value in (0.0, np.nan, np.nan)))
     table = []
@@ -65,13 +68,6 @@ def analyse(results: Results) -> Ablation:
 def _notes(found: tuple[Difference, ...]) -> list[str]:
     lines = []
     for title in dict.fromkeys(d.measure for d in found):
-        own = sorted(
-            (d for d in found if d.measure == title), key=lambda d: float(d.estimate.value)
-        )
         lines.append(f"\nsuccess {title}, p adjusted over {len(found)} comparisons:")
-        for word, sign in (("worse", -1), ("better", 1)):
-            significant = [d for d in own if d.p < LEVEL and d.estimate.value * sign > 0]
-            lines += [f"  {word}: {d.condition}, {d.shown}" for d in significant]
-        others = [d.condition for d in own if d.p >= LEVEL]
-        lines += [f"  no significant difference: {name}" for name in others]
-    return lines
+        lines += told([d for d in found if d.measure == title])
+    return [*lines, *power_lines(found)]

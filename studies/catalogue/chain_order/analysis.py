@@ -16,8 +16,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...analysis.comparison import LEVEL, aligned
-from ...analysis.paired_tests import Friedman, friedman, holm, paired_permutation
+from ...analysis.comparison import aligned
+from ...analysis.paired_tests import LEVEL, Friedman, friedman, holm, paired_permutation
 from ...analysis.results import Results
 from ...analysis.statistics import bootstrap, rate
 from ...analysis.summary import Summary

@@ -10,6 +10,9 @@ from .analysis import Hierarchies, analyse, check
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+NUMBERS = ("robots", "messages", "decision_median")
+"""What of whole trials the analysis rests on."""
+
 
 def draw(analysis: Hierarchies) -> dict[str, Figure]:
     """Return the figures of an analysis by name."""
@@ -18,4 +21,4 @@ def draw(analysis: Hierarchies) -> dict[str, Figure]:
     return {"hierarchies": figure_of(analysis)} if analysis.cases else {}
 
 
-__all__ = ["analyse", "check", "draw", "measure"]
+__all__ = ["NUMBERS", "analyse", "check", "draw", "measure"]

@@ -14,19 +14,21 @@ hierarchy that succeeds only where it is easy looks quick.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from itertools import islice
 from textwrap import wrap
 from typing import ClassVar
 
 import numpy as np
 
-from ...analysis.comparison import LEVEL, Array, Difference, difference, paired
-from ...analysis.paired_tests import holm, paired_permutation
+from ...analysis.comparison import Array, Difference, adjusted, difference, paired
+from ...analysis.paired_tests import LEVEL
+from ...analysis.power import seeds_needed
 from ...analysis.results import Arrays, Results
 from ...analysis.statistics import Estimate, bootstrap, rate
 from ...analysis.summary import EVALUATED, Summary, two_figures
+from ...analysis.verdicts import power_lines
 from ...spec.conditions import label_but
 from ...spec.errors import SpecError
 from ...spec.spec import Spec
@@ -128,19 +130,6 @@ class Verdict:
         return tuple(d for d in self.comparisons if d not in rest)
 
 
-def seeds_needed(comparisons: int) -> int:
-    """Return the fewest seeds of which a p can stay below `LEVEL` after Holm's adjustment.
-
-    The least p of n seeds is ``2 ** (1 - n)``: all differ in one direction.
-
-    Examples
-    --------
-    >>> seeds_needed(1), seeds_needed(63)
-    (6, 12)
-    """
-    return math.floor(1.0 + math.log2(comparisons / LEVEL)) + 1
-
-
 @dataclass(frozen=True)
 class Hierarchies:
     """The analysis.
@@ -236,16 +225,13 @@ def _verdicts(results: Results, cases: tuple[Case, ...]) -> tuple[Verdict, ...]:
             continue
         own, other = paired(results, case.condition, base, _outcomes)
         if len(own) >= 2:
-            raw = paired_permutation(own.mean(axis=1), other.mean(axis=1))
-            estimate = difference(own, other)
-            compared = Difference(case.hierarchy, EVALUATED, len(own), estimate, raw)
+            runs = own.mean(axis=1), other.mean(axis=1)
+            compared = Difference.of(case.hierarchy, EVALUATED, *runs, difference(own, other))
             found.setdefault(case.setting, []).append(compared)
-    ps = [compared.p for group in found.values() for compared in group]
-    adjusted = iter(holm(ps))
+    compared_all = adjusted([compared for group in found.values() for compared in group])
+    following = iter(compared_all)
     return tuple(
-        Verdict(
-            setting, reference, tuple(replace(d, p=float(next(adjusted))) for d in group), len(ps)
-        )
+        Verdict(setting, reference, tuple(islice(following, len(group))), len(compared_all))
         for setting, group in found.items()
     )
 
@@ -276,6 +262,7 @@ def _told(verdicts: tuple[Verdict, ...]) -> Iterator[str]:
         yield from (f"  {d.condition} differs by {d.shown}" for d in verdict.different)
         yield from _listed("no difference found", verdict.alike)
         yield from _listed("cannot be told", verdict.undecided)
+    yield from power_lines([d for verdict in verdicts for d in verdict.comparisons])
 
 
 def _listed(said: str, comparisons: tuple[Difference, ...]) -> Iterator[str]:

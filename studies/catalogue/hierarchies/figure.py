@@ -8,7 +8,7 @@ from matplotlib.ticker import LogLocator
 
 from ...analysis.summary import EVALUATED
 from ...presentation.by_robots import add_legend, draw_line, scale_axis
-from ...presentation.figures import SETTINGS
+from ...presentation.figures import SETTINGS, log_axis
 from .analysis import DECIDING, Hierarchies
 
 ROWS = (EVALUATED, DECIDING)
@@ -39,7 +39,7 @@ def figure_of(analysis: Hierarchies) -> Figure:
         for axes in panels.flat:
             scale_axis(axes, sizes)
         panels[0][0].set_ylim(-0.03, 1.03)
-        panels[1][0].set_yscale("log")
+        log_axis(panels[1][0])
         panels[1][0].yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         panels[1][0].yaxis.set_major_formatter("{x:g}")
         panels[1][0].yaxis.set_minor_formatter("")

@@ -4,11 +4,25 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ...spec.errors import SpecError
+from ...spec.spec import Spec
 from ...trials.session import run_trial as measure
 from .analysis import LearningCurves, analyse
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+def check(spec: Spec) -> None:
+    """Raise `SpecError` if something is to fail after the last episode of training."""
+    for condition in spec.conditions():
+        for failure in getattr(condition.settings.scenario, "failures", ()):
+            if failure.episode >= spec.episodes:
+                raise SpecError(
+                    f"scenario.failures: one begins in episode {failure.episode}, allowed 0 to "
+                    f"{spec.episodes - 1} of {spec.episodes} episodes "
+                    f"(condition {condition.label!r})"
+                )
 
 
 def draw(analysis: LearningCurves) -> dict[str, Figure]:
@@ -18,4 +32,4 @@ def draw(analysis: LearningCurves) -> dict[str, Figure]:
     return {"learning-curves": figure_of(analysis)} if analysis.table else {}
 
 
-__all__ = ["analyse", "draw", "measure"]
+__all__ = ["analyse", "check", "draw", "measure"]

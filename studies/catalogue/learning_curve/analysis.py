@@ -46,16 +46,18 @@ class Metric:
     bounds: tuple[float, float] = NOT_NEGATIVE
 
 
-def metrics_of(measures: Sequence[Measure]) -> tuple[Metric, ...]:
-    """Return the columns of the table, given what is measured of an episode.
+def metrics_of(measures: Sequence[Measure], episodes: int) -> tuple[Metric, ...]:
+    """Return the columns of the table, given what is measured of an episode, and their number.
 
     Success as it begins, as it ends and when evaluated; how the evaluation fares by other rates
-    and how many steps it takes; and every other measure at the end of training.
+    and how many steps it takes; and every other measure at the end of training. Where training is
+    no longer than a block, its begin is its end.
     """
     rates = [m for m in measures if m.is_rate and m.name != SUCCESS.name]
     numbers = [m for m in measures if not m.is_rate and m.name != SUCCESS.name]
+    begin = [Metric(f"success first {BLOCK}", SUCCESS.name, "first", is_rate=True)]
     return (
-        Metric(f"success first {BLOCK}", SUCCESS.name, "first", is_rate=True),
+        *(begin if episodes > BLOCK else ()),
         Metric(f"success last {BLOCK}", SUCCESS.name, "last", is_rate=True),
         Metric(EVALUATED, SUCCESS.name, "evaluation", is_rate=True),
         *(Metric(f"{m.title}, evaluation", m.name, "evaluation", is_rate=True) for m in rates),
@@ -96,7 +98,7 @@ def analyse(results: Results) -> LearningCurves:
     for condition, training in results.training.items():
         evaluation = results.evaluation.get(condition)
         estimates = {}
-        for metric in metrics_of(results.measures):
+        for metric in metrics_of(results.measures, training["success"].shape[1]):
             arrays = evaluation if metric.block == "evaluation" else training
             if arrays is None or metric.measure not in arrays:  # published results keep a part
                 continue

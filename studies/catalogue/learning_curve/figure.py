@@ -53,7 +53,7 @@ def _panel(axes: Axes, measure: Measure, analysis: LearningCurves) -> None:
 
 
 def _curve(axes: Axes, estimate: Estimate, index: int) -> None:
-    episodes = range(1, len(estimate.value) + 1)
+    episodes = range(len(estimate.value))  # counted from 0, as in rows and specs
     colour = COLOURS[index % len(COLOURS)]
     style = STYLES[index % len(STYLES)]
     marker = "o" if len(estimate.value) == 1 else None

@@ -9,6 +9,9 @@ from .analysis import Scaling, analyse, measure
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+NUMBERS = ("robots", "agents", "messages", "team_bytes", "decision_median", "step_bytes")
+"""What of whole trials the analysis rests on."""
+
 
 def draw(analysis: Scaling) -> dict[str, Figure]:
     """Return the figures of an analysis by name."""
@@ -17,4 +20,4 @@ def draw(analysis: Scaling) -> dict[str, Figure]:
     return {"scaling": figure_of(analysis)} if analysis.points else {}
 
 
-__all__ = ["analyse", "draw", "measure"]
+__all__ = ["NUMBERS", "analyse", "draw", "measure"]

@@ -159,6 +159,15 @@ class Scaling:
     notes: tuple[str, ...]
     bodies: str
 
+    @property
+    def groups(self) -> dict[str, list[Summary]]:
+        """The lines of the table by number of robots: a team is compared with those of its size."""
+        found: dict[str, list[Summary]] = {}
+        for point, line in zip(self.points, self.table, strict=True):
+            named = f"{point.robots} robot{'s' * (point.robots != 1)}"
+            found.setdefault(named, []).append(line)
+        return found
+
 
 def analyse(results: Results) -> Scaling:
     """Estimate; 95 % intervals, seeds as the unit of sampling. Times are per step."""

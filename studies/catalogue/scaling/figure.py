@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ...presentation.by_robots import add_legend, draw_line, scale_axis, style
-from ...presentation.figures import SETTINGS
+from ...presentation.figures import SETTINGS, log_axis
 from .analysis import Scaling
 
 PANELS = (
@@ -39,7 +39,7 @@ def figure_of(analysis: Scaling) -> Figure:
                     draw_line(axes, robots, values, index, len(evaluators))
             axes.set_title(title, loc="left")
             if logarithmic:
-                axes.set_yscale("log")
+                log_axis(axes)
             else:
                 top = 1.1 * axes.get_ylim()[1]
                 axes.set_ylim(*((-0.03, 1.03) if name == "evaluation success" else (0.0, top)))
@@ -67,7 +67,7 @@ def _messages(axes: Axes, analysis: Scaling, evaluators: list[str]) -> None:
             )
             axes.plot(*zip(*own, strict=True), **style(index))
     if min(passed for _, passed in counts):
-        axes.set_yscale("log")
+        log_axis(axes)
     else:  # agents that see nobody pass nothing
         axes.set_yscale("symlog", linthresh=1.0)
         axes.set_ylim(bottom=-0.2)

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...analysis.comparison import Difference, ratio
-from ...analysis.paired_tests import holm, paired_permutation
+from ...analysis.comparison import Difference, adjusted, ratio
 from ...analysis.results import Arrays, Results
 from ...analysis.statistics import bootstrap, rate
 from ...analysis.summary import Summary
+from ...analysis.verdicts import power_lines
 from ...spec.errors import SpecError
 from ...spec.spec import Spec
 from ...trials.contact import ContactShares
@@ -95,15 +95,13 @@ def ratios_of(results: Results, condition: str) -> tuple[Difference, ...]:
         return ()
     base = results.evaluation[condition]["success"]
     others = {box: arrays["success"] for box, arrays in results.elsewhere(condition).items()}
-    adjusted = holm([_p(outcomes, base) for outcomes in others.values()])
-    return tuple(
-        Difference(box, "ratio", len(base), ratio(outcomes, base), float(p))
-        for (box, outcomes), p in zip(others.items(), adjusted, strict=True)
+    runs = base.mean(axis=1)
+    return adjusted(
+        [
+            Difference.of(box, "ratio", outcomes.mean(axis=1), runs, ratio(outcomes, base))
+            for box, outcomes in others.items()
+        ]
     )
-
-
-def _p(outcomes: np.ndarray, base: np.ndarray) -> float:
-    return paired_permutation(outcomes.mean(axis=1), base.mean(axis=1))
 
 
 def _further(arrays: Arrays, numbers: Arrays, box: str) -> dict:
@@ -141,4 +139,4 @@ def _verdict(condition: str, found: tuple[Difference, ...]) -> list[str]:
         lines.append(
             f"  {d.condition}: {e.value:.2f} [{e.low:.2f}, {e.high:.2f}], p = {d.p:.2g} (adjusted)"
         )
-    return lines
+    return [*lines, *power_lines(found)]

@@ -9,6 +9,9 @@ from .analysis import Contests, analyse, measure
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+NUMBERS = ("agents", "weights", "formula", "rule_evaluations")
+"""What of whole trials the analysis rests on."""
+
 
 def draw(analysis: Contests) -> dict[str, Figure]:
     """Return the figures of an analysis by name."""
@@ -17,4 +20,4 @@ def draw(analysis: Contests) -> dict[str, Figure]:
     return {"single-agent": figure_of(analysis)} if analysis.contests else {}
 
 
-__all__ = ["analyse", "draw", "measure"]
+__all__ = ["NUMBERS", "analyse", "draw", "measure"]

@@ -7,7 +7,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ...presentation.figures import COLOURS, SETTINGS
+from ...presentation.figures import COLOURS, SETTINGS, log_axis
 from .analysis import Contests, smoothed
 
 SMOOTHED = 10
@@ -30,7 +30,7 @@ def figure_of(analysis: Contests) -> Figure:
                 width = min(SMOOTHED, len(c.curve.value))
                 curve = smoothed(c.curve, width)
                 colour = COLOURS[contenders.index(c.contender) % len(COLOURS)]
-                axes.plot(np.arange(len(curve)) + width, curve, color=colour)
+                axes.plot(np.arange(len(curve)) + width - 1, curve, color=colour)
             axes.set_ylim(-0.03, 1.03)
             axes.set_title(f"success, n = {n}", loc="left")
             axes.set_xlabel("episode")
@@ -38,7 +38,8 @@ def figure_of(analysis: Contests) -> Figure:
         for i, contender in enumerate(contenders):
             own = [c for c in analysis.contests if c.contender == contender]
             values = [float(c.milliseconds.value) for c in own]
-            times.semilogy([c.agents for c in own], values, "o-", color=COLOURS[i % len(COLOURS)])
+            times.plot([c.agents for c in own], values, "o-", color=COLOURS[i % len(COLOURS)])
+        log_axis(times)
         times.set_xticks(agents)
         times.set_xlabel("agents n")
         times.set_title("time of a step [ms]", loc="left")

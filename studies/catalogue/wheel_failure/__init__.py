@@ -9,6 +9,9 @@ from .analysis import WheelFailures, analyse, check, measure
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+NUMBERS = ("onset",)
+"""What of whole trials the analysis rests on."""
+
 
 def draw(analysis: WheelFailures) -> dict[str, Figure]:
     """Return the figures of an analysis by name."""
@@ -17,4 +20,4 @@ def draw(analysis: WheelFailures) -> dict[str, Figure]:
     return {"wheel-failure": figure_of(analysis)} if analysis.courses else {}
 
 
-__all__ = ["analyse", "check", "draw", "measure"]
+__all__ = ["NUMBERS", "analyse", "check", "draw", "measure"]

@@ -23,11 +23,11 @@ import numpy as np
 from ....core.learners.frozen import FrozenSettings
 from ....core.learners.learner import LearnerSettings
 from ....core.team import Team
-from ...analysis.comparison import Array, Difference
-from ...analysis.paired_tests import holm, paired_permutation
+from ...analysis.comparison import Array, Difference, adjusted, paired_difference
 from ...analysis.results import Arrays, Results
 from ...analysis.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, rates
 from ...analysis.summary import Summary
+from ...analysis.verdicts import power_lines
 from ...spec.conditions import label_but
 from ...spec.errors import SpecError
 from ...spec.spec import Spec
@@ -62,7 +62,9 @@ def measure(trial: Trial) -> TrialResult:
     session.train(trial.episodes - onset, onset, phase=KEPT, team=kept)
     session.evaluate()
     session.evaluate_elsewhere()
-    return session.result({"onset": float(onset)})
+    begun = sorted({f.episode for f in getattr(trial.settings.scenario, "failures", ())} - {onset})
+    later = {f"onset.{k}": float(episode) for k, episode in enumerate(begun, 2)}
+    return session.result({"onset": float(onset), **later})
 
 
 def check(spec: Spec) -> None:
@@ -112,7 +114,9 @@ class Course:
     adapts
         What does, see `ADAPTS`; `training` or `weights kept` if self-models were not swept.
     onset
-        Episode in which the wheel fails.
+        Episode in which the first wheel fails.
+    onsets
+        Episodes in which any does.
     success
         ``(n_seeds, n_episodes)`` from the start of training.
     seeds
@@ -122,6 +126,7 @@ class Course:
     fault: str
     adapts: str
     onset: int
+    onsets: tuple[int, ...]
     success: Array
     steps: Array
     seeds: tuple[int, ...]
@@ -197,7 +202,7 @@ def analyse(results: Results) -> WheelFailures:
     gains = _gains(courses)
     notes = ["Named after the colon is what adapts to the failure."] if courses else []
     notes += ["\nsuccess at the end against nothing adapting (p adjusted):"] if gains else []
-    notes += [f"  {gain.condition}: {gain.shown}" for gain in gains]
+    notes += [f"  {gain.condition}: {gain.shown}" for gain in gains] + power_lines(gains)
     curves = tuple(rates(course.success) for course in courses)
     return WheelFailures(tuple(map(_summary, courses)), courses, curves, gains, tuple(notes))
 
@@ -209,7 +214,9 @@ def courses_of(results: Results) -> list[Course]:
     for condition, training in results.training.items():
         if condition not in kept:
             continue
-        onset = int(results.numbers[condition]["onset"][0])
+        numbers = results.numbers[condition]
+        onset = int(numbers["onset"][0])
+        onsets = tuple(int(v[0]) for name, v in numbers.items() if name.startswith("onset"))
         fault, enabled = _twin(condition, results.columns.get(condition, {}))
         for phase in (KEPT, "training"):
             after = kept[condition] if phase == KEPT else {}
@@ -221,7 +228,7 @@ def courses_of(results: Results) -> list[Course]:
             }
             found.append(
                 Course(
-                    fault, ADAPTS.get((enabled, phase), phase), onset,
+                    fault, ADAPTS.get((enabled, phase), phase), onset, onsets,
                     arrays["success"].astype(float), arrays["steps"].astype(float),
                     results.seeds[condition],
                 )
@@ -269,10 +276,7 @@ def _gains(courses: tuple[Course, ...]) -> tuple[Difference, ...]:
         ends = [
             c.end.mean(axis=1)[[c.seeds.index(seed) for seed in shared]] for c in (course, base)
         ]
-        raw = paired_permutation(*ends)
-        found.append((course, len(shared), bootstrap(ends[0] - ends[1], bounds=(-1, 1)), raw))
-    adjusted = holm([raw for *_, raw in found])
-    return tuple(
-        Difference(f"{course.fault}, {course.adapts}", "end", seeds, estimate, float(p))
-        for (course, seeds, estimate, _), p in zip(found, adjusted, strict=True)
-    )
+        estimate = paired_difference(ends[0], ends[1], of_rates=True)
+        named = f"{course.fault}, {course.adapts}"
+        found.append(Difference.of(named, "end", ends[0], ends[1], estimate))
+    return adjusted(found)

@@ -22,7 +22,7 @@ def figure_of(analysis: WheelFailures) -> Figure:
     """Return the figure.
 
     A panel for every fault, a line for what adapts; running means over seeds and episodes, bands
-    their 95 % intervals. The wheel fails at the grey line.
+    their 95 % intervals. Wheels fail at grey lines.
     """
     faults = list(dict.fromkeys(course.fault for course in analysis.courses))
     cases = list(dict.fromkeys(course.adapts for course in analysis.courses))
@@ -34,11 +34,12 @@ def figure_of(analysis: WheelFailures) -> Figure:
         panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
         for axes, fault in zip(panels.flat, faults, strict=False):
             for course in (c for c in analysis.courses if c.fault == fault):
-                axes.axvline(course.onset + 0.5, color="#888888", linewidth=0.8)
+                for onset in course.onsets:
+                    axes.axvline(onset - 0.5, color="#888888", linewidth=0.8)
                 index = cases.index(course.adapts)
                 runs = _smoothed(course.success, course.onset)
                 estimate = bootstrap(runs, bounds=(0, 1))
-                episodes = np.arange(1, runs.shape[1] + 1)
+                episodes = np.arange(runs.shape[1])  # counted from 0, as in rows and specs
                 colour, style = COLOURS[index % len(COLOURS)], STYLES[index % len(STYLES)]
                 axes.fill_between(
                     episodes, estimate.low, estimate.high, color=colour, alpha=0.1, lw=0

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 @click.option(
     "--format",
     "form",
-    type=Choice(["table", "json", "markdown"]),
+    type=Choice(["table", "json", "markdown", "latex"]),
     default="table",
     help="How to print the table.",
 )
@@ -52,8 +52,8 @@ def command(
     from ...analysis import published
     from ...claims import claims
     from ...claims.table import print_claims
+    from ...presentation.progress import say
     from ...spec.errors import SpecError
-    from ..display import say
 
     if out is None:
         for option, given in (("--quick", quick), ("--publish", publish), ("--jobs", jobs)):
@@ -78,10 +78,10 @@ def _run(out: Path, *, quick: bool, jobs: int | None) -> dict[str, Published]:
     from ...analysis import published
     from ...analysis.results import read
     from ...claims import claims
+    from ...presentation.progress import Terminal
     from ...run import run_study
     from ...spec.errors import SpecError
     from ...spec.spec import Spec
-    from ..display import Terminal
 
     found = {}
     for study in claims.STUDIES_OF_CLAIMS:

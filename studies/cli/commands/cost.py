@@ -63,14 +63,15 @@ def command(
 ) -> int:
     """Print the cost of hierarchies, by formula (Eq. 18-23) and, if asked, measured."""
     from ....core.cost import Problem
-    from ...cost.cost import MOST_OPERATIONS, cost_rows
+    from ...api.costs import cost_table
+    from ...cost.cost import MOST_OPERATIONS
     from ...cost.table import written
+    from ...presentation.progress import say
     from ...spec.errors import SpecError
-    from ..display import say
 
     try:
         problem = Problem(rules, actions, iterations)
-        rows = list(cost_rows(topology, numbers(agents), problem, measured=measured))
+        rows = cost_table(topology, numbers(agents), problem, measured=measured).rows
         if plot is not None:
             from ...cost.figure import draw
 

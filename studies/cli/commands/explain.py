@@ -32,9 +32,9 @@ def command(directory: Path, condition: str | None, seed: int | None, trust: boo
     from ...explain.figures import draw
     from ...explain.text import MOST_AGENTS, text
     from ...presentation.figures import save
+    from ...presentation.progress import say
     from ...store import durable
     from ...store.store import Store
-    from ..display import say
     from ..trusting import trust_files
 
     if trust:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import click
 
-from ..arguments import Assignments, Choice, File, Text, Whole
+from ..arguments import Assignments, Choice, File, Several, Text, Whole
 
 directory = click.argument("directory", type=File(), metavar="DIR")
 """An existing study."""
@@ -60,7 +60,43 @@ changes = click.option(
 )
 """Assignments laid over a spec, see `nested_agents.studies.spec.overlay.assignment`."""
 
+figures = click.option(
+    "--figures",
+    cls=Several,
+    type=Choice(["png", "svg", "pdf"]),
+    metavar="png|svg|pdf...",
+    default=("png", "svg"),
+    help="Formats of the figures.",
+)
+"""What figures of a study are written as."""
+
 plot = click.option(
     "--plot", type=File(), metavar="PATH", help="A figure to write: SVG, PNG or PDF by suffix."
 )
 """A picture to write."""
+
+as_study = click.option(
+    "--as",
+    "study",
+    type=Text(),
+    metavar="STUDY",
+    help="Analyse the trials as this study does, by its name or file.py:NAME; nothing is run.",
+)
+"""Another study than that which the trials were run for."""
+
+where = click.option(
+    "--where",
+    type=Text(),
+    metavar="CHOICE",
+    help='Only the trials of a choice: "robots == 8 and seed < 5", "box in [square, circle]".',
+)
+"""A part of the trials, see `nested_agents.studies.analysis.selection.Where`."""
+
+form = click.option(
+    "--format",
+    "form",
+    type=Choice(["table", "markdown", "latex", "csv"]),
+    default="table",
+    help="How to print the table; CSV holds every digit, LaTeX needs the package booktabs.",
+)
+"""How a table of estimates is printed."""

@@ -24,21 +24,11 @@ def command(directory: Path, out: Path | None, trust: bool) -> int:
 
     DIR is where the study is kept; it may be unfinished.
     """
-    from ...report.page import page
-    from ...spec.errors import SpecError
-    from ...store import durable
+    from ...api.study import load
     from ..trusting import trust_files
 
-    path = directory / "report.html" if out is None else out
-    if path.is_dir() or not path.name:
-        raise SpecError(f"--out {path}: is a directory")
-    if path.suffix not in (".html", ".htm"):
-        raise SpecError(f"--out {path}: suffix must be .html or .htm")
     if trust:
         trust_files(directory)
-    content = page(directory).encode()
-    if not path.parent.is_dir():
-        raise SpecError(f"--out {path}: there is no directory {path.parent}")
-    durable.write(path, content)
-    print(f"{path}: {len(content) / 1e6:.1f} MB, nothing outside it is needed")
+    path = load(directory).report(out)
+    print(f"{path}: {path.stat().st_size / 1e6:.1f} MB, nothing outside it is needed")
     return 0

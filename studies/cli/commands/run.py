@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..arguments import Command, File
+from ..arguments import Command, File, Several, Text
 from . import options
 
 if TYPE_CHECKING:
@@ -29,6 +29,15 @@ if TYPE_CHECKING:
 @options.address
 @options.accept_code
 @options.trust
+@options.figures
+@click.option(
+    "--log",
+    "loggers",
+    cls=Several,
+    type=Text(),
+    metavar="file.py:NAME...",
+    help="Tell this logger of every finished trial, as for TensorBoard or MLflow.",
+)
 @options.changes
 def command(
     spec: Path,
@@ -38,6 +47,8 @@ def command(
     address: str | None,
     accept_code: bool,
     trust: bool,
+    figures: tuple[str, ...],
+    loggers: tuple[str, ...],
     changes: tuple[str, ...],
 ) -> int:
     """Run the study of a spec; the same command again continues it.
@@ -68,4 +79,6 @@ def command(
         backend=backend,
         address=address,
         accept_code=accept_code,
+        formats=figures,
+        loggers=loggers,
     )

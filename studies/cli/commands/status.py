@@ -17,9 +17,11 @@ def command(directory: Path) -> int:
 
     DIR is where the study is kept.
     """
+    from ...analysis.power import SMALLEST, USUAL_DEVIATION
+    from ...analysis.verdicts import power_text
+    from ...presentation.words import count, duration
     from ...store.store import Store
     from ...workers.progress import progress
-    from ..display import count, duration
 
     with Store.open(directory) as store:
         outline, now, failed = store.outline(), progress(store), store.failed()
@@ -37,6 +39,10 @@ def command(directory: Path) -> int:
         print(f"time     about {duration(now.seconds)} with {processes}")
     if versions > 1:
         print(f"code     finished trials are of {versions} versions of the installed code")
+    if len(outline.columns) > 1:
+        lines = power_text(len(outline.seeds), len(outline.columns) - 1, USUAL_DEVIATION, SMALLEST)
+        for name, line in zip(("power", *[""] * len(lines)), lines, strict=False):
+            print(f"{name:<9}{line.removeprefix('Power: ').strip()}")
     if now.refusal:
         print(f"\nnothing can be added: {now.refusal}")
     for line in now.damaged:

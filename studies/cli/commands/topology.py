@@ -57,10 +57,12 @@ def command(
 ) -> int:
     """List the topologies, or show one of them: edges, order of decision, who sees whom, cost.
 
-    SPEC is a topology as in a spec: chain:reversed, tree:2, file.py:function, graph.json, ...
+    SPEC is a topology as in a spec: chain:reversed, tree:2, file.py:function, graph.json,
+    teams.json, ...; or the spec of a study, whose hierarchies are shown over its own agents.
     """
     from ....topologies.view import kinds, printed, view
     from ...spec.errors import SpecError
+    from ..hierarchies import of_spec
 
     try:
         if action == "list":
@@ -75,10 +77,16 @@ def command(
         elif topology is None:
             raise SpecError("topology show: SPEC is missing; see nested-agents topology list")
         else:
-            shown = view(topology, agents, robots, wheels, actions)
-            if plot is not None:
-                shown.draw(plot)
-            print(printed(shown, form))
+            found = of_spec(topology)
+            if found is None:
+                found = [view(topology, agents, robots, wheels, actions)]
+            elif agents or robots or wheels:
+                raise SpecError(f"{topology}: is the spec of a study, which says its own agents")
+            for number, shown in enumerate(found, 1):
+                if plot is not None:
+                    several = f"-{number}" if len(found) > 1 else ""
+                    shown.draw(plot.with_name(f"{plot.stem}{several}{plot.suffix}"))
+                print(printed(shown, form), end="\n\n" if number < len(found) else "\n")
     except ValueError as error:
         raise SpecError(str(error)) from None
     return 0

@@ -110,6 +110,6 @@ def test_there_is_a_panel_for_every_number(further, tmp_path):
 
 
 def test_success_alone_makes_a_table():
-    assert [metric.title for metric in metrics_of((SUCCESS,))] == [
+    assert [metric.title for metric in metrics_of((SUCCESS,), 20)] == [
         "success first 5", "success last 5", "evaluation success", "evaluation steps",
     ]  # fmt: skip

@@ -34,7 +34,7 @@ SHORT = {
 def test_levels_recovery_and_area_by_hand() -> None:
     success = np.array([[1] * 6 + [0, 0, 1, 1, 1, 1, 1, 1], [1] * 6 + [0] * 8], dtype=float)
     steps = np.full(success.shape, 10.0)
-    course = Course("fault", "both", 6, success, steps, (0, 1))
+    course = Course("fault", "both", 6, (6,), success, steps, (0, 1))
     recovered, episodes, spent = course.recovery()
     assert recovered.tolist() == [1.0, 0.0]
     assert episodes.tolist() == [2.0, 8.0]

@@ -187,6 +187,10 @@ def test_the_committed_results_make_the_page(capsys) -> None:
     files = list(claims.PUBLISHED.glob("*.json"))
     assert {path.stem for path in files} == {
         *claims.STUDIES_OF_CLAIMS,
+        "arms",
+        "arm-transfer",
+        "games",
+        "long-arms",
         "tasks",
         "told",
         "costs",

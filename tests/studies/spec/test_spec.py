@@ -359,7 +359,40 @@ def test_long_values_that_begin_alike_are_told_apart():
     alike = [{"kind": "teams", "members": m} for m in (members, [members[0], members[1][::-1]])]
     first, second = Spec.of({"sweep": {"topology": alike}}).conditions()
     assert first.label != second.label
-    assert first.label[:50] == second.label[:50]
+    assert [c.label[:6] for c in (first, second)] == ["teams "] * 2
     assert max(len(first.label), len(second.label)) <= 60
     assert "robot2.left" in str(first.columns["topology"])
     assert first.columns != second.columns
+
+
+def test_described_boxes_are_called_by_their_names():
+    kite = {"name": "kite", "vertices": [[0, 0], [0.3, 0], [0.3, 0.2], [0.1, 0.3]]}
+    nameless = {"vertices": [[0, 0], [0.3, 0], [0.3, 0.2], [0.1, 0.4]]}
+    spec = Spec(sweep={"scenario.box": ["square", kite, nameless]})
+    labels = [condition.label for condition in spec.conditions()]
+    assert labels[:2] == ["square", "kite"]
+    assert labels[2].startswith("described ")
+    # Without a name nothing of a box changes, its trials included.
+    table = spec.conditions()[2].settings.model_dump(mode="json")["scenario"]["box"]
+    assert "name" not in table
+    assert spec.conditions()[1].settings.scenario.box.name == "kite"
+
+
+def test_keywords_make_a_whole_spec_and_objects_stand_for_names():
+    from nested_agents.core.hierarchy import Hierarchy
+    from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
+
+    pair = Hierarchy(["robot1.left", "robot1.right"], [("robot1.left", "robot1.right")])
+    world = BoxPushingSettings(robots=1).build()
+    spec = Spec(seeds=2, scenario=world, topology=pair)
+    (condition,) = spec.conditions()
+    assert condition.settings.scenario.robots == 1
+    assert condition.settings.topology.kind == "edges"
+    assert Spec.of(spec.table()) == spec
+    with pytest.raises(SpecError, match="seed = 3: unknown key; did you mean 'seeds'"):
+        Spec(seed=3)
+
+
+def test_a_key_that_is_nearly_another_one_is_suggested():
+    with pytest.raises(SpecError, match=r"scenario\.robot = 4: .*; did you mean 'robots'\?"):
+        Spec.of({"scenario": {"robot": 4}})

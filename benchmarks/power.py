@@ -1,0 +1,102 @@
+"""Whether studies find what the promised power says: ``python -m benchmarks.power``.
+
+Studies of known differences are simulated and tested by the permutation test itself, exact up to 12
+seeds and by 2,000 drawn patterns of signs beyond. Differences of single seeds are normal, as the
+promise has it, or those of two success rates of ten episodes, whose chances differ from seed to
+seed: these have ties and bounds. Then the same with the deviation that a study would estimate from
+its own seeds, averaged over the studies.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable
+
+import numpy as np
+from rich.box import SIMPLE
+from rich.console import Console
+from rich.table import Table
+
+from nested_agents.studies.analysis.paired_tests import LEVEL, paired_permutation
+from nested_agents.studies.analysis.power import RATES, deviation_of, power
+
+Draw = Callable[[np.random.Generator, int, int], np.ndarray]
+"""Draws differences ``(n_studies, n_seeds)``."""
+
+CASES = (
+    # seeds, comparisons, effect in deviations of normal differences
+    (6, 1, 1.2), (7, 2, 1.2), (8, 1, 1.0), (10, 5, 1.2), (12, 22, 1.5), (20, 1, 0.65),
+    (30, 10, 0.7),
+)  # fmt: skip
+CHANCES = ((8, 1, 0.3, 0.8), (12, 2, 0.4, 0.8), (20, 1, 0.6, 0.8), (30, 10, 0.6, 0.85))
+"""Seeds, comparisons, and the mean chances of success that are compared."""
+EPISODES = 10
+SPREAD = 6.0
+"""Of the Beta distribution of chances over seeds: the sum of its parameters."""
+EXACT_SEEDS, DRAWN = 12, 2000
+
+
+def normal(effect: float) -> Draw:
+    """Return what draws normal differences of this mean, in units of their deviation."""
+    return lambda rng, studies, seeds: rng.normal(size=(studies, seeds)) + effect
+
+
+def rates(first: float, second: float) -> Draw:
+    """Return what draws differences of two success rates of mean chances `first` and `second`."""
+
+    def draw(rng: np.random.Generator, studies: int, seeds: int) -> np.ndarray:
+        found = [
+            rng.binomial(EPISODES, rng.beta(p * SPREAD, (1 - p) * SPREAD, (studies, seeds)))
+            for p in (first, second)
+        ]
+        return np.asarray((found[1] - found[0]) / EPISODES)
+
+    return draw
+
+
+def found(differences: np.ndarray, comparisons: int) -> float:
+    """Return the share of studies ``(n_studies, n_seeds)`` that find their difference."""
+    n = differences.shape[1]
+    nothing, flips = np.zeros(n), 2**n if n <= EXACT_SEEDS else DRAWN
+    ps = [paired_permutation(d, nothing, permutations=flips) for d in differences]
+    return float(np.mean(np.array(ps) * comparisons < LEVEL))
+
+
+def main() -> None:
+    """Simulate and print."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.power", description=__doc__)
+    parser.add_argument("--studies", type=int, default=10_000, help="simulated studies a case")
+    options = parser.parse_args()
+    table = Table("differences", box=SIMPLE)
+    for heading in ("seeds", "comparisons", "promised", "found", "off by"):
+        table.add_column(heading, justify="right")
+    begun, worst = time.monotonic(), 0.0
+    cases: list[tuple[str, int, int, Draw, bool]] = [
+        (f"normal, {effect:g} deviations", n, m, normal(effect), False) for n, m, effect in CASES
+    ]
+    cases += [(f"rates of {p:g} and {q:g}", n, m, rates(p, q), True) for n, m, p, q in CHANCES]
+    for name, seeds, comparisons, draw, of_rates in cases:
+        rng = np.random.default_rng([seeds, comparisons])
+        many = draw(rng, 100_000, 1)
+        effect, deviation = float(many.mean()), float(many.std()) * (RATES if of_rates else 1.0)
+        differences = draw(rng, options.studies, seeds)
+        share = found(differences, comparisons)
+        promises = {"": power(effect, deviation, seeds, comparisons)}
+        if of_rates:
+            own = [deviation_of([d], of_rates=True) or 0.0 for d in differences[:200]]
+            told = [power(effect, round(d, 3), seeds, comparisons) for d in own]
+            promises[", own deviation"] = float(np.mean(told))
+        for how, promised in promises.items():
+            off = share - promised
+            worst = max(worst, abs(off))
+            numbers = (f"{promised:.3f}", f"{share:.3f}", f"{off:+.3f}")
+            table.add_row(f"{name}{how}", str(seeds), str(comparisons), *numbers)
+    console = Console(width=80)
+    console.print(table)
+    seconds = time.monotonic() - begun
+    console.print(f"{options.studies} studies a case, {seconds:.0f} s; at most off by {worst:.3f}")
+
+
+if __name__ == "__main__":
+    main()

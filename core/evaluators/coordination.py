@@ -1,0 +1,177 @@
+"""Evaluators for coordination graphs: a team's value is a sum, each part over an agent's peers.
+
+Agent j values the joint actions of itself and its peers; all others are taken to maintain. These
+values, a table for each agent, are added up, and the joint action of the greatest sum is found: by
+variable elimination, exactly, or by max-plus, in time that is linear in the number of agents. It is
+found once for all agents of a decision. Each then values its own actions given that all others do
+their part of it. Where actions are equally good its own part comes first, so that agents who are
+told nothing agree.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from ..arrays import FloatArray, IntArray
+from ..coordination.elimination import Elimination, Scope
+from ..coordination.max_plus import MaxPlus
+from ..protocols import Prediction
+from .evaluator import Aggregation, DecisionProblem, Deliberation, EvaluatorSettings, combinations
+
+FIRST = 1e-9
+"""By how much, relative to the value, an agent's own part comes before what is equally good."""
+
+
+class VariableEliminationSettings(EvaluatorSettings):
+    """The joint action of the greatest sum of values over peers, exactly."""
+
+    kind: Literal["variable-elimination"] = "variable-elimination"
+
+    def build(self, problem: DecisionProblem) -> VariableElimination:
+        """Return the evaluator of a team."""
+        return VariableElimination(problem)
+
+
+class MaxPlusSettings(EvaluatorSettings):
+    """The joint action of a great sum of values over peers, by messages between them."""
+
+    kind: Literal["max-plus"] = "max-plus"
+    rounds: Annotated[int, Field(ge=1, le=10_000)] = 100
+    """Most rounds of messages."""
+    damping: Annotated[float, Field(ge=0, lt=1)] = 0.5
+    """Share of a message that is kept from the round before."""
+
+    def build(self, problem: DecisionProblem) -> MaxPlusMessages:
+        """Return the evaluator of a team."""
+        return MaxPlusMessages(self, problem)
+
+
+class _Coordinated(Aggregation, ABC):
+    """What the two share: tables of values, and what is made of the best joint action.
+
+    Raises
+    ------
+    ValueError
+        If nobody has peers, or anything but own values and best responses is asked for.
+    """
+
+    name: str
+
+    def __init__(self, problem: DecisionProblem) -> None:
+        super().__init__(problem)
+        hierarchy = problem.hierarchy
+        if hierarchy.edges or not hierarchy.peers:
+            raise ValueError(
+                f"learner.decision.evaluator = {self.name!r}: the topology joins no peers, use "
+                "coordination-graph"
+            )
+        for key, value, allowed in (
+            ("rule", problem.rule, "value"),
+            ("teammates", problem.teammates, "best-response"),
+            ("value_of", problem.value_of, "own"),
+        ):
+            if value != allowed:
+                raise ValueError(
+                    f"learner.decision.{key} = {value!r}: {self.name} adds up own values over "
+                    f"peers, allowed: {allowed!r}"
+                )
+        n = len(hierarchy)
+        self.scopes: tuple[Scope, ...] = tuple(
+            tuple(sorted((i, *hierarchy.below(i)))) for i in range(n)
+        )
+        try:
+            self._prepare(n)
+        except ValueError as error:
+            raise ValueError(f"learner.decision.evaluator = {self.name!r}: {error}") from None
+        self._tried = {k: combinations(tuple(range(k)), self.n_actions) for k in self._sizes}
+        self._concerning = [[k for k, s in enumerate(self.scopes) if i in s] for i in range(n)]
+        self._prediction: Prediction | None = None
+        self._tables: list[FloatArray] = []
+        self._best: IntArray = np.zeros(n, dtype=np.int64)
+
+    @property
+    def _sizes(self) -> set[int]:
+        return set(map(len, self.scopes))
+
+    @abstractmethod
+    def _prepare(self, n: int) -> None:
+        """Prepare to maximise sums of tables over the scopes."""
+
+    @abstractmethod
+    def _maximised(self, tables: Sequence[FloatArray]) -> IntArray:
+        """Return the joint action ``(n,)`` of the greatest sum."""
+
+    def values(self, deliberation: Deliberation) -> FloatArray:
+        """Return the value ``(A,)`` of each action of the deciding agent."""
+        agent = deliberation.agent
+        if agent == self.hierarchy.order[0] or deliberation.prediction is not self._prediction:
+            self._prediction = deliberation.prediction
+            self._tables = [self._table(deliberation, i) for i in range(len(self.scopes))]
+            self._best = self._maximised(self._tables)
+        values = np.zeros(self.n_actions)
+        for k in self._concerning[agent]:
+            index = [slice(None) if i == agent else self._best[i] for i in self.scopes[k]]
+            values += self._tables[k][tuple(index)]
+        own = self._best[agent]
+        margin = FIRST * max(1.0, abs(float(values[own])))
+        is_equal = np.abs(values - values[own]) <= margin
+        is_equal[own] = False
+        values[is_equal] -= 2.0 * margin
+        return values
+
+    def _table(self, deliberation: Deliberation, agent: int) -> FloatArray:
+        """Return what an agent's value makes of the joint actions of its scope."""
+        scope = self.scopes[agent]
+        tried = self._tried[len(scope)]
+        self.count(agent, len(tried))
+        shape = (self.n_actions,) * len(scope)
+        weights = deliberation.weights[agent]
+        if not weights.any():
+            return np.zeros(shape)
+        joint = np.tile(deliberation.joint_action, (len(tried), 1))
+        joint[:, list(scope)] = tried
+        states = deliberation.prediction.states(agent, joint)
+        return self.rules.values(weights, states).reshape(shape)
+
+
+class VariableElimination(_Coordinated):
+    """Finds the greatest sum by variable elimination.
+
+    Raises
+    ------
+    ValueError
+        If the coordination graph is too wide; in one line, before anything is allocated.
+    """
+
+    name = "variable-elimination"
+
+    def _prepare(self, n: int) -> None:
+        try:
+            self._elimination = Elimination(self.scopes, n, self.n_actions)
+        except ValueError as error:
+            raise ValueError(f"{error}; use max-plus") from None
+
+    def _maximised(self, tables: Sequence[FloatArray]) -> IntArray:
+        return self._elimination.best(tables)
+
+
+class MaxPlusMessages(_Coordinated):
+    """Finds a great sum by max-plus."""
+
+    name = "max-plus"
+
+    def __init__(self, settings: MaxPlusSettings, problem: DecisionProblem) -> None:
+        self._settings = settings
+        super().__init__(problem)
+
+    def _prepare(self, n: int) -> None:
+        s = self._settings
+        self._messages = MaxPlus(self.scopes, n, self.n_actions, s.rounds, s.damping)
+
+    def _maximised(self, tables: Sequence[FloatArray]) -> IntArray:
+        return self._messages.best(tables)

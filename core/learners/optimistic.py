@@ -1,0 +1,61 @@
+"""Optimistic TD: what went wrong is put down to the others, who still explore.
+
+An agent that does not see what the others do cannot tell a bad action from a good one that they
+spoilt. Lauer and Riedmiller (2000) let values rise only; Matignon, Laurent and Le Fort-Piat (2007)
+let them fall, more slowly than they rise.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from ..arrays import FloatArray, IntArray
+from ..settings import Fraction, Positive
+from .learner import LearnerSettings
+from .online import Online
+
+if TYPE_CHECKING:
+    from ..rules.rule_base import RuleBase
+
+
+class OptimisticTDSettings(LearnerSettings):
+    """TD(0) whose values rise faster than they fall, for agents that do not see one another."""
+
+    kind: Literal["optimistic-td"] = "optimistic-td"
+    step_size: Positive = 0.1
+    """alpha, divided by the squared length of the feature vector."""
+    falling: Fraction = 0.0
+    """Step size of negative TD errors over alpha: 0 never lowers a value (distributed Q-learning),
+    in between is hysteretic, 1 is TD(0)."""
+
+    def build(self, rules: RuleBase, rows: IntArray) -> OptimisticTD:
+        """Return the learner of a team."""
+        return OptimisticTD(self, rules, rows)
+
+
+class OptimisticTD(Online):
+    """TD(0) that believes good news more than bad.
+
+    On entering state s' after state s::
+
+        delta = R(s) + gamma f(s') - f(s)                       (Eq. 7)
+        theta = theta + alpha max(delta, b delta) phi(s) / |phi(s)|^2
+
+    with b the setting `falling`.
+    """
+
+    def __init__(self, settings: OptimisticTDSettings, rules: RuleBase, rows: IntArray) -> None:
+        super().__init__(settings.discount, rules, rows)
+        self.settings = settings
+
+    def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
+        from ..rules import kernels
+
+        s = self.settings
+        delta = self.errors(self.theta, states, rewards, entered)
+        steps = s.step_size * np.maximum(delta, s.falling * delta)
+        steps /= self.rules.squared_lengths(states)
+        kernels.add_features(self.theta, self.rows, states, steps, self.rules.layout)
+        return self.theta.size

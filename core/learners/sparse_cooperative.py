@@ -1,0 +1,64 @@
+"""Sparse cooperative Q-learning: each agent learns its part of a sum (Kok and Vlassis 2006).
+
+The team's value is the sum of the agents' values, each over its peers in a coordination graph. What
+all are paid together is shared out equally, so that the parts add up to it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from ..arrays import FloatArray, IntArray
+from ..settings import Positive
+from .learner import LearnerSettings
+from .online import Online
+
+if TYPE_CHECKING:
+    from ..rules.rule_base import RuleBase
+
+
+class SparseCooperativeSettings(LearnerSettings):
+    """Agents learn the parts of a sum, each by its share of the reward."""
+
+    kind: Literal["sparse-cooperative"] = "sparse-cooperative"
+    step_size: Positive = 0.1
+    """alpha, divided by the squared length of the feature vector."""
+
+    def build(self, rules: RuleBase, rows: IntArray) -> SparseCooperative:
+        """Return the learner of a team."""
+        return SparseCooperative(self, rules, rows)
+
+
+class SparseCooperative(Online):
+    """TD(0) for each part of a sum (Kok and Vlassis 2006, Eq. 11, on after-states).
+
+    On entering state s' after state s, agent i of n learns::
+
+        delta_i = R_i(s) + gamma f_i(s') - f_i(s)
+        theta_i = theta_i + alpha delta_i phi_i(s) / |phi_i(s)|^2
+
+    where R_i is its own reward, or R / n if one is paid to all: then the deltas add up to the TD
+    error of ``sum_i f_i``. The state entered stands for the best one, which is what the greedy
+    joint action of the graph leads to.
+    """
+
+    def __init__(
+        self, settings: SparseCooperativeSettings, rules: RuleBase, rows: IntArray
+    ) -> None:
+        super().__init__(settings.discount, rules, rows)
+        self.settings = settings
+
+    def observe(self, states: FloatArray, reward: float | FloatArray, terminated: bool) -> int:
+        """Update for the step from the previous states to these, each agent by its share."""
+        shared = reward / len(states) if np.ndim(reward) == 0 else reward
+        return super().observe(states, shared, terminated)
+
+    def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
+        from ..rules import kernels
+
+        delta = self.errors(self.theta, states, rewards, entered)
+        steps = self.settings.step_size * delta / self.rules.squared_lengths(states)
+        kernels.add_features(self.theta, self.rows, states, steps, self.rules.layout)
+        return self.theta.size

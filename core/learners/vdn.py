@@ -1,0 +1,63 @@
+"""Value decomposition: the sum of the agents' values learns from one error (Sunehag et al. 2018).
+
+What all are paid together says nothing of who earned it. The TD error of the sum goes back to every
+agent alike, who learn what their parts must be for the sum to be right.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from ..arrays import FloatArray, IntArray
+from ..settings import Positive
+from .learner import LearnerSettings
+from .online import Online
+
+if TYPE_CHECKING:
+    from ..rules.rule_base import RuleBase
+
+
+class ValueDecompositionSettings(LearnerSettings):
+    """The sum of all agents' values learns from the TD error of the team."""
+
+    kind: Literal["vdn"] = "vdn"
+    step_size: Positive = 0.1
+    """alpha, divided by the squared length of all agents' feature vectors together."""
+
+    def build(self, rules: RuleBase, rows: IntArray) -> ValueDecomposition:
+        """Return the learner of a team."""
+        return ValueDecomposition(self, rules, rows)
+
+
+class ValueDecomposition(Online):
+    """TD(0) on the sum of the agents' values, without the networks of the original.
+
+    On entering state s' after state s, with R the reward of all (the sum, if each has its own)::
+
+        delta   = R(s) + gamma sum_i f_i(s') - sum_i f_i(s)
+        theta_i = theta_i + alpha delta phi_i(s) / sum_j |phi_j(s)|^2
+
+    The state entered stands for what the agents' greatest values lead to, as in all learners here.
+    """
+
+    def __init__(
+        self, settings: ValueDecompositionSettings, rules: RuleBase, rows: IntArray
+    ) -> None:
+        super().__init__(settings.discount, rules, rows)
+        self.settings = settings
+
+    def observe(self, states: FloatArray, reward: float | FloatArray, terminated: bool) -> int:
+        """Update for the step from the previous states to these; the team's reward in parts."""
+        shared = reward / len(states) if np.ndim(reward) == 0 else reward
+        return super().observe(states, shared, terminated)
+
+    def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
+        from ..rules import kernels
+
+        delta = self.errors(self.theta, states, rewards, entered).sum()
+        lengths = self.rules.squared_lengths(states).sum()
+        steps = np.full(len(states), self.settings.step_size * delta / lengths)
+        kernels.add_features(self.theta, self.rows, states, steps, self.rules.layout)
+        return self.theta.size

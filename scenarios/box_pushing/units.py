@@ -1,0 +1,59 @@
+"""Sizes that are surely wrong, with the unit in which they were probably meant.
+
+The world is one of robots that stand on a table: centimetres and hundreds of grams. A box of 300 m
+is no error, for the physics holds, but it was hardly meant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import pi
+from typing import Any
+
+LARGEST_BOX, LARGEST_RADIUS, LARGEST_REACH = 20.0, 1.0, 5.0
+"""Beyond these a size was hardly meant [m]."""
+HEAVIEST = 50.0
+"""The same of masses [kg]."""
+FASTEST = 10.0
+"""The same of wheel speeds [m/s]."""
+NEAREST_GOAL = 1e-4
+"""Less than this no tolerance is meant to be [m]."""
+
+
+def doubts(settings: Any) -> Iterator[str]:
+    """Yield a line for every size of `BoxPushingSettings` that is surely meant in another unit."""
+    box, robot = settings.box, settings.robot
+    if not isinstance(box, str):
+        places = list(zip(*box.vertices, strict=True))
+        width = max(max(axis) - min(axis) for axis in places)
+        yield from _length("box.vertices", width, LARGEST_BOX)
+        yield from _mass("box.mass", box.mass)
+    if not isinstance(robot, str):
+        yield from _length("robot.radius", robot.radius, LARGEST_RADIUS)
+        yield from _mass("robot.mass", robot.mass)
+        if robot.max_speed > FASTEST:
+            yield _meant("robot.max_speed", robot.max_speed, "m/s", "mm/s", 1e-3)
+    yield from _length("infrared.reach", settings.infrared.reach, LARGEST_REACH)
+    yield from _length("tolerance", settings.tolerance, LARGEST_BOX)
+    if settings.tolerance < NEAREST_GOAL:
+        said = f"{settings.tolerance:g} m: hardly any episode will reach the goal"
+        yield f"scenario.tolerance = {said}"
+    if settings.orientation_tolerance is not None and settings.orientation_tolerance > pi:
+        angle = settings.orientation_tolerance
+        yield _meant("orientation_tolerance", angle, "rad", "degrees", pi / 180.0)
+
+
+def _length(key: str, value: float, most: float) -> Iterator[str]:
+    if value > most:
+        unit, factor = ("mm", 1e-3) if value * 1e-2 > most / 10.0 else ("cm", 1e-2)
+        yield _meant(key, value, "m", unit, factor)
+
+
+def _mass(key: str, value: float) -> Iterator[str]:
+    if value > HEAVIEST:
+        yield _meant(key, value, "kg", "g", 1e-3)
+
+
+def _meant(key: str, value: float, unit: str, other: str, factor: float) -> str:
+    said = f"{value:g} {unit}: perhaps meant in {other}, {value * factor:.3g} {unit}"
+    return f"scenario.{key} = {said}"

@@ -1,0 +1,1 @@
+"""Games in which all agents are paid alike, played again and again."""

@@ -1,0 +1,101 @@
+"""What is said of comparisons: what they found, and what they could have found."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from textwrap import wrap
+
+from .comparison import Difference
+from .paired_tests import LEVEL
+from .power import SMALLEST, WANTED, detectable, deviation_of, seeds_for, seeds_needed
+from .summary import two_figures
+
+WIDTH = 80
+"""Of a line [characters]."""
+
+
+WORDS = ("worse", "better")
+"""What a significantly lower and a higher success rate are called."""
+
+
+def told(found: Sequence[Difference], words: tuple[str, str] = WORDS) -> Iterator[str]:
+    """Yield a line for every difference of one measure: the significant ones first, sorted.
+
+    `words` are what lower and higher values are called.
+    """
+    ranked = sorted(found, key=lambda d: float(d.estimate.value))
+    for word, sign in zip(words, (-1, 1), strict=True):
+        for d in ranked:
+            if d.p < LEVEL and d.estimate.value * sign > 0:
+                yield from _line(word, d)
+    for d in ranked:
+        if d.p >= LEVEL:
+            yield from _line("no significant difference", d)
+
+
+def _line(verdict: str, d: Difference) -> list[str]:
+    text = f"{verdict}: {d.condition}, {d.shown}"
+    return wrap(text, WIDTH, initial_indent="  ", subsequent_indent="    ", break_on_hyphens=False)
+
+
+def power_lines(
+    found: Sequence[Difference], *, of_rates: bool = True, smallest: float | None = None
+) -> list[str]:
+    """Return lines on which differences the comparisons could find, and how many seeds it takes.
+
+    Parameters
+    ----------
+    found
+        All that were adjusted together, of one unit.
+    of_rates
+        Whether they are differences of success rates.
+    smallest
+        The smallest difference of interest; of rates `SMALLEST` unless said otherwise.
+    """
+    if not found:
+        return []
+    seeds = min(d.seeds for d in found)
+    deviation = deviation_of([d.sample for d in found], of_rates=of_rates)
+    return power_text(
+        seeds, len(found), deviation, SMALLEST if of_rates and smallest is None else smallest
+    )
+
+
+def power_text(
+    seeds: int, comparisons: int, deviation: float | None, smallest: float | None
+) -> list[str]:
+    r"""Return lines on what paired seeds can tell, given the deviation of their differences.
+
+    Examples
+    --------
+    >>> print(*power_text(5, 2, 0.25, 0.2), sep="\n")
+    Power: 5 seeds and 2 comparisons cannot give an adjusted p below .05, whatever
+      the outcome. It needs at least 7 seeds; for a difference of .20, about 18.
+    >>> print(*power_text(20, 1, 0.25, 0.2), sep="\n")
+    Power: with 20 seeds, a difference of .17 is found with probability .80. For a
+      difference of .20 it takes about 15 seeds.
+    """
+    counted = f"{seeds} seed{'s' * (seeds != 1)}"
+    among = f" and {comparisons} comparisons" if comparisons > 1 else ""
+    needed = seeds_needed(comparisons)
+    wanted = None
+    if smallest is not None and deviation is not None:
+        wanted = seeds_for(smallest, deviation, comparisons)
+    if seeds < needed:
+        text = (
+            f"{counted}{among} cannot give an adjusted p below .05, whatever the outcome. "
+            f"It needs at least {needed} seeds"
+        )
+        if smallest is not None and wanted is not None:
+            text += f"; for a difference of {two_figures(smallest)}, about {wanted}"
+        text += "."
+    elif deviation is None:
+        text = f"{counted}{among} that deviate by nothing: how small a difference they would find "
+        text += "cannot be told."
+    else:
+        least = two_figures(detectable(deviation, seeds, comparisons))
+        text = f"with {counted}{among}, a difference of {least} is found with probability "
+        text += f"{two_figures(WANTED)}."
+        if smallest is not None and wanted is not None:
+            text += f" For a difference of {two_figures(smallest)} it takes about {wanted} seeds."
+    return wrap(f"Power: {text}", WIDTH, subsequent_indent="  ", break_on_hyphens=False)

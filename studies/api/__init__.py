@@ -1,0 +1,1 @@
+"""What Python users hold: a study that is run or loaded, asked, drawn, reported and planned."""

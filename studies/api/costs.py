@@ -1,0 +1,70 @@
+"""The cost of hierarchies as a table, by the paper's formulas and measured."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from html import escape
+
+from ...core.cost import Problem
+from ..cost.cost import PAPER, CostRow, cost_rows
+from ..cost.table import written
+
+
+@dataclass(frozen=True)
+class CostTable:
+    """Costs, a row for every topology and number of agents; printed or shown by a notebook.
+
+    Attributes
+    ----------
+    rows
+        The costs as exact integers.
+    """
+
+    rows: tuple[CostRow, ...]
+
+    @property
+    def csv(self) -> str:
+        """The table as CSV, with every digit."""
+        return written(self.rows, "csv")
+
+    @property
+    def latex(self) -> str:
+        """The table for LaTeX, with the package booktabs."""
+        return written(self.rows, "latex")
+
+    def __str__(self) -> str:
+        return written(self.rows, "table")
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(str(self))}</pre>"
+
+
+def cost_table(
+    topologies: Sequence[str] = ("chain",),
+    agents: Iterable[int] = (4,),
+    problem: Problem = PAPER,
+    *,
+    measured: bool = False,
+) -> CostTable:
+    """Return what hierarchies cost, by Eq. 18-23 and, if asked, measured.
+
+    Parameters
+    ----------
+    topologies
+        As in a spec.
+    agents
+        Numbers of agents.
+    problem
+        Rules and actions of an agent, and steps of an episode; those of the paper unless given.
+    measured
+        Whether to count and time steps of the running system, too.
+
+    Raises
+    ------
+    ValueError
+        If a topology or a number is refused; one line.
+    """
+    return CostTable(tuple(cost_rows(topologies, list(agents), problem, measured=measured)))

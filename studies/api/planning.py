@@ -1,0 +1,268 @@
+"""What a study will take and what it can find, before anything is spent on it.
+
+Two episodes of every condition are run to see what a step takes, on a seed that no study reports.
+Deciding and simulating take a time per step. Learning may take one per step, too, and one per step
+kept so far: a regression over all of training grows with the square of its length.
+"""
+
+from __future__ import annotations
+
+import resource
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from textwrap import wrap
+from typing import Any
+
+import numpy as np
+from scipy.optimize import nnls
+
+from ..analysis.power import SMALLEST, USUAL_DEVIATION, detectable, seeds_for
+from ..analysis.verdicts import WIDTH, power_text
+from ..catalogue.study import load_study
+from ..presentation.words import count, duration
+from ..spec.errors import SpecError
+from ..spec.outline import Outline
+from ..spec.spec import Spec
+from ..trials.session import Session
+from ..trials.trial import Trial, check, trials_of
+from ..workers.worker import CORES
+
+SEED = 10_000
+"""Of the trials that are tried out."""
+EPISODES = 2
+"""Tried of every condition; one that is cut short goes before them, in which code is compiled."""
+QUICK = 0.25
+"""Share of its steps that an episode takes if the goal is reached early."""
+
+
+@dataclass(frozen=True)
+class Pace:
+    """What the trials of a condition take.
+
+    Attributes
+    ----------
+    acting
+        Seconds of a step but for learning.
+    learning
+        Seconds of learning for a step of the episode that has ended.
+    regression
+        The same for every step that is kept by then.
+    bytes
+        What the team holds [bytes], and how much more for every step of training.
+    """
+
+    acting: float
+    learning: float
+    regression: float
+    bytes: tuple[float, float]
+
+    def seconds(self, steps: float, training: Sequence[int], evaluation: float) -> float:
+        """Return the time of a trial whose episodes take so many steps.
+
+        Parameters
+        ----------
+        steps
+            Of an episode of training.
+        training
+            Episodes of training, stage by stage.
+        evaluation
+            Steps of all evaluations together.
+        """
+        acting = self.acting * (steps * sum(training) + evaluation)
+        learning = sum(
+            self.learning * steps * n + self.regression * steps**2 * n * (n + 1) / 2
+            for n in training
+        )
+        return acting + learning
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a study will take and what it can find.
+
+    Attributes
+    ----------
+    outline
+        What the study consists of.
+    trials
+        How many there are.
+    processes
+        How many run at a time.
+    seconds
+        Time of the whole study [s]: if episodes take `QUICK` of their steps, and if all take all.
+    memory
+        Of all processes together [bytes], at most.
+    comparisons
+        With the first condition.
+    deviation
+        Standard deviation of paired differences that is supposed.
+    smallest
+        The smallest difference of success rates that is of interest.
+    doubts
+        What looks like a slip of the pen, a line each.
+    """
+
+    outline: Outline
+    trials: int
+    processes: int
+    seconds: tuple[float, float] | None
+    memory: float | None
+    comparisons: int
+    deviation: float
+    smallest: float
+    doubts: tuple[str, ...] = ()
+
+    @property
+    def detectable(self) -> float:
+        """The least difference of success rates that is found with a power of .8."""
+        return detectable(self.deviation, len(self.outline.seeds), max(self.comparisons, 1))
+
+    @property
+    def seeds_needed(self) -> int | None:
+        """How many seeds it takes to find the smallest difference of interest with that power."""
+        return seeds_for(self.smallest, self.deviation, max(self.comparisons, 1))
+
+    def __str__(self) -> str:
+        return "\n".join(self._lines())
+
+    __repr__ = __str__
+
+    def _lines(self) -> Iterator[str]:
+        o = self.outline
+        seeds = count(len(o.seeds), "seed")
+        yield f"study    {o.study}: {count(len(o.columns), 'condition')} x {seeds}"
+        yield f"trials   {self.trials}, each {o.lengths} of up to {count(o.steps, 'step')}"
+        with_ = f"with {count(self.processes, 'process', 'es')}"
+        if self.seconds is not None:
+            quick, slow = map(duration, self.seconds)
+            share = f"{QUICK:.0%}".replace("%", " %")
+            yield (
+                f"time     {quick} if episodes take {share} of their steps, at most {slow}, {with_}"
+            )
+        if self.memory is not None:
+            yield f"memory   up to {self.memory / 1e9:.1f} GB {with_}"
+        if self.comparisons:
+            lines = power_text(len(o.seeds), self.comparisons, self.deviation, self.smallest)
+            yield from ("", *lines)
+            said = (
+                f"Differences of success rates, every condition with the first, p adjusted; "
+                f"differences of single seeds are taken to deviate by {self.deviation:g}."
+            )
+            yield from wrap(said, WIDTH)
+        yield from self.doubts
+
+
+def plan(
+    spec: Spec | Mapping[str, Any] | str | Path,
+    *,
+    jobs: int | None = None,
+    deviation: float = USUAL_DEVIATION,
+    smallest: float = SMALLEST,
+    timed: bool = True,
+) -> Plan:
+    """Return what a study will take and what it can find; some seconds a condition are run.
+
+    Parameters
+    ----------
+    spec
+        A `Spec`, a table, or the path of a TOML file.
+    jobs
+        Trials at a time; one for every core unless said otherwise.
+    deviation
+        Standard deviation that is supposed of the differences of single seeds.
+    smallest
+        The smallest difference of success rates that is of interest.
+    timed
+        Whether to try the conditions out.
+
+    Raises
+    ------
+    SpecError
+        If the study cannot be run, or a number is out of range.
+    """
+    made = made_of(spec)
+    for name, value in (("deviation", deviation), ("smallest", smallest)):
+        if not 0.0 < value <= 1.0:
+            raise SpecError(f"--{name} {value:g}: must be above 0 and at most 1")
+    if jobs is not None and jobs < 1:
+        raise SpecError(f"--jobs {jobs}: must be at least 1")
+    check(made)
+    with made.sources.active():
+        getattr(load_study(made.study), "check", lambda spec: None)(made)
+    trials = trials_of(made)
+    processes = max(1, min(jobs or CORES, len(trials)))
+    seconds = memory = None
+    if timed:
+        seconds, memory = _taken(made, trials, processes)
+    return Plan(
+        Outline.of(made), len(trials), processes, seconds, memory, len(made.conditions()) - 1,
+        deviation, smallest, made.doubts(),
+    )  # fmt: skip
+
+
+def made_of(spec: Spec | Mapping[str, Any] | str | Path) -> Spec:
+    """Return the spec that a table or a file stands for."""
+    if isinstance(spec, Spec):
+        return spec
+    return Spec.of(spec) if isinstance(spec, Mapping) else Spec.load(Path(spec))
+
+
+def _taken(
+    spec: Spec, trials: Sequence[Trial], processes: int
+) -> tuple[tuple[float, float], float]:
+    """Return the time of a study [s], from and to, and its memory [bytes]."""
+    spent = np.zeros(2)
+    largest = 0.0
+    with spec.sources.active():
+        for trial in trials[: len(spec.conditions())]:
+            training = [*(stage.episodes for stage in trial.curriculum), trial.episodes]
+            evaluations = trial.evaluation * (1 + len(trial.evaluations))
+            pace = paced(trial)
+            evaluated = evaluations * (trial.evaluation_steps or trial.steps)
+            for i, share in enumerate((QUICK, 1.0)):
+                seconds = pace.seconds(share * trial.steps, training, share * evaluated)
+                spent[i] += len(spec.seeds) * seconds
+            held, more = pace.bytes
+            largest = max(largest, held + more * trial.steps * sum(training))
+    longest = spent / processes
+    return (float(longest[0]), float(longest[1])), processes * (_resident() + largest)
+
+
+def paced(trial: Trial) -> Pace:
+    """Return what a condition's trials take, by trying one of them out."""
+    alone = replace(trial, seed=SEED, curriculum=(), evaluations=(), evaluation_steps=None)
+    warming = Session(replace(alone, episodes=1, steps=2, evaluation=1))
+    warming.train(1)
+    warming.evaluate()
+    session = Session(replace(trial, seed=SEED, episodes=EPISODES, curriculum=()))
+    held = _bytes(session)
+    acting: list[float] = []
+    learning: list[list[float]] = []
+
+    def note(record: Any) -> None:
+        if record.step == 0:
+            learning.append([])
+        learning[-1].append(record.learning)
+        seconds = record.transition.info.get("seconds", {})
+        acting.append(record.deciding + sum(seconds.values()))
+
+    session.train(EPISODES, observe=note)
+    steps = np.array([len(episode) for episode in learning], dtype=float)
+    taken = np.array([sum(episode) for episode in learning])
+    # An episode of T steps takes T (a + b N) to learn from, N being the steps kept by its end.
+    (per_step, per_kept), _ = nnls(np.stack([steps, steps * np.cumsum(steps)], axis=1), taken)
+    more = max(_bytes(session) - held, 0.0) / steps.sum()
+    # The median: what else a machine does now and then is not the study's.
+    return Pace(float(np.median(acting)), float(per_step), float(per_kept), (held, float(more)))
+
+
+def _bytes(session: Session) -> float:
+    return float(sum(array.nbytes for array in session.team.arrays().values()))
+
+
+def _resident() -> float:
+    """Return the most memory that this process, as large as a worker, has held [bytes]."""
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return float(peak) * (1 if sys.platform == "darwin" else 1024)

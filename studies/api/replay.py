@@ -1,0 +1,90 @@
+"""A recorded episode as an animation in a file, which a notebook shows."""
+
+from __future__ import annotations
+
+import base64
+from dataclasses import dataclass
+from pathlib import Path
+
+from ...core.protocols import DrawnScenario
+from ...core.refusals import closest
+from ..spec.errors import SpecError
+from ..store.store import Store
+from ..trials.trial import trials_of
+
+MOST_BYTES = 20_000_000
+"""Of an animation that a notebook is given."""
+
+
+@dataclass(frozen=True)
+class Replay:
+    """An animation.
+
+    Attributes
+    ----------
+    path
+        Where it is.
+    title
+        Condition, seed and episode.
+    """
+
+    path: Path
+    title: str
+
+    def _repr_html_(self) -> str:
+        content = self.path.read_bytes()
+        if self.path.suffix != ".gif" or len(content) > MOST_BYTES:
+            return f"{self.title}: {self.path}"
+        encoded = base64.b64encode(content).decode("ascii")
+        return f"<img alt='{self.title}' src='data:image/gif;base64,{encoded}'>"
+
+
+def draw(
+    directory: Path, condition: str | None, seed: int | None, episode: str, path: Path | None
+) -> Replay:
+    """Draw a recorded episode of a trial that has finished.
+
+    Parameters
+    ----------
+    directory
+        Of a study.
+    condition, seed
+        Which trial; the first one unless said otherwise.
+    episode
+        ``first`` or ``last``; ``before`` or ``after`` where a wheel fails.
+    path
+        Of the animation, GIF or MP4; in the folder ``replay`` of the study unless said otherwise.
+
+    Raises
+    ------
+    SpecError
+        If there is no such trial or recording, or its scenario does not draw.
+    """
+    with Store.open(directory) as store:
+        spec = store.spec()
+        trials = [t for t in trials_of(spec) if condition in (None, t.condition)]
+        if not trials:
+            known = closest(condition, [c.label for c in spec.conditions()])
+            raise SpecError(f"condition = {condition!r}: {known}")
+        chosen = next((t for t in trials if seed in (None, t.seed)), None)
+        if chosen is None:
+            raise SpecError(f"seed = {seed}: known: {', '.join(map(str, spec.seeds))}")
+        recorded = list(chosen.recorded.values())
+        if episode == "first" and episode not in recorded:
+            episode = "last"  # of one episode
+        if episode not in recorded:
+            raise SpecError(f"episode = {episode!r}: {closest(episode, recorded)}")
+        with chosen.sources.active():
+            scenario = chosen.settings.scenario.build()
+        if not isinstance(scenario, DrawnScenario):
+            raise SpecError(f"no replay: {type(scenario).__name__} does not draw its episodes")
+        if store.states().get(chosen.identity) != "done":
+            raise SpecError(f"{chosen.condition}, seed {chosen.seed}: has not finished")
+        if path is None:
+            folder = directory / "replay"
+            folder.mkdir(exist_ok=True)
+            named = f"{chosen.identity[:8]}-{episode}.gif"
+            path = folder / named
+        if not path.exists():
+            scenario.animate(store.recording(chosen, episode), path)
+    return Replay(path, f"{chosen.condition}, seed {chosen.seed}, {episode} episode")

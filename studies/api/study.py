@@ -1,0 +1,409 @@
+"""A study in Python: run it or load it, then ask, compare, draw, replay and report.
+
+Everything is computed when it is asked for, from what the study's directory holds.
+
+Examples
+--------
+>>> import tempfile
+>>> out = tempfile.mkdtemp()
+>>> spec = {"seeds": 2, "episodes": 1, "steps": 2, "evaluation": 1, "preset": "random"}
+>>> study = run(spec, out, jobs=1, progress=False)
+>>> study.conditions, study.table(["success last 5"]).titles
+(('random',), ('success last 5',))
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ...core.refusals import closest
+from ...core.sources import Sources
+from ..analysis import published
+from ..analysis.contrasts import contrasts
+from ..analysis.power import SMALLEST, USUAL_DEVIATION
+from ..analysis.results import Results, read
+from ..analysis.selection import Where, selected, together
+from ..analysis.verdicts import power_text
+from ..catalogue.study import analysed, load_study
+from ..presentation.progress import Terminal
+from ..presentation.tables import SummaryTable, tabulate
+from ..presentation.words import count
+from ..run import Observer, Silent, run_study
+from ..spec.errors import SpecError
+from ..spec.outline import Outline
+from ..spec.spec import Spec
+from ..store import durable
+from ..store.store import Store
+from ..workers.workers import Backend
+from . import frames, replay
+from .comparison import Comparison
+from .frames import Part
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from pandas import DataFrame
+
+Place = str | PathLike[str]
+"""Of a directory or a file."""
+
+
+@dataclass(frozen=True)
+class StudyResults:
+    """What the finished trials of a study measured, or those of several studies together.
+
+    Made by `run` and `load`. A notebook shows it as its table.
+
+    Attributes
+    ----------
+    outline
+        What the study consists of.
+    results
+        Its measures as arrays, by condition.
+    failed
+        Condition, seed and traceback of every failed trial.
+    remarks
+        What must be said of the results, in lines.
+    """
+
+    outline: Outline
+    results: Results
+    failed: tuple[tuple[str, int, str], ...] = ()
+    remarks: tuple[str, ...] = ()
+    _sources: Sources = field(default_factory=Sources, repr=False)
+    _settings: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    _parts: tuple[Part, ...] = ()
+    _is_whole: bool = True
+
+    @property
+    def conditions(self) -> tuple[str, ...]:
+        """Labels of the conditions of which any trial has finished."""
+        return tuple(self.results.seeds)
+
+    @property
+    def trials(self) -> DataFrame:
+        """One row per trial: seconds [s] and numbers of the whole trial; needs pandas.
+
+        What its columns are stands in ``trials.attrs["columns"]``.
+        """
+        return frames.trials(self._kept_rows(), self._keeps_any)
+
+    @property
+    def episodes(self) -> DataFrame:
+        """One row per episode, counted from 0, and a column per measure; needs pandas.
+
+        What its columns are, and their units, stands in ``episodes.attrs["columns"]``.
+        """
+        return frames.episodes(self._kept_rows(), self._keeps)
+
+    def table(self, columns: Sequence[str] = ()) -> SummaryTable:
+        """Return conditions against estimates with their 95 % intervals.
+
+        Parameters
+        ----------
+        columns
+            Headings of the columns, in this order; all unless said otherwise.
+        """
+        return tabulate(self.analysis.table, columns)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the study says of its results, verdicts and their power, line by line."""
+        return tuple(getattr(self.analysis, "notes", ()))
+
+    @property
+    def power(self) -> tuple[str, ...]:
+        """What comparisons with the first condition can find, supposing a usual deviation."""
+        comparisons = len(self.conditions) - 1
+        if comparisons < 1:
+            return ()
+        seeds = min(map(len, self.results.seeds.values()))
+        return tuple(power_text(seeds, comparisons, USUAL_DEVIATION, SMALLEST))
+
+    @cached_property
+    def analysis(self) -> Any:
+        """What the study makes of its results, see `nested_agents.studies.catalogue.study`."""
+        with self._sources.active():
+            return analysed(self.outline.study, self.results)
+
+    def compare(
+        self,
+        by: str | None = None,
+        measure: str = "success",
+        *,
+        phase: str | None = None,
+        reference: str | None = None,
+    ) -> Comparison:
+        """Compare conditions seed by seed: effect, interval, p, and what could have been found.
+
+        Parameters
+        ----------
+        by
+            A swept key, or the last part of it: conditions that agree in all others are compared.
+            None: all conditions with the first.
+        measure
+            A measure of episodes, ``steps``, ``return`` or a number of whole trials, by name.
+        phase
+            Of the episodes; ``evaluation`` unless said otherwise.
+        reference
+            What the others are compared with; the first unless said otherwise.
+
+        Raises
+        ------
+        SpecError
+            If there is no such key, measure, phase or reference.
+        """
+        return Comparison(contrasts(self.results, measure, phase, by, reference))
+
+    def where(self, choice: str) -> StudyResults:
+        """Return the trials of a choice, such as ``"robots == 8 and seed < 5"``; see `Where`."""
+        chosen = Where(choice)
+
+        def keep(condition: str, seed: int) -> bool:
+            settings = self._settings.get(condition, {})
+            return chosen(condition, seed, settings, self.results.columns.get(condition, {}))
+
+        found = selected(self.results, keep)
+        if not found.seeds:
+            raise SpecError(f"where = {choice!r}: no finished trial is so")
+        return replace(self, results=found, failed=(), _is_whole=False)
+
+    def as_study(self, name: str) -> StudyResults:
+        """Return the same trials as another study analyses them, one of your own included.
+
+        Raises
+        ------
+        SpecError
+            If there is no such study.
+        """
+        load_study(name)
+        outline = replace(self.outline, study=name)
+        return replace(self, outline=outline, _is_whole=False)
+
+    @property
+    def figures(self) -> dict[str, Figure]:
+        """The figures of the study by name."""
+        with self._sources.active():
+            study = load_study(self.outline.study)
+            return study.draw(self.analysis) if self.analysis.table else {}
+
+    def figure(self, name: str | None = None) -> Figure:
+        """Return a figure of the study as matplotlib has it; the first unless named.
+
+        Raises
+        ------
+        SpecError
+            If there is no such figure.
+        """
+        drawn = self.figures
+        if not drawn:
+            raise SpecError(f"study = {self.outline.study!r}: has no figure of these results")
+        if name is not None and name not in drawn:
+            raise SpecError(f"figure = {name!r}: {closest(name, drawn)}")
+        return drawn[next(iter(drawn)) if name is None else name]
+
+    def replay(
+        self,
+        condition: str | None = None,
+        seed: int | None = None,
+        episode: str = "last",
+        path: Place | None = None,
+    ) -> replay.Replay:
+        """Draw a recorded episode of a trial as an animation; a notebook shows it.
+
+        Parameters
+        ----------
+        condition, seed
+            Which trial; the first unless said otherwise.
+        episode
+            ``first`` or ``last``; ``before`` or ``after`` where a wheel fails.
+        path
+            Where to write, GIF or MP4; the study's folder ``replay`` unless said otherwise.
+        """
+        where = None if path is None else Path(path)
+        return replay.draw(self.directory, condition, seed, episode, where)
+
+    def report(self, path: Place | None = None) -> Path:
+        """Write the whole study as one self-contained HTML file and return its path.
+
+        Parameters
+        ----------
+        path
+            Of the file; ``report.html`` in the study's directory unless said otherwise.
+
+        Raises
+        ------
+        SpecError
+            If the path is no HTML file, or these are not the results of one whole study.
+        """
+        from ..report.page import page  # its templates and packers take their time
+
+        if not self._is_whole:
+            raise SpecError("report: is of a whole study, not of a part of it or of another one")
+        where = self.directory / "report.html" if path is None else Path(path)
+        if where.is_dir() or not where.name:
+            raise SpecError(f"--out {where}: is a directory")
+        if where.suffix not in (".html", ".htm"):
+            raise SpecError(f"--out {where}: suffix must be .html or .htm")
+        content = page(self.directory).encode()
+        if not where.parent.is_dir():
+            raise SpecError(f"--out {where}: there is no directory {where.parent}")
+        durable.write(where, content)
+        return where
+
+    @property
+    def directory(self) -> Path:
+        """Where the study is kept.
+
+        Raises
+        ------
+        SpecError
+            If these are the results of several studies, or of a published file.
+        """
+        if len(self._parts) != 1:
+            raise SpecError("these are not the results of one study that is kept in a directory")
+        return self._parts[0].directory
+
+    def _repr_html_(self) -> str:
+        return f"<h4>{self.outline.study}</h4>{self.table().html}"
+
+    def _kept_rows(self) -> tuple[Part, ...]:
+        if not self._parts:
+            raise SpecError("published results have no rows, only a table")
+        return self._parts
+
+    def _keeps(self, condition: str, seed: int) -> bool:
+        return seed in self.results.seeds.get(condition, ())
+
+    def _keeps_any(self, condition: str, seed: int) -> bool:
+        return self._is_whole or self._keeps(condition, seed)
+
+
+def run(
+    spec: Spec | Mapping[str, Any] | Place,
+    out: Place,
+    *,
+    jobs: int | None = None,
+    backend: Backend = "loky",
+    address: str | None = None,
+    retry_failed: bool = False,
+    accept_code: bool = False,
+    progress: bool = True,
+    observer: Observer | None = None,
+    loggers: Sequence[str] = (),
+) -> StudyResults:
+    """Run what is left of a study and return what it found; the same call again continues it.
+
+    Parameters
+    ----------
+    spec
+        A `Spec`, a table as TOML has it, which may hold objects, or the path of a TOML file.
+    out
+        Where the study is kept; made if it does not exist. Every trial is kept the moment it
+        finishes.
+    jobs, backend, address, retry_failed, accept_code, loggers
+        As those of `nested_agents.studies.run.run_study`.
+    progress
+        Whether to show how it goes.
+    observer
+        Who is told how it goes instead, see `nested_agents.studies.run.Observer`.
+
+    Warns
+    -----
+    UserWarning
+        If trials failed; ``study.failed`` has their tracebacks.
+
+    Raises
+    ------
+    SpecError
+        If the study cannot be run or continued; one line says why.
+    """
+    out = Path(out)
+    if isinstance(spec, Mapping):
+        spec = Spec.of(spec)
+    elif not isinstance(spec, Spec):
+        spec = Spec.load(Path(spec), study=out)
+    told = observer or (Terminal() if progress else Silent())
+    with run_study(
+        spec, out, jobs=jobs, backend=backend, address=address, retry_failed=retry_failed,
+        accept_code=accept_code, observer=told, loggers=loggers,
+    ) as store:  # fmt: skip
+        found = _of(store)
+    if found.failed and observer is None:
+        warnings.warn(
+            f"{count(len(found.failed), 'trial')} failed: study.failed says why", stacklevel=2
+        )
+    return found
+
+
+def load(*places: Place) -> StudyResults:
+    """Return the results of a study that is kept in a directory, or of several together.
+
+    Parameters
+    ----------
+    *places
+        Directories of studies; or a single file that ``export --format json`` has written.
+        Conditions of several studies whose labels are equal get the name of their directory; the
+        first study says how all of them are analysed.
+
+    Raises
+    ------
+    SpecError
+        If there is no readable study, or its rows are damaged; one line says what.
+    """
+    if not places:
+        raise SpecError("load: needs a directory at least")
+    paths = [Path(place) for place in places]
+    twice = next((p for i, p in enumerate(paths) if p.resolve() in _resolved(paths[:i])), None)
+    if twice is not None:
+        raise SpecError(f"{twice}: is named more than once")
+    found = [_loaded(path) for path in paths]
+    if len(found) == 1:
+        return found[0]
+    names = [path.name if _distinct(paths) else str(path) for path in paths]
+    results, labels = together([(n, s.results) for n, s in zip(names, found, strict=True)])
+    settings = {
+        new[c]: own for s, new in zip(found, labels, strict=True) for c, own in s._settings.items()
+    }
+    parts = [
+        Part(part.directory, new) for s, new in zip(found, labels, strict=True) for part in s._parts
+    ]
+    failed = [
+        (new[c], *rest) for s, new in zip(found, labels, strict=True) for c, *rest in s.failed
+    ]
+    outline = replace(found[0].outline, columns=results.columns)
+    return StudyResults(
+        outline, results, tuple(failed), tuple(r for s in found for r in s.remarks),  # type: ignore[arg-type]
+        found[0]._sources, settings, tuple(parts), _is_whole=False,
+    )  # fmt: skip
+
+
+def _resolved(paths: Sequence[Path]) -> list[Path]:
+    return [path.resolve() for path in paths]
+
+
+def _distinct(paths: Sequence[Path]) -> bool:
+    return len({path.name for path in paths}) == len(paths)
+
+
+def _loaded(path: Path) -> StudyResults:
+    if path.is_file():
+        kept = published.load(path)
+        remarks = (f"{path}: {kept.note}",) if kept.note else ()
+        return StudyResults(kept.outline, kept.results, (), remarks)
+    with Store.open(path) as store:
+        store.verify()
+        return _of(store)
+
+
+def _of(store: Store) -> StudyResults:
+    outline = store.outline()
+    part = Part(store.directory, {label: label for label in outline.columns})
+    return StudyResults(
+        outline, read(store), tuple(store.failed()), (), store.sources(), store.settings(), (part,)
+    )

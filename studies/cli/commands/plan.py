@@ -1,0 +1,49 @@
+"""``nested-agents plan``: what a study will take and what it can find."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from ..arguments import Command, File, Number
+from . import options
+
+
+@click.command(cls=Command)
+@click.argument("spec", type=File(), metavar="SPEC.toml")
+@options.jobs
+@click.option(
+    "--deviation",
+    type=Number(),
+    metavar="SD",
+    default=0.25,
+    help="Standard deviation that is supposed of the differences of single seeds.",
+)
+@click.option(
+    "--smallest",
+    type=Number(),
+    metavar="D",
+    default=0.2,
+    help="The smallest difference of success rates that is of interest.",
+)
+@click.option("--timed/--no-timed", default=True, help="Try two episodes of every condition.")
+@options.changes
+def command(
+    spec: Path,
+    jobs: int | None,
+    deviation: float,
+    smallest: float,
+    timed: bool,
+    changes: tuple[str, ...],
+) -> int:
+    """Tell trials, time, memory and the differences that a study can find, before it is run.
+
+    SPEC.toml says what to run. Two episodes of every condition are tried out.
+    """
+    from ...api.planning import plan
+    from ...spec.spec import Spec
+
+    made = Spec.load(spec, changes)
+    print(plan(made, jobs=jobs, deviation=deviation, smallest=smallest, timed=timed))
+    return 0

@@ -1,0 +1,123 @@
+"""How a study goes, shown while it runs: a bar on a terminal or in a notebook, else lines."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Iterable
+from html import escape
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+
+from ..spec.outline import Outline
+from ..spec.spec import Spec
+from ..workers.runner import Outcome
+from .words import count, duration
+
+PLAIN_SECONDS = 10.0
+"""How often a line tells of the progress when there is no terminal."""
+
+
+def say(line: str) -> None:
+    """Print a line on standard error."""
+    print(line, file=sys.stderr, flush=True)
+
+
+class Terminal:
+    """Shows how a study goes, see `nested_agents.studies.run.Observer`.
+
+    On standard error; in a notebook as a bar below the cell.
+    """
+
+    def announce(self, spec: Spec, directory: Path, processes: int) -> None:
+        """Say what is about to be run."""
+        conditions, seeds = len(spec.conditions()), len(spec.seeds)
+        say(
+            f"{spec.study}: {count(conditions, 'condition')} x {count(seeds, 'seed')}, "
+            f"{Outline.of(spec).lengths} of up to {count(spec.steps, 'step')}, "
+            f"{count(processes, 'process', 'es')}, kept in {directory}"
+        )
+
+    def note(self, line: str) -> None:
+        """Say it."""
+        say(line)
+
+    def follow(self, outcomes: Iterable[Outcome], total: int, done: int) -> None:
+        """Show how many of `total` trials are done, which have failed, and how long is left."""
+        if done:
+            say(f"{done} of {total} trials were run before")
+        if done == total:
+            return
+        if sys.stderr.isatty():
+            _follow_bar(outcomes, total, done)
+        elif Console().is_jupyter:
+            _follow_notebook(outcomes, total, done)
+        else:
+            _follow_lines(outcomes, total, done)
+
+
+def _follow_bar(outcomes: Iterable[Outcome], total: int, done: int) -> None:
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(bar_width=None),
+        MofNCompleteColumn(),
+        TextColumn("trials"),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(compact=True),
+    )
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, speed_estimate_period=600.0) as progress:
+        task = progress.add_task("running", total=total, completed=done)
+        for outcome in outcomes:
+            progress.advance(task)
+            if outcome.error is not None:
+                progress.console.print(_failure(outcome), markup=False, highlight=False)
+
+
+def _follow_lines(outcomes: Iterable[Outcome], total: int, done: int) -> None:
+    begin = said = time.monotonic()
+    for here, outcome in enumerate(outcomes, 1):
+        if outcome.error is not None:
+            say(_failure(outcome))
+        now = time.monotonic()
+        if now - said >= PLAIN_SECONDS or done + here == total:
+            said = now
+            left = duration((now - begin) / here * (total - done - here))
+            say(f"{done + here} of {total} trials, {duration(now - begin)}, about {left} left")
+
+
+def _follow_notebook(outcomes: Iterable[Outcome], total: int, done: int) -> None:
+    from IPython.display import HTML, display
+
+    begin = time.monotonic()
+    failures: list[str] = []
+
+    def bar(finished: int) -> HTML:
+        spent, here = time.monotonic() - begin, finished - done
+        left = f", about {duration(spent / here * (total - finished))} left" if here else ""
+        failed = "".join(f"<br>{escape(line)}" for line in failures)
+        return HTML(
+            f"<progress value='{finished}' max='{total}'></progress> "
+            f"{finished} of {total} trials, {duration(spent)}{left}{failed}"
+        )
+
+    shown = display(bar(done), display_id=True)
+    for here, outcome in enumerate(outcomes, 1):
+        if outcome.error is not None:
+            failures.append(_failure(outcome))
+        shown.update(bar(done + here))
+
+
+def _failure(outcome: Outcome) -> str:
+    last = (outcome.error or "").strip().splitlines()[-1]
+    return f"failed: {outcome.trial.condition}, seed {outcome.trial.seed}: {last}"

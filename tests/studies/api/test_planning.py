@@ -1,0 +1,67 @@
+import numpy as np
+import pytest
+
+import nested_agents as na
+from nested_agents.studies.api.planning import Pace, paced
+from nested_agents.studies.cli.main import main
+from nested_agents.studies.trials.trial import trials_of
+
+SPEC = na.Spec(
+    seeds=5, episodes=4, steps=20, evaluation=2, learner={"kind": "td-lambda"},
+    scenario=na.LineUpSettings(carts=2), sweep={"scenario.carts": [2, 3]},
+)  # fmt: skip
+
+
+def test_a_plan_tells_trials_time_memory_and_power() -> None:
+    plan = na.plan(SPEC, jobs=2)
+    assert (plan.trials, plan.processes, plan.comparisons) == (10, 2, 1)
+    quick, slow = plan.seconds
+    assert 0.0 < quick < slow
+    assert 5e7 < plan.memory < 1e10
+    assert plan.detectable == np.inf
+    text = str(plan)
+    assert "trials   10, each 4 episodes of up to 20 steps" in text
+    assert "5 seeds cannot give an adjusted p below .05" in text
+    assert max(map(len, text.splitlines())) <= 80
+
+
+def test_more_seeds_find_smaller_differences() -> None:
+    plans = [na.plan(SPEC.model_copy(update={"seeds": n}), timed=False) for n in (8, 20, 40)]
+    assert plans[0].detectable > plans[1].detectable > plans[2].detectable
+    assert plans[1].seconds is None
+    assert {p.seeds_needed for p in plans} == {15}
+
+
+def test_learning_from_all_that_is_kept_grows_with_the_square_of_training() -> None:
+    pace = Pace(acting=0.001, learning=0.0, regression=1e-6, bytes=(0.0, 0.0))
+    one, two = (pace.seconds(100, [n], 0) - 0.1 * n for n in (100, 200))
+    assert two / one == pytest.approx(4.0, rel=0.01)
+    assert pace.seconds(100, [10], 500) == pytest.approx(1.5 + 1e-6 * 100**2 * 55)
+
+
+def test_what_is_tried_is_on_a_seed_that_no_study_reports() -> None:
+    pace = paced(trials_of(SPEC)[0])
+    assert 0.0 < pace.acting < 1.0
+    assert pace.bytes[0] > 0.0
+
+
+@pytest.mark.parametrize(
+    ("options", "complaint"),
+    [
+        (["--deviation", "0"], "--deviation 0: must be above 0 and at most 1"),
+        (["--smallest", "x"], "--smallest x: must be a number"),
+        (["--jobs", "0"], "--jobs 0: must be at least 1"),
+    ],
+)
+def test_numbers_out_of_range_are_refused(tmp_path, capsys, options, complaint) -> None:
+    path = tmp_path / "spec.toml"
+    path.write_text("seeds = 2")
+    assert main(["plan", str(path), "--no-timed", *options]) == 2
+    assert complaint in capsys.readouterr().err
+
+
+def test_doubtful_sizes_are_told_before_anything_is_spent(tmp_path, capsys) -> None:
+    path = tmp_path / "spec.toml"
+    path.write_text("seeds = 2\n[scenario.infrared]\nreach = 60.0\n")
+    assert main(["plan", str(path), "--no-timed"]) == 0
+    assert "scenario.infrared.reach = 60 m: perhaps meant in mm" in capsys.readouterr().out

@@ -1,0 +1,172 @@
+"""A study in Python, with made-up results: nothing here simulates."""
+
+import sys
+from types import ModuleType
+
+import made_up
+import pytest
+
+import nested_agents as na
+from nested_agents.studies import run as studies_run
+from nested_agents.studies.api import frames
+from nested_agents.studies.catalogue import learning_curve
+from nested_agents.studies.presentation import progress
+
+TABLE = {"seeds": 3, "episodes": 4, "steps": 5, "evaluation": 2,
+         "sweep": {"preset": ["default", "frozen"]}}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def places(tmp_path_factory: pytest.TempPathFactory):
+    """Two finished studies, the second of other seeds."""
+    here = [tmp_path_factory.mktemp("studies") / name for name in ("one", "two")]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(learning_curve, "measure", made_up.measure)
+        patch.setattr(studies_run, "check", lambda spec: made_up.MEASURES)
+        na.run(TABLE, here[0], jobs=1, progress=False)
+        na.run(na.Spec(**{**TABLE, "seeds": [0, 1, 2, 3]}), str(here[1]), jobs=1, progress=False)
+    return here
+
+
+@pytest.fixture
+def study(places):
+    return na.load(places[0])
+
+
+def test_a_study_tells_its_conditions_table_and_notes(study) -> None:
+    assert study.conditions == ("default", "frozen")
+    assert study.outline.seeds == (0, 1, 2)
+    table = study.table(["success last 5"])
+    assert str(table).splitlines()[1].split()[0] == "default"
+    assert table._repr_html_().count("<tr>") == 3
+    assert "<th>default<br><small>3 seeds</small></th>" in study._repr_html_()
+    assert "3 seeds cannot give an adjusted p below .05" in " ".join(study.power)
+
+
+def test_rows_are_data_frames_whose_columns_are_told(study) -> None:
+    pytest.importorskip("pandas", reason="extra [pandas]")
+    trials, episodes = study.trials, study.episodes
+    assert len(trials) == 6
+    assert len(episodes) == 6 * (4 + 2)
+    assert set(episodes["phase"]) == {"training", "evaluation"}
+    assert episodes["success"].dtype == bool
+    for frame in (trials, episodes):
+        assert set(frame.attrs["columns"]) == set(frame.columns)
+    assert episodes.attrs["columns"]["final_distance_m"]["unit"] == "m"
+    assert trials.attrs["columns"]["seconds.total"] == {"unit": "s", "meaning": "time spent"}
+    part = study.where("seed < 2 and condition == frozen")
+    assert set(part.episodes["seed"]) == {0, 1}
+    assert len(part.trials) == 2
+
+
+def test_without_pandas_one_line_says_how_to_get_it(study, monkeypatch) -> None:
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(na.SpecError, match=r"pip install 'nested-agents\[pandas\]'"):
+        frames._pandas()
+
+
+def test_conditions_are_compared(study) -> None:
+    found = study.compare(measure="steps")
+    (difference,) = found.differences
+    assert difference.condition == "frozen"
+    assert difference.seeds == 3
+    assert "3 seeds cannot give" in str(found)
+    assert "<table>" in found._repr_html_()
+    assert found.table.latex.startswith("% needs \\usepackage{booktabs}")
+
+
+def test_trials_are_asked_again_by_another_study(study) -> None:
+    again = study.as_study("ablation")
+    assert again.table().titles[0] == "training"
+    assert any("p adjusted over 2 comparisons" in note for note in again.notes)
+    for name, complaint in (("ablaton", "did you mean 'ablation'"), ("scaling", "needs robots")):
+        with pytest.raises(na.SpecError, match=complaint):
+            study.as_study(name).table()
+    with pytest.raises(na.SpecError, match="report: is of a whole study"):
+        again.report()
+
+
+def test_studies_are_loaded_together(places) -> None:
+    both = na.load(*places)
+    assert both.conditions == ("default (one)", "frozen (one)", "default (two)", "frozen (two)")
+    found = both.compare(by="directory")
+    assert [group.setting for group in found.contrasts.groups] == ["default", "frozen"]
+    # Equal trials, equal results: the made-up numbers are functions of the trial.
+    assert all(d.estimate.value == 0.0 for d in found.differences)
+    with pytest.raises(na.SpecError, match="named more than once"):
+        na.load(places[0], places[0])
+    with pytest.raises(na.SpecError, match="not the results of one study"):
+        both.replay()
+
+
+def test_the_figure_is_matplotlib_s(study) -> None:
+    assert study.figure().axes
+    with pytest.raises(na.SpecError, match="did you mean 'learning-curves'"):
+        study.figure("learning-curve")
+
+
+def test_the_report_is_a_file(study, tmp_path) -> None:
+    path = study.report(tmp_path / "study.html")
+    assert path.read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
+    with pytest.raises(na.SpecError, match=r"suffix must be \.html"):
+        study.report(tmp_path / "study.pdf")
+
+
+@pytest.mark.parametrize(
+    ("options", "complaint"),
+    [
+        ({"condition": "defaut"}, "did you mean 'default'"),
+        ({"seed": 9}, "seed = 9: known: 0, 1, 2"),
+        ({"episode": "middle"}, "episode = 'middle': known: first, last"),
+    ],
+)
+def test_a_replay_there_is_not_is_refused(study, options: dict, complaint: str) -> None:
+    with pytest.raises(na.SpecError, match=complaint):
+        study.replay(**options)
+
+
+def test_what_holds_no_study_is_refused_in_one_line(tmp_path) -> None:
+    with pytest.raises(na.SpecError, match="holds no study"):
+        na.load(tmp_path)
+    with pytest.raises(na.SpecError, match="needs a directory"):
+        na.load()
+
+
+def test_failed_trials_are_warned_of(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(learning_curve, "measure", made_up.failing)
+    monkeypatch.setattr(studies_run, "check", lambda spec: made_up.MEASURES)
+    with pytest.warns(UserWarning, match=r"1 trial failed: study\.failed says why"):
+        study = na.run(TABLE, tmp_path / "out", jobs=1, progress=False)
+    ((condition, seed, error),) = study.failed
+    assert (condition, seed) == ("frozen", 1)
+    assert "a wheel came off" in error
+
+
+class Cell:
+    """What a notebook's display shows."""
+
+    def __init__(self) -> None:
+        self.shown: list[str] = []
+
+    def display(self, content: str, display_id: bool = False) -> "Cell":
+        self.shown.append(content)
+        return self
+
+    def update(self, content: str) -> None:
+        self.shown.append(content)
+
+
+def test_progress_in_a_notebook_is_a_bar_below_the_cell(monkeypatch) -> None:
+    cell, module = Cell(), ModuleType("IPython.display")
+    module.HTML, module.display = str, cell.display  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "IPython", ModuleType("IPython"))
+    monkeypatch.setitem(sys.modules, "IPython.display", module)
+    trials = made_up.TRIALS[:2]
+    outcomes = [
+        progress.Outcome(trials[0], None, 1.0),
+        progress.Outcome(trials[1], "Traceback\nRuntimeError: <off>", 1.0),
+    ]
+    progress._follow_notebook(outcomes, 3, 1)
+    assert "<progress value='1' max='3'>" in cell.shown[0]
+    assert "3 of 3 trials" in cell.shown[-1]
+    assert "RuntimeError: &lt;off&gt;" in cell.shown[-1]

@@ -1,0 +1,159 @@
+"""What a new user stumbled over, each mended thing once."""
+
+import numpy as np
+import pytest
+from made_up_results import hierarchies, scaling, wheel_failure
+from matplotlib.figure import Figure
+
+import nested_agents as na
+from nested_agents.core.hierarchy import Hierarchy
+from nested_agents.core.protocols import SUCCESS
+from nested_agents.studies.catalogue.learning_curve.analysis import metrics_of
+from nested_agents.studies.catalogue.scaling import analyse as analyse_scaling
+from nested_agents.studies.catalogue.wheel_failure import analyse as analyse_failures
+from nested_agents.studies.catalogue.wheel_failure import draw as draw_failures
+from nested_agents.studies.claims import claims
+from nested_agents.studies.claims.table import latex
+from nested_agents.studies.cli.main import main
+from nested_agents.studies.presentation.figures import log_axis
+from nested_agents.studies.report import words
+from nested_agents.topologies.drawing import draw
+
+
+def test_a_verdict_on_sizes_compares_within_a_size() -> None:
+    said = words.verdicts(analyse_scaling(scaling({2: 0.9, 8: 0.4})))
+    assert said.startswith("2 robots: ")
+    assert " 8 robots: " in said
+    assert said.count("highest is") == 2
+
+
+def test_every_failure_is_marked() -> None:
+    results = wheel_failure({"seized": {"weights": 0.8, "nothing": 0.4, "both": 0.9,
+                                        "self-model": 0.6}})  # fmt: skip
+    for numbers in results.numbers.values():
+        numbers["onset.2"] = np.full(20, 30.0)
+    axes = draw_failures(analyse_failures(results))["wheel-failure"].axes[0]
+    marks = {line.get_xdata()[0] for line in axes.lines if len(set(line.get_xdata())) == 1}
+    assert marks == {19.5, 29.5}
+
+
+def test_short_training_has_no_identical_columns() -> None:
+    assert [m.title for m in metrics_of((SUCCESS,), 4)][:2] == [
+        "success last 5", "evaluation success",
+    ]  # fmt: skip
+    assert metrics_of((SUCCESS,), 6)[0].title == "success first 5"
+
+
+@pytest.mark.parametrize("values", [[0.6, 0.7], [0.3, 4.0], [1.0, 2e5]])
+def test_ticks_of_logarithmic_axes_are_plain_numbers(values: list[float]) -> None:
+    figure = Figure()
+    axes = figure.subplots()
+    axes.plot([1, 2], values)
+    log_axis(axes)
+    figure.draw_without_rendering()
+    shown = [t.get_text() for t in axes.get_yticklabels(which="both") if t.get_text()]
+    assert shown
+    assert not any("times" in text or "^" in text for text in shown)
+
+
+def test_the_legend_of_a_cost_figure_is_not_cut(tmp_path, monkeypatch) -> None:
+    from nested_agents.studies.cost import figure as module
+
+    kept: list[Figure] = []
+    monkeypatch.setattr(module, "write", lambda figure, path: kept.append(figure))
+    topologies = ["chain", "tree:2", "teams", "chain:interleaved", "star"]
+    module.draw(na.cost_table(topologies, [2, 4]).rows, tmp_path / "cost.png")
+    (figure,) = kept
+    figure.draw_without_rendering()
+    extent = figure.legends[0].get_window_extent()
+    assert extent.x0 >= 0.0
+    assert extent.x1 <= figure.bbox.width
+
+
+def test_the_paper_s_numbers_stand_beside_ours(capsys) -> None:
+    assert main(["cost"]) == 0
+    assert "The paper prints 2.45e12 (nested) and 1.1e27 (single" in capsys.readouterr().out
+    assert main(["cost", "--agents", "6"]) == 0
+    assert "The paper prints" not in capsys.readouterr().out
+    assert main(["cost", "--format", "latex"]) == 0
+    assert capsys.readouterr().out.startswith("% needs \\usepackage{booktabs}")
+
+
+def test_claims_are_written_for_latex_with_the_packages_they_need() -> None:
+    text = latex(claims.judge({}))
+    assert text.startswith("% needs \\usepackage{booktabs,tabularx}")
+    assert text.count(r"\\") == len(claims.judge({})) + 1
+
+
+def test_colours_of_a_drawn_hierarchy_are_explained(tmp_path) -> None:
+    path = tmp_path / "teams.svg"
+    draw(Hierarchy("abcd", [("a", "b"), ("a", "c"), ("c", "d")]), path, groups=[(0, 1), (2, 3)])
+    assert "colours: robots" in path.read_text()
+
+
+def test_a_failure_after_the_last_episode_is_refused(tmp_path, capsys) -> None:
+    path = tmp_path / "spec.toml"
+    path.write_text('episodes = 5\n[[scenario.failures]]\nkind = "seized"\nepisode = 5\n'
+                    'wheels = "robot1.left"\n')  # fmt: skip
+    assert main(["plan", str(path), "--no-timed"]) == 2
+    assert "one begins in episode 5, allowed 0 to 4 of 5 episodes" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("make", "complaint"),
+    [
+        (lambda: na.BoxPushingSettings(robot=4), "robot = 4: .*; did you mean 'robots'"),
+        (lambda: na.BoxPushingSettings(box="hexagn").build(), "did you mean 'hexagon'"),
+        (lambda: na.parse_topology(None), "topology None: must be a name, a file or a table"),
+        (lambda: na.build_hierarchy(na.TopologySettings(), "ab"), "is not of these 2 agents"),
+        (lambda: na.parse_topology({"kind": "tems"}), "did you mean 'teams'"),
+        (lambda: na.parse_topology({"members": 3}), "topology.members = 3: must be a list"),
+    ],
+)
+def test_errors_in_python_are_one_line_that_names_the_field(make, complaint: str) -> None:
+    with pytest.raises(ValueError, match=complaint) as refusal:
+        make()
+    assert "\n" not in str(refusal.value)
+    assert "pydantic" not in str(refusal.value)
+
+
+def test_a_missing_agent_is_named() -> None:
+    from nested_agents.scenarios.box_pushing.environments import WheelsEnv
+
+    env = WheelsEnv({"robots": 1}, steps=3)
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match=r"step: .*'robot1.right' is missing"):
+        env.step({"robot1.left": 0})
+
+
+def test_files_of_teams_are_topologies(tmp_path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "teams.json").write_text('{"members": [["a", "b"], ["c", ["d", "e"]]]}')
+    (tmp_path / "teams.toml").write_text('link = "star"\nmembers = [["a", "b"], ["c", "d"]]\n')
+    (tmp_path / "spec.toml").write_text('[sweep]\ntopology = ["chain", "teams", "per-robot"]\n')
+    hierarchy = na.build_hierarchy("teams.json", list("abcde"))
+    assert hierarchy.edges == ((0, 1), (0, 2), (2, 3), (3, 4))
+    for name, shown in (("teams.json", "5 agents, depth 4"), ("teams.toml", "4 agents, depth 3")):
+        assert main(["topology", "show", name, "--plot", f"{name}.svg"]) == 0
+        assert shown in capsys.readouterr().out
+        assert (tmp_path / f"{name}.svg").exists()
+    assert main(["topology", "show", "spec.toml", "--plot", "all.svg"]) == 0
+    out = capsys.readouterr().out
+    assert ["chain:" in out, "teams:" in out, "per-robot: 2 agents" in out] == [True] * 3
+    assert {path.name for path in tmp_path.glob("all*")} == {f"all-{k}.svg" for k in (1, 2, 3)}
+    assert main(["topology", "show", "spec.toml", "--agents", "4"]) == 2
+
+
+@pytest.mark.parametrize("text", ['{"members": 3}', '{"members": [["a", 3]]}', '{"members": []}'])
+def test_what_is_no_file_of_teams_is_refused(tmp_path, monkeypatch, capsys, text) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "teams.json").write_text(text)
+    assert main(["topology", "show", "teams.json"]) == 2
+    assert "must be a list of names and of such lists" in capsys.readouterr().err
+
+
+def test_hierarchies_say_how_small_a_difference_they_could_find() -> None:
+    from nested_agents.studies.catalogue.hierarchies import analyse
+
+    chances = {("chain", "team", 2): 0.9, ("star", "team", 2): 0.8}
+    assert any("Power: with 20 seeds" in note for note in analyse(hierarchies(chances)).notes)
