@@ -18,37 +18,38 @@ from nested_agents.scenarios.box_pushing.states.variables import STATE_VARIABLES
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
 from nested_agents.scenarios.kinematic_chain.variables import CHAIN_VARIABLES
+from nested_agents.studies.api.frames import EPISODE_COLUMNS, TRIAL_COLUMNS
 from nested_agents.studies.cli.main import COMMANDS
 from nested_agents.studies.cli.main import nested_agents as program
 from nested_agents.studies.spec.keys import tables
 from nested_agents.studies.spec.presets import PRESETS
 from nested_agents.studies.spec.toml import dumps
 
-EPISODES = (
-    ("condition", "", "label of the condition"),
-    ("*swept keys*", "", "a column for every swept key, and `name` if there are overrides"),
-    ("seed", "1", "seed of the trial"),
-    ("phase", "", "`training`, `evaluation`, `training:STAGE` or `evaluation:NAME`"),
-    ("episode", "1", "number of the episode within its phase, from 0"),
-    ("steps", "1", "decisions until the episode ended"),
-    ("*measures*", "", "those of the scenario, in the table below"),
-    ("return", "1", "sum of the rewards, not discounted; the mean over agents that are paid apart"),
-)
+BESIDE = {
+    "*swept keys*": ("", "a column for every swept key, and `name` if there are overrides"),
+    "*measures*": ("", "those of the scenario, in the table below"),
+    "seconds.decision": ("s", "time spent on decisions, predictions included"),
+    "seconds.physics": ("s", "time spent on physics"),
+    "seconds.sensors": ("s", "time spent on sensing"),
+    "seconds.learning": ("s", "time spent on learning"),
+    "seconds.total": ("s", "time that the trial took"),
+    "*numbers*": ("", "numbers of whole trials that the study keeps, in the table below"),
+}
+"""What columns mean that are not the same in all studies, or are of times."""
+EPISODES = tuple(
+    (name, *(EPISODE_COLUMNS | BESIDE)[name])
+    for name in (
+        "condition", "*swept keys*", "seed", "phase", "episode", "steps", "*measures*", "return"
+    )
+)  # fmt: skip
 """Columns of the rows of episodes: name, unit, meaning."""
-TRIALS = (
-    ("condition", "", "label of the condition"),
-    ("*swept keys*", "", "as above"),
-    ("seed", "1", "seed of the trial"),
-    ("state", "", "`done` or `failed`"),
-    ("identity", "", "hash of everything that the trial depends on"),
-    ("error", "", "last line of the traceback, if the trial failed"),
-    ("seconds.decision", "s", "time spent on decisions, predictions included"),
-    ("seconds.physics", "s", "time spent on physics"),
-    ("seconds.sensors", "s", "time spent on sensing"),
-    ("seconds.learning", "s", "time spent on learning"),
-    ("seconds.total", "s", "time that the trial took"),
-    ("*numbers*", "", "numbers of whole trials that the study keeps, in the table below"),
-)
+TRIALS = tuple(
+    (name, *(TRIAL_COLUMNS | BESIDE)[name])
+    for name in (
+        "condition", "*swept keys*", "seed", "state", "identity", "error", "seconds.decision",
+        "seconds.physics", "seconds.sensors", "seconds.learning", "seconds.total", "*numbers*",
+    )
+)  # fmt: skip
 NUMBERS = (
     ("agents", "1", "number of agents"),
     ("robots", "1", "number of bodies that agents move"),
@@ -77,9 +78,11 @@ MODULES = {
         "hierarchy", "spaces", "protocols", "team", "loop", "decision", "exploration",
         "rules.fuzzy", "rules.rule_base", "rules.settings",
         "learners.learner", "learners.td", "learners.batch", "learners.anova",
-        "learners.gradient", "learners.frozen",
+        "learners.gradient", "learners.optimistic", "learners.fmq",
+        "learners.sparse_cooperative", "learners.vdn", "learners.frozen",
         "evaluators.evaluator", "evaluators.auto", "evaluators.exact", "evaluators.sampling",
-        "evaluators.additive", "evaluators.best_response",
+        "evaluators.additive", "evaluators.best_response", "evaluators.coordination",
+        "coordination.elimination", "coordination.max_plus",
         "self_model", "calibration", "cost", "registry", "settings",
     )),
     "topologies": ("Who is above whom.", ("builders", "checks", "config", "drawing", "files")),
@@ -90,12 +93,14 @@ MODULES = {
         "box_pushing.prediction.predictors", "box_pushing.world.boxes",
         "box_pushing.world.robots", "box_pushing.world.failures",
         "box_pushing.pictures.rendering", "kinematic_chain.config", "kinematic_chain.scenario",
-        "kinematic_chain.view", "kinematic_chain.variables", "line_up", "failures.settings",
+        "kinematic_chain.view", "kinematic_chain.variables", "matrix_games.games",
+        "matrix_games.scenario", "line_up", "failures.settings",
         "state_variables", "checking.checker",
     )),
     "studies": ("What is measured, compared and drawn.", (
-        "run", "spec.spec", "spec.keys", "spec.presets", "trials.trial", "trials.session",
-        "store.store", "analysis.results", "analysis.statistics", "analysis.comparison",
+        "api.study", "api.planning", "api.costs", "api.comparison", "api.frames", "run",
+        "spec.spec", "spec.errors", "spec.keys", "spec.presets", "trials.trial", "trials.session",
+        "store.store", "analysis.results", "analysis.statistics", "analysis.comparison", "analysis.power",
         "analysis.summary", "catalogue.study", "cost.cost", "claims.claims",
     )),
 }  # fmt: skip
