@@ -100,8 +100,8 @@ MODULES = {
     "studies": ("What is measured, compared and drawn.", (
         "api.study", "api.planning", "api.costs", "api.comparison", "api.frames", "run",
         "spec.spec", "spec.errors", "spec.keys", "spec.presets", "trials.trial", "trials.session",
-        "store.store", "analysis.results", "analysis.statistics", "analysis.comparison", "analysis.power",
-        "analysis.summary", "catalogue.study", "cost.cost", "claims.claims",
+        "store.store", "analysis.results", "analysis.statistics", "analysis.comparison",
+        "analysis.power", "analysis.summary", "catalogue.study", "cost.cost", "claims.claims",
     )),
 }  # fmt: skip
 """The public modules of each package, by what the package is for."""
