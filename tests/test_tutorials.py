@@ -32,8 +32,8 @@ def typed(line: str, page: str) -> list[str]:
     arguments = [part for part in arguments if part not in ("--jobs", "1", "2")]
     changes = [*SMALL]
     if page == "wheel_failures":
-        failure = '{kind="reversed",wheels="robot1.front-left",episode=1}'
-        changes = ["seeds=2", "episodes=4", "steps=8", f"scenario.failures=[{failure}]"]
+        failure = '{kind="reversed",wheels="robot1.front-left",episode=5}'
+        changes = ["seeds=2", "episodes=10", "steps=4", f"scenario.failures=[{failure}]"]
     shown = ["--set"] if "--set" not in arguments else []
     return [*arguments, *shown, *changes, "--jobs", "1"]
 
