@@ -28,7 +28,7 @@ class CalibrationSettings(Settings):
     """Whether and how fast a team revises the constants of its predictor."""
 
     enabled: bool = False
-    """Otherwise they stay as the scenario believes them to be."""
+    """Whether constants are revised; otherwise they stay as the scenario believes them to be."""
     prior: Positive = 0.7
     """Standard deviation of the logarithm of a constant at first: 0.7 is a factor of 2."""
     noise: Positive = 0.008

@@ -101,7 +101,7 @@ class PaperExploration(ExplorationSettings):
     max_temperature: Annotated[float, Field(gt=1)] = 100.0
     """T_max; not printed in the paper."""
     decay: NonNegative = 0.005
-    """s per step, printed in Section IX."""
+    """Decay of the temperature per step, s; printed in Section IX."""
     clock: Literal["episode", "run"] = "run"
     """Whether t counts the steps of the episode or of the whole run; not stated in the paper."""
     exploit: Literal["greatest", "sample"] = "greatest"
@@ -166,9 +166,9 @@ class BoltzmannExploration(ExplorationSettings):
 
     kind: Literal["boltzmann"] = "boltzmann"
     max_temperature: Positive = 500.0
-    """T_max."""
+    """Temperature that is added at first, T_max."""
     decay: NonNegative = 0.006
-    """s per step."""
+    """Decay of the temperature per step, s."""
 
     def build(self, n_agents: int) -> Explorer:
         """Return the explorer of a team."""
@@ -213,8 +213,11 @@ class BurstExploration(ExplorationSettings):
 
     kind: Literal["burst"] = "burst"
     rate: Fraction = 0.3
+    """Fraction of explorative decisions in the first episode."""
     decay: Fraction = 0.75
+    """Factor on that fraction from episode to episode."""
     floor: Fraction = 0.02
+    """Fraction of explorative decisions below which it does not fall."""
     team_limit: Positive | None = None
     """Agents that explore at a time, at most, in the mean: in a large team somebody else disturbs
     always; none: no limit."""

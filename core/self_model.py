@@ -33,7 +33,7 @@ class SelfModelSettings(Settings):
     """Whether and how fast a robot revises what it believes its wheels to do."""
 
     enabled: bool = False
-    """Otherwise prediction takes every robot as nominal."""
+    """Whether robots learn it; otherwise prediction takes every robot as nominal."""
     prior_effect: Positive = 0.3
     """Standard deviation of a wheel's effect around the nominal one [m/s per m/s]."""
     prior_constant: Positive = 0.003

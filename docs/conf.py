@@ -1,6 +1,18 @@
 """Sphinx configuration."""
 
+import re
+import sys
 from importlib.metadata import version as installed_version
+from pathlib import Path
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE))
+
+import diagrams  # noqa: E402
+import reference  # noqa: E402
+
+reference.write(HERE / "reference")
+diagrams.draw(HERE / "diagrams")
 
 project = "nested-agents"
 author = "nested-agents contributors"
@@ -12,18 +24,47 @@ extensions = [
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
     "sphinx.ext.mathjax",
+    "sphinx_gallery.gen_gallery",
     "numpydoc",
     "myst_parser",
 ]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
-exclude_patterns = ["_build"]
+exclude_patterns = ["_build", "gallery/**/*.py", "gallery/*.ipynb"]
+templates_path = ["_templates"]
 nitpicky = False
 
 autodoc_typehints = "none"  # numpydoc's Parameters sections already say them
+autodoc_member_order = "bysource"
 autosummary_generate = True
 numpydoc_show_class_members = False
 myst_enable_extensions = ["dollarmath", "colon_fence", "deflist"]
 myst_heading_anchors = 3
 
+sphinx_gallery_conf = {
+    "examples_dirs": "../examples",
+    "gallery_dirs": "gallery",
+    "filename_pattern": r"/plot_",
+    "download_all_examples": False,
+    "show_memory": False,
+    "write_computation_times": False,
+    "remove_config_comments": True,
+}
+
 html_theme = "furo"
 html_title = f"nested-agents {release}"
+html_theme_options = {"navigation_with_keys": True}
+html_static_path = ["_static"]
+html_css_files = ["tables.css"]
+
+
+def escape_bars(app, what, name, thing, options, lines):
+    """Keep sizes of sets, |S|, from being taken for substitutions outside of literal text."""
+    for i, line in enumerate(lines):
+        parts = line.split("``")
+        parts[::2] = [re.sub(r"\|(\w+)\|", r"\|\1\|", part) for part in parts[::2]]
+        lines[i] = "``".join(parts)
+
+
+def setup(app):
+    """Connect what is above."""
+    app.connect("autodoc-process-docstring", escape_bars)

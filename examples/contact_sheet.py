@@ -6,6 +6,7 @@ Writes the picture ``boxes.png``, or the one named as argument, and prints the b
 properties. Boxes grow with the number of robots.
 """
 
+# sphinx_gallery_thumbnail_path = "boxes.png"
 import sys
 from pathlib import Path
 

@@ -103,6 +103,7 @@ class TreeSettings(TopologySettings):
 
     kind: Literal["tree"] = "tree"
     branching: Count = 2
+    """Number of subordinates of an agent."""
 
     argument: ClassVar[str] = "BRANCHING"
 
@@ -121,7 +122,7 @@ class StarSettings(TopologySettings):
 
     kind: Literal["star"] = "star"
     leader: str | None = None
-    """None: the first agent."""
+    """Name of the leader; none: the first agent."""
 
     argument: ClassVar[str] = "LEADER"
 
@@ -144,6 +145,7 @@ class TeamsSettings(TopologySettings):
 
     kind: Literal["teams"] = "teams"
     link: Literal["chain", "star"] = "chain"
+    """Whether the leaders of the members of a team form a chain or a star."""
     members: Members | None = None
     """Nested lists of agent names, to any depth; none: the groups (robots) of the scenario."""
 
@@ -215,7 +217,7 @@ class EdgesSettings(TopologySettings):
     edges: tuple[tuple[str, str], ...]
     """Pairs (superior, subordinate)."""
     alone: Names = ()
-    """Agents in no edge."""
+    """Agents that are in no edge."""
 
     argument: ClassVar[str] = "A>B,B>C,D"
 
@@ -239,8 +241,9 @@ class RandomSettings(TopologySettings):
 
     kind: Literal["random"] = "random"
     seed: Annotated[int, Field(ge=0)] = 0
+    """Seed of its random numbers."""
     density: Fraction = 0.3
-    """Chance of each possible edge."""
+    """Probability of each possible edge."""
 
     argument: ClassVar[str] = "SEED"
 
@@ -259,7 +262,7 @@ class FileSettings(TopologySettings):
 
     kind: Literal["file"] = "file"
     path: str
-    """Of the file, relative to the spec."""
+    """Path of the file, relative to the spec."""
 
     argument: ClassVar[str] = "PATH.graphml|PATH.json|PATH.toml"
 

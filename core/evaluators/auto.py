@@ -25,7 +25,7 @@ class AutoSettings(EvaluatorSettings):
     sampling_up_to: Annotated[int, Field(ge=1)] = 12
     """Agents that may still be free for sampling, if predictions can be had as sums."""
     samples: Samples = 64
-    """As of the evaluator ``sampling``."""
+    """Joint actions that are tried by sampling, as of the evaluator ``sampling``."""
 
     def build(self, problem: DecisionProblem) -> Evaluator:
         """Return the evaluator of a team."""

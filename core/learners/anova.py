@@ -51,9 +51,9 @@ class AnovaTDSettings(ReplaySettings):
 
     kind: Literal["anova-td"] = "anova-td"
     trace_decay: Fraction = 0.0
-    """lambda, as of batch TD."""
+    """Trace decay lambda, as of batch TD."""
     interaction: Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)] = 0.1
-    """rho: prior variance of a function of k + 1 variables over that of one of k."""
+    """Interaction rho: prior variance of a function of k + 1 variables over that of one of k."""
     tolerance: Annotated[float, Field(gt=0, le=1)] = 0.01
     """Share of its prior variance that may be left out of an after-state."""
     dictionary: Annotated[int, Field(ge=1, le=4096)] = 800

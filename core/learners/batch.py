@@ -49,7 +49,7 @@ class BatchTDSettings(ReplaySettings):
 
     kind: Literal["batch-td"] = "batch-td"
     trace_decay: Fraction = 0.0
-    """lambda: 0 bootstraps from the next state, 1 sums the rewards of the whole episode."""
+    """Trace decay lambda: 0 bootstraps from the next state, 1 sums the rewards of an episode."""
 
     def build(self, rules: RuleBase, rows: IntArray) -> BatchTD:
         """Return the learner of a team."""

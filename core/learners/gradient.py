@@ -26,11 +26,11 @@ class GradientTDSettings(LearnerSettings):
     correction: Literal["tdc", "gtd2"] = "tdc"
     """TD with gradient correction, or GTD2."""
     step_size: Positive = 0.01
-    """alpha, of the consequent weights."""
+    """Step size of the consequent weights, alpha."""
     second_step_size: Positive = 0.005
-    """beta, of the second weights."""
+    """Step size of the second weights, beta."""
     trace_decay: Fraction = 0.4
-    """lambda."""
+    """Trace decay, lambda."""
 
     def build(self, rules: RuleBase, rows: IntArray) -> GradientTD:
         """Return the learner of a team."""

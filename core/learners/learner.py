@@ -83,15 +83,20 @@ class LearnerSettings(Settings):
 
     kind: str = ""
     rule_base: RuleBaseSettings = RuleBaseSettings()
+    """Fuzzy rule base of every agent."""
     discount: Annotated[float, Field(ge=0, lt=1)] = 0.95
-    """gamma of Eq. 7."""
+    """Discount per decision, gamma of Eq. 7."""
     weights: Literal["own", "role"] = "own"
     """Whether every agent has consequent weights of its own, or all agents of one role (the left
     wheels, say) share them and pool their experience."""
     exploration: Annotated[ExplorationSettings, Plugged(EXPLORATIONS)] = BurstExploration()
+    """How agents explore."""
     decision: Decision = Decision()
+    """How values become a joint action."""
     self_model: SelfModelSettings = SelfModelSettings()
+    """What robots learn of their own wheels."""
     calibration: CalibrationSettings = CalibrationSettings()
+    """What the team learns of the constants of its predictor."""
 
     def build(self, rules: RuleBase, rows: IntArray) -> Learner:
         """Return the learner of a team, all consequent weights zero.

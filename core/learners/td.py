@@ -21,9 +21,9 @@ class TDLambdaSettings(LearnerSettings):
 
     kind: Literal["td-lambda"] = "td-lambda"
     step_size: Positive = 0.00012
-    """alpha of Eq. 13."""
+    """Step size, alpha of Eq. 13."""
     trace_decay: Fraction = 0.4
-    """lambda of Eq. 8."""
+    """Trace decay, lambda of Eq. 8."""
     normalised: bool = False
     """Divide the step size by the squared length of the feature vector."""
     averaging: Annotated[float, Field(ge=1, allow_inf_nan=False)] = 1.0

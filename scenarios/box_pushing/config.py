@@ -40,13 +40,15 @@ class RewardSettings(Settings):
     """Whose contact and infrared readings the conditions ask for: those of all robots, as in the
     paper, one reward for all agents; or those of each robot, a reward for the agents of each."""
     c1: NonNegative = 0.01
+    """Weight of R1 (Eq. 15), the reward for the box being near the goal."""
     r1: NonNegative = 1.5
-    """Per metre of the box's distance to the goal."""
+    """Decay of R1 per metre of the box's distance to the goal."""
     c2: NonNegative = 0.0007
+    """Weight of R2 and R3 (Eq. 16), the reward for robots being near the box."""
     r2: NonNegative = 5.0
-    """Per unit of infrared reading of a robot (R2 and R3 of Eq. 16 for any number of robots)."""
+    """Decay per unit of infrared reading of a robot (Eq. 16, for any number of robots)."""
     c4: NonNegative = 0.0003
-    """Per radian of the box's orientation error."""
+    """Penalty per radian of the box's orientation error (Eq. 17)."""
     least_approach: NonNegative = 0.001
     """By how much the box must have come nearer in a decision period for a negative Delta D [m];
     with 0 a box that creeps by rounding errors is paid as one that is pushed."""
@@ -151,7 +153,7 @@ class BoxSettings(Described):
     holes: tuple[Vertices, ...] = ()
     """Outlines of holes [m]."""
     mass: Positive = 0.4
-    """[kg]."""
+    """Mass of the box [kg]."""
     friction: NonNegative = 0.2
     """Coefficient of friction with the ground."""
     contact_friction: NonNegative = 0.3
@@ -165,26 +167,28 @@ class WheelSettings(Settings):
     """A wheel of a robot of one's own."""
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")]
+    """Name of the wheel; its agent is called ``robot1.NAME``."""
     x: float
-    """Ahead of the centre [m]."""
+    """Position of the wheel ahead of the centre [m]."""
     y: float
-    """To the left of the centre [m]."""
+    """Position of the wheel to the left of the centre [m]."""
 
 
 class RobotSettings(Described):
     """A robot of one's own; what is not given is the e-Puck's."""
 
     wheels: Annotated[tuple[WheelSettings, ...], Field(min_length=1)]
+    """Its wheels, one agent each."""
     radius: Annotated[float, Field(ge=0.001, le=10)] = 0.037
-    """Of the round body [m]."""
+    """Radius of the round body [m]."""
     mass: Positive = 0.15
-    """[kg]."""
+    """Mass of the robot [kg]."""
     max_speed: Positive = 0.13
     """Greatest wheel speed [m/s]; state spaces lay the memberships of wheel speeds over it."""
     stiffness: Positive = 6.5
-    """Of one wheel's servo [N per m/s]."""
+    """Stiffness of one wheel's servo [N per m/s]."""
     lateral_stiffness: Positive = 20.0
-    """Of one wheel's grip sideways [N per m/s]."""
+    """Stiffness of one wheel's grip sideways [N per m/s]."""
     traction: Positive = 0.8
     """Coefficient of friction between wheels and ground."""
     sensors: tuple[float, ...] | None = None
@@ -220,11 +224,11 @@ class BeliefSettings(Settings):
     """By what factors the push predictor takes constants for other than the world has them."""
 
     stiffness: Positive = 1.0
-    """Of the wheels, ahead and sideways."""
+    """Factor on the stiffness of the wheels, ahead and sideways."""
     load: Positive = 1.0
-    """Of the ground friction of the box."""
+    """Factor on the ground friction of the box."""
     contact_friction: Positive = 1.0
-    """Of the friction between robots and box."""
+    """Factor on the friction between robots and box."""
 
 
 def label(thing: str | Settings) -> str:
@@ -244,8 +248,9 @@ class BoxPushingSettings(ScenarioSettings):
     box: str | BoxSettings = "square"
     """Box by name, or a table that describes one."""
     infrared: InfraredSettings = InfraredSettings()
+    """How the infrared sensors of all robots read."""
     start: Literal["easy", "medium", "hard"] = "medium"
-    """Start distribution."""
+    """Distribution of start poses: how far off the course to the goal robots and box begin."""
     scaling: Literal["fixed", "similar"] = "fixed"
     """Whether the box's distance to the goal, `tolerance`, `termination_radius` and the reward's r1
     stay as they are whatever the number of robots, or are in units of the box and grow with it."""
@@ -259,6 +264,7 @@ class BoxPushingSettings(ScenarioSettings):
     belief: BeliefSettings = BeliefSettings()
     """What the predictor `push` is told of constants that robots cannot see."""
     reward: RewardSettings = RewardSettings()
+    """The constants of the reward, and whose contact it asks for."""
     action_repeat: Periods = 8
     """Control periods of 64 ms for which a decision is held."""
     prediction_horizon: Periods = 24

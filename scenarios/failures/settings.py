@@ -74,7 +74,7 @@ class Weak(FailureSettings):
     """It moves at a fraction of its command."""
 
     gain: Annotated[float, Field(gt=0, lt=1)] = 0.3
-    """That fraction."""
+    """Fraction of its command at which it moves."""
 
 
 class Reversed(FailureSettings):
@@ -85,14 +85,14 @@ class Stuck(FailureSettings):
     """It moves at one speed whatever its command."""
 
     speed: Annotated[float, Field(ge=-1, le=1)] = 0.5
-    """That speed, as a fraction of the greatest."""
+    """Speed at which it moves, as a fraction of the greatest."""
 
 
 class Delayed(FailureSettings):
     """It carries out its commands too late."""
 
     periods: Annotated[int, Field(ge=1, le=1000)] = 8
-    """By how many control periods."""
+    """Control periods by which commands are late."""
 
 
 class Noisy(FailureSettings):

@@ -29,15 +29,15 @@ class RewardSettings(Settings):
     """
 
     c1: NonNegative = 0.01
-    """At the goal."""
+    """Reward at the goal."""
     c2: NonNegative = 0.003
-    """For coming nearer, times ``exp(-r2 distance)``."""
+    """Reward for coming nearer, times ``exp(-r2 distance)``."""
     r2: NonNegative = 1.5
-    """Per metre of the tip's distance from the goal."""
+    """Decay of that reward per metre of the tip's distance from the goal."""
     least_approach: NonNegative = 0.001
     """By how much the tip must have come nearer in a decision for that [m]."""
     receding: float = -0.005
-    """Otherwise."""
+    """Reward if the tip did not come nearer."""
 
 
 class JointFailure(FailureSettings):
@@ -96,6 +96,7 @@ class KinematicChainSettings(ScenarioSettings):
     """State variables beside the speed of the own joint, by name, one's own included; see
     `kinematic_chain.variables`."""
     reward: RewardSettings = RewardSettings()
+    """The constants of the reward."""
     speed: Positive = 0.6
     """Greatest speed of a joint [rad/s], in arms of few joints; see `top_speed`."""
     speed_of_all: Positive = 5.0

@@ -35,6 +35,7 @@ COMMANDS: dict[str, str] = {
     "report": "Write a study as one self-contained HTML file.",
     "explain": "Explain a trained team in words and figures.",
     "presets": "List the named starting points of a spec, or print one.",
+    "keys": "List the keys of a spec: type, default, what is allowed, meaning.",
     "topology": "List the topologies, or show one of them.",
     "check": "Check that scenarios keep their promises.",
     "cost": "Print what hierarchies cost, by formula and measured.",

@@ -56,8 +56,11 @@ class Override(Settings):
     preset: str | None = None
     """The preset under its tables; none: the spec's."""
     scenario: Mapping[str, Any] = Field(default_factory=dict)
+    """Laid over the spec's scenario."""
     topology: Mapping[str, Any] = Field(default_factory=dict)
+    """Laid over the spec's topology."""
     learner: Mapping[str, Any] = Field(default_factory=dict)
+    """Laid over the spec's learner."""
     sweep: Mapping[str, tuple[Any, ...]] = Field(default_factory=dict)
     """Lists of values by dotted key, for this override alone."""
     curriculum: Curriculum | None = None

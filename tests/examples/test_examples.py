@@ -3,6 +3,8 @@
 import runpy
 from pathlib import Path
 
+import matplotlib as mpl
+import matplotlib.pyplot as plt
 import pytest
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -43,6 +45,15 @@ def test_contact_sheet(
     assert path.stat().st_size > 100_000
     documented = (EXAMPLES.parent / "docs" / "worlds.md").read_text(encoding="utf-8")
     assert capsys.readouterr().out.strip() in documented
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("plot_*.py")), ids=lambda path: path.stem)
+def test_an_example_of_the_gallery_draws_a_figure(path: Path) -> None:
+    with mpl.rc_context({"backend": "agg"}):
+        runpy.run_path(str(path), run_name="__main__")
+        assert len(plt.get_fignums()) == 1
+        plt.close("all")
 
 
 def test_three_uses_in_thirty_lines(

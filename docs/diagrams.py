@@ -1,0 +1,183 @@
+"""Draws the diagrams of the guide, in the one style of all figures of the toolkit.
+
+``conf.py`` calls `draw` before the pages are read. Each diagram is a function that returns a
+figure.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, FancyBboxPatch, Polygon, Wedge
+
+from nested_agents.core.rules.fuzzy import Partition
+from nested_agents.studies.presentation.figures import COLOURS, SETTINGS, write
+
+BLUE, ORANGE, GREEN = COLOURS[:3]
+GREY = "#777777"
+PASSED = ("$a_1$", "$a_1, a_2$", "$a_1, a_2, a_3$")
+ACTIONS = ("increase", "decrease", "maintain", "zero")
+
+
+def draw(folder: Path) -> None:
+    """Write all diagrams as SVG into a folder."""
+    folder.mkdir(exist_ok=True)
+    for make in (nested_decision, perception, learner, predictions, house):
+        with mpl.rc_context(SETTINGS):
+            figure = make()
+        write(figure, folder / f"{make.__name__}.svg")
+
+
+def canvas(width: float, height: float) -> tuple[Figure, Axes]:
+    """Return a figure [inches] and its only axes, in the same units, without a frame."""
+    figure = Figure(figsize=(width, height))
+    axes = figure.add_axes((0, 0, 1, 1))
+    axes.set(xlim=(0, width), ylim=(0, height), aspect="equal")
+    axes.axis("off")
+    return figure, axes
+
+
+def box(axes: Axes, x: float, y: float, text: str, colour: str = GREY, width: float = 1.3) -> None:
+    """Draw a box with text around a point."""
+    height = 0.3 + 0.16 * text.count("\n")
+    patch = FancyBboxPatch(
+        (x - width / 2, y - height / 2), width, height,
+        boxstyle="round,pad=0.03", edgecolor=colour, facecolor="white", linewidth=1.3,
+    )  # fmt: skip
+    axes.add_patch(patch)
+    axes.text(x, y, text, ha="center", va="center", linespacing=1.3)
+
+
+def arrow(
+    axes: Axes, start: Sequence[float], end: Sequence[float], text: str = "", colour: str = GREY
+) -> None:
+    """Draw an arrow with a word beside its middle."""
+    axes.annotate(
+        "", xy=end, xytext=start, arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 1.3}
+    )
+    x, y = np.add(start, end) / 2
+    axes.text(x, y + 0.2, text, ha="center", va="bottom", color=colour)
+
+
+def nested_decision() -> Figure:
+    """Draw four agents in a chain: who passes what down, and who tries how many joint actions."""
+    figure, axes = canvas(7.2, 2.1)
+    names = ("robot1.left", "robot1.right", "robot2.left", "robot2.right")
+    places = np.linspace(0.85, 6.35, 4)
+    for i, (x, name) in enumerate(zip(places, names, strict=True)):
+        box(axes, x, 1.25, name, BLUE)
+        tried = 4 ** (4 - i)
+        axes.text(x, 0.75, f"tries {tried} joint\nactions of {4 - i}", ha="center", va="center")
+        if i:
+            arrow(axes, (places[i - 1] + 0.7, 1.25), (x - 0.7, 1.25), PASSED[i - 1], ORANGE)
+    axes.text(3.6, 1.88, "superior → subordinate: actions that have been decided are passed down",
+              ha="center", color=ORANGE)  # fmt: skip
+    axes.text(3.6, 0.3, "340 joint actions in all; one agent for all four wheels has 256, and "
+              "a rule base over every variable", ha="center", color=GREY)  # fmt: skip
+    return figure
+
+
+def perception() -> Figure:
+    """Draw what an agent knows of a situation: its own wheel, its robot, the box, the others."""
+    figure, axes = canvas(7.2, 2.9)
+    robot, goal, centre = np.array([1.5, 0.8]), np.array([6.4, 1.75]), np.array([3.3, 1.3])
+    square = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * 0.42
+    turn = np.array([[np.cos(0.25), -np.sin(0.25)], [np.sin(0.25), np.cos(0.25)]])
+    axes.add_patch(Polygon(square @ turn.T + centre, facecolor="#DDDDDD", edgecolor="black"))
+    axes.add_patch(Polygon(square + goal, fill=False, linestyle="--", edgecolor=GREY))
+    axes.text(goal[0], goal[1] + 0.48, "goal", ha="center", color=GREY)
+    for place, colour in ((robot, BLUE), (np.array([2.1, 2.2]), GREY)):
+        axes.add_patch(Circle(place, 0.3, facecolor="white", edgecolor=colour, linewidth=1.5))
+        axes.plot(*zip(place, np.add(place, (0.3, 0.05)), strict=True), color=colour)
+    wheel = np.add(robot, (-0.12, 0.28)), np.add(robot, (0.14, 0.26))
+    axes.plot(*zip(*wheel, strict=True), color=ORANGE, linewidth=5)
+    line = {"arrowstyle": "-", "color": ORANGE}
+    axes.annotate(
+        "wheel speed\n(the agent's own wheel)", np.add(robot, (0, 0.3)), (0.95, 1.5),
+        color=ORANGE, ha="center", arrowprops=line,
+    )  # fmt: skip
+    axes.plot(*zip(robot, centre, strict=True), color=BLUE, linestyle=":")
+    axes.add_patch(Wedge(robot, 0.85, 9, 15, facecolor=BLUE, alpha=0.5))
+    axes.text(2.5, 0.72, "bearing of the box\nand gap to it", color=BLUE, ha="center", va="top")
+    axes.annotate("", goal, centre, arrowprops={"arrowstyle": "<->", "color": GREEN})
+    axes.text(
+        4.9, 1.12, "distance from the goal,\nand how fast it shrinks", color=GREEN, ha="center"
+    )
+    push = centre + (centre - robot) / np.linalg.norm(centre - robot) * 3.0
+    axes.plot(*zip(centre, push, strict=True), color=ORANGE, linestyle="--", linewidth=1)
+    axes.text(4.6, 2.2, "where a push would pass the goal:\ncross-track error", color=ORANGE,
+              ha="center")  # fmt: skip
+    axes.text(2.1, 2.6, "the others: greatest gap", color=GREY, ha="center")
+    axes.text(5.3, 0.35, "not seen: the shape of the box, failures,\nactions of agents that are "
+              "neither above nor below", ha="center", color=GREY)  # fmt: skip
+    return figure
+
+
+def learner() -> Figure:
+    """Draw the membership functions of a variable, and the function that weights make of them."""
+    figure = Figure(figsize=(7.2, 2.4), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    x = np.linspace(-0.4, 0.4, 401)
+    centres = (-0.3, -0.06, 0.0, 0.06, 0.3)
+    strengths = Partition(centres, "triangular").strengths(x)
+    styles = ("-", (0, (5, 2)), (0, (1, 1.2)), (0, (6, 1.5, 1, 1.5)), "-")
+    for k, style in enumerate(styles):
+        left.plot(x, strengths[:, k], color=COLOURS[k], linestyle=style)
+    left.set(xlabel="cross-track error [m]", ylabel="firing strength",
+             title="five rules: IF the error is far right, ... THEN")  # fmt: skip
+    weights = np.array([-1.94, 0.44, 1.34, 0.44, -0.28])
+    right.plot(x, strengths @ weights, color=BLUE)
+    right.plot(centres, weights, "o", color=ORANGE)
+    right.annotate("a consequent weight", (0.06, 0.44), (0.12, 1.0), color=ORANGE,
+                   arrowprops={"arrowstyle": "-", "color": ORANGE})  # fmt: skip
+    right.set(xlabel="cross-track error [m]", ylabel="part of the value f",
+              title="value: strengths times consequent weights")  # fmt: skip
+    return figure
+
+
+def predictions() -> Figure:
+    """Draw the way from a state and joint actions to predicted states, values and an action."""
+    figure, axes = canvas(7.2, 2.3)
+    box(axes, 0.75, 1.2, "state", BLUE, 0.9)
+    heights = (1.95, 1.45, 0.95, 0.45)
+    values = (1.31, 0.62, 1.04, 0.71)
+    for name, y, value in zip(ACTIONS, heights, values, strict=True):
+        arrow(axes, (1.25, 1.2), (1.95, y))
+        box(axes, 2.5, y, name, GREY, 0.95)
+        arrow(axes, (3.05, y), (3.6, y), colour=ORANGE)
+        box(axes, 4.25, y, "next state", ORANGE, 1.1)
+        arrow(axes, (4.85, y), (5.35, y), colour=GREEN)
+        best = value == max(values)
+        told = f"f = {value}" + ", taken" * best
+        axes.text(5.45, y, told, va="center", color=GREEN, weight="bold" if best else "normal")
+    axes.text(2.5, 2.2, "own action, with those below", ha="center", color=GREY)
+    axes.text(4.25, 2.2, "predictor", ha="center", color=ORANGE)
+    axes.text(5.9, 2.2, "rule base", ha="center", color=GREEN)
+    axes.text(3.6, 0.1, "no reward enters: a learner knows of the reward only what it was paid",
+              ha="center", color=GREY)  # fmt: skip
+    return figure
+
+
+def house() -> Figure:
+    """Draw the four packages and what they hold; arrows are imports."""
+    figure, axes = canvas(7.2, 2.9)
+    rows = (
+        ("studies", 2.45, ORANGE, "spec → trials → store → workers → analysis → presentation\n"
+         "→ catalogue → run → claims, cost, explain, report → cli"),
+        ("scenarios", 1.45, GREEN, "box pushing (world, states,\nprediction, pictures), line-up,\n"
+         "the checker"),
+        ("topologies", 1.45, GREEN, "builders, files,\nchecks, drawing"),
+        ("core", 0.45, BLUE, "rules, learners, evaluators, exploration, hierarchy, team, loop:\n"
+         "no physics, no files"),
+    )  # fmt: skip
+    places = {"studies": 3.6, "scenarios": 2.0, "topologies": 5.4, "core": 3.6}
+    for name, y, colour, text in rows:
+        width = 2.6 if y == 1.45 else 5.4
+        box(axes, places[name], y, f"{name}/\n{text}", colour, width)
+    for start, end in (((2.6, 2.1), (2.2, 1.83)), ((4.6, 2.1), (5.0, 1.76)),
+                       ((2.2, 1.05), (2.6, 0.77)), ((5.0, 1.12), (4.6, 0.77))):  # fmt: skip
+        arrow(axes, start, end)
+    return figure

@@ -1,0 +1,278 @@
+"""Writes the generated pages of the reference, from the code that they are about.
+
+``conf.py`` calls `write` before the pages are read: keys of a spec, presets, columns of results,
+commands and modules. Nothing on these pages is written by hand, but what the columns mean that all
+studies have alike.
+"""
+
+from collections.abc import Iterable, Iterator
+from importlib import import_module
+from pathlib import Path
+
+import click
+
+import nested_agents
+from nested_agents.core.protocols import Measure
+from nested_agents.scenarios import SCENARIOS
+from nested_agents.scenarios.box_pushing.states.variables import STATE_VARIABLES
+from nested_agents.scenarios.box_pushing.world.boxes import BOXES
+from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
+from nested_agents.scenarios.kinematic_chain.variables import CHAIN_VARIABLES
+from nested_agents.studies.api.frames import EPISODE_COLUMNS, TRIAL_COLUMNS
+from nested_agents.studies.cli.main import COMMANDS
+from nested_agents.studies.cli.main import nested_agents as program
+from nested_agents.studies.spec.keys import tables
+from nested_agents.studies.spec.presets import PRESETS
+from nested_agents.studies.spec.toml import dumps
+
+BESIDE = {
+    "*swept keys*": ("", "a column for every swept key, and `name` if there are overrides"),
+    "*measures*": ("", "those of the scenario, in the table below"),
+    "seconds.decision": ("s", "time spent on decisions, predictions included"),
+    "seconds.physics": ("s", "time spent on physics"),
+    "seconds.sensors": ("s", "time spent on sensing"),
+    "seconds.learning": ("s", "time spent on learning"),
+    "seconds.total": ("s", "time that the trial took"),
+    "*numbers*": ("", "numbers of whole trials that the study keeps, in the table below"),
+}
+"""What columns mean that are not the same in all studies, or are of times."""
+EPISODES = tuple(
+    (name, *(EPISODE_COLUMNS | BESIDE)[name])
+    for name in (
+        "condition", "*swept keys*", "seed", "phase", "episode", "steps", "*measures*", "return"
+    )
+)  # fmt: skip
+"""Columns of the rows of episodes: name, unit, meaning."""
+TRIALS = tuple(
+    (name, *(TRIAL_COLUMNS | BESIDE)[name])
+    for name in (
+        "condition", "*swept keys*", "seed", "state", "identity", "error", "seconds.decision",
+        "seconds.physics", "seconds.sensors", "seconds.learning", "seconds.total", "*numbers*",
+    )
+)  # fmt: skip
+NUMBERS = (
+    ("agents", "1", "number of agents"),
+    ("robots", "1", "number of bodies that agents move"),
+    ("messages", "1", "messages in a decision: edges of the transitive closure of the hierarchy"),
+    ("joint_actions", "1", "joint actions that the team tries in a decision"),
+    ("rule_evaluations", "1", "values of rule bases that the team computes in a decision"),
+    ("formula", "1", "what Eq. 18 counts for a decision"),
+    ("weights", "1", "number of consequent weights"),
+    ("decision_median", "s", "median time of a decision of the whole team"),
+    ("decision_99", "s", "99th percentile of that time"),
+    ("team_bytes", "B", "arrays that the team remembers at the end"),
+    ("weight_bytes", "B", "consequent weights among them"),
+    ("step_bytes", "B", "memory that a step takes beside them"),
+    ("process_bytes", "B", "peak of resident memory of the worker while it trained"),
+    ("period_s", "s", "time for which a decision is held"),
+    ("least_touching", "1", "share of contact of the robot that touches the box least"),
+    ("all_touching", "1", "share of evaluation episodes in which every robot is in contact for at"
+     " least half of the time in which any robot is"),
+    ("touching.BOX.robotN", "1", "share of contact of a robot, in the evaluation with a box"),
+    ("onset", "1", "episode in which the first failure begins"),
+)  # fmt: skip
+VARIABLES = {"box-pushing": STATE_VARIABLES, "kinematic-chain": CHAIN_VARIABLES}
+"""State variables by the scenario that has them."""
+MODULES = {
+    "core": ("How agents perceive, predict, decide and learn, and what that costs.", (
+        "hierarchy", "spaces", "protocols", "team", "loop", "decision", "exploration",
+        "rules.fuzzy", "rules.rule_base", "rules.settings",
+        "learners.learner", "learners.td", "learners.batch", "learners.anova",
+        "learners.gradient", "learners.optimistic", "learners.fmq",
+        "learners.sparse_cooperative", "learners.vdn", "learners.frozen",
+        "evaluators.evaluator", "evaluators.auto", "evaluators.exact", "evaluators.sampling",
+        "evaluators.additive", "evaluators.best_response", "evaluators.coordination",
+        "coordination.elimination", "coordination.max_plus",
+        "self_model", "calibration", "cost", "registry", "settings",
+    )),
+    "topologies": ("Who is above whom.", ("builders", "checks", "config", "drawing", "files")),
+    "scenarios": ("Where agents act.", (
+        "box_pushing.config", "box_pushing.scenario", "box_pushing.environments",
+        "box_pushing.reward", "box_pushing.starts", "box_pushing.states.view",
+        "box_pushing.states.variables", "box_pushing.states.state_spaces",
+        "box_pushing.prediction.predictors", "box_pushing.world.boxes",
+        "box_pushing.world.robots", "box_pushing.world.failures",
+        "box_pushing.pictures.rendering", "kinematic_chain.config", "kinematic_chain.scenario",
+        "kinematic_chain.view", "kinematic_chain.variables", "matrix_games.games",
+        "matrix_games.scenario", "line_up", "failures.settings",
+        "state_variables", "checking.checker",
+    )),
+    "studies": ("What is measured, compared and drawn.", (
+        "api.study", "api.planning", "api.costs", "api.comparison", "api.frames", "run",
+        "spec.spec", "spec.errors", "spec.keys", "spec.presets", "trials.trial", "trials.session",
+        "store.store", "analysis.results", "analysis.statistics", "analysis.comparison",
+        "analysis.power", "analysis.summary", "catalogue.study", "cost.cost", "claims.claims",
+    )),
+}  # fmt: skip
+"""The public modules of each package, by what the package is for."""
+
+
+def write(folder: Path) -> None:
+    """Write the pages into a folder, those that have changed."""
+    folder.mkdir(exist_ok=True)
+    pages = {"keys": keys(), "columns": columns(), "commands": commands(), "api": api()}
+    pages |= {name: modules(name) for name in MODULES}
+    for name, lines in pages.items():
+        text = "\n".join(lines) + "\n"
+        path = folder / f"{name}.md"
+        if not path.exists() or path.read_text(encoding="utf-8") != text:
+            path.write_text(text, encoding="utf-8")
+
+
+def table(headings: Iterable[str], rows: Iterable[Iterable[str]]) -> Iterator[str]:
+    """Yield the lines of a table."""
+    headings = list(headings)
+    yield f"| {' | '.join(headings)} |"
+    yield f"|{'---|' * len(headings)}"
+    for row in rows:
+        yield f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in row)} |"
+    yield ""
+
+
+def code(text: str) -> str:
+    """Return a text as code, or nothing for nothing."""
+    return f"`{text}`" if text else ""
+
+
+def prose(text: str) -> str:
+    """Return the reStructuredText of a docstring as Markdown."""
+    return text.replace("``", "`").replace("<", "&lt;")
+
+
+def keys() -> Iterator[str]:
+    """Yield the page on the keys of a spec."""
+    yield "# Keys of a spec\n"
+    yield "This page is made from the settings models that check every spec, and from the text"
+    yield "beside their fields. `nested-agents keys scenario.box` prints any part of it in a"
+    yield "terminal. A key is written in the table of its heading. *Required* means that there is"
+    yield "no default; *none* is the absence of a value, and cannot be written in TOML.\n"
+    for one in tables():
+        yield f"## {code(one.heading) if one.name else 'The top of a spec'}\n"
+        yield f"{prose(one.summary)}\n"
+        if one.keys:
+            yield from table(
+                ("key", "meaning", "unit", "default", "type", "allowed"),
+                (
+                    (
+                        code(k.name),
+                        prose(k.meaning),
+                        k.unit,
+                        code(k.default),
+                        k.type,
+                        code(k.allowed),
+                    )
+                    for k in one.keys
+                ),
+            )
+    yield "## Presets\n"
+    yield "A preset is laid under the tables of a spec. `nested-agents presets NAME` prints it in"
+    yield "full.\n"
+    for name, preset in PRESETS.items():
+        yield f"### `{name}`\n\n{preset.summary[0].upper()}{preset.summary[1:]}.\n"
+        yield f"```toml\n{dumps(dict(preset.table)).strip()}\n```\n"
+    yield "## Boxes, robots and state variables by name\n"
+    yield f"Boxes: {', '.join(map(code, BOXES))}.\n"
+    yield f"Robots: {', '.join(map(code, ROBOTS))}.\n"
+    for kind, registry in VARIABLES.items():
+        yield f"State variables of `{kind}`, beside the speed of the agent's own actuator:\n"
+        named = ((name, registry.find(name)) for name in registry.built_in)
+        yield from table(
+            ("state variable", "unit", "range", "meaning"),
+            (
+                (
+                    code(name),
+                    v.variable.unit,
+                    f"{v.variable.low:.3g} to {v.variable.high:.3g}",
+                    prose(" ".join((v.function.__doc__ or "").partition("\n\n")[0].split())),
+                )
+                for name, v in named
+            ),
+        )
+
+
+def columns() -> Iterator[str]:
+    """Yield the page on the columns of results."""
+    yield "# Columns of results\n"
+    yield "`export` writes the tables `episodes` and `trials`; the view `results` of the database"
+    yield "and `nested-agents results --format csv` hold the first. A unit of 1 is a pure number.\n"
+    headings = ("column", "unit", "meaning")
+    for title, rows in (
+        ("Rows of episodes", EPISODES), ("Rows of trials", TRIALS), ("Numbers of trials", NUMBERS)
+    ):  # fmt: skip
+        yield f"## {title}\n"
+        yield from table(headings, ((code(n) if "*" not in n else n, u, m) for n, u, m in rows))
+    yield "## Measures of the scenarios\n"
+    yield "A scenario declares its own measures ([](../extending.md#a-scenario)). These are those"
+    yield "of the built-in scenarios.\n"
+    for kind in SCENARIOS.built_in:
+        yield f"### `{kind}`\n"
+        yield from table(
+            ("column", "heading", "unit", "of the steps of an episode", "better", "bounds"),
+            (
+                (code(m.name), m.title, m.unit, "yes (1) or no (0)" if m.is_rate else m.gathering,
+                 m.better or "", bounds(m))
+                for m in SCENARIOS.parsed(kind).build().measures
+            ),
+        )  # fmt: skip
+
+
+def bounds(measure: Measure) -> str:
+    """Return what a measure cannot be below or above."""
+    ends = [f">= {measure.least:g}"] if measure.least is not None else []
+    ends += [f"<= {measure.greatest:g}"] if measure.greatest is not None else []
+    return code(", ".join(ends))
+
+
+def commands() -> Iterator[str]:
+    """Yield the page on the command line."""
+    yield "# Commands\n"
+    yield "In a checkout, `./dev exec` goes before every command. The exit status is 0 if all went"
+    yield "well, 1 if a trial failed, 2 if there is something for you to mend, which one line on"
+    yield "standard error names, and 130 after Ctrl-C.\n"
+    yield from table(("command", "purpose"), ((f"[`{n}`](#{n})", t) for n, t in COMMANDS.items()))
+    for name in COMMANDS:
+        command = import_module(f"nested_agents.studies.cli.commands.{name}").command
+        yield f"## {name}\n"
+        if isinstance(command, click.Group):
+            for below, one in command.commands.items():
+                yield f"### {name} {below}\n"
+                yield from _usage(one, f"{name} {below}")
+        else:
+            yield from _usage(command, name)
+
+
+def _usage(command: click.Command, name: str) -> Iterator[str]:
+    parent = click.Context(program, info_name="nested-agents", **program.context_settings)
+    context = click.Context(
+        command, info_name=name, parent=parent, terminal_width=88, max_content_width=88
+    )
+    yield f"```text\n{command.get_help(context).strip()}\n```\n"
+
+
+def api() -> Iterator[str]:
+    """Yield the page on the names of the package itself."""
+    yield "# Python\n"
+    yield "`import nested_agents as na` offers these names, each imported when it is first used."
+    yield "The pages below hold the modules that they live in.\n"
+    places = nested_agents._PLACES
+    rows = []
+    for name, (module, attribute) in places.items():
+        thing = getattr(nested_agents, name)
+        said = "" if isinstance(thing, Measure) else (thing.__doc__ or "")
+        first = prose(" ".join(said.strip().partition("\n\n")[0].split()))
+        home = getattr(thing, "__module__", f"nested_agents.{module}")
+        role = f"{{py:obj}}`{name} <{home}.{attribute}>`"
+        rows.append((role, first.replace("*", "\\*"), code(home.removeprefix("nested_agents."))))
+    yield from table(("name", "meaning", "module"), rows)
+    yield "```{toctree}\n:maxdepth: 1\n"
+    yield from MODULES
+    yield "```"
+
+
+def modules(package: str) -> Iterator[str]:
+    """Yield the page on a package: its public modules."""
+    purpose, names = MODULES[package]
+    yield f"# nested_agents.{package}\n\n{purpose}\n"
+    yield "```{eval-rst}\n.. autosummary::\n   :toctree: api\n   :template: module.rst\n"
+    yield from (f"   nested_agents.{package}.{name}" for name in names)
+    yield "```"

@@ -1,0 +1,41 @@
+"""
+A study in Python
+=================
+
+A spec is a dictionary, a study keeps its rows in a folder, and results come back as arrays. The
+scenario is the small one, carts on a line, so that this takes seconds.
+"""
+
+import tempfile
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+
+from nested_agents import Spec
+from nested_agents.studies.analysis.results import read
+from nested_agents.studies.run import run_study
+
+spec = Spec.of(
+    {
+        "study": "learning-curve",
+        "preset": "own-value",
+        "seeds": 4,
+        "episodes": 8,
+        "steps": 60,
+        "evaluation": 5,
+        "scenario": {"kind": "line-up", "carts": 3},
+        "overrides": [{"name": "learning"}, {"name": "frozen", "learner": {"kind": "frozen"}}],
+    }
+)
+
+folder = tempfile.mkdtemp()
+if __name__ == "__main__":
+    with run_study(spec, Path(folder) / "carts", jobs=1) as store:
+        results = read(store)
+
+    figure, ax = plt.subplots(figsize=(6, 3), layout="constrained")
+    for style, (label, arrays) in zip(("-", "--"), results.training.items(), strict=True):
+        spread = arrays["final_spread_m"].mean(axis=0)
+        ax.plot(range(1, 1 + len(spread)), spread, style, label=label)
+    ax.set(xlabel="episode", ylabel="mean final spread [m]")
+    ax.legend()

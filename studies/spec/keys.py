@@ -1,0 +1,317 @@
+"""Every key that a spec may have, read from the settings models and the text beside their fields.
+
+Nothing is written down twice: types, defaults and what is allowed come from the models by which a
+spec is validated, meanings and units from the docstrings of their fields. What registries offer is
+walked as well, so a new scenario or learner has its keys here from the first day.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import json
+import re
+import textwrap
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from itertools import pairwise
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+from annotated_types import Ge, Gt, Le, Lt, MinLen
+from pydantic.fields import FieldInfo
+from typing_extensions import TypeAliasType
+
+from ...core.registry import Plugged, SettingsRegistry
+from ...core.settings import Settings
+from .conditions import ConditionSettings, Override
+from .curriculum import StageSettings
+from .spec import Spec
+
+UNIT = re.compile(r"\[(m|m/s|kg|rad|s|N per m/s|m/s per m/s)\]")
+"""How the text beside a field names its unit."""
+TYPES = {bool: "true or false", int: "whole number", float: "number", str: "text", Any: "any"}
+MOST_TOLD = 10**9
+"""A bound beyond it is that of a machine's integers, and no help to anybody."""
+COMPARISONS = ((Ge, "ge", ">="), (Gt, "gt", ">"), (Le, "le", "<="), (Lt, "lt", "<"))
+
+
+@dataclass(frozen=True)
+class Key:
+    """A key of a table.
+
+    Attributes
+    ----------
+    name
+        As it is written in a spec.
+    type, default, allowed
+        In words; a default is written as in TOML, or is ``none`` or ``required``.
+    unit
+        Empty where there is none.
+    meaning
+        The docstring of the field, in one line; empty if it has none.
+    """
+
+    name: str
+    type: str
+    default: str
+    allowed: str
+    unit: str
+    meaning: str
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of a spec, or the part of it that things of one kind have.
+
+    Attributes
+    ----------
+    name
+        Dotted, as ``learner.rule_base``; empty for the top of a spec.
+    kind
+        The ``kind`` that it must have for these keys; empty: any.
+    within
+        The ``kind`` of the table above that it belongs to; empty: any.
+    summary
+        The first line of the docstring of its model.
+    model
+        The settings model.
+    keys
+        What may stand in it.
+    """
+
+    name: str
+    kind: str
+    within: str
+    summary: str
+    model: type[Settings]
+    keys: tuple[Key, ...]
+
+    @property
+    def full_names(self) -> tuple[str, ...]:
+        """The dotted names of its keys."""
+        return tuple(f"{self.name}.{key.name}".lstrip(".") for key in self.keys)
+
+    @property
+    def heading(self) -> str:
+        """How it begins in a spec: ``[learner], kind = "frozen"``."""
+        kind = f', kind = "{self.kind}"' if self.kind else ""
+        within = f', of "{self.within}"' if self.within else ""
+        return (f"[{self.name}]" if self.name else "top of the spec") + kind + within
+
+
+def tables() -> tuple[Table, ...]:
+    """Return every table of a spec: its own keys, then those of conditions, kind by kind.
+
+    Examples
+    --------
+    >>> by_name = {(table.name, table.kind): table for table in tables()}
+    >>> [key.name for key in by_name["scenario", "line-up"].keys]
+    ['carts']
+    """
+    own: list[tuple[str, type[Settings]]]
+    own = [("", Spec), ("overrides", Override), ("curriculum", StageSettings)]
+    heads = [_table(name, ("", ""), model, {}) for name, model in own]
+    return (*heads, *_below(ConditionSettings, "", "", set()))
+
+
+def keys_below(prefix: str) -> tuple[Table, ...]:
+    """Return the tables whose name begins with a dotted prefix, with the keys that fit it.
+
+    Examples
+    --------
+    >>> [key.default for table in keys_below("learner.discount") for key in table.keys]
+    ['0.95']
+    """
+    found = []
+    for table in tables():
+        kept = tuple(
+            key
+            for key, name in zip(table.keys, table.full_names, strict=True)
+            if not prefix or f"{name}.".startswith(f"{prefix}.")
+        )
+        if kept:
+            found.append(replace(table, keys=kept))
+    return tuple(found)
+
+
+def _below(model: type[Settings], name: str, within: str, seen: set[Any]) -> Iterator[Table]:
+    """Yield the tables that the fields of a model hold, at any depth, each once."""
+    for field, info in model.model_fields.items():
+        place = f"{name}.{field}" if name else field
+        for base, kinds in _families(info):
+            if base is not None:
+                yield from _held(base, place, ("", within), {}, seen)
+            inherited = {} if base is None else base.model_fields
+            for kind, held in kinds:
+                yield from _held(held, place, (kind, within), inherited, seen)
+
+
+def _families(info: FieldInfo) -> Iterator[tuple[Any, list[tuple[str, type[Settings]]]]]:
+    """Yield what a field may hold: models by kind, after the model that they inherit, if any."""
+    plugged = _registry(info)
+    if plugged is not None:
+        yield plugged.base, [(kind, plugged.model(kind)) for kind in plugged.built_in]
+        return
+    models = list(_models_in(info.annotation))
+    kinds = [(m.model_fields["kind"].default, m) for m in models if "kind" in m.model_fields]
+    if kinds:
+        yield _common(model for _, model in kinds), kinds
+    for model in models:
+        if "kind" not in model.model_fields:
+            yield None, [("", model)]
+
+
+def _registry(info: FieldInfo) -> SettingsRegistry | None:
+    return next((item.registry for item in info.metadata if isinstance(item, Plugged)), None)
+
+
+def _common(models: Iterable[type[Settings]]) -> type[Settings] | None:
+    """Return the nearest model that all models inherit, unless it has no keys."""
+    first, *others = models
+    for cls in first.__mro__[1:]:
+        if all(issubclass(other, cls) for other in others) and issubclass(cls, Settings):
+            return cls if cls.model_fields else None
+    return None
+
+
+def _held(
+    model: type[Settings],
+    name: str,
+    kinds: tuple[str, str],
+    base: Mapping[str, FieldInfo],
+    seen: set[Any],
+) -> Iterator[Table]:
+    if (name, model) in seen:
+        return
+    seen.add((name, model))
+    table = _table(name, kinds, model, base)
+    if table.keys or table.kind:
+        yield table
+    yield from _below(model, name, kinds[0] or kinds[1], seen)
+
+
+def _table(
+    name: str, kinds: tuple[str, str], model: type[Settings], base: Mapping[str, FieldInfo]
+) -> Table:
+    told = meanings(model)
+    keys = tuple(
+        _key(field, info, told.get(field, ""))
+        for field, info in model.model_fields.items()
+        if field != "kind" and not (field in base and base[field].default == info.default)
+    )
+    summary = (inspect.getdoc(model) or "").partition("\n\n")[0]
+    return Table(name, *kinds, " ".join(summary.split()), model, keys)
+
+
+@cache
+def meanings(model: type[Settings]) -> dict[str, str]:
+    """Return the docstrings of the fields of a model, inherited ones included, each as one line."""
+    found: dict[str, str] = {}
+    for cls in reversed(model.__mro__):
+        if not (issubclass(cls, Settings) and cls is not Settings):
+            continue
+        (definition,) = ast.parse(textwrap.dedent(inspect.getsource(cls))).body
+        body = definition.body if isinstance(definition, ast.ClassDef) else []
+        for field, text in pairwise(body):
+            if (
+                isinstance(field, ast.AnnAssign)
+                and isinstance(field.target, ast.Name)
+                and isinstance(text, ast.Expr)
+                and isinstance(text.value, ast.Constant)
+            ):
+                found[field.target.id] = " ".join(str(text.value.value).split())
+    return found
+
+
+def _key(name: str, info: FieldInfo, meaning: str) -> Key:
+    unit = UNIT.search(meaning)
+    plugged = _registry(info)
+    if plugged is not None:
+        kinds = f"kind: {', '.join(plugged.built_in)}"
+        return Key(name, "table", _shown(info), kinds, "", meaning)
+    allowed = [*_bounds(info.metadata), *_allowed(info.annotation)]
+    return Key(
+        name,
+        _type(info.annotation),
+        _shown(info),
+        ", ".join(dict.fromkeys(allowed)),
+        unit[1] if unit else "",
+        meaning,
+    )
+
+
+def _shown(info: FieldInfo) -> str:
+    if info.is_required():
+        return "required"
+    value = info.get_default(call_default_factory=True)
+    if value is None:
+        return "none"
+    if isinstance(value, Settings):
+        kind = getattr(value, "kind", "")
+        return json.dumps(kind) if kind else "{}"
+    if value == tuple(range(8)):
+        return "8"  # the seeds, which are written as their number
+    return json.dumps(value)
+
+
+def _arms(annotation: Any) -> tuple[Any, ...]:
+    """Return the alternatives of a union but None, aliases and annotations taken off."""
+    origin = get_origin(annotation)
+    if isinstance(annotation, TypeAliasType):
+        return (annotation,)
+    if origin is Annotated:
+        return _arms(get_args(annotation)[0])
+    if origin in (Union, UnionType):
+        return tuple(arm for one in get_args(annotation) for arm in _arms(one))
+    return () if annotation is NoneType else (annotation,)
+
+
+def _type(annotation: Any) -> str:
+    return " or ".join(dict.fromkeys(_type_of(arm) for arm in _arms(annotation)))
+
+
+def _type_of(arm: Any) -> str:
+    origin, given = get_origin(arm), get_args(arm)
+    if isinstance(arm, TypeAliasType):
+        return "nested lists of text"
+    if origin is Literal:
+        return " or ".join(dict.fromkeys(TYPES[type(value)] for value in given))
+    if origin is tuple:
+        inner = _type(given[0])
+        return f"list of {inner}" if given[-1] is Ellipsis else f"pair of {inner}"
+    if inspect.isclass(origin) or (isinstance(arm, type) and issubclass(arm, Settings)):
+        return "table"
+    return TYPES[arm]
+
+
+def _allowed(annotation: Any) -> Iterator[str]:
+    """Yield what is allowed beside the type: the words of literals, and bounds, at any depth."""
+    origin, given = get_origin(annotation), get_args(annotation)
+    if origin is Literal:
+        yield from (json.dumps(value) for value in given if value is not False)
+    elif origin is Annotated:
+        yield from _allowed(given[0])
+        yield from _bounds(item for one in given[1:] for item in getattr(one, "metadata", ()))
+    elif origin in (Union, UnionType, tuple):
+        for one in given:
+            yield from _allowed(one)
+
+
+def _bounds(metadata: Any) -> Iterator[str]:
+    for item in metadata:
+        for cls, attribute, sign in COMPARISONS:
+            if isinstance(item, cls) and getattr(item, attribute) <= MOST_TOLD:
+                yield f"{sign} {getattr(item, attribute):,}"
+        if isinstance(item, MinLen):
+            yield f"at least {item.min_length} of them"
+
+
+def _models_in(annotation: Any) -> Iterator[type[Settings]]:
+    """Yield the settings models that an annotation mentions."""
+    if isinstance(annotation, type) and issubclass(annotation, Settings):
+        yield annotation
+    elif not isinstance(annotation, TypeAliasType):
+        for one in get_args(annotation):
+            yield from _models_in(one)

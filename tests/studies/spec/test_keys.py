@@ -1,0 +1,94 @@
+"""Every key of a spec is told of: type, default, what is allowed, meaning."""
+
+import pytest
+
+from nested_agents.core.registry import Plugged
+from nested_agents.core.settings import Settings
+from nested_agents.studies.cli.main import main
+from nested_agents.studies.spec.conditions import ConditionSettings
+from nested_agents.studies.spec.keys import Key, Table, keys_below, tables
+
+TABLES = tables()
+
+
+def subclasses(cls: type) -> set[type]:
+    return {cls}.union(*(subclasses(below) for below in cls.__subclasses__()))
+
+
+def built_in_models() -> set[type[Settings]]:
+    """All settings models of ours that have fields, however they are reached."""
+    found = subclasses(Settings) - {Settings, ConditionSettings}
+    return {
+        model
+        for model in found
+        if model.__module__.startswith("nested_agents.") and set(model.model_fields) - {"kind"}
+    }
+
+
+def test_the_fields_of_all_models_are_the_keys_that_are_listed() -> None:
+    told = {(table.model, key.name) for table in TABLES for key in table.keys}
+    listed = {table.model for table in TABLES}
+    for model in built_in_models():
+        below = {m for m in listed if issubclass(m, model)}  # an heir may share its base's table
+        related = {m for m in listed if any(issubclass(heir, m) for heir in {model, *below})}
+        assert related, f"{model.__name__} is no part of a spec"
+        for field in set(model.model_fields) - {"kind"}:
+            assert any((m, field) in told for m in related), f"{model.__name__}.{field}"
+    fields = {(m, field) for m in listed for field in m.model_fields}
+    assert told <= fields
+
+
+@pytest.mark.parametrize("table", TABLES, ids=lambda table: table.heading)
+def test_every_key_has_a_meaning(table: Table) -> None:
+    assert table.summary.endswith(".") or "``" in table.summary
+    for key in table.keys:
+        assert len(key.meaning) > 12, f"{table.heading}: {key.name} has no docstring"
+        assert key.type
+        assert key.default
+
+
+def test_registries_are_walked() -> None:
+    (metadata,) = [
+        item for item in ConditionSettings.model_fields["learner"].metadata
+        if isinstance(item, Plugged)
+    ]  # fmt: skip
+    kinds = {table.kind for table in TABLES if table.name == "learner"}
+    assert kinds == {"", *metadata.registry.built_in}
+
+
+def the_key(name: str) -> Key:
+    (table,) = keys_below(name)
+    (key,) = table.keys
+    return key
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "default", "allowed", "unit"),
+    [
+        ("scenario.termination_radius", "number", "1.5", "> 0", "m"),
+        ("scenario.start", "text", '"medium"', '"easy", "medium", "hard"', ""),
+        ("scenario.robots", "whole number", "2", ">= 1, <= 64", ""),
+        ("scenario.box.holes", "list of list of pair of number", "[]", "at least 3 of them", "m"),
+        ("learner.rule_base.memberships", "whole number", "none", ">= 2, <= 15", ""),
+        ("topology.members", "nested lists of text", "none", "", ""),
+        ("overrides.name", "text", "required", "", ""),
+    ],
+)
+def test_a_key(name: str, kind: str, default: str, allowed: str, unit: str) -> None:
+    key = the_key(name)
+    assert (key.type, key.default, key.allowed, key.unit) == (kind, default, allowed, unit)
+
+
+def test_the_command(capsys: pytest.CaptureFixture[str], monkeypatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    assert main(["keys", "scenario.infrared.reach"]) == 0
+    assert capsys.readouterr().out == (
+        '[scenario.infrared], of "box-pushing"\n'
+        "reach = 0.06: number, > 0, [m]\n"
+        "    Distance beyond which they read 0 [m]; the e-Puck's are useful up to about 6\n"
+        "    cm.\n"
+    )
+    assert main(["keys", "lerner"]) == 2
+    assert "lerner: there is no such key; did you mean 'learner'?" in capsys.readouterr().err
+    assert main(["keys"]) == 0
+    assert max(map(len, capsys.readouterr().out.splitlines())) <= 80

@@ -1,0 +1,60 @@
+"""README.md and docs/start.md: their specs are specs, their Python runs."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from nested_agents.studies.cli.main import COMMANDS
+from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.trials.trial import check
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGES = {name: (ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "docs/start.md")}
+
+
+def blocks(page: str, language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", PAGES[page], re.DOTALL)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_the_spec_is_one(page: str) -> None:
+    (spec,) = blocks(page, "toml")
+    check(Spec.parse(spec))
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_the_commands_exist(page: str) -> None:
+    lines = [line for block in blocks(page, "sh") for line in block.splitlines()]
+    assert {"./dev demo"} <= {line.partition(" #")[0].strip() for line in lines}
+    for line in lines:
+        match = re.match(r"\./dev exec nested-agents (\S+)", line)
+        assert match is None or match[1] in COMMANDS
+
+
+def test_the_python_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (code,) = blocks("README.md", "python")
+    assert len([line for line in code.splitlines() if line]) <= 12
+    small = "seeds=2, episodes=1, steps=4, evaluation=1"
+    assert "seeds=8, episodes=20, steps=200" in code
+    code = code.replace("seeds=8, episodes=20, steps=200", small).replace("jobs=2", "jobs=1")
+    exec(code, {})
+    assert "evaluation" in capsys.readouterr().out
+    assert (tmp_path / "out" / "leaders.pdf").is_file()
+
+
+def test_the_replay_is_small_and_the_version_is_one() -> None:
+    assert (ROOT / "docs" / "push.gif").stat().st_size < 1_000_000
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text()
+
+
+def test_the_links_lead_somewhere() -> None:
+    for name in ("README.md", "CONTRIBUTING.md"):
+        text = (ROOT / name).read_text(encoding="utf-8")
+        for link in re.findall(r"\]\(([^)#]+)", text):
+            assert (ROOT / link).exists(), f"{name}: {link}"
