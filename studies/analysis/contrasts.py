@@ -25,6 +25,9 @@ EPISODES = (
 )
 """What is known of every episode besides the measures of its scenario."""
 
+DECISION = Measure("decision_median", "time of a decision", "ms", better="lower", least=0.0)
+"""A trial's median; kept in seconds, shown in milliseconds."""
+
 
 @dataclass(frozen=True)
 class Group:
@@ -180,6 +183,8 @@ def _values(results: Results, name: str, phase: str) -> tuple[Measure, dict[str,
         raise SpecError(f"measure = {name!r}: {closest(name, {*measures, *whole})}")
     both = (results.numbers, results.usage)
     found = {c: by[c][name] for by in both for c in by if name in by[c]}
+    if name == DECISION.name:
+        return DECISION, {c: 1e3 * seconds for c, seconds in found.items()}, ""
     return Measure(name, name), found, ""
 
 

@@ -78,14 +78,16 @@ class Where:
         settings
             Of its condition, as tables.
         columns
-            What tells the condition from the others; what they say goes before settings.
+            What tells the condition from the others; what they say goes before settings, unless
+            they are empty, as columns of another study are.
 
         Raises
         ------
         SpecError
             If the text names what the trial has not, or compares what cannot be compared.
         """
-        known = {"condition": condition, "seed": seed, **dict(flat(settings)), **columns}
+        told = {key: value for key, value in columns.items() if value != ""}
+        known = {"condition": condition, "seed": seed, **dict(flat(settings)), **told}
         return bool(self._value(self._tree, known))
 
     def _value(self, node: ast.expr, known: Mapping[str, Any]) -> bool:

@@ -47,7 +47,7 @@ def run_and_show(
         spec, directory, jobs=jobs, backend=backend, address=address, retry_failed=retry_failed,
         accept_code=accept_code, observer=Terminal(), loggers=loggers,
     )  # fmt: skip
-    replays = _replays(study) if replay and not study.failed else []
+    replays = _replays(study, spec.episodes) if replay and not study.failed else []
     display.print_study(study)
     folder = directory / "figures"
     folder.mkdir(exist_ok=True)
@@ -57,15 +57,14 @@ def run_and_show(
     return 1 if study.failed else 0
 
 
-def _replays(study: StudyResults) -> list[Path]:
+def _replays(study: StudyResults, episodes: int) -> list[Path]:
     """Draw what is recorded of the first trial, if its scenario knows how."""
     folder = study.directory / "replay"
+    names = ("first", "last") if episodes > 1 else ("last",)
     try:
         folder.mkdir(exist_ok=True)
-        paths = [folder / f"{name}-episode.gif" for name in ("first", "last")]
         return [
-            study.replay(episode=name, path=path).path
-            for name, path in zip(("first", "last"), paths, strict=True)
+            study.replay(episode=name, path=folder / f"{name}-episode.gif").path for name in names
         ]
     except SpecError as error:
         say(str(error))

@@ -2,10 +2,11 @@
 
 import io
 import signal
+import sqlite3
 import subprocess
 import sys
 import time
-from contextlib import redirect_stderr, redirect_stdout
+from contextlib import closing, redirect_stderr, redirect_stdout, suppress
 from pathlib import Path
 
 import made_up
@@ -42,6 +43,16 @@ def heeding_interrupts() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
+def _finished(database):
+    """Return how many trials are kept as done."""
+    with (
+        suppress(sqlite3.OperationalError),  # being made
+        closing(sqlite3.connect(f"{database.as_uri()}?mode=ro", uri=True)) as connection,
+    ):
+        return connection.execute("SELECT count(*) FROM trials WHERE state = 'done'").fetchone()[0]
+    return 0
+
+
 def finish(process):
     out, err = process.communicate(timeout=120)
     return process.returncode, out, err
@@ -51,7 +62,7 @@ def wait_for_results(directory, process):
     """Wait until something has finished and is kept."""
     deadline = time.monotonic() + 60
     while time.monotonic() < deadline and process.poll() is None:
-        if list((directory / "recordings").glob("[!.]*.npz")):
+        if (directory / "recordings").is_dir() and _finished(directory / "results.sqlite"):
             return
         time.sleep(0.02)
     pytest.fail(f"nothing finished: {process.communicate()}")

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 
 from nested_agents.core.loop import EpisodicScenario
 from nested_agents.core.protocols import RewardPrediction, Scenario
+from nested_agents.core.settings import SettingsError
 from nested_agents.scenarios.checking.checker import check_scenario
 from nested_agents.scenarios.matrix_games.games import GAMES, optimal, payoffs_of
 from nested_agents.scenarios.matrix_games.scenario import MatrixGame, MatrixGameSettings
@@ -50,7 +50,7 @@ def test_three_agents_are_paid_the_least_of_their_pairs():
     ],
 )
 def test_what_is_no_game_is_refused(game, said):
-    with pytest.raises(ValidationError, match=said):
+    with pytest.raises(SettingsError, match=said):
         MatrixGameSettings(game=game)
 
 

@@ -50,7 +50,7 @@ def test_numbers_of_whole_trials_are_compared_too() -> None:
     found = contrasts(results, "decision_median")
     assert found.phase == ""
     assert [d.condition for d in found.significant] == ["sampling, robots=2"]
-    assert "higher: sampling" in "\n".join(found.notes)
+    assert "worse: sampling" in "\n".join(found.notes)
 
 
 @pytest.mark.parametrize(

@@ -184,6 +184,7 @@ def test_latex_has_what_was_measured() -> None:
     formulas, measured = written(rows, "latex").split("\n\n")
     assert r"\begin{tabular}{rlrrrrr}" in formulas
     assert measured.splitlines() == [
+        r"% needs \usepackage{booktabs}",
         r"\begin{tabular}{rlrrrrrr}",
         r"\toprule",
         r"$n$ & topology & formula & counted & rules valued & updates & ms & MiB \\",

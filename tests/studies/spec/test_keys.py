@@ -16,12 +16,17 @@ def subclasses(cls: type) -> set[type]:
 
 
 def built_in_models() -> set[type[Settings]]:
-    """All settings models of ours that have fields, however they are reached."""
+    """All settings models of ours that have fields, however they are reached.
+
+    Not those of controllers of one scenario, which are named by module and class.
+    """
     found = subclasses(Settings) - {Settings, ConditionSettings}
     return {
         model
         for model in found
-        if model.__module__.startswith("nested_agents.") and set(model.model_fields) - {"kind"}
+        if model.__module__.startswith("nested_agents.")
+        and not model.__module__.endswith(".scripted")
+        and set(model.model_fields) - {"kind"}
     }
 
 

@@ -247,5 +247,5 @@ def test_size_grows_with_the_number_of_robots() -> None:
     # The same friction per robot as for two.
     assert four.friction_force / 4 == pytest.approx(BOXES["square"].friction_force / 2)
     assert box_for("circle", 3).radius == pytest.approx(1.5 * BOXES["circle"].radius)
-    with pytest.raises(ValueError, match=r"box = .egg., allowed L, T, U, bar, circle"):
+    with pytest.raises(ValueError, match=r"box = .egg.: known: L, T, U, bar, circle"):
         box_for("egg", 2)
