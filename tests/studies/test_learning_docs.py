@@ -21,6 +21,7 @@ COLUMNS = ("success last 5", "evaluation success", "evaluation steps")
         ("scaling", ("evaluation success", "all touch")),
         ("crowds", ("evaluation success", "all touch")),
         ("controls", ("evaluation success",)),
+        ("four-robots-hard", ("evaluation success", "evaluation steps")),
         ("own-value", ("evaluation success",)),
         ("transfer", ("evaluation success", "success, four", "success, eight")),
         ("curriculum", ("evaluation success", "success, sixteen", "success, thirty-two")),

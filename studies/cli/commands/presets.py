@@ -20,7 +20,11 @@ def command(name: str | None) -> int:
     from ...spec.conditions import resolve
     from ...spec.toml import dumps
 
-    print(dumps(resolve(name, {}, {}).model_dump()), end="")
+    settings = resolve(name, {}, {})
+    if suited := settings.scenario.suited(name):
+        print("# What this scenario lays over the preset, as it is set here:")
+        print(*(f"# {line}" for line in dumps(suited).splitlines() if line), sep="\n", end="\n\n")
+    print(dumps(settings.model_dump()), end="")
     return 0
 
 
