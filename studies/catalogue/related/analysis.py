@@ -28,7 +28,12 @@ from ...spec.spec import Spec
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 
-TITLES = {"memory": "memory [kB]", "messages": "messages", "formula": "formula", "counted": "counted"}
+TITLES = {
+    "memory": "memory [kB]",
+    "messages": "messages",
+    "formula": "formula",
+    "counted": "counted",
+}
 """Titles of the numbers of whole trials."""
 
 
