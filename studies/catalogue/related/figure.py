@@ -6,6 +6,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import SymmetricalLogLocator
 
 from ...analysis.summary import EVALUATED
 from ...presentation.figures import COLOURS, SETTINGS
@@ -18,6 +19,9 @@ PANELS = {
     "counted": "operations of a decision",
 }
 """Titles of panels by title of estimate."""
+LEAST = {"ms": 0.01, "memory [kB]": 0.01, "counted": 1.0}
+"""Where logarithmic axes begin; below, they are linear and hold 0."""
+MOST_TICKS = 5
 APART = 0.2
 """How far the points of one system stand apart, in rows."""
 
@@ -50,8 +54,12 @@ def figure_of(analysis: Related) -> Figure:
                 axes.plot(float(found.value), y, "o", color=colour, markersize=3)
             axes.set_title(title, loc="left")
             axes.grid(axis="x", alpha=0.25)
-            if name != EVALUATED:
-                axes.set_xscale("symlog", linthresh=0.01 if name == "ms" else 1.0)
+            if name in LEAST:
+                axes.set_xscale("symlog", linthresh=LEAST[name])
+                axes.set_xlim(left=0.0)
+                locator = SymmetricalLogLocator(base=10.0, linthresh=LEAST[name])
+                locator.set_params(numticks=MOST_TICKS)
+                axes.xaxis.set_major_locator(locator)
         panels[0].set_xlim(-0.03, 1.03)
         panels[0].set_yticks(np.arange(len(systems)), systems)
         panels[0].set_ylim(len(systems) - 0.5, -0.5)
