@@ -84,6 +84,9 @@ class StateSpace:
     common
         Names of shared variables that are the same for all agents: what they are worth to a team
         is found once.
+    actions
+        Names of variables that are actions taken, of the agent or of others, with a membership
+        function at each: what `QLearning` maximises over.
 
     Examples
     --------
@@ -96,6 +99,7 @@ class StateSpace:
     variables: tuple[Variable, ...]
     n_own: int = 0
     common: tuple[str, ...] = ()
+    actions: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         names = [v.name for v in self.variables]
@@ -110,6 +114,9 @@ class StateSpace:
                 raise ValueError(
                     f"state space {self.name!r}: common variable {name!r} is none of the shared"
                 )
+        for name in self.actions:
+            if name not in names:
+                raise ValueError(f"state space {self.name!r}: action {name!r} is no variable")
 
     @property
     def n_variables(self) -> int:

@@ -26,6 +26,9 @@ SCENARIOS = SettingsRegistry(
     "scenario",
     {
         "box-pushing": "nested_agents.scenarios.box_pushing.config:BoxPushingSettings",
+        "pushing-points": (
+            "nested_agents.scenarios.box_pushing.options.config:PushingPointsSettings"
+        ),
         "matrix-game": "nested_agents.scenarios.matrix_games.scenario:MatrixGameSettings",
         "kinematic-chain": "nested_agents.scenarios.kinematic_chain.config:KinematicChainSettings",
         "line-up": "nested_agents.scenarios.line_up:LineUpSettings",

@@ -189,7 +189,7 @@ def from_edges(
     return graph
 
 
-def from_networkx(graph: nx.DiGraph, agents: Sequence[str]) -> nx.DiGraph:
+def from_networkx(graph: nx.Graph, agents: Sequence[str], *, peers: bool = False) -> nx.Graph:
     """Return a directed acyclic graph over `agents` with its nodes named by their ``str``.
 
     Parameters
@@ -198,6 +198,8 @@ def from_networkx(graph: nx.DiGraph, agents: Sequence[str]) -> nx.DiGraph:
         Its nodes are the agents, its edges lead from superior to subordinate; not modified.
     agents
         Names in agent order.
+    peers
+        Whether an undirected graph, which then joins peers, is allowed, too.
 
     Raises
     ------
@@ -210,13 +212,13 @@ def from_networkx(graph: nx.DiGraph, agents: Sequence[str]) -> nx.DiGraph:
     >>> from_networkx(nx.DiGraph([(0, 1)]), ["0", "1"]).edges
     OutEdgeView([('0', '1')])
     """
-    if not graph.is_directed():
+    if not graph.is_directed() and not peers:
         raise ValueError("the graph is undirected: who is above whom?")
     if graph.is_multigraph():
         raise ValueError("the graph is a multigraph: edges could be given more than once")
-    named: nx.DiGraph = nx.relabel_nodes(graph, str)
+    named: nx.Graph = nx.relabel_nodes(graph, str)
     check_names([str(node) for node in graph], agents, "the graph")
-    if not nx.is_directed_acyclic_graph(named):
+    if named.is_directed() and not nx.is_directed_acyclic_graph(named):
         Hierarchy(agents, named.edges)  # raises and names the cycle
     return named
 

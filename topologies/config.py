@@ -419,7 +419,7 @@ def hierarchy_of(
         if settings.kind in TOPOLOGIES.built_in:
             graph = settings.build(agents, named)
         else:
-            graph = from_networkx(files.called(settings, agents, named), agents)
+            graph = from_networkx(files.called(settings, agents, named), agents, peers=True)
         directed = graph.is_directed()
         return Hierarchy(agents, graph.edges if directed else (), () if directed else graph.edges)
     except ValueError as error:

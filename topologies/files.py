@@ -75,7 +75,7 @@ class Builder(Protocol):
         ...
 
 
-def called(builder: Builder, agents: Sequence[str], groups: Sequence[Sequence[str]]) -> nx.DiGraph:
+def called(builder: Builder, agents: Sequence[str], groups: Sequence[Sequence[str]]) -> nx.Graph:
     """Return the graph that a user's function makes.
 
     Raises
@@ -92,9 +92,7 @@ def called(builder: Builder, agents: Sequence[str], groups: Sequence[Sequence[st
     return graph
 
 
-def _returned(
-    builder: Builder, agents: Sequence[str], groups: Sequence[Sequence[str]]
-) -> nx.DiGraph:
+def _returned(builder: Builder, agents: Sequence[str], groups: Sequence[Sequence[str]]) -> nx.Graph:
     name = _name(builder)
     try:
         result = builder.build(tuple(agents), tuple(tuple(group) for group in groups))
@@ -106,8 +104,8 @@ def _returned(
         edges = [(str(superior), str(subordinate)) for superior, subordinate in result]
     except (TypeError, ValueError):
         raise ValueError(
-            f"{name} returned {type(result).__name__}, allowed: a networkx DiGraph or pairs "
-            "(superior, subordinate)"
+            f"{name} returned {type(result).__name__}, allowed: a networkx DiGraph, a Graph "
+            "of peers, or pairs (superior, subordinate)"
         ) from None
     graph = nx.DiGraph()
     graph.add_nodes_from(agents)

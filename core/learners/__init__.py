@@ -19,6 +19,7 @@ LEARNERS = SettingsRegistry(
         "optimistic-td": f"{__name__}.optimistic:OptimisticTDSettings",
         "fmq": f"{__name__}.fmq:FMQSettings",
         "sparse-cooperative": f"{__name__}.sparse_cooperative:SparseCooperativeSettings",
+        "q-learning": f"{__name__}.q_learning:QLearningSettings",
         "vdn": f"{__name__}.vdn:ValueDecompositionSettings",
         "frozen": f"{__name__}.frozen:FrozenSettings",
     },

@@ -46,6 +46,8 @@ class RuleBase:
         Type of the consequent weights that learners keep; states are double precision always.
     common
         Indices of variables that are the same for all agents.
+    actions
+        Indices of variables that are actions taken.
 
     Examples
     --------
@@ -64,6 +66,7 @@ class RuleBase:
         n_own: int = 0,
         dtype: str = "float64",
         common: Sequence[int] = (),
+        actions: Sequence[int] = (),
     ) -> None:
         d = len(partitions)
         for term in terms:
@@ -78,7 +81,7 @@ class RuleBase:
         self.partitions = tuple(partitions)
         self.terms = tuple(terms)
         self.n_own = n_own
-        self.common = frozenset(common)
+        self.common, self.actions = frozenset(common), frozenset(actions)
         self.sizes = tuple(prod(self.partitions[j].size for j in term) for term in self.terms)
         self.n_rules = sum(self.sizes)
         if self.n_rules > MOST_RULES:
@@ -138,7 +141,8 @@ class RuleBase:
         ]
         common = [names.index(name) for name in space.common]
         terms = list(dict.fromkeys(terms))
-        return cls(partitions, terms, space.n_own, settings.precision, common)
+        actions = [names.index(name) for name in space.actions]
+        return cls(partitions, terms, space.n_own, settings.precision, common, actions)
 
     def shared_by(self, term: tuple[int, ...]) -> Literal["agent", "body", "all"]:
         """Return who sees the same variables of a term: the agent alone, its body's, or all."""

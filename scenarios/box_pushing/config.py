@@ -237,11 +237,9 @@ def label(thing: str | Settings) -> str:
     return thing if isinstance(thing, str) else thing.model_dump_json()
 
 
-class BoxPushingSettings(ScenarioSettings):
-    """The box-pushing scenario (Section IX)."""
+class BoxTaskSettings(ScenarioSettings):
+    """Robots, box, task and servo layer: what all scenarios of box pushing have in common."""
 
-    kind: Literal["box-pushing"] = "box-pushing"
-    factory: ClassVar[str] = f"{__package__}.scenario:BoxPushing"
     robots: Annotated[int, Field(ge=1, le=64)] = 2
     """Number of robots."""
     robot: str | RobotSettings = "e-puck"
@@ -257,19 +255,8 @@ class BoxPushingSettings(ScenarioSettings):
     stay as they are whatever the number of robots, or are in units of the box and grow with it."""
     failures: tuple[Failure, ...] = ()
     """Failures of wheels, as ``[[scenario.failures]]`` tables."""
-    state_space: Literal["paper", "relational", "pose", "crowd"] | tuple[str, ...] = "relational"
-    """Eq. 1, the relational variables, those and the orientation of the box, or state variables by
-    name, one's own included, see `box_pushing.states.variables`."""
-    predictor: Literal["push", "rigid", "static", "exact"] = "push"
-    """What predictions take the world for, see `box_pushing.prediction.predictors`."""
-    belief: BeliefSettings = BeliefSettings()
-    """What the predictor `push` is told of constants that robots cannot see."""
-    reward: RewardSettings = RewardSettings()
-    """The constants of the reward, and whose contact it asks for."""
     action_repeat: Periods = 8
     """Control periods of 64 ms for which a decision is held."""
-    prediction_horizon: Periods = 24
-    """Control periods that predictions look ahead, the decision being held for all of them."""
     speed_increment: Annotated[float, Field(gt=0, le=1)] = 0.5
     """What increase and decrease change, as a fraction of the greatest wheel speed."""
     tolerance: Positive = 0.05
@@ -278,27 +265,6 @@ class BoxPushingSettings(ScenarioSettings):
     """Distance of the box from the goal [m] beyond which an episode is broken off."""
     orientation_tolerance: Positive | None = None
     """Orientation error that still counts as reached [rad]; none: any."""
-
-    @field_validator("state_space", mode="before")
-    @classmethod
-    def _by_name(cls, value: object) -> object:
-        from .states.variables import STATE_VARIABLES
-
-        return referred(STATE_VARIABLES, value)
-
-    @model_validator(mode="after")
-    def _believes(self) -> Self:
-        if self.predictor != "push" and self.belief != BeliefSettings():
-            raise ValueError(f"belief is for predictor = 'push', received {self.predictor!r}")
-        return self
-
-    def suited(self, preset: str) -> Mapping[str, Any]:
-        """Return what learns best here: with one or two robots, every wheel by weights of its own.
-
-        Two robots stand on different sides of the box and need different functions; larger teams
-        learn sooner if all left wheels share theirs, and all right wheels.
-        """
-        return {"learner": {"weights": "own"}} if preset == "default" and self.robots <= 2 else {}
 
     def doubts(self) -> tuple[str, ...]:
         """Return sizes that are surely meant in another unit, a line each.
@@ -325,3 +291,42 @@ class BoxPushingSettings(ScenarioSettings):
         """What a recording must tell beside motions, so that it can be drawn."""
         named = {"robot": self.robot, "box": self.box, "infrared": self.infrared}
         return {"dt": self.period} | {name: label(thing) for name, thing in named.items()}
+
+
+class BoxPushingSettings(BoxTaskSettings):
+    """The box-pushing scenario (Section IX)."""
+
+    kind: Literal["box-pushing"] = "box-pushing"
+    factory: ClassVar[str] = f"{__package__}.scenario:BoxPushing"
+    state_space: Literal["paper", "relational", "pose", "crowd"] | tuple[str, ...] = "relational"
+    """Eq. 1, the relational variables, those and the orientation of the box, or state variables by
+    name, one's own included, see `box_pushing.states.variables`."""
+    predictor: Literal["push", "rigid", "static", "exact"] = "push"
+    """What predictions take the world for, see `box_pushing.prediction.predictors`."""
+    belief: BeliefSettings = BeliefSettings()
+    """What the predictor `push` is told of constants that robots cannot see."""
+    reward: RewardSettings = RewardSettings()
+    """The constants of the reward, and whose contact it asks for."""
+    prediction_horizon: Periods = 24
+    """Control periods that predictions look ahead, the decision being held for all of them."""
+
+    @field_validator("state_space", mode="before")
+    @classmethod
+    def _by_name(cls, value: object) -> object:
+        from .states.variables import STATE_VARIABLES
+
+        return referred(STATE_VARIABLES, value)
+
+    @model_validator(mode="after")
+    def _believes(self) -> Self:
+        if self.predictor != "push" and self.belief != BeliefSettings():
+            raise ValueError(f"belief is for predictor = 'push', received {self.predictor!r}")
+        return self
+
+    def suited(self, preset: str) -> Mapping[str, Any]:
+        """Return what learns best here: with one or two robots, every wheel by weights of its own.
+
+        Two robots stand on different sides of the box and need different functions; larger teams
+        learn sooner if all left wheels share theirs, and all right wheels.
+        """
+        return {"learner": {"weights": "own"}} if preset == "default" and self.robots <= 2 else {}

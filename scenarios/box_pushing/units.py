@@ -21,7 +21,7 @@ NEAREST_GOAL = 1e-4
 
 
 def doubts(settings: Any) -> Iterator[str]:
-    """Yield a line for every size of `BoxPushingSettings` that is surely meant in another unit."""
+    """Yield a line for every size of `BoxTaskSettings` that is surely meant in another unit."""
     box, robot = settings.box, settings.robot
     if not isinstance(box, str):
         places = list(zip(*box.vertices, strict=True))

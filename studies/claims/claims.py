@@ -158,6 +158,21 @@ CLAIMS: tuple[Claim, ...] = (
         Within(0.01),
     ),
     Claim(
+        "complexity", "nesting reduces the complexity of joint-action learners [4]", "X-A",
+        "cost", "joint actions tried by a chain of four, over those of joint-action learners",
+        measured.tried_beside_joint_action_learners, AtMost(0.5),
+    ),
+    Claim(
+        "optimum", "agents that observe each other agree on the optimal joint action", "V, X-A",
+        "games", "P(optimal joint action), worst game, nested with observed frequencies",
+        measured.optimal("nested, observed"), AtLeast(0.8),
+    ),
+    Claim(
+        "maximum", "the same, the best being expected of those below", "V, X-A",
+        "games", "P(optimal joint action), worst game, nested with the maximum",
+        measured.optimal("nested, maximum"), AtLeast(0.8),
+    ),
+    Claim(
         "order", "the order of the chain is arbitrary", "X-A",
         "chain-order", "greatest difference of evaluation success from the first order",
         measured.order_matters, Within(0.15),

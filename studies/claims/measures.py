@@ -144,6 +144,36 @@ def cost_error(results: Results) -> Measured:
     return Measured(Estimate(worst, worst, worst), 0)
 
 
+def tried_beside_joint_action_learners(results: Results) -> Measured:
+    """Compute the joint actions that four nested agents try, over those of joint-action learners.
+
+    A joint-action learner considers what all others may do, a nested agent those below it.
+    """
+    problem, n = Problem(), 4
+    share = np.asarray(problem.decision(range(n)) / problem.decision([n - 1] * n))
+    return Measured(Estimate(share, share, share), 0, note=f"{n} agents")
+
+
+def optimal(system: str) -> Compute:
+    """Return what measures how often a system ends in the optimum of its worst game."""
+
+    def compute(results: Results) -> Measured | None:
+        found = {
+            ", ".join(str(v) for k, v in columns.items() if k != "name"): rate(
+                results.evaluation[condition]["success"]
+            )
+            for condition, columns in results.columns.items()
+            if columns.get("name") == system and condition in results.evaluation
+        }
+        if not found:
+            return None
+        worst = min(found, key=lambda game: float(found[game].value))
+        seeds = len(next(iter(results.evaluation.values()))["success"])
+        return Measured(found[worst], seeds, note=worst)
+
+    return compute
+
+
 def order_matters(results: Results) -> Measured | None:
     """Measure the order of the chain that differs most from the first, over all intervals.
 

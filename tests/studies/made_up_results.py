@@ -1,5 +1,7 @@
 """Results of studies whose answer is known, made without a simulation."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
@@ -45,6 +47,18 @@ def shapes(chances: dict[str, float], trained: float = 0.95, seeds: int = SEEDS)
         for r in (1, 2)
     }
     return base
+
+
+def games(systems: dict[str, float], by_game: dict[str, float] | None = None) -> Results:
+    """Systems that find the optimum of games with a chance, or one of each game."""
+    conditions = {
+        f"{system}, game={game}": (system, game, chance if by_game is None else by_game[game])
+        for system, chance in systems.items()
+        for game in by_game or ("climbing",)
+    }
+    base = ablation({c: chance for c, (_, _, chance) in conditions.items()})
+    columns = {c: {"name": s, "scenario.game": game} for c, (s, game, _) in conditions.items()}
+    return replace(base, columns=columns)
 
 
 def wheel_failure(

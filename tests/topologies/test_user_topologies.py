@@ -49,6 +49,13 @@ def test_pairs_or_a_graph(written, body: str) -> None:
     assert build(settings, AGENTS).edges == ((0, 1), (1, 2), (2, 3))
 
 
+def test_an_undirected_graph_is_one_of_peers(written) -> None:
+    body = "import networkx as nx\n    return nx.cycle_graph(agents)"
+    hierarchy = build(parse(written(f"def f(agents, groups):\n    {body}\n")), AGENTS)
+    assert hierarchy.edges == ()
+    assert hierarchy.peers == ((0, 1), (0, 3), (1, 2), (2, 3))
+
+
 @pytest.mark.parametrize(
     ("source", "message"),
     [
@@ -63,6 +70,10 @@ def test_pairs_or_a_graph(written, body: str) -> None:
         ("def f(agents, groups): return [('a', 'b')] * 2", "edge a -> b is given more than once"),
         ("def f(agents, groups): return [('a', 'x')]", "unknown agent 'x' in the graph"),
         ("def f(agents, groups): return [('a', 'b'), ('b', 'a')]", "cycle a -> b -> a"),
+        (
+            "import networkx as nx\ndef f(agents, groups): return nx.path_graph(['a', 'b'])",
+            "agent 'c' is missing from the graph",
+        ),
         (
             "import networkx as nx\ndef f(agents, groups): return nx.DiGraph([('a', 'b')])",
             "agent 'c' is missing from the graph",

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_up_results import ablation, arrays, scaling, shapes, wheel_failure
+from made_up_results import ablation, arrays, games, scaling, shapes, wheel_failure
 
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
 from nested_agents.studies import STUDIES
@@ -71,6 +71,8 @@ def orders(chances: list[float]) -> Results:
 GOOD = {"nothing": 0.0, "weights": 1.0, "self-model": 1.0, "both": 1.0}
 BAD = {"nothing": 0.0, "weights": 0.1, "self-model": 0.1, "both": 0.1}
 FAULTS = ("4 wheels, seized", "4 wheels, reversed")
+SYSTEMS = ("nested, observed", "nested, maximum")
+COMPUTED = ("cost", "complexity")
 
 
 def everything(good: bool) -> dict[str, Results]:
@@ -80,6 +82,7 @@ def everything(good: bool) -> dict[str, Results]:
         "scaling": scaling({2: 1.0, 64: 1.0 if good else 0.1}, 1e-4 if good else 1e-2),
         "wheel-failure": wheel_failure(dict.fromkeys(FAULTS, GOOD if good else BAD)),
         "shapes": shapes({"circle": 0.98, "L": 0.98 if good else 0.2}),
+        "games": games(dict.fromkeys(SYSTEMS, 1.0 if good else 0.1)),
         "ablation": ablation({"default": 1.0, "static predictor": 1.0 if good else 0.1}),
     }
 
@@ -91,7 +94,7 @@ def verdicts() -> dict[bool, dict[str, str]]:
     }
 
 
-@pytest.mark.parametrize("claim", [c.name for c in CLAIMS if c.name != "cost"])
+@pytest.mark.parametrize("claim", [c.name for c in CLAIMS if c.name not in COMPUTED])
 def test_every_claim_can_hold_and_can_fail(claim, verdicts) -> None:
     assert verdicts[True][claim] == "holds"
     assert verdicts[False][claim] == "does not hold"
@@ -103,8 +106,22 @@ def test_the_costs_that_the_paper_prints_are_computed() -> None:
     assert float(finding.measured.estimate.value) == pytest.approx(2.4575625 / 2.45 - 1.0)
 
 
+def test_a_chain_of_four_tries_a_third_of_what_joint_action_learners_try() -> None:
+    (finding,) = [f for f in judge({}) if f.claim.name == "complexity"]
+    assert finding.verdict == "holds"
+    assert float(finding.measured.estimate.value) == (4 + 16 + 64 + 256) / (4 * 256)
+
+
+def test_the_worst_game_decides() -> None:
+    results = games({"nested, observed": 1.0}, {"climbing": 1.0, "penalty:-100": 0.0})
+    (finding,) = [f for f in judge({"games": results}) if f.claim.name == "optimum"]
+    assert finding.verdict == "does not hold"
+    assert finding.measured.note == "penalty:-100"
+
+
 def test_without_results_nothing_is_decided() -> None:
-    assert {f.verdict for f in judge({}) if f.claim.name != "cost"} == {"not decided"}
+    found = {f.verdict for f in judge({}) if f.claim.name not in COMPUTED}
+    assert found == {"not decided"}
 
 
 def test_few_seeds_decide_nothing() -> None:
@@ -129,6 +146,7 @@ def test_claims_name_studies_and_conditions_that_their_specs_have() -> None:
             wanted = {
                 "learning-curve": {"own-value", "frozen", "random", "planner", "paper"},
                 "ablation": {"default", "static predictor"},
+                "games": {f"{s}, game=climbing" for s in SYSTEMS} if folder is QUICK else set(),
                 "wheel-failure": {f"{f}, enabled={e}" for f in FAULTS for e in ("true", "false")},
             }.get(study, set())
             assert wanted <= labels
@@ -189,7 +207,6 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         *claims.STUDIES_OF_CLAIMS,
         "arms",
         "arm-transfer",
-        "games",
         "long-arms",
         "tasks",
         "told",
@@ -245,6 +262,9 @@ REST = {
     "ablation": '[[overrides]]\nname = "default"\n'
     '[[overrides]]\nname = "static predictor"\nscenario.predictor = "static"',
     "shapes": 'evaluations.circle.box = "circle"',
+    "games": '[scenario]\nkind = "matrix-game"\n[learner]\nkind = "td-lambda"\ndiscount = 0.0\n'
+    'rule_base.order = "full"\ndecision.value_of = "own"\n'
+    '[[overrides]]\nname = "nested, observed"\nsweep.scenario.game = ["climbing"]',
     "scaling": '[[overrides]]\nname = "exact"\nsweep.scenario.robots = [1, 2]',
     "wheel-failure": "scenario.failures = "
     '[{kind = "seized", wheels = "robot1.left", episode = 5}]\n'

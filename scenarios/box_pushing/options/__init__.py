@@ -1,0 +1,1 @@
+"""Box pushing by one agent per robot, whose actions are ways to pushing points."""

@@ -1,0 +1,22 @@
+"""docs/related.md says what is so."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.trials.trial import check
+
+ROOT = Path(__file__).resolve().parents[2]
+TEXT = (ROOT / "docs" / "related.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("spec", re.findall(r"```toml\n(.*?)```", TEXT, re.DOTALL))
+def test_specs(spec: str) -> None:
+    check(Spec.parse(spec))
+
+
+@pytest.mark.parametrize("path", re.findall(r"nested-agents run (\S+\.toml)", TEXT))
+def test_commands_name_specs_that_can_be_built(path: str) -> None:
+    check(Spec.load(ROOT / path))
