@@ -84,9 +84,8 @@ plt.rcParams.update({"font.size": 20, "axes.spines.top": False, "axes.spines.rig
 figure, axes = plt.subplots(1, 2, figsize=(16, 9), sharey=True, layout="constrained")
 for ax, game in zip(axes, ("climbing", "penalty:-100"), strict=True):
     for row, one in enumerate(reversed(teams)):
-        (label,) = (c for c in study.conditions if one["name"] in c and c.endswith(game))
-        success = study.results.evaluation[label]["success"]
-        share = na.rate(success.astype(bool))
+        (label,) = (c for c in study.conditions if c.startswith(one["name"]) and c.endswith(game))
+        share = na.rate(study.results.evaluation[label]["success"])
         colour = COLOURS[0] if one["name"] == "nested, maximum" else "0.7"
         ax.barh(row, share.value, color=colour)
         ax.plot([share.low, share.high], [row, row], "k", linewidth=3)
@@ -99,8 +98,8 @@ figure.savefig("out/course/climbing-game.png", dpi=80)
 # %%
 # Questions
 # ---------
-# Put your answers in place of ``None`` and run the cell again; the last two questions are letters
-# and numbers as the sheet says, which ``nested-agents course sheet climbing-game`` prints.
+# Put your answers in place of ``None`` and run the cell again. ``nested-agents course sheet
+# climbing-game`` prints the same questions in full.
 
 answers = {
     "optimum": None,  # what are both paid for the best joint action?

@@ -13,6 +13,8 @@ The program takes half a minute, most of it for the teams that are run.
 # ----------
 # An agent with four actions and ``below`` agents below it tries ``4 ** (1 + below)`` joint actions.
 
+from pathlib import Path
+
 import matplotlib.pyplot as plt
 
 import nested_agents as na
@@ -54,6 +56,7 @@ for (name, topology), colour, style in zip(TOPOLOGIES.items(), COLOURS, STYLES, 
     ax.annotate(name, (16, counts[-1]), xytext=(12, 0), textcoords="offset points", va="center")
 ax.set(yscale="log", xlabel="agents", ylabel="joint actions of a decision")
 ax.set_title("The hierarchy decides what a decision costs")
+Path("out/course").mkdir(parents=True, exist_ok=True)
 figure.savefig("out/course/costs.png", dpi=80)
 
 # %%

@@ -57,7 +57,7 @@ plt.rcParams.update({"font.size": 20, "axes.spines.top": False, "axes.spines.rig
 figure, ax = plt.subplots(figsize=(16, 9), layout="constrained")
 marks = zip(study.conditions, hierarchies, COLOURS, "osD", strict=False)
 for label, name, colour, marker in marks:
-    found = na.rate(study.results.evaluation[label]["success"].astype(bool))
+    found = na.rate(study.results.evaluation[label]["success"])
     ax.plot([costs[name]] * 2, [found.low, found.high], color=colour, linewidth=4)
     ax.plot(costs[name], found.value, marker, color=colour, markersize=20, label=name)
 ax.set(xscale="log", ylim=(-0.02, 1.02))
@@ -68,9 +68,9 @@ figure.savefig("out/course/own-hierarchy.png", dpi=80)
 # %%
 # Questions
 # ---------
-# The last answer is a list of pairs of names over the wheels ``robot1.left``, ``robot1.right``, ...,
-# ``robot4.right``: all eight hang together, one wheel of each robot is above the other, and a
-# decision tries at most 400 joint actions.
+# The last answer is a list of pairs of names over the wheels ``robot1.left``, ``robot1.right``, and
+# so on to ``robot4.right``: all eight hang together, one wheel of each robot is above the other,
+# and a decision tries at most 400 joint actions.
 
 answers = {
     "chain": None,  # how many joint actions does a decision of the chain of four try?

@@ -20,7 +20,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import nested_agents as na
-from nested_agents.studies.presentation.figures import COLOURS
+from nested_agents.studies.presentation.figures import COLOURS, STYLES
 
 SEEDS, EPISODES, FAILS = 4, 20, 10
 failure = {"kind": "reversed", "wheels": "robot1.front-left", "episode": FAILS}
@@ -46,13 +46,18 @@ for note in study.notes:
 
 plt.rcParams.update({"font.size": 20, "axes.spines.top": False, "axes.spines.right": False})
 figure, ax = plt.subplots(figsize=(16, 9), layout="constrained")
-names = ("weights alone", "weights and self-model")
-for number, (label, name) in enumerate(zip(study.conditions, names, strict=True)):
-    success = study.results.training[label]["success"].mean(axis=0)
+without, with_model = study.conditions
+lines = {
+    "weights and self-model": (study.results.training[with_model], 0),
+    "weights alone": (study.results.training[without], 0),
+    "nothing adapts": (study.results.phases["weights kept"][without], FAILS),
+}
+for number, (name, (measures, first)) in enumerate(lines.items()):
+    success = measures["success"].mean(axis=0)
     smooth = np.convolve(success, np.ones(3) / 3, mode="valid")
     ax.plot(
-        np.arange(1, 1 + len(smooth)), smooth, color=COLOURS[number], marker="os"[number],
-        linestyle=("-", "--")[number], linewidth=4, markersize=12, label=name,
+        first + 1 + np.arange(len(smooth)), smooth, color=COLOURS[number], marker="os^"[number],
+        linestyle=STYLES[number], linewidth=4, markersize=12, label=name,
     )  # fmt: skip
 ax.axvline(FAILS - 0.5, color="k", linestyle=":", linewidth=3)
 ax.text(FAILS - 0.3, 1.02, "a wheel turns against its command")

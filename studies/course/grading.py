@@ -113,12 +113,14 @@ def grade_sheet(path: Path) -> Marks:
         for key in table:
             if key not in ("lab", "name", "answers"):
                 raise SpecError(f"{key}: unknown key; known: answers, lab, name")
-        lab, name, answers = (table.get("lab"), table.get("name", ""), table.get("answers", {}))
+        if "lab" not in table:
+            raise SpecError(f"lab: missing; known: {', '.join(LABS)}")
+        name, answers = table.get("name", ""), table.get("answers", {})
         if not isinstance(name, str):
             raise SpecError(f"name = {show(name)}: must be a text")
         if not isinstance(answers, dict):
             raise SpecError(f"answers = {show(answers)}: must be a table")
-        return grade(lab, answers, name)
+        return grade(table["lab"], answers, name)
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, SpecError) as error:
         raise SpecError(f"{path}: {error}") from None
 

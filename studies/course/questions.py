@@ -17,21 +17,17 @@ from ...core.hierarchy import Hierarchy
 
 
 class Question(Protocol):
-    """One question of a lab.
-
-    Attributes
-    ----------
-    text
-        What is asked.
-    hint
-        Where to look, for those who answered wrongly.
-    """
+    """One question of a lab."""
 
     @property
-    def text(self) -> str: ...
+    def text(self) -> str:
+        """What is asked."""
+        ...
 
     @property
-    def hint(self) -> str: ...
+    def hint(self) -> str:
+        """Where to look, for those who answered wrongly."""
+        ...
 
     @property
     def form(self) -> str:
