@@ -12,7 +12,7 @@ from ..arguments import Choice, Command, Text
 
 @click.command(cls=Command)
 @click.argument("action", type=Choice(["list", "sheet", "check"]), metavar="list|sheet|check")
-@click.argument("arguments", type=Text(), metavar="[LAB|SHEET.toml...]", nargs=-1)
+@click.argument("arguments", type=Text(), metavar="[LAB|SHEET.toml]", nargs=-1)
 @click.option(
     "--format",
     "form",
