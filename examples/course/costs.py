@@ -50,10 +50,11 @@ print(na.cost_table(["chain", "tree:2"], agents=[2, 4, LARGEST], measured=True))
 plt.rcParams.update({"font.size": 20, "axes.spines.top": False, "axes.spines.right": False})
 figure, ax = plt.subplots(figsize=(16, 9), layout="constrained")
 sizes = range(1, 17)
-for (name, topology), colour, style in zip(TOPOLOGIES.items(), COLOURS, STYLES, strict=False):
+for number, (name, topology) in enumerate(TOPOLOGIES.items()):
     counts = [tried(topology, n) for n in sizes]
-    ax.plot(sizes, counts, color=colour, linestyle=style, linewidth=4)
-    ax.annotate(name, (16, counts[-1]), xytext=(12, 0), textcoords="offset points", va="center")
+    ax.plot(sizes, counts, color=COLOURS[number], linestyle=STYLES[number], linewidth=4)
+    beside = (12, (14, -14, 0)[number])  # chain and tree end close together
+    ax.annotate(name, (16, counts[-1]), xytext=beside, textcoords="offset points", va="center")
 ax.set(yscale="log", xlabel="agents", ylabel="joint actions of a decision")
 ax.set_title("The hierarchy decides what a decision costs")
 Path("out/course").mkdir(parents=True, exist_ok=True)
