@@ -5,8 +5,6 @@ The climbing game: what nesting buys
 Two agents choose one of three actions each, and both are paid what a table says. They play again
 and again, and learn what joint actions are worth. The best joint action lies between heavy
 punishments, so whoever climbs first falls. You will see which teams reach the top, and why.
-
-The program takes less than a minute.
 """
 
 # %%

@@ -4,8 +4,6 @@ What a chain, a tree and a graph cost
 
 An agent tries its own actions together with all joint actions of the agents below it. So the
 hierarchy decides what a decision costs. You will count it, by formula and in a running team.
-
-The program takes half a minute, most of it for the teams that are run.
 """
 
 # %%

@@ -4,8 +4,6 @@ Your own hierarchy
 
 You write down who is above whom, look at what it costs, and find out whether it matters: against
 the chain of the paper, and against agents who see nobody.
-
-The program takes one to two minutes on two idle cores.
 """
 
 # %%

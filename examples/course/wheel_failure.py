@@ -5,8 +5,6 @@ A wheel fails
 Two robots of four wheels learn to push a box to its goal. Half-way a wheel of one of them begins to
 turn against its command, and nobody tells the agents. You will see what that costs, and what brings
 the team back: weights that go on learning, or a model of the own body.
-
-The program takes two to three minutes on two idle cores.
 """
 
 # %%
