@@ -108,6 +108,7 @@ MODULES = {
         "spec.spec", "spec.errors", "spec.keys", "spec.presets", "trials.trial", "trials.session",
         "store.store", "analysis.results", "analysis.statistics", "analysis.comparison",
         "analysis.power", "analysis.summary", "catalogue.study", "cost.cost", "claims.claims",
+        "course.grading",
     )),
 }  # fmt: skip
 """The public modules of each package, by what the package is for."""

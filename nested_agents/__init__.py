@@ -65,6 +65,7 @@ _PLACES = {
     "cost_table": ("studies.api.costs", "cost_table"),
     "control_loop": ("core.loop", "control_loop"),
     "detectable": ("studies.analysis.power", "detectable"),
+    "grade": ("studies.course.grading", "grade"),
     "greatest": ("core.exploration", "greatest"),
     "load": ("studies.api.study", "load"),
     "parse_topology": ("topologies", "parse"),

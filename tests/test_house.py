@@ -22,7 +22,7 @@ ALLOWED = {
 }
 STUDIES = (
     "spec", "trials", "store", "workers", "analysis", "presentation", "catalogue", "loggers", "run",
-    "claims", "cost", "explain", "report", "api", "cli",
+    "claims", "cost", "explain", "report", "api", "course", "cli",
 )  # fmt: skip
 """The rooms of studies/, each of which may import those before it."""
 MAX_BYTES = 1_000_000

@@ -15,10 +15,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-from ..presentation.figures import COLOURS, SETTINGS, check_suffix, write
+from ..presentation.figures import COLOURS, MARKERS, SETTINGS, check_suffix, write
 from .cost import CostRow
-
-MARKERS = "os^Dvp*"
 
 
 def draw(rows: Sequence[CostRow], path: Path) -> None:

@@ -18,7 +18,7 @@ from ...core.arrays import FloatArray
 from ...scenarios.box_pushing.config import BoxPushingSettings
 from ...scenarios.box_pushing.world.boxes import BoxSpec, box_for
 from ...scenarios.box_pushing.world.robots import robot_for
-from ..presentation.figures import COLOURS, SETTINGS, STYLES
+from ..presentation.figures import COLOURS, MARKERS, SETTINGS, STYLES
 from .body import ROWS, Bodies, body_name, by_robot
 from .policy import AROUND, MOVES, Field
 from .rules import exponent, labels, percent, strongest_pairs
@@ -71,19 +71,21 @@ def _functions(found: Explained, block: slice) -> Figure:
             low, high = variable.low, variable.high
         if variable.unit == "rad":
             axes.xaxis.set_major_locator(MultipleLocator(90))
-        x = np.linspace(low, high, 401)
+        x = np.union1d(np.linspace(low, high, 401), partition.centres)
         strengths = partition.strengths(x)
         for i, (name, part) in enumerate(zip(names, parts, strict=True)):
             robot = name.partition(".")[0]
             wheel = [n for n in names if n.partition(".")[0] == robot].index(name)
+            number = robots.index(robot)
             look: dict[str, Any] = {
-                "color": COLOURS[robots.index(robot) % len(COLOURS)],
-                "ls": STYLES[wheel % len(STYLES)],
-            }
-            line = axes.plot(turn * x, times * strengths @ part.singles[j], lw=1.4, **look)[0]
+                "color": COLOURS[number % len(COLOURS)], "ls": STYLES[wheel % len(STYLES)],
+                "marker": MARKERS[number % len(MARKERS)], "ms": 3,
+            }  # fmt: skip
+            at = np.searchsorted(x, partition.centres)
+            line = axes.plot(
+                turn * x, times * strengths @ part.singles[j], lw=1.4, markevery=at.tolist(), **look
+            )[0]
             line.set_label(name if j == 0 else f"_{i}")
-            at = turn * np.asarray(partition.centres)
-            axes.plot(at, times * part.singles[j], ".", color=look["color"], ms=4)
         share = float(np.mean([p.share(p.singles[j]) for p in parts]))
         unit = {"rad": " [°]", "1": ""}.get(variable.unit, f" [{variable.unit}]")
         axes.set_title(f"{variable.name}{unit}, {percent(share)}", loc="left")
@@ -94,7 +96,7 @@ def _functions(found: Explained, block: slice) -> Figure:
     figure.supylabel("adds to f" + (rf" [$\times 10^{{{-power}}}$]" if power else ""), fontsize=9)
     figure.legend(
         loc="outside lower center", ncols=4, frameon=False,
-        title="dots: rules, less their mean; in the titles the share of the variance of f",
+        title="markers: rules, less their mean; in the titles the share of the variance of f",
     )  # fmt: skip
     return figure
 
@@ -109,7 +111,7 @@ def _pairs(found: Explained) -> Figure:
         words = [labels(found.variables[i], found.rules.partitions[i]) for i in (j, k)]
         for axes, name, part in zip(row, found.agents, parts, strict=False):
             image = axes.imshow(
-                times * part.pairs[j, k], cmap="RdBu", vmin=-greatest, vmax=greatest,
+                times * part.pairs[j, k], cmap="cividis", vmin=-greatest, vmax=greatest,
                 origin="lower", aspect="auto",
             )  # fmt: skip
             axes.set_title(f"{name}, {percent(part.share(part.pairs[j, k]))}", loc="left")

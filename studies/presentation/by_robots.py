@@ -12,18 +12,17 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import NullLocator
 
 from ..analysis.statistics import Estimate
-from .figures import COLOURS, STYLES
+from .figures import COLOURS, MARKERS, STYLES
 
-MARKERS = "osD^vP"
 APART = 0.06
 """How far neighbouring lines stand apart, in doublings of the number of robots."""
 
 
 def style(index: int) -> dict[str, Any]:
-    """Return how a line looks: lines of one colour differ in marker and dashes."""
+    """Return how a line looks: lines differ in colour, marker and dashes."""
     return {
         "color": COLOURS[index % len(COLOURS)], "marker": MARKERS[index % len(MARKERS)],
-        "linestyle": STYLES[index // len(COLOURS) % len(STYLES)],
+        "linestyle": STYLES[index % len(STYLES)],
         "markersize": 4, "linewidth": 1.2,
     }  # fmt: skip
 

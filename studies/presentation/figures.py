@@ -20,7 +20,13 @@ USUAL = ("png", "svg")
 """Those that figures of a study are written in unless said otherwise."""
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Distinct to colour-blind readers (Okabe and Ito 2008); the palest is left out."""
-STYLES = ("-", (0, (5, 2)), (0, (1, 1.2)), (0, (6, 1.5, 1, 1.5)))
+STYLES = (
+    "-", (0, (5, 2)), (0, (1, 1.2)), (0, (6, 1.5, 1, 1.5)), (0, (3, 1.5, 1, 1.5, 1, 1.5)),
+    (0, (1, 3.5)), (0, (8, 3)),
+)  # fmt: skip
+"""As many as there are colours, most of which are one grey on paper."""
+MARKERS = "osD^vPX"
+"""The same for points."""
 SETTINGS: dict[str, Any] = {
     "font.size": 9,
     "axes.spines.top": False,

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ...presentation.figures import COLOURS, SETTINGS
+from ...presentation.figures import COLOURS, MARKERS, SETTINGS
 from .analysis import Games
 
 COLUMNS = 3
@@ -20,8 +20,8 @@ APART = 0.2
 def figure_of(analysis: Games) -> Figure:
     """Return the figure: probabilities of the optimum with their 95 % intervals.
 
-    A panel for each game (the first thing that settings differ in), a colour for the rest of the
-    setting, a marker for the number of plays.
+    A panel for each game (the first thing that settings differ in), a colour and a marker for the
+    rest of the setting; what is filled has been measured after all plays.
     """
     cases = analysis.cases
     systems = list(dict.fromkeys(case.system for case in cases))
@@ -41,12 +41,14 @@ def figure_of(analysis: Games) -> Figure:
                 for count, e in case.found.items():
                     which = looks.index((case.setting[1:], count))
                     y = systems.index(case.system) + APART * (which - (len(looks) - 1) / 2)
-                    colour = COLOURS[rests.index(case.setting[1:]) % len(COLOURS)]
+                    rest = rests.index(case.setting[1:])
+                    colour, marker = COLOURS[rest % len(COLOURS)], MARKERS[rest % len(MARKERS)]
                     filled = colour if count == plays[-1] else "white"
                     axes.plot([float(e.low), float(e.high)], [y, y], color=colour, linewidth=1.0)
                     axes.plot(
-                        float(e.value), y, "o", color=colour, markerfacecolor=filled, markersize=3.5
-                    )
+                        float(e.value), y, marker, color=colour, markerfacecolor=filled,
+                        markersize=3.5,
+                    )  # fmt: skip
             axes.set_xlim(-0.03, 1.03)
             axes.set_yticks(np.arange(len(systems)), systems)
             axes.grid(axis="x", alpha=0.25)
@@ -69,11 +71,12 @@ def _legend(
 ) -> None:
     handles = []
     for rest, count in looks:
-        colour = COLOURS[rests.index(rest) % len(COLOURS)]
+        which = rests.index(rest)
+        colour, marker = COLOURS[which % len(COLOURS)], MARKERS[which % len(MARKERS)]
         filled = colour if count == plays[-1] else "white"
         label = ", ".join((*rest, f"{count:,} plays"))
         handles.append(
-            Line2D([], [], color=colour, marker="o", markerfacecolor=filled, label=label)
+            Line2D([], [], color=colour, marker=marker, markerfacecolor=filled, label=label)
         )
     figure.legend(
         handles=handles, title="bars: 95 % intervals", loc="outside upper center", ncols=2,

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ...presentation.figures import COLOURS, SETTINGS, log_axis
+from ...presentation.figures import COLOURS, MARKERS, SETTINGS, STYLES, log_axis
 from .analysis import Contests, smoothed
 
 SMOOTHED = 10
@@ -29,8 +31,8 @@ def figure_of(analysis: Contests) -> Figure:
             for c in (c for c in analysis.contests if c.agents == n):
                 width = min(SMOOTHED, len(c.curve.value))
                 curve = smoothed(c.curve, width)
-                colour = COLOURS[contenders.index(c.contender) % len(COLOURS)]
-                axes.plot(np.arange(len(curve)) + width - 1, curve, color=colour)
+                look = _look(contenders.index(c.contender))
+                axes.plot(np.arange(len(curve)) + width - 1, curve, **look)
             axes.set_ylim(-0.03, 1.03)
             axes.set_title(f"success, n = {n}", loc="left")
             axes.set_xlabel("episode")
@@ -38,7 +40,9 @@ def figure_of(analysis: Contests) -> Figure:
         for i, contender in enumerate(contenders):
             own = [c for c in analysis.contests if c.contender == contender]
             values = [float(c.milliseconds.value) for c in own]
-            times.plot([c.agents for c in own], values, "o-", color=COLOURS[i % len(COLOURS)])
+            times.plot(
+                [c.agents for c in own], values, marker=MARKERS[i % len(MARKERS)], **_look(i)
+            )
         log_axis(times)
         times.set_xticks(agents)
         times.set_xlabel("agents n")
@@ -46,8 +50,12 @@ def figure_of(analysis: Contests) -> Figure:
         for axes in panels:
             axes.grid(alpha=0.25)
         handles = [
-            Line2D([], [], color=COLOURS[i % len(COLOURS)], label=contender)
+            Line2D([], [], marker=MARKERS[i % len(MARKERS)], label=contender, **_look(i))
             for i, contender in enumerate(contenders)
         ]
         figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
         return figure
+
+
+def _look(index: int) -> dict[str, Any]:
+    return {"color": COLOURS[index % len(COLOURS)], "linestyle": STYLES[index % len(STYLES)]}

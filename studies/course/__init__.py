@@ -1,0 +1,1 @@
+"""A course of four labs: their questions, and how answers to them are graded."""

@@ -1,0 +1,75 @@
+"""Wheel and sdist, each installed by itself, run a study outside of the checkout, with equal rows.
+
+Dependencies are those of the environment that runs the tests, so that nothing is fetched or
+compiled; ``python -m benchmarks.packages`` installs these, too.
+"""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+SPEC = """\
+study = "learning-curve"
+seeds = 1
+episodes = 1
+steps = 4
+evaluation = 1
+scenario.kind = "line-up"
+"""
+BUILD = "import sys; from setuptools import build_meta as b; getattr(b, sys.argv[1])(sys.argv[2])"
+
+
+def call(*command: object, cwd: Path, **environment: str) -> str:
+    done = subprocess.run(
+        list(map(str, command)), cwd=cwd, env={**os.environ, **environment},
+        stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def checkout(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of what is committed or about to be: building leaves nothing in the checkout."""
+    folder = tmp_path_factory.mktemp("checkout")
+    listed = subprocess.run(
+        ["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    if listed.returncode:
+        pytest.skip("not a git checkout")
+    for name in filter(None, listed.stdout.split("\0")):
+        copy = folder / name
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        if (ROOT / name).is_symlink():
+            copy.symlink_to(os.readlink(ROOT / name))
+        elif (ROOT / name).is_file():
+            copy.write_bytes((ROOT / name).read_bytes())
+    return folder
+
+
+@pytest.mark.slow
+def test_wheel_and_sdist_run_where_there_is_no_checkout(checkout: Path, tmp_path: Path) -> None:
+    rows = []
+    for kind in ("wheel", "sdist"):
+        place = tmp_path / kind
+        place.mkdir()
+        call(sys.executable, "-c", BUILD, f"build_{kind}", place, cwd=checkout)
+        (package,) = place.iterdir()
+        call(
+            sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index",
+            "--no-build-isolation", "--target", place / "env", package, cwd=place,
+        )  # fmt: skip
+        (place / "spec.toml").write_text(SPEC)
+        program = [sys.executable, "-P", "-m", "nested_agents"]
+        where = "import nested_agents; print(nested_agents.__file__)"
+        alone = {"PYTHONPATH": str(place / "env")}
+        said = call(sys.executable, "-P", "-c", where, cwd=place, **alone)
+        assert Path(said.strip()).is_relative_to(place / "env")
+        call(*program, "run", "spec.toml", "--out", "out", "--jobs", "1", cwd=place, **alone)
+        rows.append(call(*program, "results", "out", "--format", "csv", cwd=place, **alone))
+    assert rows[0] == rows[1]
+    assert rows[0].count("\n") > 1
