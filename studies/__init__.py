@@ -13,6 +13,7 @@ STUDIES = Registry(
         "scaling": f"{__name__}.catalogue.scaling",
         "hierarchies": f"{__name__}.catalogue.hierarchies",
         "games": f"{__name__}.catalogue.games",
+        "peers": f"{__name__}.catalogue.peers",
         "single-agent": f"{__name__}.catalogue.single_agent",
     },
 )

@@ -123,7 +123,7 @@ def draw_faults(
     befallen = rng.permutation(len(actuators))[:count]
     found = []
     for i in befallen.tolist():
-        kind, episode = kinds[rng.integers(len(kinds))], int(rng.integers(first, last + 1))
+        kind, episode = kinds[int(rng.integers(len(kinds)))], int(rng.integers(first, last + 1))
         end = None if lasts is None else episode + lasts
         found.append(
             KINDS[kind](
