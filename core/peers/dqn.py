@@ -11,7 +11,8 @@ from stable_baselines3.common.logger import Logger
 from ..arrays import FloatArray, IntArray
 from ..protocols import Scenario, Transition
 from .inputs import Inputs, RewardScale
-from .peer import Peer, drawing_from, weights_of
+from .networks import drawing_from, weights_of
+from .peer import Peer
 from .seen import Seen
 from .settings import DQNSettings
 

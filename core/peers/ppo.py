@@ -20,7 +20,8 @@ from ..arrays import FloatArray, IntArray
 from ..protocols import Scenario, Transition
 from .central_critic import CentralCriticPolicy
 from .inputs import Inputs, RewardScale
-from .peer import Peer, drawing_from, weights_of
+from .networks import drawing_from, weights_of
+from .peer import Peer
 from .seen import Seen
 from .settings import PolicyGradientSettings
 
