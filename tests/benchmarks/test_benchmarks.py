@@ -54,6 +54,15 @@ def test_a_small_crowd_is_drawn(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_decisions_of_every_size_are_timed() -> None:
+    few = ["--preset", "own-value", "--robots", "2", "4", "5", "--number", "3"]
+    command = [sys.executable, "-m", "benchmarks.decisions", *few]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    assert "time ~ n^" in run.stdout
+    assert "with 8 to 10 agents (least)" in run.stdout
+
+
+@pytest.mark.slow
 def test_what_can_be_solved_at_a_size_is_told() -> None:
     few = ["--robots", "3", "--seeds", "2", "--scalings", "similar", "--grows", "width"]
     command = [sys.executable, "-m", "benchmarks.sizes", *few]
