@@ -16,6 +16,7 @@ from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
+from .acting import Actors
 from .arrays import FloatArray, IntArray
 from .protocols import Scenario, Transition
 from .team import Team
@@ -87,7 +88,7 @@ def policy_seed(seed: int) -> np.random.SeedSequence:
 
 def control_loop(
     scenario: Scenario,
-    team: Team,
+    team: Actors,
     *,
     episodes: int,
     steps: int,
@@ -101,7 +102,7 @@ def control_loop(
     Parameters
     ----------
     scenario, team
-        The world and the agents; both are modified.
+        The world and those who act in it; both are modified.
     episodes, steps
         How many episodes, and how many steps each may take.
     seed

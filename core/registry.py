@@ -138,7 +138,9 @@ class SettingsRegistry(Registry):
     kind, built_in
         As of `Registry`.
     base
-        What the settings of all things of the kind inherit.
+        What the settings of things of the kind inherit.
+    root
+        What those inherit at least that are of another sort; none: there is no other sort.
 
     Examples
     --------
@@ -155,9 +157,15 @@ class SettingsRegistry(Registry):
     4
     """
 
-    def __init__(self, kind: str, built_in: Mapping[str, str], base: type[Settings]) -> None:
+    def __init__(
+        self,
+        kind: str,
+        built_in: Mapping[str, str],
+        base: type[Settings],
+        root: type[Settings] | None = None,
+    ) -> None:
         super().__init__(kind, built_in)
-        self.base = base
+        self.base, self.root = base, root or base
         self._adapted: dict[tuple[str, int], tuple[Any, type[Settings]]] = {}
 
     def model(self, name: str) -> type[Settings]:
@@ -188,7 +196,7 @@ class SettingsRegistry(Registry):
     def _derived(self, name: str, thing: Any) -> type[Settings]:
         is_model = isinstance(thing, type) and issubclass(thing, Settings)
         own = thing if is_model else getattr(thing, "Settings", self.base)
-        if not (isinstance(own, type) and issubclass(own, self.base)):
+        if not (isinstance(own, type) and issubclass(own, self.root)):
             base = f"{self.base.__module__}.{self.base.__qualname__}"
             raise ValueError(f"the settings of a {self.kind} must inherit {base}")
         if not callable(thing):

@@ -8,6 +8,7 @@ from typing import cast
 
 import numpy as np
 
+from .acting import Actors
 from .arrays import FloatArray, IntArray
 from .calibration import Calibration
 from .evaluators.evaluator import NOTHING_GIVEN, DecisionProblem, Deliberation, Evaluator
@@ -436,6 +437,22 @@ def carried_rows(former: Scenario, scenario: Scenario, *, shared: bool) -> IntAr
             else f"{said}: learner.weights = 'own'; with 'role', agents of a role share theirs"
         )
     return np.array([owners.index(owner) for owner in others])
+
+
+def of_fuzzy_agents(team: Actors) -> Team:
+    """Return a team that is a hierarchy of fuzzy agents.
+
+    Raises
+    ------
+    ValueError
+        If those who act are no such team, but a learner that acts for all; one line.
+    """
+    if not isinstance(team, Team):
+        raise ValueError(
+            f"learner.kind: {type(team).__name__} acts for all by itself; this needs agents with "
+            "rule bases"
+        )
+    return team
 
 
 def _no_successor(part: object) -> str:

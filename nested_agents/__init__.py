@@ -44,6 +44,8 @@ _PLACES = {
     "Partition": ("core.rules.fuzzy", "Partition"),
     "RuleBase": ("core.rules.rule_base", "RuleBase"),
     "SUCCESS": ("core.protocols", "SUCCESS"),
+    "Peer": ("core.peers.peer", "Peer"),
+    "PeerSettings": ("core.peers.settings", "PeerSettings"),
     "Scenario": ("core.protocols", "Scenario"),
     "ScenarioSettings": ("core.settings", "ScenarioSettings"),
     "Session": ("studies.trials.session", "Session"),

@@ -14,6 +14,7 @@ STUDIES = Registry(
         "hierarchies": f"{__name__}.catalogue.hierarchies",
         "games": f"{__name__}.catalogue.games",
         "related": f"{__name__}.catalogue.related",
+        "peers": f"{__name__}.catalogue.peers",
         "single-agent": f"{__name__}.catalogue.single_agent",
     },
 )

@@ -7,7 +7,9 @@ R(s) / (1 - discount). Siblings differ where their mathematics differs.
 """
 
 from ..registry import SettingsRegistry
-from .learner import LearnerSettings
+from .learner import LearnerSettings, TeamSettings
+
+PEERS = f"{__name__.rpartition('.')[0]}.peers.settings"
 
 LEARNERS = SettingsRegistry(
     "learner",
@@ -22,9 +24,14 @@ LEARNERS = SettingsRegistry(
         "q-learning": f"{__name__}.q_learning:QLearningSettings",
         "vdn": f"{__name__}.vdn:ValueDecompositionSettings",
         "frozen": f"{__name__}.frozen:FrozenSettings",
+        "ppo": f"{PEERS}:PPOSettings",
+        "ippo": f"{PEERS}:IPPOSettings",
+        "mappo": f"{PEERS}:MAPPOSettings",
+        "dqn": f"{PEERS}:DQNSettings",
     },
     LearnerSettings,
+    TeamSettings,
 )
 """Learners by name."""
 
-__all__ = ["LEARNERS", "LearnerSettings"]
+__all__ = ["LEARNERS", "LearnerSettings", "TeamSettings"]

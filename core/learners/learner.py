@@ -78,10 +78,23 @@ class SuccessorLearner(Protocol):
         ...
 
 
-class LearnerSettings(Settings):
-    """What the settings of all learners share."""
+class TeamSettings(Settings):
+    """What stands in the ``[learner]`` table of a spec: how those who act learn.
+
+    `LearnerSettings` are of a hierarchy of fuzzy agents, which `nested_agents.core.team` builds;
+    those of whoever acts for all by itself are built as they are, see `nested_agents.core.peers`.
+    """
 
     kind: str = ""
+
+    def build(self, *given: Any) -> Any:
+        """Return what the settings are of."""
+        raise TypeError(f"learner {self.kind!r} says not how it is built")
+
+
+class LearnerSettings(TeamSettings):
+    """What the settings of all learners share."""
+
     rule_base: RuleBaseSettings = RuleBaseSettings()
     """Fuzzy rule base of every agent."""
     discount: Annotated[float, Field(ge=0, lt=1)] = 0.95

@@ -17,6 +17,7 @@ from ...core.settings import NonNegative, Positive, ScenarioSettings, Settings
 from ..failures.settings import (
     Delayed,
     FailureSettings,
+    Free,
     Names,
     Noisy,
     Reversed,
@@ -81,7 +82,7 @@ class SeizedSettings(Seized, WheelFailure):
     kind: Literal["seized"] = "seized"
 
 
-class FreeSettings(WheelFailure):
+class FreeSettings(Free, WheelFailure):
     """The wheel has no drive and turns freely."""
 
     kind: Literal["free"] = "free"

@@ -38,6 +38,8 @@ class Failures:
         Names of the ``n`` actuators.
     limits
         ``(n,)`` greatest speed of every actuator, in units of its speed.
+    said
+        What the failures are called in complaints.
 
     Attributes
     ----------
@@ -63,14 +65,20 @@ class Failures:
     """
 
     def __init__(
-        self, settings: Sequence[FailureSettings], agents: Sequence[str], limits: FloatArray
+        self,
+        settings: Sequence[FailureSettings],
+        agents: Sequence[str],
+        limits: FloatArray,
+        said: str = "scenario.failures",
     ) -> None:
         self._settings = tuple(settings)
         self._delays_first = sorted(
             range(len(settings)), key=lambda i: not isinstance(settings[i], Delayed)
         )
         self._limits = limits
-        self._masks = [_named(i, failure, agents) for i, failure in enumerate(settings)]
+        self._masks = [
+            _named(f"{said}[{i}]", failure, agents) for i, failure in enumerate(settings)
+        ]
         delays = [f.periods for f in settings if isinstance(f, Delayed)]
         self._memory = max(delays, default=0)
         self.begin(0, 0)
@@ -163,7 +171,7 @@ def _held(
             return speeds
 
 
-def _named(number: int, failure: FailureSettings, agents: Sequence[str]) -> BoolArray:
+def _named(said: str, failure: FailureSettings, agents: Sequence[str]) -> BoolArray:
     """Return the mask ``(n,)`` of what a failure names."""
     mask = np.zeros(len(agents), dtype=bool)
     for name in failure.names:
@@ -172,7 +180,7 @@ def _named(number: int, failure: FailureSettings, agents: Sequence[str]) -> Bool
             shown = ", ".join(agents[:8]) + (", ..." if len(agents) > 8 else "")
             head, dot, _ = agents[0].rpartition(".")
             raise ValueError(
-                f"scenario.failures[{number}].{failure.part} = {name!r}: no such "
+                f"{said}.{failure.part} = {name!r}: no such "
                 f"{failure.part.removesuffix('s')}, allowed {shown} or a pattern such as "
                 f"{head}{dot}*"
             )

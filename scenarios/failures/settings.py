@@ -70,6 +70,10 @@ class Seized(FailureSettings):
     """It does not move."""
 
 
+class Free(FailureSettings):
+    """It has no drive and gives way."""
+
+
 class Weak(FailureSettings):
     """It moves at a fraction of its command."""
 

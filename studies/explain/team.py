@@ -16,11 +16,12 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import track
 
+from ...core.learners import LearnerSettings
 from ...core.protocols import Scenario
 from ...core.registry import closest
 from ...core.rules.rule_base import RuleBase
 from ...core.spaces import Variable
-from ...core.team import Team
+from ...core.team import Team, of_fuzzy_agents
 from ...scenarios.box_pushing.scenario import BoxPushing
 from ..spec.errors import SpecError
 from ..store.store import Store
@@ -104,7 +105,9 @@ def explained(store: Store, trial: Trial) -> Explained:
 
 def _explained(store: Store, trial: Trial) -> Explained:
     team, scenario, bodies = _trained(store, trial)
-    rules = RuleBase.build(scenario.state_space, trial.settings.learner.rule_base)
+    learner = trial.settings.learner
+    assert isinstance(learner, LearnerSettings), "of fuzzy agents, see _trained"
+    rules = RuleBase.build(scenario.state_space, learner.rule_base)
     taken = [explain_rules.take_apart(rules, theta) for theta in team.learner.theta]
     parts = tuple(taken[row] for row in team.rows)
     fields: list[Field] | str
@@ -127,10 +130,10 @@ def _explained(store: Store, trial: Trial) -> Explained:
 def _trained(store: Store, trial: Trial) -> tuple[Team, Scenario, Bodies | None]:
     try:
         session = Session(trial)
+        team = of_fuzzy_agents(session.team)
     except ValueError as error:  # a file that settings name is not what it was
         raise SpecError(f"{store.directory}: {error}") from None
-    team, scenario = session.team, session.scenario
-    strikes = trial.settings.scenario.onset
+    scenario, strikes = session.scenario, trial.settings.scenario.onset
     model, bodies = team.self_model, None
     if model is not None:
         bodies = Bodies({}, ())

@@ -16,7 +16,7 @@ from typing import Annotated, Any
 
 from pydantic import Field, ValidationError
 
-from ...core.learners import LEARNERS, LearnerSettings
+from ...core.learners import LEARNERS, TeamSettings
 from ...core.learners.batch import BatchTDSettings
 from ...core.registry import Plugged, closest
 from ...core.settings import ScenarioSettings, Settings, tuples
@@ -39,7 +39,7 @@ class ConditionSettings(Settings):
 
     scenario: Annotated[ScenarioSettings, Plugged(SCENARIOS)] = BoxPushingSettings()
     topology: Topology = ChainSettings()
-    learner: Annotated[LearnerSettings, Plugged(LEARNERS)] = BatchTDSettings()
+    learner: Annotated[TeamSettings, Plugged(LEARNERS)] = BatchTDSettings()
 
     def canonical(self) -> str:
         """Return the JSON text that equal settings share, whatever wrote them."""

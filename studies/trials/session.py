@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from time import perf_counter
 
+from ...core.acting import Actors
 from ...core.loop import (
     EpisodicScenario,
     StepRecord,
@@ -72,7 +73,7 @@ class Session:
         first: int = 0,
         *,
         phase: str = "training",
-        team: Team | None = None,
+        team: Actors | None = None,
         observe: Observer | None = None,
     ) -> None:
         """Let the team (or another one, whose time is not counted) explore, learn, be measured.
@@ -204,7 +205,7 @@ class Session:
     ) -> bool:
         """Run whole episodes compiled and keep their rows, or return that it cannot be done."""
         scenario = there.scenario
-        if not isinstance(scenario, EpisodicScenario):
+        if not isinstance(scenario, EpisodicScenario) or not isinstance(there.team, Team):
             return False
         for episode in range(first, first + episodes):
             begin = perf_counter()

@@ -10,13 +10,15 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
 
+from ...core.acting import Actors
 from ...core.arrays import IntArray
-from ...core.learners import LearnerSettings
+from ...core.learners import LearnerSettings, TeamSettings
 from ...core.loop import policy_seed
+from ...core.peers.seen import SeenScenario
 from ...core.protocols import Measure, Scenario, measures_of
 from ...core.settings import ScenarioSettings
 from ...core.sources import Sources, named
-from ...core.team import Team, carried_rows
+from ...core.team import Team, carried_rows, of_fuzzy_agents
 from ..spec.conditions import Condition, ConditionSettings
 from ..spec.curriculum import Stage, lengths
 from ..spec.errors import SpecError
@@ -175,10 +177,10 @@ class Arrangement(NamedTuple):
     """As the settings describe it."""
     scenario: Scenario
     """The same as the agents see it, which may be as one agent."""
-    team: Team
+    team: Actors
     """The agents."""
 
-    def take_over(self, former: Arrangement, settings: LearnerSettings) -> None:
+    def take_over(self, former: Arrangement, settings: TeamSettings) -> None:
         """Let the team begin where that of another world ended.
 
         Raises
@@ -186,9 +188,10 @@ class Arrangement(NamedTuple):
         ValueError
             If it cannot, see `carried_rows` and `Team.take_over`; one line.
         """
-        self.team.take_over(former.team, self._rows(former, settings))
+        rows = self._rows(former, settings)
+        of_fuzzy_agents(self.team).take_over(of_fuzzy_agents(former.team), rows)
 
-    def with_trained(self, former: Arrangement, settings: LearnerSettings) -> Arrangement:
+    def with_trained(self, former: Arrangement, settings: TeamSettings) -> Arrangement:
         """Return it with the team that was trained in another world: to be evaluated, not to learn.
 
         That is the former team itself if the agents are the same, else one that takes over.
@@ -201,11 +204,12 @@ class Arrangement(NamedTuple):
         rows = self._rows(former, settings)
         if self.scenario.agents == former.scenario.agents:
             return self._replace(team=former.team)
-        self.team.take_over(former.team, rows)
+        of_fuzzy_agents(self.team).take_over(of_fuzzy_agents(former.team), rows)
         return self
 
-    def _rows(self, former: Arrangement, settings: LearnerSettings) -> IntArray:
-        return carried_rows(former.scenario, self.scenario, shared=settings.weights == "role")
+    def _rows(self, former: Arrangement, settings: TeamSettings) -> IntArray:
+        shared = isinstance(settings, LearnerSettings) and settings.weights == "role"
+        return carried_rows(former.scenario, self.scenario, shared=shared)
 
 
 def arrange(settings: ConditionSettings, seed: int) -> Arrangement:
@@ -218,13 +222,19 @@ def arrange(settings: ConditionSettings, seed: int) -> Arrangement:
     """
     world = settings.scenario.build()
     scenario, hierarchy = settings.topology.arrange(world)
-    team = Team.build(settings.learner, scenario, hierarchy, policy_seed(seed))
+    learner, source = settings.learner, policy_seed(seed)
+    if isinstance(learner, LearnerSettings):
+        team: Actors = Team.build(learner, scenario, hierarchy, source)
+    else:
+        scenario = SeenScenario(scenario)
+        team = learner.build(scenario, source)
     return Arrangement(world, scenario, team)
 
 
 def build(settings: ConditionSettings, seed: int) -> tuple[Scenario, Team]:
-    """Return the scenario and the untrained team of a condition; see `arrange`."""
-    return arrange(settings, seed)[1:]
+    """Return the scenario and the untrained team of fuzzy agents of a condition; see `arrange`."""
+    found = arrange(settings, seed)
+    return found.scenario, of_fuzzy_agents(found.team)
 
 
 def check(spec: Spec) -> tuple[Measure, ...]:
@@ -280,7 +290,8 @@ def _changed(settings: ConditionSettings, scenario: ScenarioSettings) -> Conditi
 def _built(settings: ConditionSettings, where: str) -> Arrangement:
     try:
         found = arrange(settings, 0)
-        if settings.learner.decision.rule != "value":
+        learner = settings.learner
+        if isinstance(learner, LearnerSettings) and learner.decision.rule != "value":
             found.scenario.reset(0)
             found.team.check(found.scenario.predict())
     except ValueError as error:

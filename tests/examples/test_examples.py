@@ -5,6 +5,7 @@ from pathlib import Path
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
+import numpy as np
 import pytest
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -26,6 +27,22 @@ def test_ppo(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
     runpy.run_path(str(path), run_name="__main__")
     lines = capsys.readouterr().out.splitlines()
     assert [line.split(":")[0] for line in lines] == ["before training", "after 1024 steps"]
+
+
+def test_fault_recovery_is_read() -> None:
+    path = EXAMPLES / "fault_recovery.py"
+    compile(path.read_text(encoding="utf-8"), str(path), "exec")
+
+
+def test_a_task_of_gymnasium_is_predicted_to_the_letter() -> None:
+    module = runpy.run_path(str(EXAMPLES / "pendulum.py"))
+    pendulum = module["Pendulum"]()
+    pendulum.reset(7)
+    for action in (0, 4, 2, 1, 3):
+        joint = np.array([[action]])
+        predicted = pendulum.predict().states(0, joint)[0]
+        entered = pendulum.step(joint[0]).states[0]
+        assert predicted == pytest.approx(entered, abs=1e-12)
 
 
 def test_picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from ....core.protocols import groups_of
+from ....core.team import of_fuzzy_agents
 from ...analysis.results import Results
 from ...analysis.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
 from ...analysis.summary import Summary, evaluated
@@ -44,7 +45,8 @@ def measure(trial: Trial) -> TrialResult:
     _forget_peak()
     session.train(trial.episodes)
     peak = _peak()
-    hierarchy, team = session.team.hierarchy, session.team
+    team = of_fuzzy_agents(session.team)
+    hierarchy = team.hierarchy
     tried = team.evaluator.counts.joint_actions if team.evaluator is not None else 0
     numbers = {
         "robots": float(len(groups_of(session.world))),

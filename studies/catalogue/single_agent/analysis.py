@@ -14,6 +14,7 @@ from typing import ClassVar
 import numpy as np
 
 from ....core.cost import Problem, below_counts
+from ....core.team import of_fuzzy_agents
 from ...analysis.results import Results
 from ...analysis.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, rates
 from ...analysis.summary import Summary
@@ -28,7 +29,8 @@ def measure(trial: Trial) -> TrialResult:
     """Train and evaluate a team, and count what a step costs; imported by name in workers."""
     session = Session(trial)
     session.train(trial.episodes)
-    team, evaluator = session.team, session.team.evaluator
+    team = of_fuzzy_agents(session.team)
+    evaluator = team.evaluator
     evaluations = 0 if evaluator is None else evaluator.counts.rule_evaluations
     steps = len(session.deciding)
     n_rules = team.learner.theta.shape[1]

@@ -71,6 +71,12 @@ def check(spec: Spec) -> None:
     """Raise `SpecError` unless a wheel fails in every condition, after and before some training."""
     for condition in spec.conditions():
         onset = condition.settings.scenario.onset
+        learner = condition.settings.learner
+        if not isinstance(learner, LearnerSettings):
+            raise SpecError(
+                f"learner.kind = {learner.kind!r}: wheel-failure needs agents with rule bases, of "
+                f"which a copy keeps its weights (condition {condition.label!r})"
+            )
         if onset is None:
             raise SpecError(
                 f"scenario.failures = []: wheel-failure needs one (condition {condition.label!r})"

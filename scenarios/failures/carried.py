@@ -1,0 +1,162 @@
+"""What faulty actuators carry out of the actions that they are told, step by step.
+
+What an action commands decides what a fault can do to it. An *effort*, such as a torque, is zero at
+a free actuator, but none holds a joint; a *velocity* is zero at a seized one, but none lets it
+coast; a *position* is held by a seized one, and none gives way. What an action cannot express is
+left to a `Mechanism`, or refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Literal
+
+import gymnasium
+import numpy as np
+
+from .action_scales import ActionScale
+from .actuators import KINDS, ActuatorFault, Free, Seized
+from .schedule import Failures
+
+Commands = Literal["effort", "velocity", "position"]
+"""What actions command."""
+Mechanism = Callable[[Any, dict[str, str]], None]
+"""Is called before every step with the environment beneath and the faults that no action expresses,
+kinds by actuator, as long as there are some, and once more when there are none."""
+
+INEXPRESSIBLE: Mapping[Commands, type[ActuatorFault]] = {
+    "effort": Seized,
+    "velocity": Free,
+    "position": Free,
+}
+"""What no action expresses, by what actions command."""
+
+
+class Carried:
+    """The actuators of one or more action spaces under a schedule of faults.
+
+    Parameters
+    ----------
+    spaces
+        Action spaces by the prefix of their actuators' names.
+    faults
+        The schedule.
+    seed
+        Of what noise and draws follow, with the seed of the environment and the episode's number.
+    commands
+        What actions command.
+    rest
+        Actions at rest, by the same prefixes; see `ActionScale`.
+    mechanism
+        See `Mechanism`.
+
+    Raises
+    ------
+    ValueError
+        If a fault names no actuator, or cannot be expressed.
+    """
+
+    def __init__(
+        self,
+        spaces: Mapping[str, gymnasium.Space[Any]],
+        faults: Sequence[ActuatorFault],
+        seed: int,
+        commands: Commands,
+        rest: Mapping[str, Any],
+        mechanism: Mechanism | None,
+    ) -> None:
+        if commands not in INEXPRESSIBLE:
+            raise ValueError(f"commands = {commands!r}, allowed: {', '.join(INEXPRESSIBLE)}")
+        for i, fault in enumerate(faults):
+            if isinstance(fault, INEXPRESSIBLE[commands]) and mechanism is None:
+                raise ValueError(
+                    f"faults[{i}]: no {commands} makes an actuator {_kind(fault)}; give a "
+                    f"mechanism that does, or say what else actions command"
+                )
+        self.scales = {
+            prefix: ActionScale(space, rest.get(prefix), f"action space {prefix}".rstrip())
+            for prefix, space in spaces.items()
+        }
+        self.names = tuple(
+            f"{prefix}.{i}" if prefix else str(i)
+            for prefix, scale in self.scales.items()
+            for i in range(len(scale))
+        )
+        ends = np.cumsum([0, *map(len, self.scales.values())])
+        self._spans = {
+            prefix: slice(*ends[i : i + 2].tolist()) for i, prefix in enumerate(self.scales)
+        }
+        limits = np.concatenate([scale.limits for scale in self.scales.values()])
+        self._failures = Failures(faults, self.names, limits, "faults")
+        self._commands, self._mechanism, self._seed = commands, mechanism, seed
+        self._world, self._episode = 0, -1
+        self._hooked = False
+        self._begin(0, 0)
+
+    def reset(self, seed: int | None, options: Mapping[str, Any] | None) -> dict[str, Any] | None:
+        """Start the next episode; a seed starts their count afresh. Return the options left.
+
+        The option ``fault_episode`` sets the number of the episode, by which faults are scheduled.
+        """
+        rest = dict(options or {})
+        if seed is not None:
+            self._world, self._episode = seed, -1
+        self._begin(self._world, int(rest.pop("fault_episode", self._episode + 1)))
+        return rest if rest else None
+
+    def _begin(self, world: int, episode: int) -> None:
+        self._world, self._episode, self._step = world, episode, 0
+        root = np.random.SeedSequence([self._seed, world, episode])
+        self._failures.begin(root, episode)
+        self._rng = np.random.default_rng(root)
+        self._held = np.zeros(len(self.names))
+
+    def carry(self, told: Mapping[str, Any], environment: Any) -> dict[str, Any]:
+        """Return what is carried out of the actions of one step, by prefix.
+
+        Spaces whose action is missing rest.
+        """
+        self._failures.strike(self._step)
+        self._step += 1
+        places = np.zeros(len(self.names))
+        for prefix, action in told.items():
+            places[self._spans[prefix]] = self.scales[prefix].place(action)
+        drawn = self._rng.random(len(places))  # as many whatever fails: runs stay paired
+        driven = self._failures.driven(places, 1)[0]
+        changed = self._failures.failed
+        if self._commands == "position":
+            for fault, mask in self._failures.active():
+                if isinstance(fault, Seized):
+                    driven[mask] = self._held[mask]
+        for fault, mask in self._failures.active():
+            if isinstance(fault, Free):
+                driven[mask] = 0.0
+        self._held = np.where(changed, driven, places)
+        if self._mechanism is not None:
+            self._hook(self._mechanism, environment)
+        return {
+            prefix: self.scales[prefix].action(
+                driven[span], action, changed[span], drawn[span]
+            )
+            for prefix, action in told.items()
+            for span in [self._spans[prefix]]
+        }  # fmt: skip
+
+    def _hook(self, mechanism: Mechanism, environment: Any) -> None:
+        unexpressed = INEXPRESSIBLE[self._commands]
+        now = {n: k for n, k in self.now().items() if KINDS[k] is unexpressed}
+        if now or self._hooked:
+            mechanism(environment, now)
+        self._hooked = bool(now)
+
+    def now(self) -> dict[str, str]:
+        """Return the kind of the fault of every actuator that has one; of several, the last."""
+        return {
+            self.names[i]: _kind(fault)
+            for fault, mask in self._failures.active()
+            for i in np.flatnonzero(mask)
+        }
+
+
+def _kind(fault: Any) -> str:
+    return next(name for name, kind in KINDS.items() if isinstance(fault, kind))

@@ -1,0 +1,255 @@
+"""What faults cost any policy in any environment, and how it comes back: the recovery table.
+
+A policy runs the same episodes twice, with the faults and without: same worlds, same random
+numbers. Returns are sums of rewards, of a parallel environment their mean over agents. Of `BLOCK`
+episodes each there are the level *before* the onset, *just after* it and at the *end*. The
+*cumulative loss* is what the episodes from the onset on fall short of their like without fault. The
+*recovery time* is the number of episodes from the onset until `BLOCK` episodes in a row have
+regained `REGAINED` of what was lost just after it, always compared with the same episodes without
+fault. A seed that does not recover counts with all the episodes that were run: a lower bound.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from ...core.arrays import FloatArray
+from ...scenarios.failures.actuators import ActuatorFault
+from ...scenarios.failures.wrappers import FaultyEnv, FaultyParallelEnv
+from ..analysis.statistics import NOT_NEGATIVE, bootstrap, rate
+from ..analysis.summary import Summary
+from ..presentation.tables import SummaryTable, tabulate
+
+BLOCK = 5
+"""Episodes that a level is measured over."""
+REGAINED = 0.9
+"""Share of what was lost just after the onset that counts as recovered when it is back."""
+
+
+class Policy(Protocol):
+    """What may act: a function of an observation, or of observations by agent.
+
+    A model of stable-baselines3 will do, whose ``predict`` is asked without exploration. Whoever
+    has ``begin(seed)`` is told that a run begins, with or without faults; whoever has ``observe``
+    is told reward, observation, terminated and truncated after every step, and may learn.
+    """
+
+    def __call__(self, observation: Any) -> Any:
+        """Return the action."""
+        ...
+
+
+class RandomPolicy:
+    """Acts at random.
+
+    Parameters
+    ----------
+    space
+        The action space; by agent for a parallel environment.
+    """
+
+    def __init__(self, space: Any) -> None:
+        self.space = space
+
+    def begin(self, seed: int) -> None:
+        """Start the random numbers of a run."""
+        spaces = self.space.values() if isinstance(self.space, Mapping) else [self.space]
+        for i, space in enumerate(spaces):
+            space.seed(seed + i)
+
+    def __call__(self, observation: Any) -> Any:
+        """Return an action, or one of every agent that observes."""
+        if isinstance(self.space, Mapping):
+            return {agent: self.space[agent].sample() for agent in observation}
+        return self.space.sample()
+
+
+@dataclass(frozen=True)
+class FaultCourse:
+    """The returns of one policy under one schedule of faults.
+
+    Attributes
+    ----------
+    name
+        Policy and schedule.
+    onset
+        Episode in which the first fault begins.
+    healthy, faulty
+        ``(n_seeds, n_episodes)`` returns without and with the faults.
+    """
+
+    name: str
+    onset: int
+    healthy: FloatArray
+    faulty: FloatArray
+
+    @property
+    def shortfall(self) -> FloatArray:
+        """What the episodes from the onset on fall short of their like without fault."""
+        short: FloatArray = (self.healthy - self.faulty)[:, self.onset :]
+        return short
+
+    def recovery(self) -> tuple[FloatArray, FloatArray]:
+        """Return per seed whether it recovered, and after how many episodes."""
+        short = sliding_window_view(self.shortfall, BLOCK, axis=1).mean(axis=2)
+        lost = np.maximum(short[:, :1], 0.0)
+        regained = short <= (1.0 - REGAINED) * lost + 1e-12
+        recovered = regained.any(axis=1)
+        episodes = np.where(recovered, regained.argmax(axis=1), self.shortfall.shape[1])
+        return recovered.astype(float), episodes.astype(float)
+
+    def summary(self) -> Summary:
+        """Return its line of the table."""
+        recovered, episodes = self.recovery()
+        k = self.onset
+        blocks = {
+            "before": self.faulty[:, k - BLOCK : k],
+            "just after": self.faulty[:, k : k + BLOCK],
+            "end": self.faulty[:, -BLOCK:],
+            "end, no fault": self.healthy[:, -BLOCK:],
+        }
+        levels = {title: bootstrap(block.mean(axis=1)) for title, block in blocks.items()}
+        return Summary(
+            self.name,
+            len(self.faulty),
+            {
+                **levels,
+                "cumulative loss": bootstrap(self.shortfall.sum(axis=1)),
+                "recovered": rate(recovered[:, None]),
+                "recovery time": bootstrap(episodes, bounds=NOT_NEGATIVE),
+            },
+        )
+
+
+@dataclass(frozen=True)
+class RecoveryTable:
+    """What faults cost, policy by policy; printed or shown by a notebook.
+
+    Attributes
+    ----------
+    courses
+        The returns behind every line.
+    """
+
+    courses: tuple[FaultCourse, ...]
+
+    @cached_property
+    def table(self) -> SummaryTable:
+        """The table in all its forms."""
+        return tabulate([course.summary() for course in self.courses])
+
+    def __str__(self) -> str:
+        said = f"Levels are mean returns of {BLOCK} episodes; recovery time is in episodes."
+        return f"{self.table}\n{said}"
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        return self.table.html
+
+
+def recovery_table(
+    make: Callable[[], Any],
+    policies: Mapping[str, Any],
+    faults: Mapping[str, Sequence[ActuatorFault]],
+    *,
+    seeds: int | Sequence[int] = 5,
+    episodes: int = 20,
+    steps: int = 1000,
+    **wrapping: Any,
+) -> RecoveryTable:
+    """Run policies through schedules of faults, paired with the same runs without.
+
+    Parameters
+    ----------
+    make
+        Makes the environment, of Gymnasium or PettingZoo's parallel kind.
+    policies
+        By name; see `Policy`.
+    faults
+        Schedules by name.
+    seeds
+        How many, or which.
+    episodes
+        Of each run; `BLOCK` or more come before the first fault, and as many from it on.
+    steps
+        Most steps of an episode.
+    **wrapping
+        Further arguments of `FaultyEnv`.
+
+    Raises
+    ------
+    ValueError
+        If there are no seeds or too few episodes, or as `FaultyEnv` does.
+    """
+    run = range(seeds) if isinstance(seeds, int) else seeds
+    if len(run) == 0:
+        raise ValueError("seeds = 0, allowed: 1 or more")
+    for name, schedule in faults.items():
+        onset = min((fault.episode for fault in schedule), default=0)
+        if not BLOCK <= onset <= episodes - BLOCK:
+            raise ValueError(
+                f"faults {name!r}: the first begins in episode {onset}, allowed {BLOCK} to "
+                f"{episodes - BLOCK} of {episodes} episodes"
+            )
+    courses = []
+    for acting, policy in policies.items():
+        healthy = np.array([returns(make, policy, (), s, episodes, steps, **wrapping) for s in run])
+        for name, schedule in faults.items():
+            faulty = [returns(make, policy, schedule, s, episodes, steps, **wrapping) for s in run]
+            onset = min(fault.episode for fault in schedule)
+            courses.append(FaultCourse(f"{acting}: {name}", onset, healthy, np.array(faulty)))
+    return RecoveryTable(tuple(courses))
+
+
+def returns(
+    make: Callable[[], Any],
+    policy: Any,
+    faults: Sequence[ActuatorFault],
+    seed: int,
+    episodes: int,
+    steps: int,
+    **wrapping: Any,
+) -> FloatArray:
+    """Return the returns ``(episodes,)`` of one run; see `recovery_table`."""
+    made = make()
+    is_parallel = hasattr(made, "possible_agents")
+    env: Any = (FaultyParallelEnv if is_parallel else FaultyEnv)(made, faults, **wrapping)
+    act = policy if not hasattr(policy, "predict") else _predicting(policy)
+    observe = getattr(policy, "observe", None)
+    if hasattr(policy, "begin"):
+        policy.begin(seed)
+    found = np.zeros(episodes)
+    for episode, world in enumerate(np.random.SeedSequence(seed).generate_state(episodes)):
+        seen, _ = env.reset(seed=int(world), options={"fault_episode": episode})
+        for _ in range(steps):
+            seen, reward, terminated, truncated, _ = env.step(act(seen))
+            if observe is not None:
+                observe(reward, seen, terminated, truncated)
+            if is_parallel:
+                found[episode] += sum(reward.values()) / len(env.possible_agents)
+                over = not env.agents
+            else:
+                found[episode] += float(reward)
+                over = terminated or truncated
+            if over:
+                break
+    env.close()
+    return found
+
+
+def _predicting(model: Any) -> Callable[[Any], Any]:
+    """Return a model of stable-baselines3 as a function; of observations by agent, each apart."""
+
+    def act(seen: Any) -> Any:
+        if isinstance(seen, Mapping):
+            return {agent: act(one) for agent, one in seen.items()}
+        return model.predict(seen, deterministic=True)[0]
+
+    return act

@@ -1,0 +1,80 @@
+"""The recovery table: its numbers by hand, and policies of several kinds."""
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+
+from nested_agents import faults
+from nested_agents.scenarios.box_pushing.environments import WheelsEnv
+from nested_agents.studies.api.recovery import BLOCK, FaultCourse, returns
+
+
+def test_numbers_by_hand() -> None:
+    healthy = np.full((2, 16), 10.0)
+    faulty = healthy.copy()
+    faulty[0, 5:8] = 0.0  # recovers: a block in a row is as good as without the fault from 8 on
+    faulty[1, 5:] = 4.0  # never does
+    course = FaultCourse("policy: fault", 5, healthy, faulty)
+    recovered, episodes = course.recovery()
+    assert recovered.tolist() == [1, 0]
+    assert episodes.tolist() == [3, 11]
+    estimates = {name: float(e.value) for name, e in course.summary().estimates.items()}
+    assert estimates == {
+        "before": 10.0,
+        "just after": pytest.approx((4 + 4) / 2),
+        "end": 7.0,
+        "end, no fault": 10.0,
+        "cumulative loss": pytest.approx((30 + 66) / 2),
+        "recovered": 0.5,
+        "recovery time": 7.0,
+    }
+
+
+class Pushing:
+    """Pushes where the pole falls, as a model of stable-baselines3 would be asked."""
+
+    def predict(self, seen: Any, deterministic: bool) -> tuple[Any, None]:
+        return np.array(int(seen[2] + seen[3] > 0)), None
+
+
+def make() -> Any:
+    return gymnasium.make("CartPole-v1")
+
+
+def test_a_fault_that_ends() -> None:
+    policies = {"push": Pushing(), "random": faults.RandomPolicy(make().action_space)}
+    schedules = {"reversed": [faults.Reversed(actuators=0, episode=5, end_episode=8)]}
+    table = faults.recovery_table(make, policies, schedules, seeds=2, episodes=13, steps=60)
+    again = faults.recovery_table(make, policies, schedules, seeds=2, episodes=13, steps=60)
+    pushing, random = table.courses
+    assert (pushing.healthy == 60).all()
+    assert (pushing.faulty[:, 5:8] < 20).all()
+    assert (pushing.faulty[:, 8:] == 60).all()
+    assert pushing.recovery()[1].tolist() == [3, 3]
+    assert (random.healthy[:, :5] == random.faulty[:, :5]).all()
+    assert (random.faulty == again.courses[1].faulty).all()
+    lines = str(table).splitlines()
+    assert max(map(len, lines)) <= 80
+    assert lines[-1].startswith(f"Levels are mean returns of {BLOCK} episodes; ")
+
+
+def test_agents_of_a_parallel_environment() -> None:
+    def wheels() -> WheelsEnv:
+        return WheelsEnv({"robots": 1, "action_repeat": 2}, steps=4)
+
+    env = wheels()
+    policy = faults.RandomPolicy({name: env.action_space(name) for name in env.possible_agents})
+    fault = faults.Reversed(actuators="robot1.left.*")
+    found = [returns(wheels, policy, f, 1, 2, 4) for f in ((), (), [fault])]
+    assert (found[0] == found[1]).all()
+    assert (found[0] != found[2]).any()
+
+
+def test_what_cannot_be_is_refused() -> None:
+    late = {"late": [faults.Free(actuators=0, episode=12)]}
+    with pytest.raises(ValueError, match=r"'late': .* episode 12, allowed 5 to 10"):
+        faults.recovery_table(make, {}, late, episodes=15)
+    with pytest.raises(ValueError, match="seeds = 0"):
+        faults.recovery_table(make, {}, {}, seeds=0)
