@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.progress import track
 
 from ...core.protocols import Scenario
-from ...core.registry import closest
+from ...core.refusals import closest
 from ...core.rules.rule_base import RuleBase
 from ...core.spaces import Variable
 from ...core.team import Team
