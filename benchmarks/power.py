@@ -30,10 +30,14 @@ CASES = (
     (30, 10, 0.7),
 )  # fmt: skip
 CHANCES = ((8, 1, 0.3, 0.8), (12, 2, 0.4, 0.8), (20, 1, 0.6, 0.8), (30, 10, 0.6, 0.85))
-"""Seeds, comparisons, and the mean chances of success that are compared."""
-EPISODES = 10
-SPREAD = 6.0
-"""Of the Beta distribution of chances over seeds: the sum of its parameters."""
+"""Seeds, comparisons, mean chances of success that are compared; `RATES` was chosen on these."""
+EPISODES, SPREAD = 10, 6.0
+"""Of each seed, and of the Beta distribution of chances over seeds: the sum of its parameters."""
+OTHERS = (
+    (9, 1, 0.2, 0.7, 10, 6.0), (10, 3, 0.5, 0.95, 20, 3.0), (16, 1, 0.5, 0.75, 5, 12.0),
+    (15, 4, 0.1, 0.45, 20, 6.0), (24, 2, 0.7, 0.9, 10, 3.0), (30, 1, 0.4, 0.55, 20, 12.0),
+)  # fmt: skip
+"""Cases on which nothing was chosen, with episodes and spread of their own."""
 EXACT_SEEDS, DRAWN = 12, 2000
 
 
@@ -42,15 +46,15 @@ def normal(effect: float) -> Draw:
     return lambda rng, studies, seeds: rng.normal(size=(studies, seeds)) + effect
 
 
-def rates(first: float, second: float) -> Draw:
+def rates(first: float, second: float, episodes: int, spread: float) -> Draw:
     """Return what draws differences of two success rates of mean chances `first` and `second`."""
 
     def draw(rng: np.random.Generator, studies: int, seeds: int) -> np.ndarray:
         found = [
-            rng.binomial(EPISODES, rng.beta(p * SPREAD, (1 - p) * SPREAD, (studies, seeds)))
+            rng.binomial(episodes, rng.beta(p * spread, (1 - p) * spread, (studies, seeds)))
             for p in (first, second)
         ]
-        return np.asarray((found[1] - found[0]) / EPISODES)
+        return np.asarray((found[1] - found[0]) / episodes)
 
     return draw
 
@@ -75,7 +79,11 @@ def main() -> None:
     cases: list[tuple[str, int, int, Draw, bool]] = [
         (f"normal, {effect:g} deviations", n, m, normal(effect), False) for n, m, effect in CASES
     ]
-    cases += [(f"rates of {p:g} and {q:g}", n, m, rates(p, q), True) for n, m, p, q in CHANCES]
+    chances = [(*case, EPISODES, SPREAD) for case in CHANCES]
+    cases += [
+        (f"rates of {p:g}, {q:g} ({k})", n, m, rates(p, q, k, spread), True)
+        for n, m, p, q, k, spread in [*chances, *OTHERS]
+    ]
     for name, seeds, comparisons, draw, of_rates in cases:
         rng = np.random.default_rng([seeds, comparisons])
         many = draw(rng, 100_000, 1)
@@ -86,7 +94,7 @@ def main() -> None:
         if of_rates:
             own = [deviation_of([d], of_rates=True) or 0.0 for d in differences[:200]]
             told = [power(effect, round(d, 3), seeds, comparisons) for d in own]
-            promises[", own deviation"] = float(np.mean(told))
+            promises[", own"] = float(np.mean(told))
         for how, promised in promises.items():
             off = share - promised
             worst = max(worst, abs(off))

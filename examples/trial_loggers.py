@@ -12,9 +12,9 @@ class TensorBoard:
     """Curves of every measure, a run for each trial, below ``tensorboard`` in the study."""
 
     def __init__(self, spec, directory):
-        from torch.utils.tensorboard import SummaryWriter
+        from tensorboard.summary import Writer
 
-        self.writer = lambda name: SummaryWriter(str(directory / "tensorboard" / name))
+        self.writer = lambda name: Writer(str(directory / "tensorboard" / name))
 
     def trial(self, trial, result):
         """Write what a trial has measured."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import (
@@ -290,6 +291,14 @@ class BoxPushingSettings(ScenarioSettings):
         if self.predictor != "push" and self.belief != BeliefSettings():
             raise ValueError(f"belief is for predictor = 'push', received {self.predictor!r}")
         return self
+
+    def suited(self, preset: str) -> Mapping[str, Any]:
+        """Return what learns best here: with one or two robots, every wheel by weights of its own.
+
+        Two robots stand on different sides of the box and need different functions; larger teams
+        learn sooner if all left wheels share theirs, and all right wheels.
+        """
+        return {"learner": {"weights": "own"}} if preset == "default" and self.robots <= 2 else {}
 
     def doubts(self) -> tuple[str, ...]:
         """Return sizes that are surely meant in another unit, a line each.

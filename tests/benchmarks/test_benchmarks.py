@@ -65,6 +65,14 @@ def test_a_small_crowd_is_drawn(run: Run, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_decisions_of_every_size_are_timed(run: Run) -> None:
+    few = ["--preset", "own-value", "--robots", "2", "4", "5", "--number", "3"]
+    said = run("benchmarks.decisions", *few)
+    assert "time ~ n^" in said
+    assert "with 8 to 10 agents (least)" in said
+
+
+@pytest.mark.slow
 def test_what_can_be_solved_at_a_size_is_told(run: Run) -> None:
     few = ["--robots", "3", "--seeds", "2", "--scalings", "similar", "--grows", "width"]
     said = run("benchmarks.sizes", *few)

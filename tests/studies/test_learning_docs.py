@@ -19,6 +19,11 @@ COLUMNS = ("success last 5", "evaluation success", "evaluation steps")
         ("tasks", COLUMNS),
         ("told", COLUMNS),
         ("scaling", ("evaluation success", "all touch")),
+        ("crowds", ("evaluation success", "all touch")),
+        ("controls", ("evaluation success",)),
+        ("own-value", ("evaluation success",)),
+        ("transfer", ("evaluation success", "success, four", "success, eight")),
+        ("curriculum", ("evaluation success", "success, sixteen", "success, thirty-two")),
     ],
 )
 def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
