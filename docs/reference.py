@@ -83,7 +83,7 @@ MODULES = {
         "evaluators.evaluator", "evaluators.auto", "evaluators.exact", "evaluators.sampling",
         "evaluators.additive", "evaluators.best_response", "evaluators.coordination",
         "coordination.elimination", "coordination.max_plus",
-        "self_model", "calibration", "cost", "registry", "settings",
+        "self_model", "calibration", "cost", "registry", "plugged", "settings",
     )),
     "topologies": ("Who is above whom.", ("builders", "checks", "config", "drawing", "files")),
     "scenarios": ("Where agents act.", (
