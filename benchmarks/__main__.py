@@ -5,12 +5,12 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import platform
 from pathlib import Path
 
 from rich.console import Console
 
 from . import measures, tables
+from .machine import machine
 
 
 def main() -> None:
@@ -40,19 +40,18 @@ def main() -> None:
     imports = measures.import_seconds(1 if options.smoke else 3)
     for name, seconds in imports.items():
         console.print(f"{name:>14} {seconds:5.2f} s to start and import")
-    machine = {
-        "processor": platform.machine(),
-        "cores": os.cpu_count(),
-        "python": platform.python_version(),
-        "load_at_start": began,
-        "load_at_end": os.getloadavg()[0],
-    }
+    ended = os.getloadavg()[0]
     console.print(
-        f"load {began:.1f} before, {machine['load_at_end']:.1f} after, on {os.cpu_count()} cores; "
-        f"ja: joint action"
+        f"load {began:.1f} before, {ended:.1f} after, on {os.cpu_count()} cores; ja: joint action"
+    )
+    ran_on = machine()
+    console.print(
+        "this machine: bytecode {bytecode_mhz:.1f} MHz, arithmetic {arithmetic_gflops:.1f} GFLOPS, "
+        "memory {memory_gb_s:.1f} GB/s".format(**ran_on["speed"]),
     )
     if options.json:
-        result = {"machine": machine, "exact": steps, "beyond": large, "import_seconds": imports}
+        ran_on |= {"load_at_start": began, "load_at_end": ended}
+        result = {"machine": ran_on, "exact": steps, "beyond": large, "import_seconds": imports}
         options.json.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
 
 

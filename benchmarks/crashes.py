@@ -29,10 +29,14 @@ from nested_agents.studies.spec.toml import dumps
 from nested_agents.studies.store.running import MARK
 from nested_agents.studies.store.store import Store
 
-SPEC = Spec.of(
-    {"seeds": 20, "episodes": 2, "steps": 100, "evaluation": 1,
-     "sweep": {"preset": ["default", "frozen"]}}
-)  # fmt: skip
+
+def spec_of(seeds: int) -> Spec:
+    """Return the spec of the study, of two conditions."""
+    return Spec.of(
+        {"seeds": seeds, "episodes": 2, "steps": 100, "evaluation": 1,
+         "sweep": {"preset": ["default", "frozen"]}}
+    )  # fmt: skip
+
 
 LONGEST = 1.5
 """Most seconds to a kill from the moment that trials are handed out or that another one is kept."""
@@ -70,11 +74,11 @@ class Tally:
     unequal: int = 0
 
 
-def disturb(backend: str, kills: int, seed: int, folder: Path) -> Tally:
-    """Kill `kills` processes of studies in `folder`, and return what happened."""
+def disturb(backend: str, kills: int, seed: int, seeds: int, folder: Path) -> Tally:
+    """Kill `kills` processes of studies of `seeds` in `folder`, and return what happened."""
     rng = random.Random(seed)
     spec = folder / "spec.toml"
-    spec.write_text(dumps(SPEC.table()))
+    spec.write_text(dumps(spec_of(seeds).table()))
     assert _begin(["run", spec, "--out", folder / "whole"], "loky").wait() == 0
     expected = _digest(folder / "whole")
     tally = Tally()
@@ -202,10 +206,11 @@ def main() -> int:
     parser.add_argument("--kills", type=int, default=100, metavar="N")
     parser.add_argument("--backend", choices=sorted(WORKERS), default="loky")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--seeds", type=int, default=20, metavar="N", help="of the study")
     options = parser.parse_args()
     begin = time.monotonic()
     with tempfile.TemporaryDirectory() as folder:
-        tally = disturb(options.backend, options.kills, options.seed, Path(folder))
+        tally = disturb(options.backend, options.kills, options.seed, options.seeds, Path(folder))
     print(f"backend         {options.backend}, seed {options.seed}")
     print(f"killed          {tally.kills['process']} processes, {tally.kills['worker']} workers")
     print(f"studies         {tally.studies}, the command begun {tally.runs} times")

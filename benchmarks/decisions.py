@@ -18,6 +18,7 @@ from rich.console import Console
 from rich.table import Table
 
 from nested_agents.core.loop import world_seed
+from nested_agents.core.team import of_fuzzy_agents
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import Session
 from nested_agents.studies.trials.trial import trials_of
@@ -32,7 +33,7 @@ def decisions(preset: str, robots: int, number: int) -> list[float]:
     settings = {"preset": preset, "seeds": 1, "scenario": {"robots": robots}}
     (trial,) = trials_of(Spec.of(settings))
     session = Session(trial)
-    scenario, team = session.scenario, session.team
+    scenario, team = session.scenario, of_fuzzy_agents(session.team)
     theta = team.learner.theta
     theta[:] = np.random.default_rng(0).normal(size=theta.shape)
     scenario.reset(world_seed(0, 0), 0)

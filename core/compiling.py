@@ -19,7 +19,7 @@ import threading
 from collections.abc import Callable, Iterator
 from functools import cache, cached_property, update_wrapper
 from pathlib import Path
-from types import CodeType, ModuleType
+from types import CodeType, FunctionType
 from typing import Any, TypeVar, cast
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -29,6 +29,13 @@ IMPORT = re.compile(r"^\s*from (\.+)([\w.]*) import ", re.MULTILINE)
 
 LOCK = "compiling.lock"
 """The file beside cached kernels that a process holds while it compiles."""
+
+INNER = "-inner"
+"""What tells cached kernels for kernels from those for Python."""
+
+FROM_PYTHON = {"no_cfunc_wrapper": True}
+FROM_KERNELS = {"no_cfunc_wrapper": True, "no_cpython_wrapper": True}
+"""What nobody calls is not compiled: a third to a half of a small kernel is its wrappers."""
 
 _threads = threading.RLock()
 
@@ -51,23 +58,33 @@ class Kernel:
 
     @cached_property
     def compiled(self) -> Any:
-        """What numba makes of the function; the kernels that it calls are made first."""
+        """What numba makes of the function for Python to call."""
+        return self._made("", **FROM_PYTHON)
+
+    @cached_property
+    def inner(self) -> Any:
+        """What numba makes of the function for other kernels to call, by far the less code."""
+        return self._made(INNER, **FROM_KERNELS)
+
+    def _made(self, suffix: str, **options: bool) -> Any:
         import numba
 
-        here = self.py_func.__globals__
-        names = set(_names(self.py_func.__code__))
-        for name in names & here.keys():
-            if isinstance(here[name], Kernel):
-                here[name] = here[name].compiled
-            elif isinstance(here[name], ModuleType):
-                for inner in names & vars(here[name]).keys():
-                    thing = getattr(here[name], inner)
-                    if isinstance(thing, Kernel):
-                        setattr(here[name], inner, thing.compiled)
-        compiled = numba.njit(**self._options)(self.py_func)
+        function = self.py_func
+        names = set(_names(function.__code__)) & function.__globals__.keys()
+        kernels = {
+            name: thing.inner
+            for name in names
+            if isinstance(thing := function.__globals__[name], Kernel)
+        }
+        seen = FunctionType(
+            function.__code__, function.__globals__ | kernels, function.__name__,
+            function.__defaults__, function.__closure__,
+        )  # fmt: skip
+        seen.__module__, seen.__qualname__ = function.__module__, function.__qualname__ + suffix
+        compiled = numba.njit(**self._options, **options)(seen)
         file = _cache_file(compiled)
         if file is not None:  # interpreted kernels, NUMBA_DISABLE_JIT=1, have none
-            source = Path(self.py_func.__code__.co_filename)
+            source = Path(function.__code__.co_filename)
             file._source_stamp = (file._source_stamp, stamp(source))
         return compiled
 

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from .evaluators import EVALUATORS, EvaluatorSettings
 from .evaluators.auto import AutoSettings
 from .evaluators.evaluator import Teammates, ValueOf
-from .registry import Plugged
+from .plugged import Plugged
 from .settings import Settings
 
 

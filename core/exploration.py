@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import Field
 
 from .arrays import FloatArray
-from .registry import SettingsRegistry
+from .plugged import SettingsRegistry
 from .settings import Fraction, NonNegative, Positive, Settings
 
 

@@ -18,8 +18,14 @@ learners (everybody is everybody's peer) and coordination graphs (few are).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING
 
-import networkx as nx
+from .deferred import Deferred
+
+if TYPE_CHECKING:
+    import networkx as nx
+else:
+    nx = Deferred("networkx")
 
 
 class Hierarchy:

@@ -87,7 +87,7 @@ MODULES = {
         "evaluators.evaluator", "evaluators.auto", "evaluators.exact", "evaluators.sampling",
         "evaluators.additive", "evaluators.best_response", "evaluators.coordination",
         "coordination.elimination", "coordination.max_plus",
-        "self_model", "calibration", "cost", "registry", "settings", "acting",
+        "self_model", "calibration", "cost", "registry", "plugged", "settings", "acting",
         "peers.settings", "peers.peer", "peers.seen", "peers.inputs",
     )),
     "topologies": ("Who is above whom.", ("builders", "checks", "config", "drawing", "files")),

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ..core.registry import SettingsRegistry
+from ..core.plugged import SettingsRegistry
 from ..core.settings import ScenarioSettings
 from .box_pushing.config import BoxPushingSettings
 

@@ -1,11 +1,11 @@
 """The examples of docs/extending.md: short, and run from outside the repository."""
 
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+
+from nested_agents.studies.cli.main import main
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "extending.md"
 SECTIONS = dict(
@@ -27,17 +27,16 @@ def test_all_kinds_have_an_example() -> None:
 
 
 @pytest.mark.parametrize("section", SECTIONS)
-def test_an_example_is_short_and_runs(section: str, tmp_path: Path) -> None:
+def test_an_example_is_short_and_runs(
+    section: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     code, spec = block(section, "python"), block(section, "toml")
     name = code.partition("\n")[0].removeprefix("# ")
     assert len([line for line in code.splitlines()[1:] if line.strip()]) <= MOST_LINES
     (tmp_path / name).write_text(code)
     (tmp_path / "spec.toml").write_text(spec)
-    for arguments in (["run", "spec.toml", "--out", "out"], ["report", "out"]):
-        call = subprocess.run(
-            [sys.executable, "-m", "nested_agents", *arguments],
-            cwd=tmp_path, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False,
-        )  # fmt: skip
-        assert call.returncode == 0, call.stderr
+    monkeypatch.chdir(tmp_path)
+    for arguments in (["run", "spec.toml", "--out", "out", "--jobs", "1"], ["report", "out"]):
+        assert main(arguments) == 0
         (tmp_path / name).unlink(missing_ok=True)  # the study has its own copy
     assert (tmp_path / "out" / "report.html").is_file()

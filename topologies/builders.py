@@ -10,13 +10,18 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from itertools import chain as concatenated
 from itertools import zip_longest
-from typing import Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
-import networkx as nx
 import numpy as np
 
+from ..core.deferred import Deferred
 from ..core.hierarchy import Hierarchy
 from .checks import check_names, with_edges
+
+if TYPE_CHECKING:
+    import networkx as nx
+else:
+    nx = Deferred("networkx")
 
 Member: TypeAlias = "str | Sequence[Member]"
 """An agent, or a team of members."""

@@ -7,24 +7,29 @@ argument may be. A further topology is one settings class and one line in `TOPOL
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
-import networkx as nx
 import numpy as np
 from pydantic import Field
 from typing_extensions import TypeAliasType
 
 from ..core import sources
+from ..core.deferred import Deferred
 from ..core.hierarchy import Hierarchy
+from ..core.plugged import Plugged, SettingsRegistry
 from ..core.protocols import Scenario, groups_of
 from ..core.refusals import closest
-from ..core.registry import Plugged, SettingsRegistry
 from ..core.robot_agents import per_robot
 from ..core.settings import Fraction, Settings, SettingsError, tuples
 from ..core.single_agent import SingleAgent
 from . import builders, files
 from .builders import from_networkx
 from .checks import check_names
+
+if TYPE_CHECKING:
+    import networkx as nx
+else:
+    nx = Deferred("networkx")
 
 Count = Annotated[int, Field(ge=1)]
 Groups = Sequence[Sequence[str]]

@@ -8,12 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import networkx as nx
 import numpy as np
 
 from ..core.arrays import FloatArray
+from ..core.deferred import Deferred
 from ..core.hierarchy import Hierarchy
+
+if TYPE_CHECKING:
+    import networkx as nx
+else:
+    nx = Deferred("networkx")
 
 COLUMNS = 6
 """Levels side by side before the picture is folded."""

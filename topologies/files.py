@@ -11,13 +11,17 @@ import json
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 from xml.etree import ElementTree
 
-import networkx as nx
-
 from ..core import sources
+from ..core.deferred import Deferred
 from .checks import check_legible, shown, with_edges
+
+if TYPE_CHECKING:
+    import networkx as nx
+else:
+    nx = Deferred("networkx")
 
 
 def read(path: str) -> nx.DiGraph | dict[str, Any]:

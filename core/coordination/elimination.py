@@ -9,12 +9,17 @@ back, each agent takes its best action given those that were eliminated later. T
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-import networkx as nx
 import numpy as np
 
 from ..arrays import FloatArray, IntArray
+from ..deferred import Deferred
+
+if TYPE_CHECKING:
+    import networkx as nx
+else:
+    nx = Deferred("networkx")
 
 Scope = tuple[int, ...]
 

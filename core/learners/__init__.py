@@ -6,7 +6,7 @@ and is not learned from. A terminal state counts as entered again for ever: its 
 R(s) / (1 - discount). Siblings differ where their mathematics differs.
 """
 
-from ..registry import SettingsRegistry
+from ..plugged import SettingsRegistry
 from .learner import LearnerSettings, TeamSettings
 
 PEERS = f"{__name__.rpartition('.')[0]}.peers.settings"

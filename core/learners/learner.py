@@ -11,7 +11,7 @@ from ..arrays import FloatArray, IntArray
 from ..calibration import CalibrationSettings
 from ..decision import Decision
 from ..exploration import EXPLORATIONS, BurstExploration, ExplorationSettings
-from ..registry import Plugged
+from ..plugged import Plugged
 from ..rules.settings import RuleBaseSettings
 from ..self_model import SelfModelSettings
 from ..settings import Settings

@@ -27,7 +27,7 @@ from ..spec.outline import Outline
 from ..spec.spec import Spec
 from ..trials.session import Session
 from ..trials.trial import Trial, check, trials_of
-from ..workers.worker import CORES
+from ..workers.worker import cores
 
 SEED = 10_000
 """Of the trials that are tried out."""
@@ -192,7 +192,7 @@ def plan(
     with made.sources.active():
         getattr(load_study(made.study), "check", lambda spec: None)(made)
     trials = trials_of(made)
-    processes = max(1, min(jobs or CORES, len(trials)))
+    processes = max(1, min(jobs or cores(), len(trials)))
     seconds = memory = None
     if timed:
         seconds, memory = _taken(made, trials, processes)

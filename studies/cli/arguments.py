@@ -13,7 +13,7 @@ from typing import Any
 
 import click
 
-from ...core.registry import closest
+from ...core.refusals import closest
 
 
 class Text(click.ParamType):

@@ -15,7 +15,7 @@ from importlib import import_module
 
 import click
 
-from ...core.registry import closest
+from ...core.refusals import closest
 from ..spec.errors import SpecError
 from .arguments import complaint
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from textwrap import fill
 from typing import Any, Literal
 
-from ...core.registry import closest
+from ...core.refusals import closest
 from ..spec.errors import SpecError, show
 from .labs import LABS, Lab
 

@@ -18,7 +18,7 @@ from rich.progress import track
 
 from ...core.learners import LearnerSettings
 from ...core.protocols import Scenario
-from ...core.registry import closest
+from ...core.refusals import closest
 from ...core.rules.rule_base import RuleBase
 from ...core.spaces import Variable
 from ...core.team import Team, of_fuzzy_agents

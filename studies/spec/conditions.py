@@ -18,15 +18,17 @@ from pydantic import Field, ValidationError
 
 from ...core.learners import LEARNERS, TeamSettings
 from ...core.learners.batch import BatchTDSettings
-from ...core.registry import Plugged, closest
+from ...core.plugged import Plugged
+from ...core.refusals import closest
 from ...core.settings import ScenarioSettings, Settings, tuples
 from ...scenarios import SCENARIOS
 from ...scenarios.box_pushing.config import BoxPushingSettings
 from ...topologies.config import ChainSettings, Topology, parse
 from .curriculum import Curriculum, Name, Stage, StageSettings
-from .errors import SpecError, explain, show
+from .errors import SpecError, show
 from .overlay import TomlTable, nested, overlay
 from .presets import PRESETS
+from .refused import explain
 from .renamed import now_called
 
 SECTIONS = ("scenario", "topology", "learner")

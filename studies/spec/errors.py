@@ -1,19 +1,8 @@
-"""What is wrong with a spec, in one line a user can act on.
-
-pydantic says where and what; this module turns that into the path as it stands in the spec, the
-value found there, what is allowed, and the closest known name.
-"""
+"""What is wrong with something that the user can mend, in one line to act on."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
-
-from pydantic import BaseModel, ValidationError
-
-from ...core.refusals import closest, dotted, mistaken, place, rule
-from .overlay import Slot, field_of, kind_of, model_at, models_of
-from .renamed import now_called
 
 LONGEST = 1200
 """Characters of a message; of a longer one the middle is left out."""
@@ -44,75 +33,3 @@ def show(value: object, width: int | None = 60) -> str:
     else:
         text = str(value)
     return text if width is None or len(text) <= width else text[: width - 3] + "..."
-
-
-def explain(error: ValidationError, model: type[BaseModel], data: Mapping[str, Any]) -> str:
-    """Return one line on the first thing that `error` found wrong with `data`.
-
-    Parameters
-    ----------
-    error
-        What pydantic raised when it validated `data` as `model`.
-    model
-        The model of the outermost table.
-    data
-        The table as the user gave it.
-    """
-    found = [(place(e["loc"], data), e) for e in error.errors(include_url=False)]
-    # Where a name or a table may stand and a table does, what is wrong is in the table.
-    start = found[0][0]
-    inside = [f for f in found if len(f[0]) > len(start) and f[0][: len(start)] == start]
-    (keys, first) = (inside or found)[0]
-    path = dotted(keys) or "spec"
-    if first["type"] == "extra_forbidden":
-        owner = _owner(keys[:-1], model, data)
-        kind = f" for kind {kind_of(owner)!r}" if owner is not None and kind_of(owner) else ""
-        renamed = now_called(path)
-        if renamed is not None:
-            return f"{path} = {show(first['input'])}: {renamed}"
-        known = set() if owner is None else set(owner.model_fields)
-        return f"{path} = {show(first['input'])}: unknown key{kind}; {closest(keys[-1], known)}"
-    if first["type"] == "missing":
-        name = str(first["loc"][-1])
-        return f"{path}: missing" if keys == (name,) else f"{path}.{name}: missing"
-    value = first["input"]
-    if first["type"] == "plugged_kind":
-        if isinstance(value, Mapping):
-            path, value = f"{path}.kind", value.get("kind")
-        renamed = now_called(path, value)
-        return f"{path} = {show(value)}: {renamed or first['msg']}"
-    if first["type"].startswith("union_tag"):
-        path, value = f"{path}.kind", value.get("kind") if isinstance(value, Mapping) else value
-        slot = _slot(keys, model, data)
-        kinds = [kind_of(m) for m in models_of(getattr(slot, "annotation", slot))]
-        return f"{path} = {show(value)}: {closest(value, [k for k in kinds if k])}"
-    # The members of a union complain one by one about the same place: say what any would take.
-    rules = dict.fromkeys(rule(e["msg"]) for there, e in found if there == keys)
-    renamed = now_called(path, value)
-    owner = _owner(keys[:-1], model, data) if keys else None
-    other = mistaken(keys[-1], owner.model_fields) if owner is not None else ""
-    return f"{path} = {show(value)}: {renamed or ', or '.join(rules) + other}"
-
-
-def _slot(keys: Sequence[int | str], model: type[BaseModel], data: Any) -> Slot:
-    """Return what the value at `keys` is meant for."""
-    slot: Slot = model
-    for key in keys:
-        if isinstance(key, int):  # an item of a list is one of the models that the list may hold
-            data = data[key]
-            continue
-        slot = field_of(model_at(slot, data), str(key))
-        if slot is None:
-            return None
-        data = data[key]
-    return slot
-
-
-def _owner(
-    keys: Sequence[int | str], model: type[BaseModel], data: Mapping[str, Any]
-) -> type[BaseModel] | None:
-    """Return the model of the table at `keys`."""
-    inner: Any = data
-    for key in keys:
-        inner = inner[key]
-    return model_at(_slot(keys, model, data), inner)

@@ -23,7 +23,7 @@ from annotated_types import Ge, Gt, Le, Lt, MinLen
 from pydantic.fields import FieldInfo
 from typing_extensions import TypeAliasType
 
-from ...core.registry import Plugged, SettingsRegistry
+from ...core.plugged import Plugged, SettingsRegistry
 from ...core.settings import Settings
 from .conditions import ConditionSettings, Override
 from .curriculum import StageSettings

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import networkx as nx
-
+from ...core.deferred import Deferred
 from ...core.evaluators import EVALUATORS
 from ...core.exploration import EXPLORATIONS
 from ...core.hierarchy import Hierarchy
@@ -19,6 +18,11 @@ from ...topologies import TOPOLOGIES
 from ...topologies.config import EdgesSettings
 from .. import STUDIES
 from .errors import SpecError
+
+if TYPE_CHECKING:
+    import networkx as nx
+else:
+    nx = Deferred("networkx")
 
 REGISTRIES: dict[str, Registry] = {
     "study": STUDIES,

@@ -18,16 +18,17 @@ from typing import Annotated, Any
 
 from pydantic import Field, PrivateAttr, ValidationError, field_validator
 
-from ...core.registry import closest
+from ...core.refusals import closest
 from ...core.settings import Settings, tuples
 from ...core.sources import Sources, is_reference, named
 from .. import STUDIES
 from .conditions import SECTIONS, Condition, Override, grid, section
 from .curriculum import Curriculum, Length, Name
-from .errors import SpecError, explain, show
+from .errors import SpecError, show
 from .objects import plain
 from .overlay import TomlTable, assignment, flat, overlay
 from .presets import PRESETS
+from .refused import explain
 
 MOST_TRIALS = 100_000
 """A larger grid is taken for a slip of the pen."""

@@ -8,7 +8,7 @@ from statistics import fmean
 
 from ..store.running import look
 from ..store.store import Store
-from .worker import CORES
+from .worker import cores
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ def progress(store: Store) -> Progress:
             failed=failed,
             left=len(trials) - len(states),
             running=(),
-            processes=CORES,
+            processes=cores(),
             seconds=None,
             damaged=tuple(store.notes),
             refusal=refusal,
@@ -64,7 +64,7 @@ def progress(store: Store) -> Progress:
     pending = [trial for trial in trials if trial.identity not in states]
     running = [trial for trial in pending if trial.identity in begun]
     left = [trial for trial in pending if trial.identity not in begun]
-    processes = CORES if mark is None else mark.processes
+    processes = cores() if mark is None else mark.processes
     seconds = _estimate(
         store.mean_seconds(),
         [trial.condition for trial in left],

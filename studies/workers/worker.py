@@ -11,13 +11,9 @@ from importlib.metadata import version
 from platform import python_version
 from typing import TYPE_CHECKING, NamedTuple
 
-from joblib import cpu_count
-
 if TYPE_CHECKING:
     from ..trials.trial import Trial, TrialResult
 
-CORES = cpu_count()
-"""Cores that this process may use."""
 
 POLL = 0.5
 """How often a worker looks whether its parent is still there [s]."""
@@ -30,6 +26,13 @@ ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_
 
 RunTrial = Callable[["Trial"], "TrialResult"]
 """Runs one trial; a module-level function, since workers import it by name."""
+
+
+def cores() -> int:
+    """Return how many cores this process may use."""
+    from joblib import cpu_count
+
+    return int(cpu_count())
 
 
 class Arrival(NamedTuple):

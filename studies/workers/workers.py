@@ -12,7 +12,7 @@ from typing import Literal, Protocol
 
 from ..spec.errors import SpecError
 from ..trials.trial import Trial
-from .worker import CORES, Arrival, RunTrial
+from .worker import Arrival, RunTrial, cores
 
 Backend = Literal["loky", "dask"]
 """``loky``: processes of this machine. ``dask``: workers of a Dask cluster."""
@@ -73,7 +73,7 @@ def start_workers(
     """
     if jobs is not None:
         check_jobs(jobs)
-    wanted = max(1, min(jobs or CORES, trials))
+    wanted = max(1, min(jobs or cores(), trials))
     if backend == "loky":
         from .loky import LokyWorkers
 

@@ -10,7 +10,8 @@ import pytest
 
 from nested_agents.core import registry
 from nested_agents.core.hierarchy import Hierarchy
-from nested_agents.core.registry import Plugged, Registry, SettingsRegistry
+from nested_agents.core.plugged import Plugged, SettingsRegistry
+from nested_agents.core.registry import Registry
 from nested_agents.core.settings import Settings, SettingsError
 from nested_agents.core.sources import Sources
 

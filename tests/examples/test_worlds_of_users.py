@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from nested_agents.studies.cli.main import main
+
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 pytestmark = pytest.mark.slow
 
@@ -22,13 +24,6 @@ def command(*arguments: str, cwd: Path) -> subprocess.Popen[str]:
         cwd=cwd, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
         text=True, start_new_session=True,
     )  # fmt: skip
-
-
-def call(*arguments: str, cwd: Path) -> str:
-    process = command(*arguments, cwd=cwd)
-    out, err = process.communicate(timeout=250)
-    assert process.returncode == 0, err
-    return out
 
 
 def rows(study: Path) -> list[tuple]:
@@ -47,13 +42,23 @@ def has_begun(study: Path) -> bool:
     ("name", "measure", "change"),
     [("tank", "missing_l", "scenario.pumps=2")],
 )
-def test_a_world_from_a_file(name: str, measure: str, change: str, tmp_path: Path) -> None:
+def test_a_world_from_a_file(
+    name: str,
+    measure: str,
+    change: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
     for suffix in ("py", "toml"):
         shutil.copy(EXAMPLES / f"{name}.{suffix}", tmp_path)
     short = ["--set", "seeds=3", "episodes=6", "steps=30", "evaluation=2", change]
     run = ["run", f"{name}.toml", *short, "--jobs", "1", "--out"]
-    call(*run, "whole", cwd=tmp_path)
-    header, *cells = call("results", "whole", "--format", "csv", cwd=tmp_path).splitlines()
+    assert main([*run, "whole"]) == 0
+    capsys.readouterr()
+    assert main(["results", "whole", "--format", "csv"]) == 0
+    header, *cells = capsys.readouterr().out.splitlines()
     assert measure in header.split(",")
     assert len(cells) == 2 * 3 * 6
 
@@ -64,13 +69,13 @@ def test_a_world_from_a_file(name: str, measure: str, change: str, tmp_path: Pat
     os.killpg(killed.pid, signal.SIGKILL)
     killed.communicate()
     (tmp_path / f"{name}.py").rename(tmp_path / "moved.py")
-    call(*run, "killed", cwd=tmp_path)
+    assert main([*run, "killed"]) == 0
     assert rows(tmp_path / "killed") == rows(tmp_path / "whole")
     for what in ("explain", "report", "table"):
-        call(what, "killed", cwd=tmp_path)
+        assert main([what, "killed"]) == 0
     page = (tmp_path / "killed" / "report.html").read_text(encoding="utf-8")
     assert measure.replace("final_", "").partition("_")[0] in page
 
     (tmp_path / "moved.py").rename(tmp_path / f"{name}.py")
-    call(*run, "cluster", "--backend", "dask", cwd=tmp_path)
+    assert main([*run, "cluster", "--backend", "dask"]) == 0
     assert rows(tmp_path / "cluster") == rows(tmp_path / "whole")

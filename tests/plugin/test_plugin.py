@@ -1,12 +1,14 @@
 """An installed package offers one thing of every kind, by entry points, and a study uses them."""
 
-import json
 import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from nested_agents.studies.cli.main import main
+from nested_agents.studies.store.store import Store
 
 ROOT = Path(__file__).resolve().parents[2]
 pytestmark = pytest.mark.slow
@@ -73,24 +75,30 @@ def test_a_study_of_what_a_package_offers(
     (tmp_path / "spec.toml").write_text(spec)
     run = call(installed, "run", "spec.toml", "--out", "out", cwd=tmp_path)
     assert (run.returncode, run.stderr.count("failed")) == (0, 0), run.stderr
-    rows = json.loads(call(installed, "results", "out", "--format", "json", cwd=tmp_path).stdout)
-    assert len({row["condition"] for row in rows}) == conditions
+    with Store.open(tmp_path / "out") as store:
+        assert len(store.columns()) == conditions
+        assert store.counts() == {"done": 2 * conditions, "failed": 0}
     assert call(installed, "report", "out", cwd=tmp_path).returncode == 0
 
 
 def test_settings_of_a_package_are_checked_like_built_in_ones(
-    installed: Path, tmp_path: Path
+    installed: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
+    monkeypatch.syspath_prepend(installed)
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "spec.toml").write_text(MEETING.partition("[sweep]")[0])
     for change, said in (
         ("scenario.walker=3", "did you mean 'walkers'?"),
         ("scenario.walkers=9", "scenario.walkers = 9: must be at most 8"),
         ("scenario.kind=meting", "did you mean 'meeting'?"),
     ):
-        (tmp_path / "spec.toml").write_text(MEETING.partition("[sweep]")[0])
-        arguments = ("run", "spec.toml", "--out", "out", "--set", change)
-        run = call(installed, *arguments, cwd=tmp_path)
-        assert (run.returncode, run.stderr.count("\n")) == (2, 1)
-        assert said in run.stderr
+        assert main(["run", "spec.toml", "--out", "out", "--set", change]) == 2
+        error = capsys.readouterr().err
+        assert error.count("\n") == 1
+        assert said in error
 
 
 def test_every_kind_of_thing_is_offered(installed: Path, tmp_path: Path) -> None:

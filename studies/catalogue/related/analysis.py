@@ -20,6 +20,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ....core.team import of_fuzzy_agents
 from ...analysis.results import Results
 from ...analysis.statistics import NOT_NEGATIVE, Estimate, bootstrap
 from ...analysis.summary import EVALUATED, Summary, evaluated
@@ -49,7 +50,7 @@ def measure(trial: Trial) -> TrialResult:
     Session(replace(trial, episodes=1, steps=3, curriculum=())).train(1)
     session = Session(trial)
     session.train(trial.episodes)
-    team = session.team
+    team = of_fuzzy_agents(session.team)
     hierarchy, n_rules = team.hierarchy, team.learner.theta.shape[1]
     tried = 0 if team.evaluator is None else hierarchy.joint_actions(len(team.action_set))
     counted = 0 if team.evaluator is None else team.evaluator.counts.rule_evaluations

@@ -17,7 +17,7 @@ def command(prefix: str | None) -> int:
     from shutil import get_terminal_size
     from textwrap import fill
 
-    from ....core.registry import closest
+    from ....core.refusals import closest
     from ...spec.errors import SpecError
     from ...spec.keys import keys_below, tables
 

@@ -77,7 +77,7 @@ def test_what_is_written_is_whole_or_not_there(command, whole, tmp_path):
     before = content(whole)
     for name in targets:
         (out / name).unlink()
-    for seconds in (0.3, 0.6, 0.9, 1.2, 1.5, 2.0, 3.0):
+    for seconds in (0.4, 0.8, 1.2, 2.0):
         kill_after(start("measure", *line), seconds)
         found = {n: (out / n).read_bytes() for n in targets if (out / n).exists()}
         assert all(found[name] == expected[name] for name in found)
@@ -89,7 +89,7 @@ def test_what_is_written_is_whole_or_not_there(command, whole, tmp_path):
 @pytest.mark.slow
 def test_a_killed_retry_is_continued_by_the_same_command(spec_file, whole, tmp_path):
     assert run_here(made_up.failing, "run", spec_file, "--out", tmp_path)[0] == 1
-    for seconds in (0.5, 1.0, 2.0):
+    for seconds in (0.7, 1.5):
         kill_after(start("slow", "retry", tmp_path), seconds)
         with Store.open(tmp_path) as store:
             store.verify()
@@ -124,12 +124,13 @@ def test_a_killed_explanation_is_begun_again(tmp_path):
         assert main(["run", str(tmp_path / "spec.toml"), "--out", str(study), "--jobs", "1"]) == 0
     before = content(study)
     line = [sys.executable, "-m", "nested_agents", "explain", str(study)]
-    for seconds in (1.0, 3.0, 5.0):
+    for seconds in (1.5, 4.0):
         process = subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         kill_after(process, seconds)
         for text in study.rglob("explanation.txt"):
             assert text.read_text().endswith("\n")
-    assert subprocess.run(line, capture_output=True).returncode == 0
+    with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
+        assert main(["explain", str(study)]) == 0
     assert content(study) == before
 
 

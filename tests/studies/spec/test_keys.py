@@ -2,7 +2,7 @@
 
 import pytest
 
-from nested_agents.core.registry import Plugged
+from nested_agents.core.plugged import Plugged
 from nested_agents.core.settings import Settings
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.conditions import ConditionSettings
