@@ -121,8 +121,8 @@ def keys_below(prefix: str) -> tuple[Table, ...]:
 
     Examples
     --------
-    >>> [key.default for table in keys_below("learner.discount") for key in table.keys]
-    ['0.95']
+    >>> [key.default for table in keys_below("topology.order") for key in table.keys]
+    ['"listed"']
     """
     found = []
     for table in tables():

@@ -42,8 +42,8 @@ def pushing_points(box: BoxSpec, count: int, gap: float) -> FloatArray:
     Four points around a square of 20 cm lie off its corners, eight have two to a side:
 
     >>> from nested_agents.scenarios.box_pushing.world.boxes import BOXES
-    >>> pushing_points(BOXES["square"], 8, 0.05).round(2)[:2].tolist()
-    [[0.15, 0.07, 3.14], [0.07, 0.15, -1.57]]
+    >>> pushing_points(BOXES["square"], 8, 0.05).round(2)[1:3].tolist()
+    [[0.07, 0.15, -1.57], [-0.07, 0.15, -1.57]]
     """
     radius = box.outline.rounding
     solid = Point(0, 0).buffer(radius, ARC) if box.polygon is None else box.polygon

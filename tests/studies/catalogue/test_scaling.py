@@ -115,7 +115,7 @@ def test_a_trial_is_measured_without_being_changed() -> None:
     result = measure(trial)
     assert result.rows == run_trial(trial).rows
     assert (result.numbers["agents"], result.numbers["messages"]) == (4.0, 6.0)
-    assert result.numbers["weight_bytes"] == 2 * 47 * 8, "two roles"
+    assert result.numbers["weight_bytes"] == 4 * 47 * 8, "four wheels"
     assert result.numbers["joint_actions"] == pytest.approx(340.0), "4 + 16 + 64 + 256"
     assert 0.0 < result.usage["decision_median"] <= result.usage["decision_99"]
     assert result.usage["process_bytes"] > result.usage["step_bytes"] > 0

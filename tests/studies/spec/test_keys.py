@@ -18,14 +18,15 @@ def subclasses(cls: type) -> set[type]:
 def built_in_models() -> set[type[Settings]]:
     """All settings models of ours that have fields, however they are reached.
 
-    Not those of controllers of one scenario, which are named by module and class.
+    Not those of controllers of one scenario, which are named by module and class, nor those of
+    faults of other environments.
     """
     found = subclasses(Settings) - {Settings, ConditionSettings}
     return {
         model
         for model in found
         if model.__module__.startswith("nested_agents.")
-        and not model.__module__.endswith(".scripted")
+        and not model.__module__.endswith((".scripted", ".actuators"))
         and set(model.model_fields) - {"kind"}
     }
 
@@ -62,7 +63,7 @@ def test_registries_are_walked() -> None:
 
 
 def the_key(name: str) -> Key:
-    (table,) = keys_below(name)
+    table, *_ = keys_below(name)  # scenarios and learners share some
     (key,) = table.keys
     return key
 

@@ -11,7 +11,7 @@ from nested_agents.studies.spec.overlay import (
     overlay,
 )
 
-LEARNER = ConditionSettings.model_fields["learner"].annotation
+LEARNER = ConditionSettings.model_fields["learner"]
 
 
 def test_neither_table_is_modified():
