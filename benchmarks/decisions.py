@@ -9,7 +9,6 @@ the number of agents is fitted to teams of at least four robots (eight agents).
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 from time import thread_time
 
 import numpy as np
@@ -46,11 +45,6 @@ def decisions(preset: str, robots: int, number: int) -> list[float]:
     return taken[WARM:]
 
 
-def exponent(agents: Sequence[int], seconds: Sequence[float]) -> float:
-    """Return the slope of log time over log agents, by least squares."""
-    return float(np.polyfit(np.log(agents), np.log(seconds), 1)[0])
-
-
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.decisions", description=__doc__)
@@ -69,7 +63,7 @@ def main() -> None:
     console.print(table)
     large = [n for n in least if n >= 8]
     if len(large) > 1:
-        slope = exponent(large, [least[n] for n in large])
+        slope = np.polyfit(np.log(large), np.log([least[n] for n in large]), 1)[0]
         console.print(f"time ~ n^{slope:.2f} with {large[0]} to {large[-1]} agents (least)")
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from ..arrays import FloatArray, IntArray
 from ..settings import NonNegative, Positive
 from .learner import LearnerSettings
-from .online import Online
+from .online import OneStep
 
 if TYPE_CHECKING:
     from ..rules.rule_base import RuleBase
@@ -33,7 +33,7 @@ class FMQSettings(LearnerSettings):
         return FMQ(self, rules, rows)
 
 
-class FMQ(Online):
+class FMQ(OneStep):
     """TD(0) with a bonus for rules under which the greatest reward came often.
 
     ``weights`` learn as in TD(0). Of the rule k that fires most in the state left, a table keeps
@@ -49,8 +49,7 @@ class FMQ(Online):
     kept = ("theta", "weights", "greatest", "hits", "visits", "trace", "reach")
 
     def __init__(self, settings: FMQSettings, rules: RuleBase, rows: IntArray) -> None:
-        super().__init__(settings.discount, rules, rows)
-        self.settings = settings
+        super().__init__(settings, rules, rows)
         self.weights = np.zeros_like(self.theta)
         shape = self.theta.shape
         self.greatest: FloatArray = np.full(shape, -np.inf)
@@ -58,11 +57,7 @@ class FMQ(Online):
         self.visits: FloatArray = np.zeros(shape)
 
     def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
-        from ..rules import kernels
-
-        delta = self.errors(self.weights, states, rewards, entered)
-        steps = self.settings.step_size * delta / self.rules.squared_lengths(states)
-        kernels.add_features(self.weights, self.rows, states, steps, self.rules.layout)
+        self._step(states, self.errors(self.weights, states, rewards, entered))
         active, strengths = self.rules.active(states)
         fired = active[np.arange(len(states)), strengths.argmax(axis=1)]
         for row, rule, reward in zip(self.rows, fired, rewards, strict=True):

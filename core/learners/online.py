@@ -1,10 +1,10 @@
-"""What the online learners share: traces, and one update per step."""
+"""What the online learners share: traces, one update per step, and TD(0) of normalised steps."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -107,3 +107,57 @@ class Online(ABC):
             setattr(self, name, array[rows] if array.ndim else array.copy())
         if "weights" not in self.kept:
             self.weights = self.theta
+
+
+class OneStepSettings(Protocol):
+    """What the settings of a `OneStep` learner have."""
+
+    @property
+    def discount(self) -> float:
+        """Discount per decision, gamma of Eq. 7."""
+        ...
+
+    @property
+    def step_size(self) -> float:
+        """alpha, divided by the squared length of the feature vector."""
+        ...
+
+
+class OneStep(Online):
+    """TD(0) whose steps are divided by the squared lengths of feature vectors."""
+
+    def __init__(self, settings: OneStepSettings, rules: RuleBase, rows: IntArray) -> None:
+        super().__init__(settings.discount, rules, rows)
+        self.settings: Any = settings
+
+    def _step(
+        self, states: FloatArray, delta: FloatArray, lengths: FloatArray | np.float64 | None = None
+    ) -> int:
+        """Add ``alpha delta phi / lengths`` to the weights; return how many there are.
+
+        Parameters
+        ----------
+        states
+            ``(n, d)`` of which phi are the feature vectors.
+        delta
+            ``(n,)`` errors.
+        lengths
+            ``(n,)`` or one for all: what steps are divided by; the squared lengths of phi if none
+            is given.
+        """
+        from ..rules import kernels
+
+        if lengths is None:
+            lengths = self.rules.squared_lengths(states)
+        steps = self.settings.step_size * delta / lengths
+        kernels.add_features(self.weights, self.rows, states, steps, self.rules.layout)
+        return self.theta.size
+
+
+class OfASum(OneStep):
+    """Learns parts of a sum: what all are paid together is shared out, so that parts add up."""
+
+    def observe(self, states: FloatArray, reward: float | FloatArray, terminated: bool) -> int:
+        """Update for the step from the previous states to these, each agent by its share."""
+        shared = reward / len(states) if np.ndim(reward) == 0 else reward
+        return super().observe(states, shared, terminated)

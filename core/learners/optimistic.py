@@ -14,7 +14,7 @@ import numpy as np
 from ..arrays import FloatArray, IntArray
 from ..settings import Fraction, Positive
 from .learner import LearnerSettings
-from .online import Online
+from .online import OneStep
 
 if TYPE_CHECKING:
     from ..rules.rule_base import RuleBase
@@ -35,7 +35,7 @@ class OptimisticTDSettings(LearnerSettings):
         return OptimisticTD(self, rules, rows)
 
 
-class OptimisticTD(Online):
+class OptimisticTD(OneStep):
     """TD(0) that believes good news more than bad.
 
     On entering state s' after state s::
@@ -46,16 +46,6 @@ class OptimisticTD(Online):
     with b the setting `falling`.
     """
 
-    def __init__(self, settings: OptimisticTDSettings, rules: RuleBase, rows: IntArray) -> None:
-        super().__init__(settings.discount, rules, rows)
-        self.settings = settings
-
     def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
-        from ..rules import kernels
-
-        s = self.settings
         delta = self.errors(self.theta, states, rewards, entered)
-        steps = s.step_size * np.maximum(delta, s.falling * delta)
-        steps /= self.rules.squared_lengths(states)
-        kernels.add_features(self.theta, self.rows, states, steps, self.rules.layout)
-        return self.theta.size
+        return self._step(states, np.maximum(delta, self.settings.falling * delta))

@@ -14,7 +14,7 @@ import numpy as np
 from ..arrays import FloatArray, IntArray
 from ..settings import Positive
 from .learner import LearnerSettings
-from .online import Online
+from .online import OneStep
 
 if TYPE_CHECKING:
     from ..rules.rule_base import RuleBase
@@ -32,7 +32,7 @@ class QLearningSettings(LearnerSettings):
         return QLearning(self, rules, rows)
 
 
-class QLearning(Online):
+class QLearning(OneStep):
     """TD(0) whose target is the greatest value over the actions in the state that was entered.
 
     With x the situation of a state and u the actions that it holds, on entering (x', u') after
@@ -51,25 +51,20 @@ class QLearning(Online):
     """
 
     def __init__(self, settings: QLearningSettings, rules: RuleBase, rows: IntArray) -> None:
-        super().__init__(settings.discount, rules, rows)
+        super().__init__(settings, rules, rows)
         if not rules.actions:
             raise ValueError(
                 "learner.kind = 'q-learning': the state space holds no actions to maximise over, "
                 "use td-lambda"
             )
-        self.settings = settings
         self._columns = sorted(rules.actions)
         centres = [rules.partitions[column].centres for column in self._columns]
         self._choices = np.array(list(product(*centres)))
 
     def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
-        from ..rules import kernels
-
         delta = self.errors(self.theta, states, rewards, None)
         if entered is not None:
             met = np.repeat(entered[:, None], len(self._choices), axis=1)
             met[:, :, self._columns] = self._choices
             delta += self.discount * self.rules.each(self.of_agents(self.theta), met).max(axis=1)
-        steps = self.settings.step_size * delta / self.rules.squared_lengths(states)
-        kernels.add_features(self.theta, self.rows, states, steps, self.rules.layout)
-        return self.theta.size
+        return self._step(states, delta)

@@ -8,12 +8,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal
 
-import numpy as np
-
 from ..arrays import FloatArray, IntArray
 from ..settings import Positive
 from .learner import LearnerSettings
-from .online import Online
+from .online import OfASum
 
 if TYPE_CHECKING:
     from ..rules.rule_base import RuleBase
@@ -31,7 +29,7 @@ class SparseCooperativeSettings(LearnerSettings):
         return SparseCooperative(self, rules, rows)
 
 
-class SparseCooperative(Online):
+class SparseCooperative(OfASum):
     """TD(0) for each part of a sum (Kok and Vlassis 2006, Eq. 11, on after-states).
 
     On entering state s' after state s, agent i of n learns::
@@ -44,21 +42,5 @@ class SparseCooperative(Online):
     joint action of the graph leads to.
     """
 
-    def __init__(
-        self, settings: SparseCooperativeSettings, rules: RuleBase, rows: IntArray
-    ) -> None:
-        super().__init__(settings.discount, rules, rows)
-        self.settings = settings
-
-    def observe(self, states: FloatArray, reward: float | FloatArray, terminated: bool) -> int:
-        """Update for the step from the previous states to these, each agent by its share."""
-        shared = reward / len(states) if np.ndim(reward) == 0 else reward
-        return super().observe(states, shared, terminated)
-
     def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
-        from ..rules import kernels
-
-        delta = self.errors(self.theta, states, rewards, entered)
-        steps = self.settings.step_size * delta / self.rules.squared_lengths(states)
-        kernels.add_features(self.theta, self.rows, states, steps, self.rules.layout)
-        return self.theta.size
+        return self._step(states, self.errors(self.theta, states, rewards, entered))

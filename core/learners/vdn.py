@@ -13,7 +13,7 @@ import numpy as np
 from ..arrays import FloatArray, IntArray
 from ..settings import Positive
 from .learner import LearnerSettings
-from .online import Online
+from .online import OfASum
 
 if TYPE_CHECKING:
     from ..rules.rule_base import RuleBase
@@ -31,7 +31,7 @@ class ValueDecompositionSettings(LearnerSettings):
         return ValueDecomposition(self, rules, rows)
 
 
-class ValueDecomposition(Online):
+class ValueDecomposition(OfASum):
     """TD(0) on the sum of the agents' values, without the networks of the original.
 
     On entering state s' after state s, with R the reward of all (the sum, if each has its own)::
@@ -42,22 +42,7 @@ class ValueDecomposition(Online):
     The state entered stands for what the agents' greatest values lead to, as in all learners here.
     """
 
-    def __init__(
-        self, settings: ValueDecompositionSettings, rules: RuleBase, rows: IntArray
-    ) -> None:
-        super().__init__(settings.discount, rules, rows)
-        self.settings = settings
-
-    def observe(self, states: FloatArray, reward: float | FloatArray, terminated: bool) -> int:
-        """Update for the step from the previous states to these; the team's reward in parts."""
-        shared = reward / len(states) if np.ndim(reward) == 0 else reward
-        return super().observe(states, shared, terminated)
-
     def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
-        from ..rules import kernels
-
         delta = self.errors(self.theta, states, rewards, entered).sum()
         lengths = self.rules.squared_lengths(states).sum()
-        steps = np.full(len(states), self.settings.step_size * delta / lengths)
-        kernels.add_features(self.theta, self.rows, states, steps, self.rules.layout)
-        return self.theta.size
+        return self._step(states, np.full(len(states), delta), lengths)

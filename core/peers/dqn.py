@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import torch
-from gymnasium.spaces import Box, Discrete
+from gymnasium.spaces import Discrete
 from stable_baselines3 import DQN
-from stable_baselines3.common.logger import Logger
 
 from ..arrays import FloatArray, IntArray
 from ..protocols import Scenario, Transition
 from .inputs import Inputs, RewardScale
-from .networks import drawing_from, weights_of
+from .networks import drawing_from, prepare, weights_of
 from .peer import Peer
 from .seen import Seen
 from .settings import DQNSettings
@@ -52,11 +51,7 @@ class DeepQ(Peer):
             policy_kwargs={"net_arch": list(settings.hidden)},
             device="cpu", _init_setup_model=False,
         )  # fmt: skip
-        model.observation_space = Box(-np.inf, np.inf, (self._inputs.n_joint,), dtype=np.float32)
-        model.action_space, model.n_envs = Discrete(self._n_actions), 1
-        with drawing_from(self.rng):
-            model._setup_model()
-        model.set_logger(Logger(None, []))
+        prepare(model, self._inputs.n_joint, Discrete(self._n_actions), 1, self.rng)
         self._model, self._decisions = model, 0
         self._rewards = RewardScale(settings.discount, 1)
 

@@ -8,25 +8,25 @@ value of the state that it broke off in (Pardo et al. 2018).
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import Any
 
 import numpy as np
 import torch
-from gymnasium.spaces import Box, Discrete, MultiDiscrete
+from gymnasium.spaces import Discrete, MultiDiscrete
 from stable_baselines3 import PPO
-from stable_baselines3.common.logger import Logger
 
 from ..arrays import FloatArray, IntArray
 from ..protocols import Scenario, Transition
 from .central_critic import CentralCriticPolicy
 from .inputs import Inputs, RewardScale
-from .networks import drawing_from, weights_of
+from .networks import drawing_from, prepare, weights_of
 from .peer import Peer
 from .seen import Seen
 from .settings import PolicyGradientSettings
 
 
-class PolicyGradient(Peer):
+class PolicyGradient(Peer, ABC):
     """What the three have in common.
 
     Parameters
@@ -54,22 +54,18 @@ class PolicyGradient(Peer):
             ent_coef=settings.entropy, policy_kwargs={"net_arch": list(settings.hidden)} | options,
             device="cpu", _init_setup_model=False,
         )  # fmt: skip
-        model.observation_space = Box(-np.inf, np.inf, (n_inputs,), dtype=np.float32)
-        model.action_space, model.n_envs = actions, n_envs
-        with drawing_from(self.rng):
-            model._setup_model()
-        model.set_logger(Logger(None, []))
+        prepare(model, n_inputs, actions, n_envs, self.rng)
         self._model, self._discount = model, settings.discount
         self._rewards = RewardScale(settings.discount, n_envs)
         self._starts: FloatArray = np.ones(n_envs)
 
+    @abstractmethod
     def _shape(self, n_actions: int) -> tuple[int, int, Any, dict[str, Any]]:
         """Return how many act side by side, on how many inputs each, the actions, and options."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _seen(self, states: FloatArray) -> FloatArray:
         """Return the inputs ``(n_envs, n_inputs)``."""
-        raise NotImplementedError
 
     def act(self, prediction: Seen, *, explore: bool = True) -> IntArray:
         """Return a joint action ``(n,)``: drawn from the policy, or the most probable."""

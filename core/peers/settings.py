@@ -1,6 +1,6 @@
 """The settings of peers, as they stand in the ``[learner]`` table of a spec.
 
-Defaults are those of stable-baselines3, but for what `docs/peers.md` says was tuned.
+Defaults are those of stable-baselines3, but for those that `docs/peers.md` names.
 """
 
 from __future__ import annotations

@@ -51,6 +51,14 @@ class Difference:
         raw = paired_permutation(own, base)
         return cls(condition, measure, len(own), estimate, raw, raw, own - base)
 
+    @classmethod
+    def between(
+        cls, condition: str, measure: str, own: Array, base: Array, *, of_rates: bool
+    ) -> Difference:
+        """Estimate and test the mean difference of paired values ``(n_seeds,)``."""
+        estimate = paired_difference(own, base, of_rates=of_rates)
+        return cls.of(condition, measure, own, base, estimate)
+
     @property
     def shown(self) -> str:
         """Value, interval, p as it is and adjusted, as text."""
@@ -103,8 +111,7 @@ def differences(
         for condition in conditions:
             base, other = paired(results, reference, condition, values)
             if len(base) >= 2:
-                estimate = paired_difference(other, base, of_rates=of_rates)
-                found.append(Difference.of(condition, title, other, base, estimate))
+                found.append(Difference.between(condition, title, other, base, of_rates=of_rates))
     return adjusted(found)
 
 

@@ -12,7 +12,7 @@ from ...core.protocols import Measure
 from ...core.refusals import closest
 from ..spec.conditions import label
 from ..spec.errors import SpecError
-from .comparison import Array, Difference, adjusted, aligned, paired_difference
+from .comparison import Array, Difference, adjusted, aligned
 from .paired_tests import LEVEL
 from .results import Results
 from .statistics import bootstrap, rate
@@ -153,8 +153,10 @@ def contrasts(
         for name, condition in others:
             ours, theirs = aligned(results, (condition, base), lambda _, c: values[c])
             if len(ours) >= 2:
-                estimate = paired_difference(ours, theirs, of_rates=told_by.is_rate)
-                own.append(Difference.of(name, measure, ours, theirs, estimate))
+                found_here = Difference.between(
+                    name, measure, ours, theirs, of_rates=told_by.is_rate
+                )
+                own.append(found_here)
         found.append(own)
     every = iter(adjusted([d for own in found for d in own]))
     made = []

@@ -182,7 +182,7 @@ def plan(
     SpecError
         If the study cannot be run, or a number is out of range.
     """
-    made = made_of(spec)
+    made = Spec.meant(spec)
     for name, value in (("deviation", deviation), ("smallest", smallest)):
         if not 0.0 < value <= 1.0:
             raise SpecError(f"--{name} {value:g}: must be above 0 and at most 1")
@@ -200,13 +200,6 @@ def plan(
         Outline.of(made), len(trials), processes, seconds, memory, len(made.conditions()) - 1,
         deviation, smallest, made.doubts(),
     )  # fmt: skip
-
-
-def made_of(spec: Spec | Mapping[str, Any] | str | Path) -> Spec:
-    """Return the spec that a table or a file stands for."""
-    if isinstance(spec, Spec):
-        return spec
-    return Spec.of(spec) if isinstance(spec, Mapping) else Spec.load(Path(spec))
 
 
 def _taken(

@@ -324,10 +324,7 @@ def run(
         If the study cannot be run or continued; one line says why.
     """
     out = Path(out)
-    if isinstance(spec, Mapping):
-        spec = Spec.of(spec)
-    elif not isinstance(spec, Spec):
-        spec = Spec.load(Path(spec), study=out)
+    spec = Spec.meant(spec, study=out)
     told = observer or (Terminal() if progress else Silent())
     with run_study(
         spec, out, jobs=jobs, backend=backend, address=address, retry_failed=retry_failed,

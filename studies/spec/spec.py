@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Iterable, Mapping
+from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -170,6 +171,15 @@ class Spec(Settings):
             named([spec.study, *(condition.tables for condition in spec._conditions)])
         )
         return spec
+
+    @classmethod
+    def meant(
+        cls, spec: Spec | Mapping[str, Any] | str | PathLike[str], study: Path | None = None
+    ) -> Spec:
+        """Return the spec that a table or the path of a TOML file stands for; see `of`, `load`."""
+        if isinstance(spec, Spec):
+            return spec
+        return cls.of(spec) if isinstance(spec, Mapping) else cls.load(Path(spec), study=study)
 
     @classmethod
     def load(cls, path: Path, changes: Iterable[str] = (), study: Path | None = None) -> Spec:

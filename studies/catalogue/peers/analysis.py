@@ -13,7 +13,7 @@ from time import process_time
 
 import numpy as np
 
-from ...analysis.comparison import Array, Difference, adjusted, paired_difference
+from ...analysis.comparison import Array, Difference, differences
 from ...analysis.results import Results
 from ...analysis.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
 from ...analysis.summary import EVALUATED, Summary, evaluated
@@ -140,29 +140,16 @@ def analyse(results: Results) -> Peers:
                 tuple(rate(success) for success in every.values()),
             )
         )
-    differences = _differences(results)
-    notes = ["success, N: when evaluated after N episodes of training."] if courses else []
-    if differences:
-        notes.append(f"\nsuccess against that of {next(iter(results.evaluation))} (p adjusted):")
-    notes += [f"  {found.condition}: {found.shown}" for found in differences]
-    notes += power_lines(differences)
-    return Peers(tuple(table), tuple(courses), differences, tuple(notes))
-
-
-def _of(results: Results, condition: str, seeds: list[int]) -> Array:
-    """Return the evaluation success of some seeds."""
-    rows = [results.seeds[condition].index(seed) for seed in seeds]
-    return np.asarray(results.evaluation[condition]["success"].mean(axis=1)[rows])
-
-
-def _differences(results: Results) -> tuple[Difference, ...]:
-    found = []
     first, *others = results.evaluation or [""]
-    for condition in others:
-        shared = [s for s in results.seeds[condition] if s in results.seeds[first]]
-        if len(shared) < 2:
-            continue
-        means = [_of(results, c, shared) for c in (condition, first)]
-        estimate = paired_difference(means[0], means[1], of_rates=True)
-        found.append(Difference.of(condition, EVALUATED, means[0], means[1], estimate))
-    return adjusted(found)
+    found = differences(results, first, others, {EVALUATED: _success})
+    notes = ["success, N: when evaluated after N episodes of training."] if courses else []
+    if found:
+        notes.append(f"\nsuccess against that of {first} (p adjusted):")
+    notes += [f"  {other.condition}: {other.shown}" for other in found]
+    notes += power_lines(found)
+    return Peers(tuple(table), tuple(courses), found, tuple(notes))
+
+
+def _success(results: Results, condition: str) -> Array:
+    """Return the evaluation success of each seed."""
+    return np.asarray(results.evaluation[condition]["success"].mean(axis=1))

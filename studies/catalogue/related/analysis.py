@@ -28,6 +28,7 @@ from ...spec.errors import SpecError
 from ...spec.spec import Spec
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
+from ..scaling.analysis import messages
 
 TITLES = {
     "memory": "memory [kB]",
@@ -57,7 +58,7 @@ def measure(trial: Trial) -> TrialResult:
     numbers = {
         "agents": float(len(hierarchy)),
         "memory": 1e-3 * team.learner.theta.nbytes,
-        "messages": float(sum(len(hierarchy.below(i)) for i in range(len(hierarchy)))),
+        "messages": float(messages(hierarchy.below(i) for i in range(len(hierarchy)))),
         "formula": float(tried * n_rules),
         "counted": counted / len(session.deciding),
     }

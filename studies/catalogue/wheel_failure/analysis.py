@@ -23,7 +23,7 @@ import numpy as np
 from ....core.learners.frozen import FrozenSettings
 from ....core.learners.learner import LearnerSettings
 from ....core.team import Team
-from ...analysis.comparison import Array, Difference, adjusted, paired_difference
+from ...analysis.comparison import Array, Difference, adjusted
 from ...analysis.results import Arrays, Results
 from ...analysis.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, rates
 from ...analysis.summary import Summary
@@ -282,7 +282,6 @@ def _gains(courses: tuple[Course, ...]) -> tuple[Difference, ...]:
         ends = [
             c.end.mean(axis=1)[[c.seeds.index(seed) for seed in shared]] for c in (course, base)
         ]
-        estimate = paired_difference(ends[0], ends[1], of_rates=True)
         named = f"{course.fault}, {course.adapts}"
-        found.append(Difference.of(named, "end", ends[0], ends[1], estimate))
+        found.append(Difference.between(named, "end", ends[0], ends[1], of_rates=True))
     return adjusted(found)
