@@ -12,6 +12,9 @@ from rich.console import Console
 from . import measures, tables
 from .machine import machine
 
+FOLDER = Path("out", "benchmarks")
+"""Where runs are kept, one file each."""
+
 
 def main() -> None:
     """Measure, print, and write what was asked for."""
@@ -20,7 +23,10 @@ def main() -> None:
     size.add_argument("--quick", action="store_true", help="under a minute; the default")
     size.add_argument("--full", action="store_true", help="all sizes, longer rounds")
     size.add_argument("--smoke", action="store_true", help="one tiny case, to see that it runs")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="also write everything here")
+    parser.add_argument(
+        "--json", type=Path, metavar="FILE",
+        help=f"where everything is written; {FOLDER}/DATE.json unless said otherwise",
+    )  # fmt: skip
     options = parser.parse_args()
     exact = {"dense": (2, 4, 6), "dense32": (4,), "compact": (2, 4, 6), "order 1": (4,)}
     beyond, budget = {"order 1": (16, 64, 128)}, 1.0
@@ -49,10 +55,12 @@ def main() -> None:
         "this machine: bytecode {bytecode_mhz:.1f} MHz, arithmetic {arithmetic_gflops:.1f} GFLOPS, "
         "memory {memory_gb_s:.1f} GB/s".format(**ran_on["speed"]),
     )
-    if options.json:
-        ran_on |= {"load_at_start": began, "load_at_end": ended}
-        result = {"machine": ran_on, "exact": steps, "beyond": large, "import_seconds": imports}
-        options.json.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    ran_on |= {"load_at_start": began, "load_at_end": ended}
+    result = {"machine": ran_on, "exact": steps, "beyond": large, "import_seconds": imports}
+    path = options.json or FOLDER / f"{ran_on['date'].replace(':', '-')}.json"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    console.print(f"kept in {path}", soft_wrap=True)
 
 
 if __name__ == "__main__":

@@ -17,7 +17,7 @@ from ..store.store import Store
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-NamesAndRows = tuple[list[str], list[tuple[Any, ...]]]
+NamesAndRows = tuple[list[str], Iterable[tuple[Any, ...]]]
 
 EPISODE_COLUMNS = {
     "condition": ("", "label of the condition"),
@@ -82,8 +82,8 @@ def _frame(
         with Store.open(part.directory) as store:
             store.verify()
             names, rows = rows_of(store)
+            frame = pandas.DataFrame(list(rows), columns=names)
             measures |= {m.name: m for m in store.measures()}
-        frame = pandas.DataFrame(rows, columns=names)
         frame["condition"] = [part.labels[c] for c in frame["condition"]]
         pairs = zip(frame["condition"], frame["seed"], strict=True)
         frames.append(frame[[keep(condition, seed) for condition, seed in pairs]])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Sequence, Set
+from collections.abc import Callable, Iterable, Sequence, Set
 from pathlib import Path
 from typing import Any, Literal
 
@@ -15,8 +15,8 @@ from ..store.store import Store
 from .csv_text import write_csv
 
 Form = Literal["csv", "parquet", "json"]
-NamesAndRows = tuple[list[str], list[tuple[Any, ...]]]
-"""The names of columns, and rows of values."""
+NamesAndRows = tuple[list[str], Iterable[tuple[Any, ...]]]
+"""The names of columns, and rows of values; CSV is written row by row, whatever their number."""
 
 
 def export(store: Store, folder: Path, form: Form, *, overwrite: bool = False) -> list[Path]:
@@ -94,7 +94,7 @@ def _parquet_writer(rates: Set[str]) -> Any:
         ) from None
 
     def write(table: NamesAndRows, path: Path) -> None:
-        names, rows = table
+        names, rows = table[0], list(table[1])
         columns = {
             n: _column([row[i] for row in rows], is_rate=n in rates) for i, n in enumerate(names)
         }

@@ -246,10 +246,13 @@ class Reading:
         cursor = self._db.execute("SELECT * FROM results WHERE phase = ?", (phase,))
         return [column[0] for column in cursor.description], cursor.fetchall()
 
-    def episodes(self) -> tuple[list[str], list[tuple[Any, ...]]]:
-        """Return the column names and the rows of all phases, by condition, seed and episode."""
+    def episodes(self) -> tuple[list[str], Iterator[tuple[Any, ...]]]:
+        """Return the column names and the rows of all phases, by condition, seed and episode.
+
+        Rows are read one by one, as long as the study is open: there may be millions.
+        """
         cursor = self._db.execute("SELECT * FROM results")
-        return [column[0] for column in cursor.description], cursor.fetchall()
+        return [column[0] for column in cursor.description], cursor
 
     def trials(self) -> tuple[list[str], list[tuple[Any, ...]]]:
         """Return the column names and one row per trial, by condition and seed.

@@ -50,6 +50,7 @@ def said(capsys, *arguments):
 def test_stages_are_kept_in_the_order_in_which_they_were_trained(study):
     with Store.open(study) as store:
         names, rows = store.episodes()
+        rows = list(rows)
         phases = store.phases()
     at = [names.index(name) for name in ("seed", "phase", "episode")]
     assert [tuple(row[i] for i in at) for row in rows[:6]] == [

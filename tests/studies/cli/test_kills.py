@@ -50,7 +50,8 @@ def content(directory):
     """Return all rows and the digest of every recording."""
     with Store.open(directory) as store:
         store.verify()
-        rows = store.episodes()
+        names, rows = store.episodes()
+        rows = names, list(rows)
     recordings = sorted((directory / "recordings").glob("[!.]*.npz"))
     return rows, [hashlib.sha256(path.read_bytes()).hexdigest() for path in recordings]
 

@@ -195,7 +195,7 @@ def test_one_reads_one_state_while_another_writes(finished):
         with Store.open(finished) as reader:
             writer.fail(made_up.TRIALS[0], "Traceback")
             assert reader.counts() == {"done": 6, "failed": 0}
-            assert len(reader.episodes()[1]) == 6 * (4 + 2)
+            assert len(list(reader.episodes()[1])) == 6 * (4 + 2)
         with Store.open(finished) as reader:
             assert reader.counts() == {"done": 5, "failed": 1}
 

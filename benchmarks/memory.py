@@ -1,0 +1,140 @@
+"""What processes and large studies take of memory and time: ``python -m benchmarks.memory``.
+
+First a worker: its resident memory after each thing that it imports, up to a trial of two steps.
+Then a study of many made-up trials of two conditions: processor time and greatest memory of the
+commands that read it. Its rows are written as those of any study, but not waited for.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+
+from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.store.store import Store
+from nested_agents.studies.trials.episodes import EpisodeRow
+from nested_agents.studies.trials.trial import Trial, TrialResult, check, trials_of
+
+from .tables import Row, show
+
+STAGES = {
+    "Python": "",
+    "numpy": "import numpy",
+    "pydantic": "import pydantic",
+    "session of a trial": "import nested_agents.studies.trials.session",
+    "Box2D": "import Box2D",
+    "scenario": "import nested_agents.scenarios.box_pushing.scenario",
+    "numba": "import numba",
+    "scipy.linalg": "import scipy.linalg",
+    "a trial of two steps": (
+        "from nested_agents.studies.spec.spec import Spec\n"
+        "from nested_agents.studies.trials.session import run_trial\n"
+        "from nested_agents.studies.trials.trial import trials_of\n"
+        "spec = Spec.of({'seeds': 1, 'episodes': 1, 'steps': 2, 'evaluation': 1})\n"
+        "run_trial(trials_of(spec)[0])"
+    ),
+}
+"""What a worker does, one after the other."""
+
+RESIDENT = """
+import sys
+for stage in sys.argv[1:]:
+    exec(stage)
+    lines = open("/proc/self/smaps_rollup").read().splitlines()[1:]
+    kilobytes = {name: int(rest.split()[0]) for name, rest in (l.split(":", 1) for l in lines)}
+    private = kilobytes["Private_Clean"] + kilobytes["Private_Dirty"]
+    print(kilobytes["Rss"] / 1024, private / 1024)
+"""
+
+COMMANDS = (
+    ["status", "DIR"], ["table", "DIR"], ["export", "DIR", "--overwrite"],
+    ["run", "DIR/study.toml", "--out", "DIR"],
+)  # fmt: skip
+WORKER = {"after": "after", "resident": "resident\n\\[MB]", "private": "private\n\\[MB]"}
+STUDY = {"command": "command", "s": "processor\n\\[s]", "peak": "greatest\n\\[MB]"}
+
+
+def worker() -> list[Row]:
+    """Return the memory of a process after each stage; kernels are compiled beforehand."""
+    rows: list[Row] = []
+    for _ in range(2):
+        line = [sys.executable, "-c", RESIDENT, *STAGES.values()]
+        said = subprocess.run(line, capture_output=True, text=True, check=True).stdout
+        found = [map(float, told.split()) for told in said.splitlines()]
+        rows = [
+            {"after": name, "resident": round(resident), "private": round(private)}
+            for name, (resident, private) in zip(STAGES, found, strict=True)
+        ]
+    return rows
+
+
+def fill(directory: Path, trials: int, episodes: int) -> None:
+    """Make a study whose results are random numbers."""
+    spec = Spec.of(
+        {
+            "seeds": trials // 2, "episodes": episodes, "steps": 8, "evaluation": 0,
+            "scenario": {"kind": "line-up"}, "sweep": {"preset": ["default", "frozen"]},
+        }
+    )  # fmt: skip
+    with Store.create(directory, spec, check(spec)) as store:
+        store._db.execute("PRAGMA synchronous = OFF")
+        for trial in trials_of(spec):
+            store.save(trial, _made_up(trial, store), total=1.0)
+
+
+def _made_up(trial: Trial, store: Store) -> TrialResult:
+    rng, measures = np.random.default_rng(trial.seed), store.measures()
+    rows = tuple(
+        EpisodeRow(
+            "training", episode, int(rng.integers(1, trial.steps + 1)),
+            {m.name: bool(rng.random() < 0.5) if m.is_rate else rng.random() for m in measures},
+            rng.random(),
+        )
+        for episode in range(trial.episodes)
+    )  # fmt: skip
+    seconds = dict.fromkeys(("decision", "physics", "sensors", "learning"), 0.1)
+    return TrialResult(rows, measures, {}, seconds)
+
+
+def commands(directory: Path) -> list[Row]:
+    """Return what each command takes."""
+    rows: list[Row] = []
+    for words in COMMANDS:
+        given = [word.replace("DIR", str(directory)) for word in words]
+        process = subprocess.Popen(
+            [sys.executable, "-m", "nested_agents", *given],
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+        _, status, used = os.wait4(process.pid, 0)
+        process.returncode = os.waitstatus_to_exitcode(status)
+        if process.returncode:
+            raise subprocess.CalledProcessError(process.returncode, given)
+        spent = used.ru_utime + used.ru_stime
+        rows.append({"command": words[0], "s": spent, "peak": round(used.ru_maxrss / 1024)})
+    return rows
+
+
+def main() -> None:
+    """Print both tables."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.memory", description=__doc__)
+    parser.add_argument("--trials", type=int, default=10_000, metavar="N")
+    parser.add_argument("--episodes", type=int, default=10, metavar="N", help="of a trial")
+    options = parser.parse_args()
+    console = Console(width=80)
+    show(console, "A worker", WORKER, worker())
+    with tempfile.TemporaryDirectory() as folder:
+        directory = Path(folder) / "study"
+        fill(directory, options.trials, options.episodes)
+        rows = commands(directory)
+    show(console, f"{options.trials} trials of {options.episodes} episodes", STUDY, rows)
+
+
+if __name__ == "__main__":
+    main()
