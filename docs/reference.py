@@ -54,7 +54,8 @@ VARIABLES = {"box-pushing": STATE_VARIABLES, "kinematic-chain": CHAIN_VARIABLES}
 """State variables by the scenario that has them."""
 MODULES = {
     "core": ("How agents perceive, predict, decide and learn, and what that costs.", (
-        "hierarchy", "spaces", "protocols", "team", "loop", "decision", "exploration",
+        "hierarchy", "spaces", "protocols", "team", "rows", "mirror", "loop", "decision",
+        "exploration",
         "rules.fuzzy", "rules.rule_base", "rules.settings",
         "learners.learner", "learners.td", "learners.batch", "learners.anova",
         "learners.gradient", "learners.optimistic", "learners.fmq",
