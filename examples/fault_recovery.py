@@ -8,6 +8,7 @@ policy beside it. Needs PyTorch: ``pip install "nested-agents[peers]"``. Then
 ``python fault_recovery.py``, or with a number of steps: ``python fault_recovery.py 50000``.
 """
 
+# sphinx_gallery_thumbnail_path = "wheel-failure.png"
 import sys
 
 import gymnasium

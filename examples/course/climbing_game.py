@@ -7,6 +7,8 @@ and again, and learn what joint actions are worth. The best joint action lies be
 punishments, so whoever climbs first falls. You will see which teams reach the top, and why.
 """
 
+# sphinx_gallery_thumbnail_path = "course/climbing-game.png"
+
 # %%
 # The game
 # --------

@@ -6,6 +6,8 @@ An agent tries its own actions together with all joint actions of the agents bel
 hierarchy decides what a decision costs. You will count it, by formula and in a running team.
 """
 
+# sphinx_gallery_thumbnail_path = "course/costs.png"
+
 # %%
 # By formula
 # ----------

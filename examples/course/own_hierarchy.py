@@ -6,6 +6,8 @@ You write down who is above whom, look at what it costs, and find out whether it
 the chain of the paper, and against agents who see nobody.
 """
 
+# sphinx_gallery_thumbnail_path = "course/own-hierarchy.png"
+
 # %%
 # Write it
 # --------

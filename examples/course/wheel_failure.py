@@ -7,6 +7,8 @@ turn against its command, and nobody tells the agents. You will see what that co
 the team back: weights that go on learning, or a model of the own body.
 """
 
+# sphinx_gallery_thumbnail_path = "course/wheel-failure.png"
+
 # %%
 # The study
 # ---------
