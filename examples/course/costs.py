@@ -49,6 +49,7 @@ print(na.cost_table(["chain", "tree:2"], agents=[2, 4, LARGEST], measured=True))
 
 plt.rcParams.update({"font.size": 20, "axes.spines.top": False, "axes.spines.right": False})
 figure, ax = plt.subplots(figsize=(16, 9), layout="constrained")
+figure.get_layout_engine().set(w_pad=0.3, h_pad=0.2)
 sizes = range(1, 17)
 for number, (name, topology) in enumerate(TOPOLOGIES.items()):
     counts = [tried(topology, n) for n in sizes]
