@@ -14,7 +14,9 @@ from .calibration import Calibration
 from .evaluators.evaluator import NOTHING_GIVEN, DecisionProblem, Deliberation, Evaluator
 from .exploration import Explorer, Greedy, SuccessorExplorer
 from .hierarchy import Hierarchy
+from .learners.batch import ReplaySettings
 from .learners.learner import Learner, LearnerSettings, SuccessorLearner
+from .mirror import Mirror
 from .protocols import (
     CalibratedPrediction,
     CalibratedScenario,
@@ -58,6 +60,8 @@ class Team:
         What the wheels do, as learned; none: prediction takes every robot as nominal.
     calibration
         The predictor's constants, as learned; none: as the scenario believes them to be.
+    mirror
+        Doubles what is learned from; none: it is what the agents met.
     """
 
     def __init__(
@@ -71,11 +75,12 @@ class Team:
         seed: np.random.SeedSequence,
         self_model: SelfModel | None = None,
         calibration: Calibration | None = None,
+        mirror: Mirror | None = None,
     ) -> None:
         self.hierarchy, self.action_set = hierarchy, action_set
         self.learner, self.explorer, self.evaluator = learner, explorer, evaluator
         self.rows = rows
-        self.self_model, self.calibration = self_model, calibration
+        self.self_model, self.calibration, self.mirror = self_model, calibration, mirror
         self.rng = np.random.Generator(np.random.PCG64(seed))
         self.seen: FloatArray = np.ones((len(hierarchy), len(action_set)))
         """How often each agent was seen to take each action, one of each to begin with."""
@@ -130,6 +135,8 @@ class Team:
             )
         rules = RuleBase.build(scenario.state_space, settings.rule_base)
         rows = rows_of(scenario, shared=settings.weights == "role")
+        is_mirrored = isinstance(settings, ReplaySettings) and settings.mirrored
+        mirror = Mirror.of(scenario) if is_mirrored else None
         evaluator, decision = None, settings.decision
         if decision.rule != "random":
             problem = DecisionProblem(
@@ -147,13 +154,14 @@ class Team:
         return cls(
             hierarchy,
             scenario.action_set,
-            settings.build(rules, rows),
+            settings.build(rules, rows if mirror is None else mirror.rows(rows)),
             rows,
             settings.exploration.build(len(hierarchy)),
             evaluator,
             seed,
             self_model,
             calibration,
+            mirror,
         )
 
     def check(self, prediction: Prediction) -> None:
@@ -254,9 +262,10 @@ class Team:
 
     def learn(self, transition: Transition) -> None:
         """Take in what a step led to."""
-        self._count(
-            self.learner.observe(transition.states, transition.reward, transition.terminated)
-        )
+        states, reward = transition.states, transition.reward
+        if self.mirror is not None:
+            states, reward = self.mirror.states(states), self.mirror.reward(reward)
+        self._count(self.learner.observe(states, reward, transition.terminated))
 
     def end_episode(self) -> None:
         """Learn what is learned after an episode."""
