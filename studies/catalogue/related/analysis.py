@@ -29,6 +29,7 @@ from ...spec.spec import Spec
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..scaling.analysis import messages
+from ..study import check_rule_bases
 
 TITLES = {
     "memory": "memory [kB]",
@@ -40,9 +41,10 @@ TITLES = {
 
 
 def check(spec: Spec) -> None:
-    """Raise `SpecError` unless trained teams are evaluated."""
+    """Raise `SpecError` unless trained teams of agents with rule bases are evaluated."""
     if spec.evaluation < 1:
         raise SpecError("evaluation = 0: related compares evaluation success, needs 1 or more")
+    check_rule_bases(spec, "whose weights and messages it counts")
 
 
 def measure(trial: Trial) -> TrialResult:
