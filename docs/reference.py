@@ -79,7 +79,7 @@ MODULES = {
         "kinematic_chain.config", "kinematic_chain.scenario",
         "kinematic_chain.view", "kinematic_chain.variables", "matrix_games.games",
         "matrix_games.scenario", "line_up", "failures.settings", "failures.actuators",
-        "failures.carried", "failures.wrappers",
+        "failures.carried", "failures.wrappers", "passing_down",
         "state_variables", "checking.checker",
     )),
     "studies": ("What is measured, compared and drawn.", (
