@@ -44,7 +44,7 @@ class MaxPlusSettings(EvaluatorSettings):
     rounds: Annotated[int, Field(ge=1, le=10_000)] = 100
     """Most rounds of messages."""
     damping: Annotated[float, Field(ge=0, lt=1)] = 0.5
-    """Share of a message that is kept from the round before."""
+    """Share of a message that is kept from the round before; in a graph without loops none is."""
 
     def build(self, problem: DecisionProblem) -> MaxPlusMessages:
         """Return the evaluator of a team."""
