@@ -6,6 +6,8 @@ An agent tries its own actions together with all joint actions of the agents bel
 hierarchy decides what a decision costs. You will count it, by formula and in a running team.
 """
 
+# sphinx_gallery_thumbnail_path = "course/costs.png"
+
 # %%
 # By formula
 # ----------
@@ -47,6 +49,7 @@ print(na.cost_table(["chain", "tree:2"], agents=[2, 4, LARGEST], measured=True))
 
 plt.rcParams.update({"font.size": 20, "axes.spines.top": False, "axes.spines.right": False})
 figure, ax = plt.subplots(figsize=(16, 9), layout="constrained")
+figure.get_layout_engine().set(w_pad=0.3, h_pad=0.2)
 sizes = range(1, 17)
 for number, (name, topology) in enumerate(TOPOLOGIES.items()):
     counts = [tried(topology, n) for n in sizes]
