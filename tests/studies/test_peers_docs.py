@@ -1,4 +1,4 @@
-"""docs/peers.md holds the table that the committed results give, and names specs that are."""
+"""docs/peers.md holds the tables that the committed results give, and names specs that are."""
 
 import re
 from pathlib import Path
@@ -14,8 +14,9 @@ TEXT = (ROOT / "docs" / "peers.md").read_text(encoding="utf-8")
 COLUMNS = ("success, 4", "success, 12", "evaluation success", "decisions", "CPU [s]")
 
 
-def test_table(capsys: pytest.CaptureFixture[str]) -> None:
-    path = claims.PUBLISHED / "peers-arm.json"
+@pytest.mark.parametrize("name", ["peers-arm", "peers-boxes"])
+def test_tables(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    path = claims.PUBLISHED / f"{name}.json"
     assert main(["table", str(path), "--columns", *COLUMNS, "--format", "markdown"]) == 0
     table = capsys.readouterr().out
     assert table in TEXT, f"docs/peers.md: put in\n{table}"

@@ -215,6 +215,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "own-value",
         "crowds",
         "peers-arm",
+        "peers-boxes",
         "transfer",
         "curriculum",
         "four-robots-hard",
