@@ -54,7 +54,8 @@ VARIABLES = {"box-pushing": STATE_VARIABLES, "kinematic-chain": CHAIN_VARIABLES}
 """State variables by the scenario that has them."""
 MODULES = {
     "core": ("How agents perceive, predict, decide and learn, and what that costs.", (
-        "hierarchy", "spaces", "protocols", "team", "loop", "decision", "exploration",
+        "hierarchy", "spaces", "protocols", "team", "rows", "mirror", "loop", "decision",
+        "exploration",
         "rules.fuzzy", "rules.rule_base", "rules.settings",
         "learners.learner", "learners.td", "learners.batch", "learners.anova",
         "learners.gradient", "learners.optimistic", "learners.fmq",
@@ -78,7 +79,7 @@ MODULES = {
         "kinematic_chain.config", "kinematic_chain.scenario",
         "kinematic_chain.view", "kinematic_chain.variables", "matrix_games.games",
         "matrix_games.scenario", "line_up", "failures.settings", "failures.actuators",
-        "failures.carried", "failures.wrappers",
+        "failures.carried", "failures.wrappers", "passing_down",
         "state_variables", "checking.checker",
     )),
     "studies": ("What is measured, compared and drawn.", (

@@ -3,13 +3,14 @@
 Three views of one scenario: `WheelsEnv` (every wheel an agent), `RobotsEnv` (every robot an agent)
 and `BoxPushingEnv` (one agent for all). Observations are the states of the paper's agents, what
 wheels of a robot share being given once; bounds are those that physics keeps, infinite where robots
-may leave for good. All agents get the team's reward. Episodes end when the box is at the goal
-(terminated), when it is beyond the arena or after `steps` steps (truncated).
+may leave for good. An agent gets the mean reward of its wheels. Episodes end when the box is at the
+goal (terminated), when it is beyond the arena or after `steps` steps (truncated).
 
 Importing this module registers ``NestedAgents/BoxPushing-v0`` with Gymnasium::
 
     module = "nested_agents.scenarios.box_pushing.environments"
     gymnasium.make(f"{module}:NestedAgents/BoxPushing-v0", steps=200)
+    gymnasium.make_vec(f"{module}:NestedAgents/BoxPushing-v0", num_envs=8, steps=200)
 """
 
 from __future__ import annotations
@@ -69,6 +70,10 @@ class Seat:
         """Return the observation in the states ``(n, d)`` of all wheels."""
         seen: FloatArray = states.ravel()[self.places].astype(np.float32)
         return seen
+
+    def paid(self, reward: float | FloatArray) -> float:
+        """Return the mean reward of the wheels; `reward` is one, or ``(n,)`` of all wheels."""
+        return float(reward if np.ndim(reward) == 0 else np.mean(np.take(reward, self.wheels)))
 
 
 class Game:
@@ -224,9 +229,9 @@ class WheelsEnv(ParallelEnv):
             joint[self.seats[name].wheels] = actions[name]
         transition, truncated = self.game.step(joint)
         observations, infos = self._told(transition.states, transition.info)
-        rewards, ends, breaks = (
-            dict.fromkeys(self.agents, value)
-            for value in (transition.reward, transition.terminated, truncated)
+        rewards = {name: self.seats[name].paid(transition.reward) for name in self.agents}
+        ends, breaks = (
+            dict.fromkeys(self.agents, value) for value in (transition.terminated, truncated)
         )
         if transition.terminated or truncated:
             self.agents = []
@@ -309,7 +314,8 @@ class BoxPushingEnv(gymnasium.Env):
         """Return observation, reward, terminated, truncated and info after an action ``(n,)``."""
         transition, truncated = self.game.step(np.asarray(action, dtype=np.int64))
         seen, info = self.seat.observe(transition.states), self.game.info(transition.info)
-        return seen, float(transition.reward), transition.terminated, truncated, info
+        paid = self.seat.paid(transition.reward)
+        return seen, paid, transition.terminated, truncated, info
 
     def render(self) -> Any:
         """Return a picture ``(height, width, 3)`` of the present, or show it."""
@@ -321,4 +327,8 @@ class BoxPushingEnv(gymnasium.Env):
 
 
 if ENV_ID not in gymnasium.registry:
-    gymnasium.register(ENV_ID, entry_point=f"{__name__}:BoxPushingEnv")
+    gymnasium.register(
+        ENV_ID,
+        entry_point=f"{__name__}:BoxPushingEnv",
+        vector_entry_point=f"{__package__}.batched.environments:VecBoxPushingEnv",
+    )

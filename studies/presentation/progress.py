@@ -8,16 +8,6 @@ from collections.abc import Iterable
 from html import escape
 from pathlib import Path
 
-from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
-
 from ..spec.outline import Outline
 from ..spec.spec import Spec
 from ..workers.runner import Outcome
@@ -59,13 +49,29 @@ class Terminal:
             return
         if sys.stderr.isatty():
             _follow_bar(outcomes, total, done)
-        elif Console().is_jupyter:
+        elif _in_notebook():
             _follow_notebook(outcomes, total, done)
         else:
             _follow_lines(outcomes, total, done)
 
 
+def _in_notebook() -> bool:
+    from rich.console import Console
+
+    return Console().is_jupyter
+
+
 def _follow_bar(outcomes: Iterable[Outcome], total: int, done: int) -> None:
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        MofNCompleteColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
+
     columns = (
         TextColumn("{task.description}"),
         BarColumn(bar_width=None),

@@ -22,7 +22,8 @@ class Progress:
     running
         Condition, seed, and seconds so far of the trials that are running.
     processes
-        How many trials run at a time; the cores of this machine if none does.
+        How many trials run at a time; if none does, as many as would: the cores of this machine,
+        or none where nothing is left.
     seconds
         Estimate of the time left [s]; None if nothing has finished to go by.
     damaged
@@ -54,7 +55,7 @@ def progress(store: Store) -> Progress:
             failed=failed,
             left=len(trials) - len(states),
             running=(),
-            processes=cores(),
+            processes=0,
             seconds=None,
             damaged=tuple(store.notes),
             refusal=refusal,
@@ -64,7 +65,8 @@ def progress(store: Store) -> Progress:
     pending = [trial for trial in trials if trial.identity not in states]
     running = [trial for trial in pending if trial.identity in begun]
     left = [trial for trial in pending if trial.identity not in begun]
-    processes = cores() if mark is None else mark.processes
+    usual = cores() if left else 0
+    processes = usual if mark is None else mark.processes
     seconds = _estimate(
         store.mean_seconds(),
         [trial.condition for trial in left],

@@ -33,6 +33,7 @@ from ...spec.errors import SpecError
 from ...spec.spec import Spec
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult, build
+from ..study import check_rule_bases
 
 BLOCK = 5
 """Episodes that a level is measured over."""
@@ -69,14 +70,9 @@ def measure(trial: Trial) -> TrialResult:
 
 def check(spec: Spec) -> None:
     """Raise `SpecError` unless a wheel fails in every condition, after and before some training."""
+    check_rule_bases(spec, "of which a copy keeps its weights")
     for condition in spec.conditions():
         onset = condition.settings.scenario.onset
-        learner = condition.settings.learner
-        if not isinstance(learner, LearnerSettings):
-            raise SpecError(
-                f"learner.kind = {learner.kind!r}: wheel-failure needs agents with rule bases, of "
-                f"which a copy keeps its weights (condition {condition.label!r})"
-            )
         if onset is None:
             raise SpecError(
                 f"scenario.failures = []: wheel-failure needs one (condition {condition.label!r})"

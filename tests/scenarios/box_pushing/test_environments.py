@@ -104,6 +104,24 @@ def test_the_three_views_show_one_scenario() -> None:
         assert set(one[1].values()) | set(two[1].values()) | {three[1]} == {transition.reward}
 
 
+def test_rewards_are_those_of_the_agents_own_wheels() -> None:
+    settings = BoxPushingSettings.model_validate({"reward": {"of": "robot"}})
+    wheels, robots, joint = (kind(settings) for kind in (WheelsEnv, RobotsEnv, BoxPushingEnv))
+    scenario = BoxPushing(settings)
+    scenario.reset(int(np.random.default_rng(6).integers(2**63)))
+    for env in (wheels, robots, joint):
+        env.reset(seed=6)
+    differed = False
+    for _ in range(20):
+        paid = scenario.step(np.zeros(4, dtype=int)).reward
+        differed |= paid[0] != paid[2]
+        assert list(wheels.step(dict.fromkeys(wheels.agents, 0))[1].values()) == list(paid)
+        of_robots = robots.step({robot: [0, 0] for robot in robots.agents})[1]
+        assert list(of_robots.values()) == [paid[0], paid[2]]
+        assert joint.step(np.zeros(4))[1] == np.mean(paid)
+    assert differed
+
+
 @pytest.mark.parametrize("settings", SETTINGS)
 def test_observations_stay_within_their_spaces(settings: BoxPushingSettings) -> None:
     env = BoxPushingEnv(settings, steps=60)
@@ -141,6 +159,25 @@ def test_a_step_after_the_end_is_empty() -> None:
     assert env.agents == []
     assert env.step({}) == ({}, {}, {}, {}, {})
     assert env.game.scenario.measure()["robot_poses"].shape == (2, 3)
+
+
+def test_several_side_by_side_are_those_of_their_seeds() -> None:
+    envs = gymnasium.make_vec(
+        ENV_ID, num_envs=2, vectorization_mode="sync", settings=SETTINGS[0], steps=4
+    )
+    single = [BoxPushingEnv(SETTINGS[0], steps=4) for _ in range(2)]
+    seen = envs.reset(seed=6)[0]
+    expected = [env.reset(seed=6 + i)[0] for i, env in enumerate(single)]
+    for _ in range(4):
+        np.testing.assert_array_equal(seen, expected)
+        envs.action_space.seed(1)
+        actions = envs.action_space.sample()
+        seen, _, _, ended, _ = envs.step(actions)
+        told = [env.step(action) for env, action in zip(single, actions, strict=True)]
+        expected = [given[0] for given in told]
+        assert ended.tolist() == [given[3] for given in told]
+    assert ended.all()
+    envs.close()
 
 
 def test_pictures() -> None:

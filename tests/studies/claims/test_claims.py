@@ -214,6 +214,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "controls",
         "own-value",
         "crowds",
+        "peers-arm",
         "transfer",
         "curriculum",
         "four-robots-hard",

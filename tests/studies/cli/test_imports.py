@@ -17,16 +17,10 @@ LOADED = [
     (["presets"], set()),
     (["results", STUDY], {"numpy", "pydantic"}),
     (["topology", "list"], {"numpy", "pydantic"}),
-    (["cost"], {"numpy", "pydantic", "rich", "scipy"}),
-    (["topology", "show", "chain"], {"numpy", "pydantic", "rich", "scipy", "networkx"}),
-    (
-        ["table", STUDY],
-        {"numpy", "pydantic", "rich", "scipy", "networkx", "scipy.special"},
-    ),
-    (
-        ["status", STUDY],
-        {"numpy", "pydantic", "rich", "scipy", "networkx", "scipy.special", "joblib"},
-    ),
+    (["cost"], {"numpy", "pydantic", "scipy"}),
+    (["topology", "show", "chain"], {"numpy", "pydantic", "scipy", "networkx"}),
+    (["status", STUDY], {"numpy", "pydantic", "scipy", "networkx", "scipy.special"}),
+    (["table", STUDY], {"numpy", "pydantic", "scipy", "networkx", "scipy.special", "rich"}),
 ]
 """Commands, one after the other in one process, and what may be loaded after each."""
 

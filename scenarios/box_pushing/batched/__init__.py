@@ -1,0 +1,1 @@
+"""Many worlds stepped in one call, by several processes: Gymnasium vector environments."""
