@@ -10,9 +10,9 @@ one of three classes:
 
 In the paper's chain nobody is unseen.
 
-*Peers* are joined by an undirected edge: they decide at the same time. Each considers all actions
-of the other, as if it were below, and neither is told what the other does. Peers make joint-action
-learners (everybody is everybody's peer) and coordination graphs (few are).
+*Neighbours* are joined by an undirected edge: they decide at the same time. Each considers all
+actions of the other, as if it were below, and neither is told what the other does. Neighbours make
+joint-action learners (everybody is everybody's neighbour) and coordination graphs (few are).
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ else:
 
 
 class Hierarchy:
-    """A directed acyclic graph over agents, some of whom may be peers.
+    """A directed acyclic graph over agents, some of whom may be neighbours.
 
     Parameters
     ----------
@@ -37,21 +37,21 @@ class Hierarchy:
         Distinct agent names; their order is the agent order.
     edges
         Pairs (superior, subordinate) of names.
-    peers
+    neighbours
         Pairs of names of those who decide at the same time, each pair once.
 
     Raises
     ------
     ValueError
         If an agent is named twice or unknown, an edge occurs twice, leads to itself, or closes a
-        cycle, or two peers are superior and subordinate. The message names it.
+        cycle, or two neighbours are superior and subordinate. The message names it.
 
     Examples
     --------
     >>> chain = Hierarchy(["a", "b", "c"], [("a", "b"), ("b", "c")])
     >>> chain.order, chain.below(0), chain.above(2)
     ((0, 1, 2), (1, 2), (0, 1))
-    >>> both = Hierarchy(["a", "b"], [], peers=[("a", "b")])
+    >>> both = Hierarchy(["a", "b"], [], neighbours=[("a", "b")])
     >>> both.below(0), both.below(1), both.above(1)
     ((1,), (0,), ())
     """
@@ -60,7 +60,7 @@ class Hierarchy:
         self,
         agents: Sequence[str],
         edges: Iterable[tuple[str, str]],
-        peers: Iterable[tuple[str, str]] = (),
+        neighbours: Iterable[tuple[str, str]] = (),
     ) -> None:
         agents, edges = tuple(agents), [(str(a), str(b)) for a, b in edges]
         if not agents:
@@ -68,9 +68,9 @@ class Hierarchy:
         for name in agents:
             if agents.count(name) > 1:
                 raise ValueError(f"hierarchy: agent {name!r} is named more than once")
-        sides = [(str(a), str(b)) for a, b in peers]
+        sides = [(str(a), str(b)) for a, b in neighbours]
         _check_edges(edges, agents, _arrow, "superior")
-        _check_edges([tuple(sorted(pair)) for pair in sides], agents, _line, "peer")
+        _check_edges([tuple(sorted(pair)) for pair in sides], agents, _line, "neighbour")
         index = {name: i for i, name in enumerate(agents)}
         graph = nx.DiGraph()
         graph.add_nodes_from(range(len(agents)))
@@ -80,16 +80,16 @@ class Hierarchy:
             raise ValueError(f"hierarchy: cycle {' -> '.join([*cycle, cycle[0]])}")
         self.agents = agents
         self.edges = tuple(sorted(graph.edges))
-        self.peers = tuple(
+        self.neighbours = tuple(
             sorted((min(p), max(p)) for p in ((index[a], index[b]) for a, b in sides))
         )
-        """Pairs of peers, by index, each once."""
+        """Pairs of neighbours, by index, each once."""
         self.order: tuple[int, ...] = tuple(nx.lexicographical_topological_sort(graph))
         beside: list[set[int]] = [set() for _ in agents]
-        for a, b in self.peers:
+        for a, b in self.neighbours:
             if nx.has_path(graph, a, b) or nx.has_path(graph, b, a):
                 pair = _line((agents[a], agents[b]))
-                raise ValueError(f"hierarchy: peers {pair} are superior and subordinate, too")
+                raise ValueError(f"hierarchy: neighbours {pair} are superior and subordinate, too")
             beside[a].add(b)
             beside[b].add(a)
         self._below = tuple(tuple(sorted(nx.descendants(graph, i) | beside[i])) for i in graph)
@@ -102,12 +102,12 @@ class Hierarchy:
 
     def __repr__(self) -> str:
         pairs = [_arrow((self.agents[a], self.agents[b])) for a, b in self.edges]
-        pairs += [_line((self.agents[a], self.agents[b])) for a, b in self.peers]
+        pairs += [_line((self.agents[a], self.agents[b])) for a, b in self.neighbours]
         named = ", ".join(pairs)
         return f"Hierarchy({len(self)} agents: {named or 'no edges'})"
 
     def below(self, agent: int) -> tuple[int, ...]:
-        """Return all agents that `agent` can see: descendants and peers, in agent order."""
+        """Return all agents that `agent` can see: descendants and neighbours, in agent order."""
         return self._below[agent]
 
     def above(self, agent: int) -> tuple[int, ...]:
@@ -126,11 +126,11 @@ class Hierarchy:
     def permuted(self, permutation: Sequence[int]) -> Hierarchy:
         """Return the same hierarchy with agent ``permutation[k]`` listed as k-th."""
         names = [self.agents[i] for i in permutation]
-        edges, peers = (
+        edges, neighbours = (
             [(self.agents[a], self.agents[b]) for a, b in pairs]
-            for pairs in (self.edges, self.peers)
+            for pairs in (self.edges, self.neighbours)
         )
-        return Hierarchy(names, edges, peers)
+        return Hierarchy(names, edges, neighbours)
 
 
 def _check_edges(

@@ -402,6 +402,21 @@ class SummedScenario(Scenario, Protocol):
         ...
 
 
+@runtime_checkable
+class MirroredScenario(Scenario, Protocol):
+    """A scenario whose mirror image is the same task, see `core.mirror`."""
+
+    def partners(self) -> tuple[int, ...]:
+        """Return for every agent the one in whose place it stands in the mirror.
+
+        Raises
+        ------
+        ValueError
+            If an agent has none; one line.
+        """
+        ...
+
+
 class EmbodiedPrediction(Prediction, Protocol):
     """A prediction for bodies that are moved by wheels."""
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from math import isfinite
+from typing import Literal
 
 import numpy as np
 
@@ -36,6 +37,9 @@ class Variable:
         evenly, see `core.rules.fuzzy.Partition.of`.
     labels
         Words for the membership functions, in the order of `centres`; empty: numbered.
+    mirrored
+        What it is in the mirror image of a world: the ``same``, or of ``opposite`` sign; none: it
+        is not known, see `core.mirror`.
 
     Raises
     ------
@@ -50,6 +54,7 @@ class Variable:
     periodic: bool = False
     centres: tuple[float, ...] = ()
     labels: tuple[str, ...] = ()
+    mirrored: Literal["same", "opposite"] | None = None
 
     def __post_init__(self) -> None:
         if not (isfinite(self.low) and isfinite(self.high) and self.low < self.high):

@@ -14,7 +14,9 @@ from .calibration import Calibration
 from .evaluators.evaluator import NOTHING_GIVEN, DecisionProblem, Deliberation, Evaluator
 from .exploration import Explorer, Greedy, SuccessorExplorer
 from .hierarchy import Hierarchy
+from .learners.batch import ReplaySettings
 from .learners.learner import Learner, LearnerSettings, SuccessorLearner
+from .mirror import Mirror
 from .protocols import (
     CalibratedPrediction,
     CalibratedScenario,
@@ -26,8 +28,8 @@ from .protocols import (
     SummedScenario,
     Transition,
     groups_of,
-    roles_of,
 )
+from .rows import rows_of
 from .rules.rule_base import RuleBase
 from .self_model import SelfModel
 from .spaces import ActionSet
@@ -58,6 +60,8 @@ class Team:
         What the wheels do, as learned; none: prediction takes every robot as nominal.
     calibration
         The predictor's constants, as learned; none: as the scenario believes them to be.
+    mirror
+        Doubles what is learned from; none: it is what the agents met.
     """
 
     def __init__(
@@ -71,11 +75,12 @@ class Team:
         seed: np.random.SeedSequence,
         self_model: SelfModel | None = None,
         calibration: Calibration | None = None,
+        mirror: Mirror | None = None,
     ) -> None:
         self.hierarchy, self.action_set = hierarchy, action_set
         self.learner, self.explorer, self.evaluator = learner, explorer, evaluator
         self.rows = rows
-        self.self_model, self.calibration = self_model, calibration
+        self.self_model, self.calibration, self.mirror = self_model, calibration, mirror
         self.rng = np.random.Generator(np.random.PCG64(seed))
         self.seen: FloatArray = np.ones((len(hierarchy), len(action_set)))
         """How often each agent was seen to take each action, one of each to begin with."""
@@ -130,6 +135,8 @@ class Team:
             )
         rules = RuleBase.build(scenario.state_space, settings.rule_base)
         rows = rows_of(scenario, shared=settings.weights == "role")
+        is_mirrored = isinstance(settings, ReplaySettings) and settings.mirrored
+        mirror = Mirror.of(scenario) if is_mirrored else None
         evaluator, decision = None, settings.decision
         if decision.rule != "random":
             problem = DecisionProblem(
@@ -147,13 +154,14 @@ class Team:
         return cls(
             hierarchy,
             scenario.action_set,
-            settings.build(rules, rows),
+            settings.build(rules, rows if mirror is None else mirror.rows(rows)),
             rows,
             settings.exploration.build(len(hierarchy)),
             evaluator,
             seed,
             self_model,
             calibration,
+            mirror,
         )
 
     def check(self, prediction: Prediction) -> None:
@@ -254,9 +262,10 @@ class Team:
 
     def learn(self, transition: Transition) -> None:
         """Take in what a step led to."""
-        self._count(
-            self.learner.observe(transition.states, transition.reward, transition.terminated)
-        )
+        states, reward = transition.states, transition.reward
+        if self.mirror is not None:
+            states, reward = self.mirror.states(states), self.mirror.reward(reward)
+        self._count(self.learner.observe(states, reward, transition.terminated))
 
     def end_episode(self) -> None:
         """Learn what is learned after an episode."""
@@ -375,68 +384,6 @@ class Team:
 def _part(arrays: Mapping[str, FloatArray], prefix: str) -> dict[str, FloatArray]:
     """Return the arrays whose names begin with `prefix`, without it."""
     return {k.removeprefix(prefix): v for k, v in arrays.items() if k.startswith(prefix)}
-
-
-def rows_of(scenario: Scenario, *, shared: bool) -> IntArray:
-    """Return the row of weights of every agent ``(n,)``: its own, or that of its role.
-
-    Examples
-    --------
-    >>> from types import SimpleNamespace
-    >>> three = SimpleNamespace(agents=("a.left", "a.right", "b.left"), roles=("l", "r", "l"))
-    >>> rows_of(three, shared=True).tolist(), rows_of(three, shared=False).tolist()
-    ([0, 1, 0], [0, 1, 2])
-    """
-    owners = roles_of(scenario) if shared else tuple(scenario.agents)
-    names = list(dict.fromkeys(owners))
-    return np.array([names.index(owner) for owner in owners])
-
-
-def carried_rows(former: Scenario, scenario: Scenario, *, shared: bool) -> IntArray:
-    """Return the row of weights of a scenario's team that each row of another's goes on from.
-
-    Parameters
-    ----------
-    former, scenario
-        The scenario that was learned in, and the one that follows.
-    shared
-        Whether weights are those of roles; if not, the agents must be the same.
-
-    Returns
-    -------
-    IntArray
-        ``(n_rows,)`` rows of the weights of `former`.
-
-    Raises
-    ------
-    ValueError
-        If state space, actions, or whose weights there are differ; one line.
-
-    Examples
-    --------
-    >>> from nested_agents.scenarios.line_up import LineUpSettings
-    >>> one, three = (LineUpSettings(carts=carts).build() for carts in (1, 3))
-    >>> carried_rows(one, three, shared=True).tolist()
-    [0]
-    """
-    trained, acting = (
-        f"{len(s.agents)} agents over {s.state_space.name!r}" for s in (former, scenario)
-    )
-    said = f"a team trained with {trained} cannot act with {acting}"
-    if former.state_space != scenario.state_space:
-        raise ValueError(f"{said}: the state spaces differ")
-    if former.action_set != scenario.action_set:
-        raise ValueError(f"{said}: the actions differ")
-    owners, others = (
-        list(dict.fromkeys(roles_of(s) if shared else s.agents)) for s in (former, scenario)
-    )
-    if set(owners) != set(others):
-        raise ValueError(
-            f"{said}: their roles are {', '.join(owners)}, and {', '.join(others)}"
-            if shared
-            else f"{said}: learner.weights = 'own'; with 'role', agents of a role share theirs"
-        )
-    return np.array([owners.index(owner) for owner in others])
 
 
 def of_fuzzy_agents(team: Actors) -> Team:

@@ -43,6 +43,7 @@ myst_heading_anchors = 3
 sphinx_gallery_conf = {
     "examples_dirs": "../examples",
     "gallery_dirs": "gallery",
+    "default_thumb_file": str(HERE / "diagrams" / "program.svg"),
     "filename_pattern": r"/plot_",
     "download_all_examples": False,
     "show_memory": False,
@@ -54,7 +55,7 @@ html_theme = "furo"
 html_title = f"nested-agents {release}"
 html_theme_options = {"navigation_with_keys": True}
 html_static_path = ["_static"]
-html_css_files = ["tables.css"]
+html_css_files = ["site.css"]
 
 
 def escape_bars(app, what, name, thing, options, lines):

@@ -25,7 +25,7 @@ ACTIONS = ("increase", "decrease", "maintain", "zero")
 def draw(folder: Path) -> None:
     """Write all diagrams as SVG into a folder."""
     folder.mkdir(exist_ok=True)
-    for make in (nested_decision, perception, learner, predictions, house):
+    for make in (nested_decision, perception, learner, predictions, house, program):
         with mpl.rc_context(SETTINGS):
             figure = make()
         write(figure, folder / f"{make.__name__}.svg")
@@ -180,4 +180,15 @@ def house() -> Figure:
     for start, end in (((2.6, 2.1), (2.2, 1.83)), ((4.6, 2.1), (5.0, 1.76)),
                        ((2.2, 1.05), (2.6, 0.77)), ((5.0, 1.12), (4.6, 0.77))):  # fmt: skip
         arrow(axes, start, end)
+    return figure
+
+
+def program() -> Figure:
+    """Draw a sheet with lines of code: in the gallery it stands for programs without a picture."""
+    figure, axes = canvas(4.0, 2.8)
+    box(axes, 2.0, 1.4, "\n" * 12, width=2.6)
+    lines = ((0, 1.2, BLUE), (0, 1.7, GREY), (1, 1.3, GREY), (1, 0.9, ORANGE), (2, 1.1, GREY))
+    for row, (indent, length, colour) in enumerate((*lines, (1, 0.7, GREEN))):
+        start, height = 0.95 + 0.25 * indent, 2.3 - 0.35 * row
+        axes.plot([start, start + length], [height] * 2, color=colour, linewidth=4)
     return figure

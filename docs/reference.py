@@ -1,8 +1,7 @@
 """Writes the generated pages of the reference, from the code that they are about.
 
 ``conf.py`` calls `write` before the pages are read: keys of a spec, presets, columns of results,
-commands and modules. Nothing on these pages is written by hand, but what the columns mean that all
-studies have alike.
+commands and modules. Little on these pages is written by hand: what columns of times mean.
 """
 
 from collections.abc import Iterable, Iterator
@@ -18,6 +17,7 @@ from nested_agents.scenarios.box_pushing.states.variables import STATE_VARIABLES
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
 from nested_agents.scenarios.kinematic_chain.variables import CHAIN_VARIABLES
+from nested_agents.studies.analysis.numbers import NUMBERS
 from nested_agents.studies.api.frames import EPISODE_COLUMNS, TRIAL_COLUMNS
 from nested_agents.studies.cli.main import COMMANDS
 from nested_agents.studies.cli.main import nested_agents as program
@@ -50,35 +50,12 @@ TRIALS = tuple(
         "seconds.physics", "seconds.sensors", "seconds.learning", "seconds.total", "*numbers*",
     )
 )  # fmt: skip
-NUMBERS = (
-    ("agents", "1", "number of agents"),
-    ("robots", "1", "number of bodies that agents move"),
-    ("messages", "1", "messages in a decision: edges of the transitive closure of the hierarchy"),
-    ("joint_actions", "1", "joint actions that the team tries in a decision"),
-    ("rule_evaluations", "1", "values of rule bases that the team computes in a decision"),
-    ("formula", "1", "operations of a decision by formula: Eq. 18, or joint actions times rules"),
-    ("counted", "1", "rule evaluations of a decision as they were counted"),
-    ("memory", "kB", "consequent weights of the team"),
-    ("period", "s", "time for which a decision is held"),
-    ("weights", "1", "number of consequent weights"),
-    ("decision_median", "s", "median time of a decision of the whole team"),
-    ("decision_99", "s", "99th percentile of that time"),
-    ("team_bytes", "B", "arrays that the team remembers at the end"),
-    ("weight_bytes", "B", "consequent weights among them"),
-    ("step_bytes", "B", "memory that a step takes beside them"),
-    ("process_bytes", "B", "peak of resident memory of the worker while it trained"),
-    ("period_s", "s", "time for which a decision is held"),
-    ("least_touching", "1", "share of contact of the robot that touches the box least"),
-    ("all_touching", "1", "share of evaluation episodes in which every robot is in contact for at"
-     " least half of the time in which any robot is"),
-    ("touching.BOX.robotN", "1", "share of contact of a robot, in the evaluation with a box"),
-    ("onset", "1", "episode in which the first failure begins"),
-)  # fmt: skip
 VARIABLES = {"box-pushing": STATE_VARIABLES, "kinematic-chain": CHAIN_VARIABLES}
 """State variables by the scenario that has them."""
 MODULES = {
     "core": ("How agents perceive, predict, decide and learn, and what that costs.", (
-        "hierarchy", "spaces", "protocols", "team", "loop", "decision", "exploration",
+        "hierarchy", "spaces", "protocols", "team", "rows", "mirror", "loop", "decision",
+        "exploration",
         "rules.fuzzy", "rules.rule_base", "rules.settings",
         "learners.learner", "learners.td", "learners.batch", "learners.anova",
         "learners.gradient", "learners.optimistic", "learners.fmq",
@@ -102,7 +79,7 @@ MODULES = {
         "kinematic_chain.config", "kinematic_chain.scenario",
         "kinematic_chain.view", "kinematic_chain.variables", "matrix_games.games",
         "matrix_games.scenario", "line_up", "failures.settings", "failures.actuators",
-        "failures.carried", "failures.wrappers",
+        "failures.carried", "failures.wrappers", "passing_down",
         "state_variables", "checking.checker",
     )),
     "studies": ("What is measured, compared and drawn.", (
@@ -207,7 +184,8 @@ def columns() -> Iterator[str]:
     yield "and `nested-agents results --format csv` hold the first. A unit of 1 is a pure number.\n"
     headings = ("column", "unit", "meaning")
     for title, rows in (
-        ("Rows of episodes", EPISODES), ("Rows of trials", TRIALS), ("Numbers of trials", NUMBERS)
+        ("Rows of episodes", EPISODES), ("Rows of trials", TRIALS),
+        ("Numbers of trials", [(name, *number) for name, number in NUMBERS.items()]),
     ):  # fmt: skip
         yield f"## {title}\n"
         yield from table(headings, ((code(n) if "*" not in n else n, u, m) for n, u, m in rows))

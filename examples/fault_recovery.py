@@ -4,10 +4,11 @@ Faults in an environment of Gymnasium
 
 PPO of stable-baselines3 learns to balance a pole; then its motor is late by two steps, or turns the
 other way round, and comes back after six episodes. The table tells what that costs, and a random
-policy beside it. Needs PyTorch: ``pip install "nested-agents[peers]"``. Then
+policy beside it. Needs ``pip install stable-baselines3``. Then
 ``python fault_recovery.py``, or with a number of steps: ``python fault_recovery.py 50000``.
 """
 
+# sphinx_gallery_thumbnail_path = "wheel-failure.png"
 import sys
 
 import gymnasium

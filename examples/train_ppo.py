@@ -3,7 +3,7 @@ Train PPO on box pushing
 ========================
 
 One agent drives all wheels, by stable-baselines3's PPO: a peer to compare hierarchies of fuzzy
-agents with. Needs PyTorch: ``pip install "nested-agents[peers]"``. Then ``python train_ppo.py``, or
+agents with. Needs ``pip install stable-baselines3``. Then ``python train_ppo.py``, or
 with a number of steps: ``python train_ppo.py 200000``.
 """
 

@@ -7,6 +7,8 @@ Loggers that are told of every finished trial. Neither package is needed by anyt
     nested-agents run spec.toml --out out --log trial_loggers.py:TensorBoard
 """
 
+# sphinx_gallery_thumbnail_path = "learning-curves.png"
+
 
 class TensorBoard:
     """Curves of every measure, a run for each trial, below ``tensorboard`` in the study."""

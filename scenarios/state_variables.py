@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 
@@ -81,12 +81,14 @@ def state_variable(
     centres: tuple[float, ...] = (),
     labels: tuple[str, ...] = (),
     common: bool = False,
+    mirrored: Literal["same", "opposite"] | None = None,
 ) -> Callable[[StateFunction], StateVariable]:
     """Make a function of a view and a body a state variable of the function's name.
 
     Parameters are those of `nested_agents.core.spaces.Variable`, and `common`: whether it is the
     same for all bodies, which makes decisions by the values of many agents faster. What the
-    function is given is read-only.
+    function is given is read-only. A variable that says what it is in the mirror image of the
+    world, the ``same`` or of ``opposite`` sign, can be used with ``learner.mirrored``.
 
     Examples
     --------
@@ -99,7 +101,7 @@ def state_variable(
 
     def described(function: StateFunction) -> StateVariable:
         name: Any = getattr(function, "__name__", None)
-        variable = Variable(name, unit, low, high, periodic, centres, labels)
+        variable = Variable(name, unit, low, high, periodic, centres, labels, mirrored)
         return StateVariable(variable, function, common)
 
     return described

@@ -1,8 +1,8 @@
 """The built-in hierarchies, each a pure function from agent names to a networkx graph.
 
 An edge leads from a superior to its subordinate, and every agent is a node; an undirected graph
-joins peers. Agents are given in agent order; *groups* are the agents of one robot each. A graph
-becomes a `nested_agents.core.hierarchy.Hierarchy` in `nested_agents.topologies.build`.
+joins neighbours. Agents are given in agent order; *groups* are the agents of one robot each. A
+graph becomes a `nested_agents.core.hierarchy.Hierarchy` in `nested_agents.topologies.build`.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def independent(agents: Sequence[str]) -> nx.DiGraph:
 
 
 def simultaneous(agents: Sequence[str]) -> nx.Graph:
-    """Return agents who are all peers: everybody considers everybody, nobody is told anything.
+    """Return agents who are all neighbours: everybody considers everybody, nobody is told anything.
 
     Examples
     --------
@@ -109,7 +109,7 @@ def coordination_graph(
     shape: Literal["line", "ring"] = "line",
     edges: Iterable[Sequence[str]] | None = None,
 ) -> nx.Graph:
-    """Return peers on a line or a ring in agent order, or the given pairs of peers.
+    """Return neighbours on a line or a ring in agent order, or the given pairs of neighbours.
 
     Raises
     ------
@@ -194,7 +194,7 @@ def from_edges(
     return graph
 
 
-def from_networkx(graph: nx.Graph, agents: Sequence[str], *, peers: bool = False) -> nx.Graph:
+def from_networkx(graph: nx.Graph, agents: Sequence[str], *, neighbours: bool = False) -> nx.Graph:
     """Return a directed acyclic graph over `agents` with its nodes named by their ``str``.
 
     Parameters
@@ -203,8 +203,8 @@ def from_networkx(graph: nx.Graph, agents: Sequence[str], *, peers: bool = False
         Its nodes are the agents, its edges lead from superior to subordinate; not modified.
     agents
         Names in agent order.
-    peers
-        Whether an undirected graph, which then joins peers, is allowed, too.
+    neighbours
+        Whether an undirected graph, which then joins neighbours, is allowed, too.
 
     Raises
     ------
@@ -217,7 +217,7 @@ def from_networkx(graph: nx.Graph, agents: Sequence[str], *, peers: bool = False
     >>> from_networkx(nx.DiGraph([(0, 1)]), ["0", "1"]).edges
     OutEdgeView([('0', '1')])
     """
-    if not graph.is_directed() and not peers:
+    if not graph.is_directed() and not neighbours:
         raise ValueError("the graph is undirected: who is above whom?")
     if graph.is_multigraph():
         raise ValueError("the graph is a multigraph: edges could be given more than once")

@@ -189,13 +189,13 @@ class SimultaneousSettings(TopologySettings):
 
 
 class CoordinationGraphSettings(TopologySettings):
-    """Peers on a line, on a ring or as listed, who decide at the same time."""
+    """Neighbours on a line, on a ring or as listed, who decide at the same time."""
 
     kind: Literal["coordination-graph"] = "coordination-graph"
     shape: Literal["line", "ring"] = "line"
-    """In agent order; on a ring the last is a peer of the first."""
+    """In agent order; on a ring the last is a neighbour of the first."""
     edges: tuple[tuple[str, str], ...] | None = None
-    """Pairs of peers in place of a shape."""
+    """Pairs of neighbours in place of a shape."""
 
     argument: ClassVar[str] = "line|ring|A-B,B-C,..."
 
@@ -424,7 +424,7 @@ def hierarchy_of(
         if settings.kind in TOPOLOGIES.built_in:
             graph = settings.build(agents, named)
         else:
-            graph = from_networkx(files.called(settings, agents, named), agents, peers=True)
+            graph = from_networkx(files.called(settings, agents, named), agents, neighbours=True)
         directed = graph.is_directed()
         return Hierarchy(agents, graph.edges if directed else (), () if directed else graph.edges)
     except ValueError as error:

@@ -97,11 +97,11 @@ def positions(hierarchy: Hierarchy) -> FloatArray:
     """Return where the agents are drawn, ``(n, 2)`` [in], y downwards.
 
     A level holds the agents that are equally many steps, on the longest way, from the top. Levels
-    are columns; every `COLUMNS` of them the picture folds and runs back below. Peers are on a
+    are columns; every `COLUMNS` of them the picture folds and runs back below. Neighbours are on a
     circle.
     """
     n = len(hierarchy)
-    if hierarchy.peers:  # all lines between agents on a circle can be seen
+    if hierarchy.neighbours:  # all lines between agents on a circle can be seen
         radius = max(0.9, 1.15 * WIDTH / (2.0 * np.sin(np.pi / max(n, 2))))
         turns = 2.0 * np.pi * np.arange(n) / n
         return radius * np.stack([np.sin(turns), -np.cos(turns)], axis=1)
@@ -180,8 +180,8 @@ def _implied(hierarchy: Hierarchy) -> set[tuple[int, int]]:
 
 
 def _note(hierarchy: Hierarchy, groups: Sequence[Sequence[int]] | None) -> str:
-    if hierarchy.peers:
-        return "lines: peers, who decide at the same time"
+    if hierarchy.neighbours:
+        return "lines: neighbours, who decide at the same time"
     implied = len(_implied(hierarchy))
     grey = "grey arrows: implied by the others"
     hidden = f"{implied} edges implied by the others are not shown"
@@ -196,7 +196,7 @@ def _note(hierarchy: Hierarchy, groups: Sequence[Sequence[int]] | None) -> str:
 def _arrows(axes, hierarchy: Hierarchy, places: FloatArray) -> None:  # type: ignore[no-untyped-def]
     from matplotlib.patches import FancyArrowPatch
 
-    for a, b in hierarchy.peers:
+    for a, b in hierarchy.neighbours:
         ends = places[[a, b]]
         axes.plot(ends[:, 0], -ends[:, 1], color="#444444", linewidth=0.8, zorder=1)
     implied = _implied(hierarchy)

@@ -109,7 +109,7 @@ def _returned(builder: Builder, agents: Sequence[str], groups: Sequence[Sequence
     except (TypeError, ValueError):
         raise ValueError(
             f"{name} returned {type(result).__name__}, allowed: a networkx DiGraph, a Graph "
-            "of peers, or pairs (superior, subordinate)"
+            "of neighbours, or pairs (superior, subordinate)"
         ) from None
     graph = nx.DiGraph()
     graph.add_nodes_from(agents)

@@ -211,7 +211,7 @@ def printed(shown: HierarchyView, form: Form) -> str:
             "topology": shown.text,
             "agents": names,
             "edges": [(names[a], names[b]) for a, b in hierarchy.edges],
-            "peers": [(names[a], names[b]) for a, b in hierarchy.peers],
+            "neighbours": [(names[a], names[b]) for a, b in hierarchy.neighbours],
             "order": [names[i] for i in hierarchy.order],
             "below": dict(zip(names, below, strict=True)),
             "depth": hierarchy.depth,
@@ -220,10 +220,12 @@ def printed(shown: HierarchyView, form: Form) -> str:
         lines = (f"{json.dumps(key)}: {json.dumps(value)}" for key, value in content.items())
         return "{" + ",\n ".join(lines) + "}"
     under = {i: [names[b] for a, b in hierarchy.edges if a == i] for i in range(n)}
-    for a, b in hierarchy.peers:
+    for a, b in hierarchy.neighbours:
         under[a].append(names[b])
         under[b].append(names[a])
-    rows = [("", "agent", "below", "tries", "peers" if hierarchy.peers else "subordinates")]
+    rows = [
+        ("", "agent", "below", "tries", "neighbours" if hierarchy.neighbours else "subordinates")
+    ]
     for rank, i in enumerate(hierarchy.order):
         subordinates = ", ".join(under[i]) or "-"
         tried = readable(shown.tries[i])

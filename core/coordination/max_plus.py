@@ -10,11 +10,18 @@ whatever the width.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..arrays import FloatArray, IntArray
+from ..deferred import Deferred
 from .elimination import Scope
+
+if TYPE_CHECKING:
+    import networkx as nx
+else:
+    nx = Deferred("networkx")
 
 
 class MaxPlus:
@@ -29,7 +36,7 @@ class MaxPlus:
     rounds
         Most rounds; fewer are made if the messages settle.
     damping
-        Share of a message that is kept from the round before, 0 to below 1.
+        Share of a message that is kept from the round before, 0 to below 1; without loops none is.
 
     Raises
     ------
@@ -52,16 +59,20 @@ class MaxPlus:
         damping: float = 0.5,
         most_entries: int = 4**10,
     ) -> None:
-        self.n, self.n_actions, self.rounds, self.damping = n, n_actions, rounds, damping
-        k = max(map(len, scopes))
+        self.n, self.n_actions, self.rounds = n, n_actions, rounds
+        # Tables over the same agents are added up: passed on apart, they would be told their own.
+        apart = list(dict.fromkeys(scopes))
+        self._place = [apart.index(scope) for scope in scopes]
+        k = max(map(len, apart))
         if n_actions**k > most_entries:
             raise ValueError(
                 f"an agent with {k - 1} neighbours in the coordination graph takes a table of "
                 f"{n_actions} ** {k} entries, allowed: {most_entries:,}"
             )
         # Shorter scopes are filled up with an agent that is not there, number n.
-        self._members = np.array([(*scope, *[n] * (k - len(scope))) for scope in scopes])
-        self._lengths = [len(scope) for scope in scopes]
+        self._members = np.array([(*scope, *[n] * (k - len(scope))) for scope in apart])
+        joined = nx.Graph((("table", t), i) for t, scope in enumerate(apart) for i in scope)
+        self.damping = 0.0 if nx.is_forest(joined) else damping
         self._of = [np.argwhere(self._members == i) for i in range(n)]
 
     def best(self, tables: Sequence[FloatArray]) -> IntArray:
@@ -74,7 +85,9 @@ class MaxPlus:
         """
         members, a = self._members, self.n_actions
         count, k = members.shape
-        full = np.stack([self._filled(table) for table in tables])
+        full = np.zeros((count, *[a] * k))
+        for place, table in zip(self._place, tables, strict=True):
+            full[place] += self._filled(table)
         told = np.zeros((count, k, a))  # by tables to agents
         best, greatest = np.zeros(self.n, dtype=np.int64), -np.inf
         for _ in range(self.rounds):

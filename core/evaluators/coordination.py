@@ -1,11 +1,11 @@
-"""Evaluators for coordination graphs: a team's value is a sum, each part over an agent's peers.
+"""Evaluators for coordination graphs: a team's value is a sum of parts, each over neighbours.
 
-Agent j values the joint actions of itself and its peers; all others are taken to maintain. These
-values, a table for each agent, are added up, and the joint action of the greatest sum is found: by
-variable elimination, exactly, or by max-plus, in time that is linear in the number of agents. It is
-found once for all agents of a decision. Each then values its own actions given that all others do
-their part of it. Where actions are equally good its own part comes first, so that agents who are
-told nothing agree.
+Agent j values the joint actions of itself and its neighbours; all others are taken to maintain.
+These values, a table for each agent, are added up, and the joint action of the greatest sum is
+found: by variable elimination, exactly, or by max-plus, in time that is linear in the number of
+agents. It is found once for all agents of a decision. Each then values its own actions given that
+all others do their part of it. Where actions are equally good its own part comes first, so that
+agents who are told nothing agree.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ FIRST = 1e-9
 
 
 class VariableEliminationSettings(EvaluatorSettings):
-    """The joint action of the greatest sum of values over peers, exactly."""
+    """The joint action of the greatest sum of values over neighbours, exactly."""
 
     kind: Literal["variable-elimination"] = "variable-elimination"
 
@@ -38,13 +38,13 @@ class VariableEliminationSettings(EvaluatorSettings):
 
 
 class MaxPlusSettings(EvaluatorSettings):
-    """The joint action of a great sum of values over peers, by messages between them."""
+    """The joint action of a great sum of values over neighbours, by messages between them."""
 
     kind: Literal["max-plus"] = "max-plus"
     rounds: Annotated[int, Field(ge=1, le=10_000)] = 100
     """Most rounds of messages."""
     damping: Annotated[float, Field(ge=0, lt=1)] = 0.5
-    """Share of a message that is kept from the round before."""
+    """Share of a message that is kept from the round before; in a graph without loops none is."""
 
     def build(self, problem: DecisionProblem) -> MaxPlusMessages:
         """Return the evaluator of a team."""
@@ -57,7 +57,7 @@ class _Coordinated(Aggregation, ABC):
     Raises
     ------
     ValueError
-        If nobody has peers, or anything but own values and best responses is asked for.
+        If nobody has neighbours, or anything but own values and best responses is asked for.
     """
 
     name: str
@@ -65,10 +65,10 @@ class _Coordinated(Aggregation, ABC):
     def __init__(self, problem: DecisionProblem) -> None:
         super().__init__(problem)
         hierarchy = problem.hierarchy
-        if hierarchy.edges or not hierarchy.peers:
+        if hierarchy.edges or not hierarchy.neighbours:
             raise ValueError(
-                f"learner.decision.evaluator = {self.name!r}: the topology joins no peers, use "
-                "coordination-graph"
+                f"learner.decision.evaluator = {self.name!r}: the topology joins no neighbours, "
+                "use coordination-graph"
             )
         for key, value, allowed in (
             ("rule", problem.rule, "value"),
@@ -78,7 +78,7 @@ class _Coordinated(Aggregation, ABC):
             if value != allowed:
                 raise ValueError(
                     f"learner.decision.{key} = {value!r}: {self.name} adds up own values over "
-                    f"peers, allowed: {allowed!r}"
+                    f"neighbours, allowed: {allowed!r}"
                 )
         n = len(hierarchy)
         self.scopes: tuple[Scope, ...] = tuple(

@@ -42,6 +42,8 @@ class ReplaySettings(LearnerSettings):
     not jump from episode to episode."""
     interval: Annotated[int, Field(ge=1)] = 100
     """Decisions of an episode after which is regressed without waiting for its end."""
+    mirrored: bool = False
+    """Whether what the mirror image of the team would have met is experience as well."""
 
 
 class BatchTDSettings(ReplaySettings):

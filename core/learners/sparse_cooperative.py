@@ -1,7 +1,7 @@
 """Sparse cooperative Q-learning: each agent learns its part of a sum (Kok and Vlassis 2006).
 
-The team's value is the sum of the agents' values, each over its peers in a coordination graph. What
-all are paid together is shared out equally, so that the parts add up to it.
+The team's value is the sum of the agents' values, each over its neighbours in a coordination graph.
+What all are paid together is shared out equally, so that the parts add up to it.
 """
 
 from __future__ import annotations

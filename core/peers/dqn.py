@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-import torch
 from gymnasium.spaces import Discrete
 from stable_baselines3 import DQN
 
 from ..arrays import FloatArray, IntArray
 from ..protocols import Scenario, Transition
 from .inputs import Inputs, RewardScale
-from .networks import drawing_from, prepare, weights_of
+from .networks import Layers, drawing_from, prepare, weights_of
 from .peer import Peer
 from .seen import Seen
 from .settings import DQNSettings
@@ -53,6 +52,7 @@ class DeepQ(Peer):
         )  # fmt: skip
         prepare(model, self._inputs.n_joint, Discrete(self._n_actions), 1, self.rng)
         self._model, self._decisions = model, 0
+        self._q = Layers([model.q_net], lambda found: np.maximum(found, 0.0))
         self._rewards = RewardScale(settings.discount, 1)
 
     @property
@@ -68,8 +68,7 @@ class DeepQ(Peer):
         if explore and self.rng.random() < self.exploration_rate:
             action = int(self.rng.integers(self._n_actions))
         else:
-            with torch.no_grad():
-                action = int(self._model.q_net(torch.as_tensor(seen)).argmax())
+            action = int(self._q(seen).argmax())
         if explore:
             self._decided = seen, np.array([[action]])
         return np.array([action])

@@ -1,9 +1,10 @@
 """PPO of stable-baselines3, decision by decision: centralised, independent, with a central critic.
 
 The policy, its rollout buffer and its update are stable-baselines3's; here is what its own loop
-does in between. Several agents with shared weights are to it as many environments side by side. A
-time limit is no end: the last reward of an episode that did not terminate is added the discounted
-value of the state that it broke off in (Pardo et al. 2018).
+does in between. Actions are drawn by adding Gumbel noise to the logarithms of probabilities.
+Several agents with shared weights are to it as many environments side by side. A time limit is no
+end: the last reward of an episode that did not terminate is added the discounted value of the state
+that it broke off in (Pardo et al. 2018).
 """
 
 from __future__ import annotations
@@ -14,13 +15,14 @@ from typing import Any
 import numpy as np
 import torch
 from gymnasium.spaces import Discrete, MultiDiscrete
+from scipy.special import logsumexp
 from stable_baselines3 import PPO
 
 from ..arrays import FloatArray, IntArray
 from ..protocols import Scenario, Transition
 from .central_critic import CentralCriticPolicy
 from .inputs import Inputs, RewardScale
-from .networks import drawing_from, prepare, weights_of
+from .networks import Layers, drawing_from, prepare, weights_of
 from .peer import Peer
 from .seen import Seen
 from .settings import PolicyGradientSettings
@@ -56,6 +58,11 @@ class PolicyGradient(Peer, ABC):
         )  # fmt: skip
         prepare(model, n_inputs, actions, n_envs, self.rng)
         self._model, self._discount = model, settings.discount
+        model.policy.set_training_mode(False)
+        hidden = model.policy.mlp_extractor
+        self._actor = Layers([hidden.policy_net, model.policy.action_net], np.tanh)
+        self._critic = Layers([hidden.value_net, model.policy.value_net], np.tanh)
+        self._n_actions = len(scenario.action_set)
         self._rewards = RewardScale(settings.discount, n_envs)
         self._starts: FloatArray = np.ones(n_envs)
 
@@ -69,38 +76,39 @@ class PolicyGradient(Peer, ABC):
 
     def act(self, prediction: Seen, *, explore: bool = True) -> IntArray:
         """Return a joint action ``(n,)``: drawn from the policy, or the most probable."""
-        seen = torch.as_tensor(self._seen(prediction.present), dtype=torch.float32)
-        self._model.policy.set_training_mode(False)
-        with torch.no_grad(), drawing_from(self.rng):
-            actions, values, logs = self._model.policy(seen, deterministic=not explore)
-        if explore:
-            self._decided = seen.numpy(), actions.numpy(), values, logs
-        return actions.numpy().astype(np.int64).reshape(self._n)
+        seen = self._seen(prediction.present).astype(np.float32)
+        logits = self._actor(seen).reshape(self._n, self._n_actions)
+        if not explore:
+            return logits.argmax(axis=1)
+        actions = (logits + self.rng.gumbel(size=logits.shape)).argmax(axis=1)
+        logs = logits[np.arange(self._n), actions] - logsumexp(logits, axis=1)
+        self._decided = seen, actions, logs.reshape(len(seen), -1).sum(axis=1)
+        return actions
 
     def learn(self, transition: Transition) -> None:
         """Keep the step; if the buffer was full before it, update the policy first."""
-        seen, actions, values, logs = self._decided
+        seen, actions, logs = self._decided
+        values = torch.as_tensor(self._critic(seen).ravel())
         if self._model.rollout_buffer.full:
-            self._update(values.flatten(), done=False)
+            self._update(values, done=False)
         rewards = self._rewards.scaled(self._share(transition.reward))
         self._model.rollout_buffer.add(
-            seen, actions.reshape(len(seen), -1), rewards, self._starts, values, logs
-        )
+            seen, actions.reshape(len(seen), -1), rewards, self._starts, values,
+            torch.as_tensor(logs),
+        )  # fmt: skip
         self._starts = np.zeros(len(seen))
         self._last = transition
 
     def end_episode(self) -> None:
         """Bootstrap from where the episode broke off; update the policy if the buffer is full."""
         buffer, last = self._model.rollout_buffer, self._last
-        seen = torch.as_tensor(self._seen(last.states), dtype=torch.float32)
-        with torch.no_grad():
-            values = self._model.policy.predict_values(seen).flatten()
+        values = self._critic(self._seen(last.states).astype(np.float32)).ravel()
         if not last.terminated:
-            buffer.rewards[buffer.pos - 1] += self._discount * values.numpy()
-        self._starts = np.ones(len(seen))
+            buffer.rewards[buffer.pos - 1] += self._discount * values
+        self._starts = np.ones(len(values))
         self._rewards.end_episode()
         if buffer.full:
-            self._update(values, done=True)
+            self._update(torch.as_tensor(values), done=True)
 
     def _update(self, values: torch.Tensor, *, done: bool) -> None:
         buffer = self._model.rollout_buffer

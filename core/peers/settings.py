@@ -1,6 +1,6 @@
 """The settings of peers, as they stand in the ``[learner]`` table of a spec.
 
-Defaults are those of stable-baselines3, but for those that `docs/peers.md` names.
+Defaults are those of stable-baselines3, but for those that docs/peers.md names and accounts for.
 """
 
 from __future__ import annotations
@@ -59,7 +59,11 @@ class NetworkSettings(PeerSettings):
 class PolicyGradientSettings(NetworkSettings):
     """What the settings of PPO (Schulman et al. 2017) in all its forms share."""
 
-    rollout: Annotated[int, Field(ge=2)] = 512
+    learning_rate: Positive = 1e-3
+    """Step size of Adam."""
+    batch_size: Count = 256
+    """Transitions in a minibatch."""
+    rollout: Annotated[int, Field(ge=2)] = 256
     """Decisions between two updates."""
     epochs: Count = 10
     """Passes over the rollout at every update."""
@@ -67,7 +71,7 @@ class PolicyGradientSettings(NetworkSettings):
     """Trace decay of the generalised advantage estimate."""
     clip: Positive = 0.2
     """Clipping range of the probability ratio."""
-    entropy: NonNegative = 0.0
+    entropy: NonNegative = 0.01
     """Weight of the entropy bonus."""
 
 

@@ -7,6 +7,8 @@ and again, and learn what joint actions are worth. The best joint action lies be
 punishments, so whoever climbs first falls. You will see which teams reach the top, and why.
 """
 
+# sphinx_gallery_thumbnail_path = "course/climbing-game.png"
+
 # %%
 # The game
 # --------
@@ -80,6 +82,7 @@ print(study.table())
 
 plt.rcParams.update({"font.size": 20, "axes.spines.top": False, "axes.spines.right": False})
 figure, axes = plt.subplots(1, 2, figsize=(16, 9), sharey=True, layout="constrained")
+figure.get_layout_engine().set(w_pad=0.3, h_pad=0.2)
 for ax, game in zip(axes, ("climbing", "penalty:-100"), strict=True):
     for row, one in enumerate(reversed(teams)):
         (label,) = (c for c in study.conditions if c.startswith(one["name"]) and c.endswith(game))

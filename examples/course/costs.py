@@ -6,6 +6,8 @@ An agent tries its own actions together with all joint actions of the agents bel
 hierarchy decides what a decision costs. You will count it, by formula and in a running team.
 """
 
+# sphinx_gallery_thumbnail_path = "course/costs.png"
+
 # %%
 # By formula
 # ----------
@@ -19,7 +21,7 @@ import nested_agents as na
 from nested_agents.core.cost import Problem, below_counts
 from nested_agents.studies.presentation.figures import COLOURS, STYLES
 
-TOPOLOGIES = {"chain": "chain", "binary tree": "tree:2", "line of peers": "coordination-graph"}
+TOPOLOGIES = {"chain": "chain", "binary tree": "tree:2", "line of neighbours": "coordination-graph"}
 problem = Problem(actions=4)
 
 
@@ -47,6 +49,7 @@ print(na.cost_table(["chain", "tree:2"], agents=[2, 4, LARGEST], measured=True))
 
 plt.rcParams.update({"font.size": 20, "axes.spines.top": False, "axes.spines.right": False})
 figure, ax = plt.subplots(figsize=(16, 9), layout="constrained")
+figure.get_layout_engine().set(w_pad=0.3, h_pad=0.2)
 sizes = range(1, 17)
 for number, (name, topology) in enumerate(TOPOLOGIES.items()):
     counts = [tried(topology, n) for n in sizes]
@@ -61,13 +64,13 @@ figure.savefig("out/course/costs.png", dpi=80)
 # %%
 # Questions
 # ---------
-# A line of peers decides by variable elimination, which is exact. Its further cost grows with the
-# width of the graph: the size of the tables that are left when one agent after the other goes.
+# A line of neighbours decides by variable elimination, which is exact. Its further cost grows with
+# the width of the graph: the size of the tables that are left when one agent after the other goes.
 
 answers = {
     "chain": None,  # how many joint actions does a decision of a chain of eight agents try?
     "tree": None,  # and of a binary tree of eight?
-    "graph": None,  # and of a line of eight peers?
+    "graph": None,  # and of a line of eight neighbours?
     "factor": None,  # by which factor does one more agent multiply the work of a long chain?
     "step": None,  # how many joint actions does one more agent add to a long line?
     "width": None,  # elimination can be afforded by a: agents, b: edges, c: width of the graph

@@ -6,6 +6,8 @@ You write down who is above whom, look at what it costs, and find out whether it
 the chain of the paper, and against agents who see nobody.
 """
 
+# sphinx_gallery_thumbnail_path = "course/own-hierarchy.png"
+
 # %%
 # Write it
 # --------
@@ -53,14 +55,16 @@ print(study.compare())
 
 plt.rcParams.update({"font.size": 20, "axes.spines.top": False, "axes.spines.right": False})
 figure, ax = plt.subplots(figsize=(16, 9), layout="constrained")
+figure.get_layout_engine().set(w_pad=0.3, h_pad=0.2)
 marks = zip(study.conditions, hierarchies, COLOURS, "osD", strict=False)
 for label, name, colour, marker in marks:
     found = na.rate(study.results.evaluation[label]["success"])
     ax.plot([costs[name]] * 2, [found.low, found.high], color=colour, linewidth=4)
     ax.plot(costs[name], found.value, marker, color=colour, markersize=20, label=name)
-ax.set(xscale="log", ylim=(-0.02, 1.02))
+ax.set(xscale="log", ylim=(-0.02, 1.02), xlim=(10, 1000))
+ax.set_xticks([10, 100, 1000], ["10", "100", "1,000"])
 ax.set(xlabel="joint actions of a decision", ylabel="evaluation success, 95 % interval")
-ax.legend(loc="lower center")
+ax.legend(loc="center")
 figure.savefig("out/course/own-hierarchy.png", dpi=80)
 
 # %%

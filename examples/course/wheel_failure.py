@@ -7,6 +7,8 @@ turn against its command, and nobody tells the agents. You will see what that co
 the team back: weights that go on learning, or a model of the own body.
 """
 
+# sphinx_gallery_thumbnail_path = "course/wheel-failure.png"
+
 # %%
 # The study
 # ---------
@@ -44,6 +46,7 @@ for note in study.notes:
 
 plt.rcParams.update({"font.size": 20, "axes.spines.top": False, "axes.spines.right": False})
 figure, ax = plt.subplots(figsize=(16, 9), layout="constrained")
+figure.get_layout_engine().set(w_pad=0.3, h_pad=0.2)
 without, with_model = study.conditions
 lines = {
     "weights and self-model": (study.results.training[with_model], 0),
@@ -59,8 +62,8 @@ for number, (name, (measures, first)) in enumerate(lines.items()):
     )  # fmt: skip
 ax.axvline(FAILS - 0.5, color="k", linestyle=":", linewidth=3)
 ax.text(FAILS - 0.3, 1.02, "a wheel turns against its command")
-ax.set(xlabel="episode", ylabel="success", ylim=(-0.02, 1.1))
-ax.legend(loc="lower right")
+ax.set(xlabel="episode", ylabel="success", ylim=(-0.02, 1.1), xticks=range(0, EPISODES + 1, 2))
+ax.legend(loc="upper left")
 figure.savefig("out/course/wheel-failure.png", dpi=80)
 
 # %%

@@ -156,6 +156,24 @@ class BoxPushing:
                 limits.append((-np.inf if variable.low < 0.0 else low, np.inf))
         return np.array(limits)
 
+    def partners(self) -> tuple[int, ...]:
+        """Return for every wheel the one opposite on its robot, or itself if it is in the middle.
+
+        Raises
+        ------
+        ValueError
+            If a wheel has none; one line.
+        """
+        wheels = [(wheel.x, wheel.y) for wheel in self.robot.wheels]
+        for name, (x, y) in zip(self.robot.wheel_names, wheels, strict=True):
+            if (x, -y) not in wheels:
+                raise ValueError(
+                    f"learner.mirrored: wheel {name!r} of robot {self.robot.name!r} has no wheel "
+                    "opposite"
+                )
+        opposite = [wheels.index((x, -y)) for x, y in wheels]
+        return tuple(group[k] for group in self.groups for k in opposite)
+
     def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
         """Place robots, box and goal by the start distribution; return states ``(n, d)``.
 

@@ -94,6 +94,10 @@ class KinematicChain:
         """The state variables of every agent."""
         return self._states.space
 
+    def partners(self) -> tuple[int, ...]:
+        """Return for every joint the one in whose place it stands in the mirror: itself."""
+        return tuple(range(len(self.agents)))
+
     def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
         """Bend the arm at random, and put the goal within its reach; return states ``(n, d)``.
 

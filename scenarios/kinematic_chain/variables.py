@@ -31,7 +31,7 @@ CHAIN_VARIABLES = Registry("chain variable", {name: f"{_PLACE}:{name}" for name 
 
 SPEEDS = (-1.0, -0.5, 0.0, 0.5, 1.0)
 """Centres of the own speed, as a fraction of the greatest: arms of any length share it."""
-SPEED = Variable("speed", "1", -1.0, 1.0, centres=SPEEDS)
+SPEED = Variable("speed", "1", -1.0, 1.0, centres=SPEEDS, mirrored="opposite")
 
 
 class ChainStates:

@@ -142,12 +142,23 @@ def aligned(
 ) -> list[Array]:
     """Return the values ``(n_seeds, ...)`` of conditions for the seeds that all of them have."""
     seeds = [results.seeds.get(condition, ()) for condition in conditions]
-    shared = [seed for seed in seeds[0] if all(seed in own for own in seeds)]
-    if not shared:
+    if not all(seeds):
         return [np.zeros(0) for _ in conditions]
+    return of_shared_seeds(seeds, [values(results, condition) for condition in conditions])
+
+
+def of_shared_seeds(seeds: Sequence[Sequence[int]], values: Sequence[ArrayLike]) -> list[Array]:
+    """Return what all have in common, of values ``(n_seeds, ...)`` and the seeds that they are of.
+
+    Examples
+    --------
+    >>> of_shared_seeds([(0, 1, 2), (2, 1)], [[0.0, 0.1, 0.2], [1.2, 1.1]])
+    [array([0.1, 0.2]), array([1.1, 1.2])]
+    """
+    shared = [seed for seed in seeds[0] if all(seed in own for own in seeds)]
     return [
-        np.asarray(values(results, condition))[[own.index(seed) for seed in shared]]
-        for condition, own in zip(conditions, seeds, strict=True)
+        np.asarray(of)[[own.index(seed) for seed in shared]]
+        for own, of in zip(seeds, values, strict=True)
     ]
 
 

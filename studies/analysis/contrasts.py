@@ -13,6 +13,7 @@ from ...core.refusals import closest
 from ..spec.conditions import label
 from ..spec.errors import SpecError
 from .comparison import Array, Difference, adjusted, aligned
+from .numbers import shown
 from .paired_tests import LEVEL
 from .results import Results
 from .statistics import bootstrap, rate
@@ -24,9 +25,6 @@ EPISODES = (
     Measure("return", "return", "1", better="higher"),
 )
 """What is known of every episode besides the measures of its scenario."""
-
-DECISION = Measure("decision_median", "time of a decision", "ms", better="lower", least=0.0)
-"""A trial's median; kept in seconds, shown in milliseconds."""
 
 
 @dataclass(frozen=True)
@@ -185,9 +183,8 @@ def _values(results: Results, name: str, phase: str) -> tuple[Measure, dict[str,
         raise SpecError(f"measure = {name!r}: {closest(name, {*measures, *whole})}")
     both = (results.numbers, results.usage)
     found = {c: by[c][name] for by in both for c in by if name in by[c]}
-    if name == DECISION.name:
-        return DECISION, {c: 1e3 * seconds for c, seconds in found.items()}, ""
-    return Measure(name, name), found, ""
+    measure, factor = shown(name)
+    return measure, {c: factor * values for c, values in found.items()}, ""
 
 
 def _groups(

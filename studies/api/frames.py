@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ...core.protocols import Measure
+from ..analysis.numbers import NUMBERS
 from ..spec.errors import SpecError
 from ..store.store import Store
 
@@ -56,6 +57,7 @@ def trials(parts: Iterable[Part], keep: Keep) -> DataFrame:
     frame, _ = _frame(parts, lambda store: store.trials(), keep)
     told = {name: ("", "a swept key") for name in frame.columns}
     told |= {n: ("s", "time spent") for n in frame.columns if n.startswith("seconds.")}
+    told |= {n: tuple(NUMBERS[n]) for n in frame.columns if n in NUMBERS}
     frame.attrs["columns"] = _told(frame.columns, told | TRIAL_COLUMNS)
     return frame
 

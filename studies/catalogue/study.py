@@ -10,9 +10,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
+from ...core.learners import LEARNERS, LearnerSettings
 from .. import STUDIES
 from ..analysis.results import Results
 from ..spec.errors import SpecError
+from ..spec.spec import Spec
 from ..trials.trial import Trial, TrialResult
 
 if TYPE_CHECKING:
@@ -60,6 +62,35 @@ def load_study(name: str) -> Study:
     if missing:
         raise SpecError(f"study = {name!r}: has no {missing[0]}, needs {', '.join(PARTS)}")
     return cast(Study, study)
+
+
+def check_rule_bases(spec: Spec, why: str) -> None:
+    """Refuse conditions whose learner is no hierarchy of fuzzy agents.
+
+    Parameters
+    ----------
+    spec
+        Of a study that looks into the agents.
+    why
+        What it looks for, to be read after "agents with rule bases".
+
+    Raises
+    ------
+    SpecError
+        If there is such a condition; one line, which names the learners that will do.
+    """
+    for condition in spec.conditions():
+        learner = condition.settings.learner
+        if not isinstance(learner, LearnerSettings):
+            raise SpecError(
+                f"learner.kind = {learner.kind!r}: {spec.study} needs agents with rule bases, "
+                f"{why}, allowed {', '.join(_with_rule_bases())} (condition {condition.label!r})"
+            )
+
+
+def _with_rule_bases() -> list[str]:
+    """Return the names of the learners of hierarchies of fuzzy agents."""
+    return [n for n in LEARNERS.names() if issubclass(LEARNERS.model(n), LearnerSettings)]
 
 
 def analysed(name: str, results: Results) -> Any:

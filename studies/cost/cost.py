@@ -4,7 +4,7 @@ The formulas (Eq. 18-23) count operations of a sweep over all states; the runnin
 state a step. What they share is the number of joint actions that every agent tries,
 ``|A| ** (1 + |below|)``, and the number of rules that value each: these are counted, and compared.
 
-In a coordination graph agents try joint actions of themselves and their peers, and decide by
+In a coordination graph agents try joint actions of themselves and their neighbours, and decide by
 variable elimination, whose own operations are timed, but not counted.
 
 Counting and timing use the line-up scenario, whose prediction costs next to nothing, and sigmoid

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import matplotlib as mpl
 import numpy as np
@@ -64,14 +64,15 @@ def write(figure: Figure, path: Path) -> None:
         figure.savefig(file, format=path.suffix[1:], dpi=150, metadata=metadata)
 
 
-def log_axis(axes: Axes) -> None:
-    """Let the vertical axis be logarithmic, its ticks plain numbers: 0.5, 1, 2, 5."""
-    axes.set_yscale("log")
-    low, high = axes.get_ylim()
+def log_axis(axes: Axes, which: Literal["x", "y"] = "y") -> None:
+    """Let an axis be logarithmic, its ticks plain numbers: 0.5, 1, 2, 5."""
+    axes.set(**{f"{which}scale": "log"})
+    axis = axes.yaxis if which == "y" else axes.xaxis
+    low, high = axis.get_view_interval()
     few = np.log10(high / low) < 3.0
-    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,)))
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{y:,.10g}"))
-    axes.yaxis.set_minor_formatter(NullFormatter())
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if few else (1.0,)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.10g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def check_suffix(path: Path) -> None:

@@ -5,17 +5,17 @@ from __future__ import annotations
 import platform
 import re
 from collections.abc import Iterable, Sequence
-from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
 from ..analysis.summary import Summary, interval, two_figures
 from ..spec.outline import Outline
+from ..workers.worker import installed
 
 PACKAGES = (
     "nested-agents",
-    "box2d-py",
+    "Box2D",
     "joblib",
     "matplotlib",
     "networkx",
@@ -155,7 +155,7 @@ def versions() -> list[tuple[str, str]]:
     """Return name and version of the software that is running, and the platform in words."""
     machine = f"{platform.system()} on {platform.machine()}"
     python = platform.python_implementation(), platform.python_version()
-    return [python, *((name, version(name)) for name in PACKAGES), ("platform", machine)]
+    return [python, *((name, installed(name)) for name in PACKAGES), ("platform", machine)]
 
 
 def without_places(text: str) -> str:

@@ -16,9 +16,10 @@ from ...core.learners import LearnerSettings, TeamSettings
 from ...core.loop import policy_seed
 from ...core.peers.seen import SeenScenario
 from ...core.protocols import Measure, Scenario, measures_of
+from ...core.rows import carried_rows
 from ...core.settings import ScenarioSettings
 from ...core.sources import Sources, named
-from ...core.team import Team, carried_rows, of_fuzzy_agents
+from ...core.team import Team, of_fuzzy_agents
 from ..spec.conditions import Condition, ConditionSettings
 from ..spec.curriculum import Stage, lengths
 from ..spec.errors import SpecError

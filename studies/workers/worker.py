@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 POLL = 0.5
 """How often a worker looks whether its parent is still there [s]."""
 
-PACKAGES = ("nested-agents", "numpy", "numba", "scipy", "box2d-py")
+PACKAGES = ("nested-agents", "numpy", "numba", "scipy", "Box2D")
 """The packages on whose versions the bits of a result may depend."""
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
@@ -114,5 +114,14 @@ def versions() -> dict[str, str]:
     """Return the versions of what a trial's bits may depend on, by name."""
     from ..trials.trial import RESULTS_VERSION
 
-    packages = {name: version(name) for name in PACKAGES}
+    packages = {name: installed(name) for name in PACKAGES}
     return {"results version": str(RESULTS_VERSION), "Python": python_version(), **packages}
+
+
+def installed(package: str) -> str:
+    """Return the version of a package. That of Box2D is its module's: several packages offer it."""
+    if package == "Box2D":
+        import Box2D
+
+        return str(Box2D.__version__)
+    return version(package)

@@ -14,8 +14,9 @@ from nested_agents.core.evaluators.sampling import Sampling
 from nested_agents.core.hierarchy import Hierarchy
 from nested_agents.core.learners import LEARNERS, LearnerSettings
 from nested_agents.core.robot_agents import per_robot
+from nested_agents.core.rows import carried_rows
 from nested_agents.core.spaces import ActionSet, StateSpace
-from nested_agents.core.team import Team, carried_rows
+from nested_agents.core.team import Team
 
 PAPER = {"kind": "paper", "decay": 0.05, "clock": "episode"}
 BURST = {"kind": "burst", "rate": 0.4}

@@ -21,6 +21,7 @@ REACHED = ("success", "evaluation success", "decide [ms]")
         ("arms", REACHED),
         ("long-arms", REACHED),
         ("arm-transfer", ("evaluation success", "success, eight", "success, sixteen")),
+        ("locked-joint", ("before", "just after", "end")),
     ],
 )
 def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:

@@ -9,6 +9,7 @@ from nested_agents.studies.cli.main import main
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "learning.md"
+LARGE_TEAM = ("training", "training, difference", "evaluation", "evaluation, difference")
 COLUMNS = ("success last 5", "evaluation success", "evaluation steps")
 
 
@@ -20,6 +21,12 @@ COLUMNS = ("success last 5", "evaluation success", "evaluation steps")
         ("told", COLUMNS),
         ("scaling", ("evaluation success", "all touch")),
         ("crowds", ("evaluation success", "all touch")),
+        ("sixty-four", ("evaluation success",)),
+        ("from-eight", ("evaluation success", "success, sixty-four")),
+        (
+            "large-team",
+            ("training", "training, difference", "evaluation", "evaluation, difference"),
+        ),
         ("controls", ("evaluation success",)),
         ("four-robots-hard", ("evaluation success", "evaluation steps")),
         ("own-value", ("evaluation success",)),

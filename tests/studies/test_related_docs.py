@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from nested_agents.studies.claims import claims
+from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.trial import check
 
@@ -20,3 +22,11 @@ def test_specs(spec: str) -> None:
 @pytest.mark.parametrize("path", re.findall(r"nested-agents run (\S+\.toml)", TEXT))
 def test_commands_name_specs_that_can_be_built(path: str) -> None:
     check(Spec.load(ROOT / path))
+
+
+def test_the_table_of_the_climbing_game(capsys: pytest.CaptureFixture[str]) -> None:
+    columns = ("evaluation success", "memory [kB]", "messages", "formula", "counted")
+    path = str(claims.PUBLISHED / "climbing.json")
+    assert main(["table", path, "--columns", *columns, "--format", "markdown"]) == 0
+    table = capsys.readouterr().out
+    assert table in TEXT, f"docs/related.md: put in\n{table}"

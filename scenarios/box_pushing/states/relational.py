@@ -29,11 +29,12 @@ def _angle(
     centres: tuple[float, ...], labels: tuple[str, ...] = TURNS, *, common: bool = False
 ) -> Callable[[StateFunction], StateVariable]:
     return state_variable(
-        "rad", -pi, pi, periodic=True, centres=centres, labels=labels, common=common
-    )
+        "rad", -pi, pi, periodic=True, centres=centres, labels=labels, common=common,
+        mirrored="opposite",
+    )  # fmt: skip
 
 
-@state_variable("m", 0.0, 0.5, centres=GAPS, labels=NEARNESS)
+@state_variable("m", 0.0, 0.5, centres=GAPS, labels=NEARNESS, mirrored="same")
 def gap(view: View, robot: int) -> FloatArray:
     """Gap between robot and box."""
     return view.gaps[:, robot]
@@ -51,7 +52,7 @@ def side(view: View, robot: int) -> FloatArray:
     return wrap(view.azimuth(robot) - view.course)
 
 
-@state_variable("m", 0.0, 0.5, centres=GAPS, labels=NEARNESS)
+@state_variable("m", 0.0, 0.5, centres=GAPS, labels=NEARNESS, mirrored="same")
 def others_gap(view: View, robot: int) -> FloatArray:
     """Greatest gap of the other robots; of the robot itself if it is alone."""
     others = [r for r in range(view.gaps.shape[1]) if r != robot] or [robot]
@@ -67,7 +68,7 @@ def push_bearing(view: View, robot: int) -> FloatArray:
 
 @state_variable(
     "m", -0.4, 0.4, centres=(-0.3, -0.06, 0.0, 0.06, 0.3),
-    labels=("far right", "right", "none", "left", "far left"), common=True,
+    labels=("far right", "right", "none", "left", "far left"), common=True, mirrored="opposite",
 )  # fmt: skip
 def cross_track_error(view: View, robot: int) -> FloatArray:
     """By how much that push would miss the goal; beyond it the whole distance."""
@@ -78,7 +79,7 @@ def cross_track_error(view: View, robot: int) -> FloatArray:
 
 @state_variable(
     "m", 0.0, 1.1, centres=(0.0, 0.1, 0.3, 0.6, 1.1),
-    labels=("there", "close", "near", "away", "far"), common=True,
+    labels=("there", "close", "near", "away", "far"), common=True, mirrored="same",
 )  # fmt: skip
 def box_distance(view: View, robot: int) -> FloatArray:
     """Distance of the box from the goal."""
@@ -87,7 +88,7 @@ def box_distance(view: View, robot: int) -> FloatArray:
 
 @state_variable(
     "m", -0.05, 0.05, centres=(-0.02, -0.005, 0.0, 0.01, 0.03),
-    labels=("receding", "slipping", "none", "slow", "fast"), common=True,
+    labels=("receding", "slipping", "none", "slow", "fast"), common=True, mirrored="same",
 )  # fmt: skip
 def approach(view: View, robot: int) -> FloatArray:
     """By how much the box came nearer per decision period: -Delta D of Conditions 1, 2."""
@@ -114,7 +115,7 @@ def face_bearing(view: View, robot: int) -> FloatArray:
 
 @state_variable(
     "1", 0.0, 1.0, centres=(0.0, 0.25, 0.5, 0.75, 1.0),
-    labels=("none", "some", "half", "most", "all"),
+    labels=("none", "some", "half", "most", "all"), mirrored="same",
 )  # fmt: skip
 def others_away(view: View, robot: int) -> FloatArray:
     """How many of the other robots are away from the box, as a share: gaps up to `AWAY` in part.
@@ -135,7 +136,7 @@ def contact_push_bearing(view: View, robot: int) -> FloatArray:
 @state_variable(
     "m", -1.0, 1.0, centres=(-0.8, -0.3, -0.08, 0.0, 0.08, 0.3, 0.8),
     labels=("very far right", "far right", "right", "none", "left", "far left", "very far left"),
-    common=True,
+    common=True, mirrored="opposite",
 )  # fmt: skip
 def contact_cross_track_error(view: View, robot: int) -> FloatArray:
     """By how much that push would miss the goal; beyond it the whole distance."""

@@ -132,11 +132,12 @@ _SPEED = Variable(
     _MAX_SPEED,
     centres=(-0.13, -0.065, 0.0, 0.065, 0.13),
     labels=("fast back", "back", "still", "forward", "fast forward"),
+    mirrored="same",
 )
 
 
 def _angle(name: str, centres: tuple[float, ...] = ()) -> Variable:
-    return Variable(name, "rad", -pi, pi, True, centres)
+    return Variable(name, "rad", -pi, pi, True, centres, mirrored="opposite")
 
 
 def listed(name: str, *shared: str) -> BoxStateSpace:
@@ -191,11 +192,11 @@ STATE_SPACES: dict[str, BoxStateSpace] = {
             (
                 _angle("heading", _EVEN),
                 _angle("goal_bearing", _EVEN),
-                Variable("goal_distance", "m", 0.0, 1.5),
+                Variable("goal_distance", "m", 0.0, 1.5, mirrored="same"),
                 _SPEED,
                 _angle("box_orientation", _EVEN),
                 _angle("box_goal_bearing", _EVEN),
-                Variable("box_distance", "m", 0.0, 1.2),
+                Variable("box_distance", "m", 0.0, 1.2, mirrored="same"),
             ),
             n_own=4,
             common=("box_orientation", "box_goal_bearing", "box_distance"),

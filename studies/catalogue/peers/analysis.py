@@ -8,7 +8,7 @@ is compared with all others at the end, paired by seed.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import process_time
 
 import numpy as np
@@ -49,6 +49,8 @@ def check(spec: Spec) -> None:
 
 def measure(trial: Trial) -> TrialResult:
     """Train, with evaluations on the way; imported by name in workers."""
+    # Compiles, once a process.
+    Session(replace(trial, episodes=1, steps=2, curriculum=())).train(1)
     session = Session(trial)
     generator = session.team.rng.bit_generator
     done, seconds, usage = 0, 0.0, {}
@@ -116,14 +118,14 @@ def analyse(results: Results) -> Peers:
     for condition in results.evaluation:
         steps = results.training[condition]["steps"].astype(float)
         usage = results.usage.get(condition, {})
-        before = {
-            count: arrays[condition]["success"]
+        earlier = {
+            int(phase.removeprefix(AFTER)): arrays[condition]["success"]
             for phase, arrays in results.phases.items()
             if phase.startswith(AFTER) and condition in arrays
-            for count in [int(phase.removeprefix(AFTER))]
         }
+        before = dict(sorted(earlier.items()))
         last = results.evaluation[condition]["success"]
-        every = {**dict(sorted(before.items())), steps.shape[1]: last}
+        every = {**before, steps.shape[1]: last}
         cpu = {count: usage.get(f"{CPU}{count}") for count in every}
         estimates = {f"success, {count}": rate(s) for count, s in before.items()}
         estimates |= evaluated(results, condition)

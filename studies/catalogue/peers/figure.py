@@ -5,9 +5,8 @@ from __future__ import annotations
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, NullFormatter
 
-from ...presentation.figures import COLOURS, SETTINGS, STYLES
+from ...presentation.figures import COLOURS, SETTINGS, STYLES, log_axis
 from .analysis import Peers
 
 
@@ -29,9 +28,7 @@ def figure_of(analysis: Peers) -> Figure:
                     spent, value, "o", color=colour, ls=style, lw=1.6, markersize=3.5, label=label
                 )
         for axes, title in zip(panels, ("decisions", "CPU time of training [s]"), strict=True):
-            axes.set_xscale("log")
-            axes.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:,.10g}"))
-            axes.xaxis.set_minor_formatter(NullFormatter())
+            log_axis(axes, "x")
             axes.set_xlabel(title)
             axes.set_ylim(-0.03, 1.03)
             axes.grid(axis="y", alpha=0.25)

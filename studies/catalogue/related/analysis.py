@@ -6,8 +6,8 @@ it succeeds when evaluated, and after how many decisions; and of a decision of a
 - its time;
 - the memory of all that is learned;
 - messages: the actions that agents tell one another. A superior tells each agent below it what it
-  has decided. Peers tell each other what they have done, or in a coordination graph what would be
-  best; max-plus does so in every round, of which one is counted;
+  has decided. Neighbours tell each other what they have done, or in a coordination graph what would
+  be best; max-plus does so in every round, of which one is counted;
 - operations: joint actions tried times the rules that value each, by the formula of the topology
   (sum over agents of ``|A| ** (1 + |below|)``, times |S|) and as counted in the running system.
 """
@@ -29,6 +29,7 @@ from ...spec.spec import Spec
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..scaling.analysis import messages
+from ..study import check_rule_bases
 
 TITLES = {
     "memory": "memory [kB]",
@@ -40,9 +41,10 @@ TITLES = {
 
 
 def check(spec: Spec) -> None:
-    """Raise `SpecError` unless trained teams are evaluated."""
+    """Raise `SpecError` unless trained teams of agents with rule bases are evaluated."""
     if spec.evaluation < 1:
         raise SpecError("evaluation = 0: related compares evaluation success, needs 1 or more")
+    check_rule_bases(spec, "whose weights and messages it counts")
 
 
 def measure(trial: Trial) -> TrialResult:

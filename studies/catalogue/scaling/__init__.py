@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .analysis import Scaling, analyse, measure
+from .analysis import Scaling, analyse, check, measure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,4 +20,4 @@ def draw(analysis: Scaling) -> dict[str, Figure]:
     return {"scaling": figure_of(analysis)} if analysis.points else {}
 
 
-__all__ = ["NUMBERS", "analyse", "draw", "measure"]
+__all__ = ["NUMBERS", "analyse", "check", "draw", "measure"]

@@ -25,9 +25,11 @@ from ....core.team import of_fuzzy_agents
 from ...analysis.results import Results
 from ...analysis.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
 from ...analysis.summary import Summary, evaluated
+from ...spec.spec import Spec
 from ...trials.contact import ContactShares
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
+from ..study import check_rule_bases
 
 COLUMNS = (
     "success", "all touch", "decide [ms]", "learn [ms]", "team [MB]", "process [MB]",
@@ -35,6 +37,11 @@ COLUMNS = (
 """What the table shows, and after the first of them the evaluations."""
 MEMORY = Path("/proc/self/status")
 CLEAR = Path("/proc/self/clear_refs")
+
+
+def check(spec: Spec) -> None:
+    """Raise `SpecError` unless all agents have rule bases."""
+    check_rule_bases(spec, "whose weights and messages it counts")
 
 
 def measure(trial: Trial) -> TrialResult:

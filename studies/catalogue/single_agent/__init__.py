@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .analysis import Contests, analyse, measure
+from .analysis import Contests, analyse, check, measure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,4 +20,4 @@ def draw(analysis: Contests) -> dict[str, Figure]:
     return {"single-agent": figure_of(analysis)} if analysis.contests else {}
 
 
-__all__ = ["NUMBERS", "analyse", "draw", "measure"]
+__all__ = ["NUMBERS", "analyse", "check", "draw", "measure"]

@@ -18,11 +18,18 @@ from ....core.team import of_fuzzy_agents
 from ...analysis.results import Results
 from ...analysis.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, rates
 from ...analysis.summary import Summary
+from ...spec.spec import Spec
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
+from ..study import check_rule_bases
 
 BLOCK = 20
 """Episodes at the end of training that the table averages over."""
+
+
+def check(spec: Spec) -> None:
+    """Raise `SpecError` unless all agents have rule bases."""
+    check_rule_bases(spec, "whose weights and rule evaluations it counts")
 
 
 def measure(trial: Trial) -> TrialResult:

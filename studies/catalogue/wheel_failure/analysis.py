@@ -23,7 +23,7 @@ import numpy as np
 from ....core.learners.frozen import FrozenSettings
 from ....core.learners.learner import LearnerSettings
 from ....core.team import Team
-from ...analysis.comparison import Array, Difference, adjusted
+from ...analysis.comparison import Array, Difference, adjusted, of_shared_seeds
 from ...analysis.results import Arrays, Results
 from ...analysis.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, rates
 from ...analysis.summary import Summary
@@ -33,6 +33,7 @@ from ...spec.errors import SpecError
 from ...spec.spec import Spec
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult, build
+from ..study import check_rule_bases
 
 BLOCK = 5
 """Episodes that a level is measured over."""
@@ -69,14 +70,9 @@ def measure(trial: Trial) -> TrialResult:
 
 def check(spec: Spec) -> None:
     """Raise `SpecError` unless a wheel fails in every condition, after and before some training."""
+    check_rule_bases(spec, "of which a copy keeps its weights")
     for condition in spec.conditions():
         onset = condition.settings.scenario.onset
-        learner = condition.settings.learner
-        if not isinstance(learner, LearnerSettings):
-            raise SpecError(
-                f"learner.kind = {learner.kind!r}: wheel-failure needs agents with rule bases, of "
-                f"which a copy keeps its weights (condition {condition.label!r})"
-            )
         if onset is None:
             raise SpecError(
                 f"scenario.failures = []: wheel-failure needs one (condition {condition.label!r})"
@@ -276,12 +272,9 @@ def _gains(courses: tuple[Course, ...]) -> tuple[Difference, ...]:
         base = bases.get(course.fault)
         if base is None or base is course:
             continue
-        shared = [seed for seed in course.seeds if seed in base.seeds]
-        if len(shared) < 2:
-            continue
-        ends = [
-            c.end.mean(axis=1)[[c.seeds.index(seed) for seed in shared]] for c in (course, base)
-        ]
-        named = f"{course.fault}, {course.adapts}"
-        found.append(Difference.between(named, "end", ends[0], ends[1], of_rates=True))
+        both = (course, base)
+        own, other = of_shared_seeds([c.seeds for c in both], [c.end.mean(axis=1) for c in both])
+        if len(own) >= 2:
+            named = f"{course.fault}, {course.adapts}"
+            found.append(Difference.between(named, "end", own, other, of_rates=True))
     return adjusted(found)

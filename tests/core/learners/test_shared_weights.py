@@ -10,10 +10,10 @@ from nested_agents.core.learners import LEARNERS
 from nested_agents.core.learners.batch import REWARD_SCALE, BatchTD, BatchTDSettings
 from nested_agents.core.learners.learner import Learner
 from nested_agents.core.learners.td import TDLambda, TDLambdaSettings
+from nested_agents.core.rows import rows_of
 from nested_agents.core.rules import reference
 from nested_agents.core.rules.fuzzy import Partition
 from nested_agents.core.rules.rule_base import RuleBase
-from nested_agents.core.team import rows_of
 
 LEARNING: dict[str, dict[str, Any]] = {
     "batch-td": {"kind": "batch-td", "ridge": 0.1, "interval": 4, "trace_decay": 0.5},

@@ -161,6 +161,25 @@ def test_a_step_after_the_end_is_empty() -> None:
     assert env.game.scenario.measure()["robot_poses"].shape == (2, 3)
 
 
+def test_several_side_by_side_are_those_of_their_seeds() -> None:
+    envs = gymnasium.make_vec(
+        ENV_ID, num_envs=2, vectorization_mode="sync", settings=SETTINGS[0], steps=4
+    )
+    single = [BoxPushingEnv(SETTINGS[0], steps=4) for _ in range(2)]
+    seen = envs.reset(seed=6)[0]
+    expected = [env.reset(seed=6 + i)[0] for i, env in enumerate(single)]
+    for _ in range(4):
+        np.testing.assert_array_equal(seen, expected)
+        envs.action_space.seed(1)
+        actions = envs.action_space.sample()
+        seen, _, _, ended, _ = envs.step(actions)
+        told = [env.step(action) for env, action in zip(single, actions, strict=True)]
+        expected = [given[0] for given in told]
+        assert ended.tolist() == [given[3] for given in told]
+    assert ended.all()
+    envs.close()
+
+
 def test_pictures() -> None:
     env = BoxPushingEnv(SETTINGS[2], render_mode="rgb_array")
     with pytest.raises(RuntimeError, match="call reset first"):

@@ -12,6 +12,7 @@ from nested_agents.studies.analysis.results import Results
 from nested_agents.studies.catalogue import wheel_failure
 from nested_agents.studies.catalogue.peers import analyse, check, draw, measure
 from nested_agents.studies.catalogue.peers.analysis import stops
+from nested_agents.studies.catalogue.study import load_study
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
@@ -78,8 +79,17 @@ def test_evaluations_on_the_way_leave_no_trace() -> None:
 def test_what_cannot_be_is_refused() -> None:
     with pytest.raises(SpecError, match="evaluation = 0: peers compares"):
         check(Spec.of({"study": "peers", "evaluation": 0}))
-    with pytest.raises(SpecError, match="'ppo': wheel-failure needs agents with rule bases"):
-        wheel_failure.check(Spec.of({"study": "wheel-failure", "learner": {"kind": "ppo"}}))
+
+
+@pytest.mark.parametrize("study", ["wheel-failure", "scaling", "single-agent", "related"])
+def test_studies_of_rule_bases_refuse_peers_before_they_begin(study: str, tmp_path: Path) -> None:
+    path = tmp_path / "spec.toml"
+    path.write_text(f'study = "{study}"\n[learner]\nkind = "ppo"\n')
+    with pytest.raises(SpecError, match=rf"'ppo': {study} needs agents with rule bases") as raised:
+        load_study(study).check(Spec.load(path))  # type: ignore[attr-defined]
+    assert "allowed batch-td, " in str(raised.value)
+    assert "ippo" not in str(raised.value)
+    assert "\n" not in str(raised.value)
 
 
 @pytest.mark.parametrize("path", SPECS, ids=lambda path: path.stem)

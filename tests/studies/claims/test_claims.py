@@ -214,6 +214,8 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "controls",
         "own-value",
         "crowds",
+        "peers-arm",
+        "peers-boxes",
         "transfer",
         "curriculum",
         "four-robots-hard",

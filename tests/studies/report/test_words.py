@@ -1,3 +1,4 @@
+import Box2D
 import numpy as np
 import pytest
 
@@ -58,3 +59,8 @@ def test_versions_name_no_host():
     said = dict(words.versions())
     assert said["platform"].split(" on ")[0] == platform.system()
     assert platform.node() not in "".join(said.values())
+
+
+def test_box2d_may_come_from_any_package(monkeypatch):
+    monkeypatch.setattr(Box2D, "__version__", "2.3.10")
+    assert dict(words.versions())["Box2D"] == "2.3.10"

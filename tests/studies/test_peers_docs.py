@@ -1,0 +1,27 @@
+"""docs/peers.md holds the tables that the committed results give, and names specs that are."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from nested_agents.studies.claims import claims
+from nested_agents.studies.cli.main import main
+from nested_agents.studies.spec.spec import Spec
+
+ROOT = Path(__file__).resolve().parents[2]
+TEXT = (ROOT / "docs" / "peers.md").read_text(encoding="utf-8")
+COLUMNS = ("success, 4", "success, 12", "evaluation success", "decisions", "CPU [s]")
+
+
+@pytest.mark.parametrize("name", ["peers-arm", "peers-boxes"])
+def test_tables(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    path = claims.PUBLISHED / f"{name}.json"
+    assert main(["table", str(path), "--columns", *COLUMNS, "--format", "markdown"]) == 0
+    table = capsys.readouterr().out
+    assert table in TEXT, f"docs/peers.md: put in\n{table}"
+
+
+@pytest.mark.parametrize("path", re.findall(r"nested-agents run (\S+\.toml)", TEXT))
+def test_commands_name_specs_that_are(path: str) -> None:
+    assert Spec.load(ROOT / path).conditions()
