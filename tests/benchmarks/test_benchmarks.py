@@ -79,3 +79,10 @@ def test_what_can_be_solved_at_a_size_is_told(run: Run) -> None:
     assert all(len(line) <= 80 for line in said.splitlines())
     assert "scaling similar, box grows: width" in said
     assert "│ 3 " in said
+
+
+@pytest.mark.slow
+def test_worlds_in_one_call_are_timed(run: Run) -> None:
+    said = run("benchmarks.batched", "--worlds", "1", "2", "--steps", "8", "--rounds", "1")
+    assert all(len(line) <= 80 for line in said.splitlines())
+    assert "Steps of worlds per second" in said
