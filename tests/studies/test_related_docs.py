@@ -24,9 +24,15 @@ def test_commands_name_specs_that_can_be_built(path: str) -> None:
     check(Spec.load(ROOT / path))
 
 
-def test_the_table_of_the_climbing_game(capsys: pytest.CaptureFixture[str]) -> None:
-    columns = ("evaluation success", "memory [kB]", "messages", "formula", "counted")
-    path = str(claims.PUBLISHED / "climbing.json")
+@pytest.mark.parametrize(
+    ("name", "columns"),
+    [
+        ("related", ("evaluation success", "success, L", "success, star", "time [s]")),
+        ("climbing", ("evaluation success", "memory [kB]", "messages", "formula", "counted")),
+    ],
+)
+def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
+    path = str(claims.PUBLISHED / f"{name}.json")
     assert main(["table", path, "--columns", *columns, "--format", "markdown"]) == 0
     table = capsys.readouterr().out
     assert table in TEXT, f"docs/related.md: put in\n{table}"
