@@ -70,6 +70,7 @@ MODULES = {
     "topologies": ("Who is above whom.", ("builders", "checks", "config", "drawing", "files")),
     "scenarios": ("Where agents act.", (
         "box_pushing.config", "box_pushing.scenario", "box_pushing.environments",
+        "box_pushing.batched.environments", "passing_down",
         "box_pushing.reward", "box_pushing.starts", "box_pushing.states.view",
         "box_pushing.states.variables", "box_pushing.states.state_spaces",
         "box_pushing.prediction.predictors", "box_pushing.world.boxes",

@@ -58,14 +58,16 @@ def run_and_show(
 
 
 def _replays(study: StudyResults, episodes: int) -> list[Path]:
-    """Draw what is recorded of the first trial, if its scenario knows how."""
+    """Draw once what is recorded of the first trial, if its scenario knows how."""
     folder = study.directory / "replay"
     names = ("first", "last") if episodes > 1 else ("last",)
+    paths = {name: folder / f"{name}-episode.gif" for name in names}
     try:
         folder.mkdir(exist_ok=True)
-        return [
-            study.replay(episode=name, path=folder / f"{name}-episode.gif").path for name in names
-        ]
+        for name, path in paths.items():
+            if not path.exists():
+                study.replay(episode=name, path=path)
     except SpecError as error:
         say(str(error))
         return []
+    return list(paths.values())

@@ -55,7 +55,7 @@ class VecBoxPushingEnv(VectorEnv):
     >>> envs = VecBoxPushingEnv(3, {"robots": 1}, steps=2, processes=1)
     >>> observations, infos = envs.reset(seed=0)
     >>> observations.shape, envs.action_space.shape, infos["distance_m"].shape
-    ((3, 10), (3, 2), (3,))
+    ((3, 9), (3, 2), (3,))
     >>> _, rewards, terminations, truncations, _ = envs.step(envs.action_space.sample())
     >>> rewards.shape, terminations.any(), truncations.any()
     ((3,), np.False_, np.False_)

@@ -219,6 +219,12 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "transfer",
         "curriculum",
         "four-robots-hard",
+        "large-team",
+        "sixty-four",
+        "from-eight",
+        "locked-joint",
+        "related",
+        "climbing",
     }
     assert all(path.stat().st_size < 300_000 for path in files)
     assert main(["claims", "--format", "markdown"]) == 0
