@@ -118,7 +118,9 @@ class Adversary:
         """Return all that a study has found."""
         with Store.open(directory) as store:
             store.verify()
-            rows = store.episodes(), store.planned(), store.columns(), store.spec() == SPEC
+            names, episodes = store.episodes()
+            kept = names, list(episodes)
+            rows = kept, store.planned(), store.columns(), store.spec() == SPEC
         paths = sorted((directory / "recordings").glob("[!.]*.npz"))
         return rows, [(path.name, path.read_bytes()) for path in paths]
 

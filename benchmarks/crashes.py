@@ -193,7 +193,8 @@ def _digest(directory: Path) -> str:
     """Return the SHA-256 of all rows and recordings."""
     with Store.open(directory) as store:
         store.verify()
-        rows, numbers = store.episodes(), store.numbers()
+        names, episodes = store.episodes()
+        rows, numbers = (names, list(episodes)), store.numbers()
     content = hashlib.sha256(json.dumps([rows, [n[:4] for n in numbers if n[4]]]).encode())
     for path in sorted((directory / "recordings").glob("[!.]*.npz")):
         content.update(path.name.encode() + path.read_bytes())

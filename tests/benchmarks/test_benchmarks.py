@@ -26,8 +26,9 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> 
 
 @pytest.mark.slow
 def test_the_smallest_benchmark_runs(run: Run, tmp_path: Path) -> None:
-    said = run("benchmarks", "--smoke", "--json", str(tmp_path / "b.json"))
-    assert all(len(line) <= 80 for line in said.splitlines())
+    *said, where = run("benchmarks", "--smoke", "--json", str(tmp_path / "b.json")).splitlines()
+    assert all(len(line) <= 80 for line in said)
+    assert where == f"kept in {tmp_path / 'b.json'}"
     result = json.loads((tmp_path / "b.json").read_text(encoding="utf-8"))
     assert [row["agents"] for row in result["exact"]] == [2, 2]
     assert result["exact"][0]["literal_ratio"] > 0
