@@ -8,7 +8,6 @@ commands that read it. Its rows are written as those of any study, but not waite
 from __future__ import annotations
 
 import argparse
-import os
 import subprocess
 import sys
 import tempfile
@@ -22,6 +21,7 @@ from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.episodes import EpisodeRow
 from nested_agents.studies.trials.trial import Trial, TrialResult, check, trials_of
 
+from .startup import used_by
 from .tables import Row, show
 
 STAGES = {
@@ -108,14 +108,7 @@ def commands(directory: Path) -> list[Row]:
     rows: list[Row] = []
     for words in COMMANDS:
         given = [word.replace("DIR", str(directory)) for word in words]
-        process = subprocess.Popen(
-            [sys.executable, "-m", "nested_agents", *given],
-            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        )  # fmt: skip
-        _, status, used = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
-        if process.returncode:
-            raise subprocess.CalledProcessError(process.returncode, given)
+        used = used_by(["-m", "nested_agents", *given], stderr=subprocess.DEVNULL)
         spent = used.ru_utime + used.ru_stime
         rows.append({"command": words[0], "s": spent, "peak": round(used.ru_maxrss / 1024)})
     return rows

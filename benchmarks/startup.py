@@ -14,8 +14,9 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping
 from pathlib import Path
+from resource import struct_rusage
+from typing import Any
 
 from rich.console import Console
 
@@ -42,20 +43,21 @@ def measure(study: Path, rounds: int, bytecode: Path) -> list[Row]:
     least = dict.fromkeys(lines, float("inf"))
     for round_ in range(rounds + 1):
         for name, line in lines.items():
-            taken = processor_seconds(line, os.environ | caching)
+            used = used_by(line, env=os.environ | caching)
+            taken = used.ru_utime + used.ru_stime
             least[name] = min(least[name], taken) if round_ else least[name]
     bare = least["import numpy, pydantic"]
     return [{"command": n, "s": taken, "ratio": taken / bare} for n, taken in least.items()]
 
 
-def processor_seconds(line: list[str], environment: Mapping[str, str]) -> float:
-    """Return the processor time [s] of Python with arguments, which must succeed."""
-    process = subprocess.Popen([sys.executable, *line], stdout=subprocess.DEVNULL, env=environment)
+def used_by(line: list[str], **options: Any) -> struct_rusage:
+    """Return what Python with arguments used, which must succeed; options are those of `Popen`."""
+    process = subprocess.Popen([sys.executable, *line], stdout=subprocess.DEVNULL, **options)
     _, status, used = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
     if process.returncode:
         raise subprocess.CalledProcessError(process.returncode, line)
-    return used.ru_utime + used.ru_stime
+    return used
 
 
 def main() -> None:

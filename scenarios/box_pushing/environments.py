@@ -35,6 +35,13 @@ RENDER_MODES = ["rgb_array", "human"]
 SettingsLike = BoxPushingSettings | Mapping[str, Any] | None
 
 
+def meant(settings: SettingsLike) -> BoxPushingSettings:
+    """Return the settings that a ``[scenario]`` table stands for; none: the default ones."""
+    if isinstance(settings, BoxPushingSettings):
+        return settings
+    return BoxPushingSettings.model_validate(settings or {})
+
+
 class Seat:
     """The wheels that one outside agent drives, and what it observes.
 
@@ -103,8 +110,7 @@ class Game:
             raise ValueError(f"steps = {steps}, must be at least 1")
         if render_mode not in (None, *RENDER_MODES):
             raise ValueError(f"render_mode = {render_mode!r}, allowed None, {RENDER_MODES}")
-        if not isinstance(settings, BoxPushingSettings):
-            settings = BoxPushingSettings.model_validate(settings or {})
+        settings = meant(settings)
         self.scenario = BoxPushing(settings)
         self.steps = steps
         self.screen = Screen(settings, render_mode, sensors=sensors) if render_mode else None

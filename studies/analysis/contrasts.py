@@ -151,10 +151,9 @@ def contrasts(
         for name, condition in others:
             ours, theirs = aligned(results, (condition, base), lambda _, c: values[c])
             if len(ours) >= 2:
-                found_here = Difference.between(
-                    name, measure, ours, theirs, of_rates=told_by.is_rate
+                own.append(
+                    Difference.between(name, measure, ours, theirs, of_rates=told_by.is_rate)
                 )
-                own.append(found_here)
         found.append(own)
     every = iter(adjusted([d for own in found for d in own]))
     made = []

@@ -54,14 +54,12 @@ NUMBERS = {
 """Numbers by the name of their column; those of a study of one's own are not among them."""
 
 _SHOWN = {
-    "decision_median": Measure(
-        "decision_median", "time of a decision", "ms", better="lower", least=0.0
-    ),
-    "decision_99": Measure(
-        "decision_99", "99th percentile of decisions", "ms", better="lower", least=0.0
-    ),
+    name: (Measure(name, title, "ms", better="lower", least=0.0), 1e3)
+    for name, title in (
+        ("decision_median", "time of a decision"),
+        ("decision_99", "99th percentile of decisions"),
+    )
 }
-_PER = {("s", "ms"): 1e3}
 
 
 def shown(name: str) -> tuple[Measure, float]:
@@ -75,6 +73,6 @@ def shown(name: str) -> tuple[Measure, float]:
     >>> shown("messages")[0].unit
     '1'
     """
-    number = NUMBERS.get(name, Number("1", name))
-    measure = _SHOWN.get(name, Measure(name, name, number.unit))
-    return measure, _PER.get((number.unit, measure.unit), 1.0)
+    if name in _SHOWN:
+        return _SHOWN[name]
+    return Measure(name, name, NUMBERS[name].unit if name in NUMBERS else "1"), 1.0

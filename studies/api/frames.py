@@ -13,12 +13,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from ...core.protocols import Measure
 from ..analysis.numbers import NUMBERS
 from ..spec.errors import SpecError
+from ..store.reading import NamesAndRows
 from ..store.store import Store
 
 if TYPE_CHECKING:
     from pandas import DataFrame
-
-NamesAndRows = tuple[list[str], Iterable[tuple[Any, ...]]]
 
 EPISODE_COLUMNS = {
     "condition": ("", "label of the condition"),

@@ -80,9 +80,11 @@ def draw(
             raise SpecError(f"no replay: {type(scenario).__name__} does not draw its episodes")
         if store.states().get(chosen.identity) != "done":
             raise SpecError(f"{chosen.condition}, seed {chosen.seed}: has not finished")
-        drawn = directory / "replay" / f"{chosen.identity[:8]}-{episode}.gif"
+        is_drawn = False
         if path is None:
-            drawn.parent.mkdir(exist_ok=True)
-        if path is not None or not drawn.exists():
-            scenario.animate(store.recording(chosen, episode), path or drawn)
-    return Replay(path or drawn, f"{chosen.condition}, seed {chosen.seed}, {episode} episode")
+            path = directory / "replay" / f"{chosen.identity[:8]}-{episode}.gif"
+            path.parent.mkdir(exist_ok=True)
+            is_drawn = path.exists()
+        if not is_drawn:
+            scenario.animate(store.recording(chosen, episode), path)
+    return Replay(path, f"{chosen.condition}, seed {chosen.seed}, {episode} episode")

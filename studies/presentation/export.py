@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterable, Sequence, Set
+from collections.abc import Callable, Sequence, Set
 from pathlib import Path
 from typing import Any, Literal
 
@@ -11,12 +11,11 @@ from ..analysis import published
 from ..analysis.results import read
 from ..spec.errors import SpecError
 from ..store.durable import replacing
+from ..store.reading import NamesAndRows
 from ..store.store import Store
 from .csv_text import write_csv
 
 Form = Literal["csv", "parquet", "json"]
-NamesAndRows = tuple[list[str], Iterable[tuple[Any, ...]]]
-"""The names of columns, and rows of values; CSV is written row by row, whatever their number."""
 
 
 def export(store: Store, folder: Path, form: Form, *, overwrite: bool = False) -> list[Path]:

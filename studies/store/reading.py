@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
@@ -36,6 +36,9 @@ class Identified(Protocol):
 
 
 T = TypeVar("T", bound=Identified)
+
+NamesAndRows = tuple[list[str], Iterable[tuple[Any, ...]]]
+"""The names of columns, and rows of values, which may be read one by one."""
 
 
 class Planned(NamedTuple):

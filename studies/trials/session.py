@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from time import perf_counter
 
 from ...core.acting import Actors
@@ -66,6 +67,12 @@ class Session:
         self._measures = measures_of(self.world)
         self._recordings: dict[str, Recording] = {}
         self._watch = Stopwatch()
+
+    @classmethod
+    def compiled(cls, trial: Trial) -> Session:
+        """Return a session whose times hold no compilation, which is done once a process."""
+        cls(replace(trial, episodes=1, steps=3, curriculum=())).train(1)
+        return cls(trial)
 
     def train(
         self,

@@ -16,8 +16,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from ....core.arrays import BoolArray
-from ..config import BoxPushingSettings
-from ..environments import SettingsLike
+from ..environments import SettingsLike, meant
 from .processes import Processes
 from .worlds import Recipe, row_type
 
@@ -83,10 +82,10 @@ class VecBoxPushingEnv(VectorEnv):
             raise ValueError(f"processes = {processes}, must be 1 to {num_envs}, one per world")
         if render_mode not in (None, *RENDER_MODES):
             raise ValueError(f"render_mode = {render_mode!r}, allowed None, {RENDER_MODES}")
-        if not isinstance(settings, BoxPushingSettings):
-            settings = BoxPushingSettings.model_validate(settings or {})
         self._autoreset = AutoresetMode(autoreset_mode)
-        recipe = Recipe(settings, steps, render_mode, sensors, self.by_wheel, self._autoreset)
+        recipe = Recipe(
+            meant(settings), steps, render_mode, sensors, self.by_wheel, self._autoreset
+        )
         game = recipe.game()
         seat = recipe.seat(game.scenario)
         self.num_envs, self.render_mode = num_envs, render_mode

@@ -8,7 +8,7 @@ is compared with all others at the end, paired by seed.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from time import process_time
 
 import numpy as np
@@ -49,9 +49,7 @@ def check(spec: Spec) -> None:
 
 def measure(trial: Trial) -> TrialResult:
     """Train, with evaluations on the way; imported by name in workers."""
-    # Compiles, once a process.
-    Session(replace(trial, episodes=1, steps=2, curriculum=())).train(1)
-    session = Session(trial)
+    session = Session.compiled(trial)
     generator = session.team.rng.bit_generator
     done, seconds, usage = 0, 0.0, {}
     for count in (*stops(trial.episodes), trial.episodes):

@@ -15,7 +15,7 @@ it succeeds when evaluated, and after how many decisions; and of a decision of a
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -49,9 +49,7 @@ def check(spec: Spec) -> None:
 
 def measure(trial: Trial) -> TrialResult:
     """Train and evaluate a team, and count what it takes; imported by name in workers."""
-    # Compiles, once a process.
-    Session(replace(trial, episodes=1, steps=3, curriculum=())).train(1)
-    session = Session(trial)
+    session = Session.compiled(trial)
     session.train(trial.episodes)
     team = of_fuzzy_agents(session.team)
     hierarchy, n_rules = team.hierarchy, team.learner.theta.shape[1]

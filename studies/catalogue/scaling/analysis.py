@@ -14,7 +14,7 @@ from __future__ import annotations
 import re
 import tracemalloc
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -46,9 +46,7 @@ def check(spec: Spec) -> None:
 
 def measure(trial: Trial) -> TrialResult:
     """Train and evaluate a team, and note what it takes; imported by name in workers."""
-    # Compiles, once a process.
-    Session(replace(trial, episodes=1, steps=2, curriculum=())).train(1)
-    session = Session(trial)
+    session = Session.compiled(trial)
     _forget_peak()
     session.train(trial.episodes)
     peak = _peak()
