@@ -74,8 +74,7 @@ def draw(
             episode = "last"  # of one episode
         if episode not in recorded:
             raise SpecError(f"episode = {episode!r}: {closest(episode, recorded)}")
-        with chosen.sources.active():
-            scenario = chosen.settings.scenario.build()
+        scenario = chosen.world()
         if not isinstance(scenario, DrawnScenario):
             raise SpecError(f"no replay: {type(scenario).__name__} does not draw its episodes")
         if store.states().get(chosen.identity) != "done":

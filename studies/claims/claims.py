@@ -199,8 +199,18 @@ CLAIMS: tuple[Claim, ...] = (
     ),
     Claim(
         "shape", "the shape of the box is indifferent", "II-C",
-        "shapes", "evaluation success over that with the square, worst shape", measured.worst_shape,
-        AtLeast(0.8),
+        "shapes", "evaluation success over that with the square, worst shape",
+        measured.worst_shape(), AtLeast(0.8),
+    ),
+    Claim(
+        "points", "a robot's pushing points depend on the geometry of the object", "X-B, of [10]",
+        "related", "success over that with the square, worst shape, pushing points as a team",
+        measured.worst_shape("pushing points, team"), AtMost(0.8),
+    ),
+    Claim(
+        "wheels", "an agent per wheel does not", "X-B",
+        "related", "success over that with the square, worst shape, nested wheels",
+        measured.worst_shape("nested"), AtLeast(0.8),
     ),
     Claim(
         "model", "no task model or contact points are needed", "II-B, II-C, XI",

@@ -258,13 +258,20 @@ def recovered(adapts: str) -> Compute:
     return compute
 
 
-def worst_shape(results: Results) -> Measured | None:
-    """Measure the success with the worst shape relative to that with the box of training."""
-    ratios = ratios_of(results, learner_of(results))
-    if not ratios:
-        return None
-    worst = least_ratio(ratios)
-    return Measured(worst.estimate, worst.seeds, note=worst.condition)
+def worst_shape(condition: str = "") -> Compute:
+    """Return what measures the success with the worst shape relative to that with the box trained.
+
+    Of a condition by its label; without, of that by which claims are judged.
+    """
+
+    def compute(results: Results) -> Measured | None:
+        ratios = ratios_of(results, condition or learner_of(results))
+        if not ratios:
+            return None
+        worst = least_ratio(ratios)
+        return Measured(worst.estimate, worst.seeds, note=worst.condition)
+
+    return compute
 
 
 def without(condition: str) -> Compute:

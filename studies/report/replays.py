@@ -1,4 +1,4 @@
-"""Recorded episodes, packed small for the canvas of a report.
+"""Recorded episodes for a report: those of box pushing packed small for its canvas.
 
 A packed episode is a zlib stream in base64. It holds, one whole column of ``T + 1`` moments after
 the other: as 16-bit differences from moment to moment x, y, heading of the box and of every robot;
@@ -25,6 +25,7 @@ from ..spec.errors import SpecError
 from ..store.durable import NotRecordedError
 from ..store.store import Planned, Store
 from ..trials.episodes import Recording
+from .films import Film, films
 from .words import runs
 
 NEEDED = (
@@ -40,7 +41,7 @@ MOST_BYTES = 1_500_000
 
 @dataclass(frozen=True)
 class Replays:
-    """What the canvas can play.
+    """What the page plays.
 
     Attributes
     ----------
@@ -48,12 +49,15 @@ class Replays:
         Robots and box with the shapes that they are drawn in.
     episodes
         The packed episodes; `body` is an index into `bodies`.
+    films
+        Episodes that other scenarios draw themselves.
     missing
         Why finished trials are not shown, and which: seeds by condition by reason.
     """
 
     bodies: list[dict[str, Any]]
     episodes: list[dict[str, Any]]
+    films: list[Film]
     missing: dict[str, dict[str, list[int]]]
 
     @property
@@ -70,11 +74,15 @@ class Replays:
 
 
 def replays(store: Store, trials: Iterable[Planned], most_bytes: int = MOST_BYTES) -> Replays:
-    """Pack the recordings of finished trials, in their order, until there is no more room."""
+    """Pack the recordings of finished trials, in their order, until there is no more room.
+
+    Those that the canvas cannot play are drawn by their scenarios, one for each condition.
+    """
     reached = _reached(store)
     done = {(condition, seed) for condition, seed, _ in reached}
     bodies: dict[tuple[str, str, int], int] = {}
-    found = Replays([], [], {})
+    found = Replays([], [], [], {})
+    others: list[Planned] = []
     size = 0
 
     def miss(trial: Planned, reason: str) -> None:
@@ -106,7 +114,12 @@ def replays(store: Store, trials: Iterable[Planned], most_bytes: int = MOST_BYTE
         except SpecError:
             miss(trial, "Not shown, as the recording is missing or damaged")
         except ValueError:
-            miss(trial, "Not shown, as the recording holds no robots that push a box")
+            others.append(trial)
+    found.films.extend(films(store, others, most_bytes - size))
+    filmed = {film.condition for film in found.films}
+    for trial in others:
+        if trial.condition not in filmed:
+            miss(trial, "Not shown, as the scenario cannot draw it, or there is no room")
     return found
 
 

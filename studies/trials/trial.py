@@ -102,6 +102,12 @@ class Trial:
         text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
         return hashlib.sha256(text.encode()).hexdigest()[:32]
 
+    def world(self) -> Scenario:
+        """Return its scenario as the settings describe it, built anew."""
+        with self.sources.active():
+            built: Scenario = self.settings.scenario.build()
+        return built
+
     @property
     def lengths(self) -> str:
         """Its episodes of training, stage by stage, in words."""

@@ -49,6 +49,18 @@ def shapes(chances: dict[str, float], trained: float = 0.95, seeds: int = SEEDS)
     return base
 
 
+def related(kept: tuple[float, float], seeds: int = SEEDS) -> Results:
+    """Agents on wheels and a team by pushing points, and what success they keep with the star."""
+    systems = ("nested", "pushing points, team")
+    base = ablation(dict.fromkeys(systems, 0.95), seeds)
+    rng = np.random.default_rng(6)
+    base.phases["evaluation:star"] = {
+        system: arrays(np.full(10, 0.95 * share), rng, seeds)
+        for system, share in zip(systems, kept, strict=True)
+    }
+    return base
+
+
 def games(systems: dict[str, float], by_game: dict[str, float] | None = None) -> Results:
     """Systems that find the optimum of games with a chance, or one of each game."""
     conditions = {

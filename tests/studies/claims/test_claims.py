@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_up_results import ablation, arrays, games, scaling, shapes, wheel_failure
+from made_up_results import ablation, arrays, games, related, scaling, shapes, wheel_failure
 
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
 from nested_agents.studies import STUDIES
@@ -82,6 +82,7 @@ def everything(good: bool) -> dict[str, Results]:
         "scaling": scaling({2: 1.0, 64: 1.0 if good else 0.1}, 1e-4 if good else 1e-2),
         "wheel-failure": wheel_failure(dict.fromkeys(FAULTS, GOOD if good else BAD)),
         "shapes": shapes({"circle": 0.98, "L": 0.98 if good else 0.2}),
+        "related": related(kept=(1.0, 0.2) if good else (0.2, 1.0)),
         "games": games(dict.fromkeys(SYSTEMS, 1.0 if good else 0.1)),
         "ablation": ablation({"default": 1.0, "static predictor": 1.0 if good else 0.1}),
     }
@@ -146,6 +147,7 @@ def test_claims_name_studies_and_conditions_that_their_specs_have() -> None:
             wanted = {
                 "learning-curve": {"own-value", "frozen", "random", "planner", "paper"},
                 "ablation": {"default", "static predictor"},
+                "related": {"nested", "pushing points, team"},
                 "games": {f"{s}, game=climbing" for s in SYSTEMS} if folder is QUICK else set(),
                 "wheel-failure": {f"{f}, enabled={e}" for f in FAULTS for e in ("true", "false")},
             }.get(study, set())
@@ -223,7 +225,6 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "sixty-four",
         "from-eight",
         "locked-joint",
-        "related",
         "climbing",
     }
     assert all(path.stat().st_size < 300_000 for path in files)

@@ -4,6 +4,7 @@ import zlib
 import numpy as np
 import pytest
 
+from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.studies.report import replays as module
 from nested_agents.studies.report.replays import body, pack, replays
 from nested_agents.studies.store.store import Store
@@ -83,5 +84,16 @@ def test_damaged_and_foreign_recordings_are_named(kept, tmp_path, monkeypatch):
     assert len(found.episodes) == 8
     assert len(found.remarks) == 1
     assert found.remarks[0].startswith("Not shown, as the recording is missing or damaged: ")
+    monkeypatch.delattr(BoxPushing, "animate")
     monkeypatch.setattr(module, "NEEDED", ("hat",))
-    assert "holds no robots that push a box" in "".join(read(directory).remarks)
+    assert "the scenario cannot draw it" in "".join(read(directory).remarks)
+
+
+def test_what_the_canvas_cannot_play_is_drawn_by_its_scenario(kept, tmp_path, monkeypatch):
+    directory = kept(tmp_path)
+    monkeypatch.setattr(module, "NEEDED", ("hat",))
+    found = read(directory)
+    assert [(film.condition, film.seed) for film in found.films] == [("default", 0), ("frozen", 0)]
+    assert all(base64.b64decode(film.data).startswith(b"GIF89a") for film in found.films)
+    assert (found.episodes, found.remarks) == ([], [])
+    assert read(directory, most_bytes=len(found.films[0].data)).films == found.films[:1]

@@ -1,0 +1,78 @@
+"""Recorded episodes as animations, where the canvas of a report cannot play them.
+
+The canvas knows robots that push a box. Any other scenario that draws its episodes, one's own
+included, has them drawn as it does itself (`nested_agents.core.protocols.DrawnScenario`).
+"""
+
+from __future__ import annotations
+
+import base64
+import tempfile
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from ...core.protocols import DrawnScenario
+from ..spec.errors import SpecError
+from ..store.store import Planned, Store
+from ..trials.trial import Trial, trials_of
+
+LAST = "last"
+"""The recorded episode that is drawn."""
+
+
+@dataclass(frozen=True)
+class Film:
+    """The last training episode of a trial.
+
+    Attributes
+    ----------
+    condition, seed
+        Which trial.
+    data
+        A GIF in base64.
+    """
+
+    condition: str
+    seed: int
+    data: str
+
+
+def films(store: Store, planned: Iterable[Planned], most_bytes: int) -> list[Film]:
+    """Draw the first of the given trials of each condition, until there is no more room."""
+    found: list[Film] = []
+    trials = _trials(store)
+    drawn: set[str] = set()
+    for plan in planned:
+        trial = trials.get(plan.identity)
+        if trial is None or trial.condition in drawn:
+            continue
+        drawn.add(trial.condition)
+        encoded = base64.b64encode(_drawn(store, trial)).decode("ascii")
+        if not 0 < len(encoded) <= most_bytes:
+            continue
+        most_bytes -= len(encoded)
+        found.append(Film(trial.condition, trial.seed, encoded))
+    return found
+
+
+def _trials(store: Store) -> Mapping[str, Trial]:
+    """Return the trials of a study by identity; none if this version cannot read its spec."""
+    try:
+        return {trial.identity: trial for trial in trials_of(store.spec())}
+    except SpecError:
+        return {}
+
+
+def _drawn(store: Store, trial: Trial) -> bytes:
+    """Return the GIF of a trial's last episode; nothing if its scenario cannot."""
+    scenario = trial.world()
+    if not isinstance(scenario, DrawnScenario) or LAST not in trial.recorded.values():
+        return b""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "episode.gif"
+        try:
+            scenario.animate(store.recording(trial, LAST), path)
+        except Exception:  # a drawing may be anybody's, and the page is worth more than it
+            return b""
+        return path.read_bytes()
