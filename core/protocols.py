@@ -86,6 +86,15 @@ class RewardPrediction(Prediction, Protocol):
 
 
 @runtime_checkable
+class ContinuedPrediction(RewardPrediction, Protocol):
+    """A prediction that goes on from what it predicts: what plans of several decisions need."""
+
+    def after(self, joint_action: IntArray) -> ContinuedPrediction:
+        """Return the prediction from where a joint action ``(n,)`` leads in one decision."""
+        ...
+
+
+@runtime_checkable
 class TeamPrediction(Prediction, Protocol):
     """A prediction that gives the next states of all agents for the same joint actions at once."""
 

@@ -41,8 +41,8 @@ class Sources:
     texts
         Files that are known already, by name.
     study
-        Directory of a study, whose copies stand in for files that are not there any more;
-        none: `folder`.
+        Directory of a study, whose copies stand in for files that are not there any more, before
+        those of `folder`, if that is a study too.
     brought_by
         What brought the `texts` along, if they are not the user's own: these are run only if they
         are trusted, see `nested_agents.core.trust`.
@@ -65,7 +65,7 @@ class Sources:
     ) -> None:
         self.folder = folder
         self._texts = dict(texts or {})
-        self._study = study or folder
+        self._studies = [place for place in (study, folder) if place is not None]
         # By name; of what was sent to a worker all that is known is that its sender has run it.
         self._brought = dict.fromkeys(self._texts, brought_by) if brought_by else {}
         self._was_sent = False
@@ -144,10 +144,12 @@ class Sources:
         if self.folder is None:
             raise ValueError(f"{name}: is not among the files kept with the study")
         path = self.folder / name
-        if not path.exists() and self._study is not None:
-            kept = self._study / FOLDER / kept_name(name)
-            if kept.exists():
-                path, self._brought[name] = kept, str(self._study)
+        if not path.exists():
+            for study in self._studies:
+                kept = study / FOLDER / kept_name(name)
+                if kept.exists():
+                    path, self._brought[name] = kept, str(study)
+                    break
         try:
             content = path.read_bytes()
         except OSError as error:

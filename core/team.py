@@ -170,7 +170,8 @@ class Team:
         Raises
         ------
         ValueError
-            If it decides by rewards, and the prediction knows none; one line.
+            If it decides by rewards, and the prediction knows none; or by plans, and the
+            prediction does not go on; one line.
         """
         problem = getattr(self.evaluator, "problem", None)
         if not isinstance(problem, DecisionProblem) or problem.rule == "value":
@@ -179,6 +180,11 @@ class Team:
             raise ValueError(
                 f"learner.decision.rule = {problem.rule!r}: the scenario predicts no rewards, "
                 "use value"
+            )
+        if getattr(self.evaluator, "continues", False) and not hasattr(prediction, "after"):
+            raise ValueError(
+                "learner.decision.evaluator: plans of several decisions need a scenario that "
+                "predicts from predicted states"
             )
 
     def begin_episode(self) -> None:

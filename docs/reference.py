@@ -133,7 +133,9 @@ def keys() -> Iterator[str]:
     yield "This page is made from the settings models that check every spec, and from the text"
     yield "beside their fields. `nested-agents keys scenario.box` prints any part of it in a"
     yield "terminal. A key is written in the table of its heading. *Required* means that there is"
-    yield "no default; *none* is the absence of a value, and cannot be written in TOML.\n"
+    yield "no default; *none* is the absence of a value, and cannot be written in TOML. A spec"
+    yield "begins from the [preset](#presets) `default` unless it names another, so that where this"
+    yield "has a value of its own the default does not apply.\n"
     for one in tables():
         yield f"## {code(one.heading) if one.name else 'The top of a spec'}\n"
         yield f"{prose(one.summary)}\n"
@@ -145,7 +147,8 @@ def keys() -> Iterator[str]:
                         code(k.name),
                         prose(k.meaning),
                         k.unit,
-                        code(k.default),
+                        code(k.default)
+                        + (f" (in preset `default`: {code(k.preset)})" if k.preset else ""),
                         k.type,
                         code(k.allowed),
                     )

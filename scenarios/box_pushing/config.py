@@ -68,7 +68,7 @@ class RewardSettings(Settings):
 
 
 class WheelFailure(FailureSettings):
-    """Wheels that fail; see `nested_agents.scenarios.failures`."""
+    """Wheels that fail."""
 
     part: ClassVar[str] = "wheels"
 
@@ -301,9 +301,10 @@ class BoxPushingSettings(BoxTaskSettings):
     factory: ClassVar[str] = f"{__package__}.scenario:BoxPushing"
     state_space: Literal["paper", "relational", "pose", "crowd"] | tuple[str, ...] = "relational"
     """Eq. 1, the relational variables, those and the orientation of the box, or state variables by
-    name, one's own included, see `box_pushing.states.variables`."""
+    name, one's own included."""
     predictor: Literal["push", "rigid", "static", "exact"] = "push"
-    """What predictions take the world for, see `box_pushing.prediction.predictors`."""
+    """What predictions take the world for: robots that yield to the box and each other, robots that do
+    not, a box that does not move, or the world itself."""
     belief: BeliefSettings = BeliefSettings()
     """What the predictor `push` is told of constants that robots cannot see."""
     reward: RewardSettings = RewardSettings()

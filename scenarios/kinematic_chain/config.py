@@ -41,7 +41,7 @@ class RewardSettings(Settings):
 
 
 class JointFailure(FailureSettings):
-    """Joints that fail; see `nested_agents.scenarios.failures`."""
+    """Joints that fail."""
 
     part: ClassVar[str] = "joints"
 
@@ -98,7 +98,8 @@ class KinematicChainSettings(ScenarioSettings):
     reward: RewardSettings = RewardSettings()
     """The constants of the reward."""
     speed: Positive = 0.6
-    """Greatest speed of a joint [rad/s], in arms of few joints; see `top_speed`."""
+    """Greatest speed of a joint [rad/s], in arms of few joints; in others 5 rad/s divided by
+    their number."""
     speed_of_all: Positive = 5.0
     """Greatest speed of all joints added up [rad/s]."""
     speed_increment: Annotated[float, Field(gt=0, le=1)] = 0.5

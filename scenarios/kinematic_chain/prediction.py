@@ -61,6 +61,8 @@ class ChainPrediction:
         ``(2,)`` [m].
     before
         Present distance of the tip from the goal [m].
+    onward
+        ``onward(angles (n,), speeds (n,), before)``: the prediction from another posture.
     """
 
     def __init__(
@@ -71,9 +73,10 @@ class ChainPrediction:
         turns: FloatArray,
         goal: FloatArray,
         before: float,
+        onward: Callable[[FloatArray, FloatArray, float], ChainPrediction],
     ) -> None:
         self.premises, self.angles, self.speeds, self.turns = premises, angles, speeds, turns
-        self.goal, self.before = goal, before
+        self.goal, self.before, self._onward = goal, before, onward
         self.shares = speeds / premises.top_speed
         """The speeds as fractions of the greatest."""
         self._joints = np.arange(len(angles))
@@ -97,6 +100,11 @@ class ChainPrediction:
         """Return the rewards ``(m,)`` of joint actions ``(m, n)``."""
         view = self.seen(joint_actions)
         return self.premises.reward(view.distance, view.approach)
+
+    def after(self, joint_action: IntArray) -> ChainPrediction:
+        """Return the prediction from where a joint action ``(n,)`` leads in one decision."""
+        reached = self.seen(joint_action[None])
+        return self._onward(reached.angles[0], self.commands(joint_action), reached.distance[0])
 
     @property
     def groups(self) -> tuple[tuple[int, ...], ...]:

@@ -9,6 +9,7 @@ they turn at the speed that they are told, unless they fail or reach their limit
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -153,15 +154,21 @@ class KinematicChain:
 
     def predict_with(self, effects: Sequence[FloatArray]) -> ChainPrediction:
         """Predict from the present state, believing in these effects ``(3, 2)`` of the joints."""
+        return self._predict_from(effects, self._angles, self._speeds, self._distance())
+
+    def _predict_from(
+        self, effects: Sequence[FloatArray], angles: FloatArray, speeds: FloatArray, before: float
+    ) -> ChainPrediction:
+        """Predict from a posture, joint speeds ``(n,)`` and the distance of the tip in it."""
         gains, offsets = np.array([effect[2] for effect in effects]).T
         every = np.tile(np.arange(len(self.action_set))[:, None], len(self.agents))
         unit = self.settings.speed_increment * self._limits
-        speeds = self.action_set.apply(self._speeds, every, unit, self._limits)
-        after = np.clip(self._angles + PERIOD * (gains * speeds + offsets), self._least, self._most)
-        turns = np.ascontiguousarray((after - self._angles).T)
+        told = self.action_set.apply(speeds, every, unit, self._limits)
+        after = np.clip(angles + PERIOD * (gains * told + offsets), self._least, self._most)
+        turns = np.ascontiguousarray((after - angles).T)
         return ChainPrediction(
-            self._premises, self._angles, np.ascontiguousarray(speeds.T), turns, self._goal,
-            self._distance(),
+            self._premises, angles, np.ascontiguousarray(told.T), turns, self._goal, before,
+            partial(self._predict_from, effects),
         )  # fmt: skip
 
     def _actual_effects(self) -> tuple[FloatArray, ...]:

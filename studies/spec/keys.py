@@ -14,6 +14,7 @@ import re
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from functools import cache
 from itertools import pairwise
 from types import NoneType, UnionType
@@ -27,6 +28,7 @@ from ...core.plugged import Plugged, SettingsRegistry
 from ...core.settings import Settings
 from .conditions import ConditionSettings, Override
 from .curriculum import StageSettings
+from .presets import PRESETS
 from .spec import Spec
 
 UNIT = re.compile(r"\[(m|m/s|kg|rad|s|N per m/s|m/s per m/s)\]")
@@ -47,6 +49,9 @@ class Key:
         As it is written in a spec.
     type, default, allowed
         In words; a default is written as in TOML, or is ``none`` or ``required``.
+    preset
+        What the preset `default`, which a spec begins from, has in place of the default; empty if
+        the same.
     unit
         Empty where there is none.
     meaning
@@ -59,6 +64,12 @@ class Key:
     allowed: str
     unit: str
     meaning: str
+    preset: str = ""
+
+    @property
+    def value(self) -> str:
+        """Its value where a spec does not say, in words."""
+        return f"{self.default} (preset default: {self.preset})" if self.preset else self.default
 
 
 @dataclass(frozen=True)
@@ -196,13 +207,51 @@ def _table(
     name: str, kinds: tuple[str, str], model: type[Settings], base: Mapping[str, FieldInfo]
 ) -> Table:
     told = meanings(model)
+    laid = _laid_by_preset(name, kinds[0])
     keys = tuple(
-        _key(field, info, told.get(field, ""))
+        _laid_over(_key(field, info, told.get(field, "")), laid)
         for field, info in model.model_fields.items()
         if field != "kind" and not (field in base and base[field].default == info.default)
     )
     summary = (inspect.getdoc(model) or "").partition("\n\n")[0]
     return Table(name, *kinds, " ".join(summary.split()), model, keys)
+
+
+def _laid_by_preset(name: str, kind: str) -> Mapping[str, Any]:
+    """Return the table of the preset `default` by name, if it is of this kind."""
+    table: Any = PRESETS["default"].table
+    for part in name.split("."):
+        table = table.get(part) if isinstance(table, Mapping) else None
+    if not isinstance(table, Mapping) or (kind and table.get("kind") != kind):
+        return {}
+    return table
+
+
+def _laid_over(key: Key, table: Mapping[str, Any]) -> Key:
+    """Return a key with what a preset's table has in place of its default."""
+    value = table.get(key.name)
+    if isinstance(value, Mapping):
+        value = value.get("kind")  # its other keys stand in a table of their own
+    told = "" if value is None else json.dumps(value)
+    return replace(key, preset="" if told == key.default else told)
+
+
+def nearest(prefix: str) -> str:
+    """Return which keys a prefix that begins none may have meant, in words.
+
+    Examples
+    --------
+    >>> nearest("value_of")
+    'did you mean learner.decision.value_of?'
+    """
+    found = tables()
+    full = dict.fromkeys(name for table in found for name in table.full_names)
+    names = [*dict.fromkeys(table.name for table in found if table.name), *full]
+    near = [name for name in full if name.endswith(f".{prefix}")]
+    near = near or get_close_matches(prefix, names, n=1)
+    if near:
+        return f"did you mean {' or '.join(near)}?"
+    return f"known: {', '.join(sorted({name.partition('.')[0] for name in full}))}"
 
 
 @cache

@@ -73,7 +73,7 @@ class Spec(Settings):
     scenario: Mapping[str, Any] = Field(default_factory=dict)
     """Laid over the preset's scenario."""
     topology: Mapping[str, Any] = Field(default_factory=dict)
-    """Laid over the preset's topology; may be written as a string, see `conditions.section`."""
+    """Laid over the preset's topology; may be written as a string."""
     learner: Mapping[str, Any] = Field(default_factory=dict)
     """Laid over the preset's learner."""
     sweep: Mapping[str, tuple[Any, ...]] = Field(default_factory=dict)
@@ -179,10 +179,12 @@ class Spec(Settings):
         """Return the spec that a table or the path of a TOML file stands for; see `of`, `load`."""
         if isinstance(spec, Spec):
             return spec
-        return cls.of(spec) if isinstance(spec, Mapping) else cls.load(Path(spec), study=study)
+        return cls.of(spec) if isinstance(spec, Mapping) else cls.load(spec, study=study)
 
     @classmethod
-    def load(cls, path: Path, changes: Iterable[str] = (), study: Path | None = None) -> Spec:
+    def load(
+        cls, path: str | PathLike[str], changes: Iterable[str] = (), study: Path | None = None
+    ) -> Spec:
         """Read a TOML file and lay ``key=value`` changes over it.
 
         Files of users are looked for beside it, then among the copies of a study.
@@ -192,6 +194,7 @@ class Spec(Settings):
         SpecError
             If the file cannot be read, is no TOML, or anything in it is wrong.
         """
+        path = Path(path)
         try:
             text = path.read_text(encoding="utf-8-sig")
         except OSError as error:

@@ -25,12 +25,15 @@ from ....core.team import of_fuzzy_agents
 from ...analysis.results import Results
 from ...analysis.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
 from ...analysis.summary import Summary, evaluated
+from ...presentation.words import count
 from ...spec.spec import Spec
 from ...trials.contact import ContactShares
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..study import check_rule_bases
 
+TIMES = {"deciding": "decide [ms]", "learning": "learn [ms]"}
+"""Times whose growth with the number of agents is estimated, by what they are of."""
 COLUMNS = (
     "success", "all touch", "decide [ms]", "learn [ms]", "team [MB]", "process [MB]",
 )  # fmt: skip
@@ -162,7 +165,7 @@ class Scaling:
 
     table: tuple[Summary, ...]
     points: tuple[Point, ...]
-    exponents: dict[str, dict[str, float]]
+    exponents: dict[str, dict[str, Estimate]]
     notes: tuple[str, ...]
     bodies: str
 
@@ -178,7 +181,7 @@ class Scaling:
 
 def analyse(results: Results) -> Scaling:
     """Estimate; 95 % intervals, seeds as the unit of sampling. Times are per step."""
-    points, table = [], []
+    points, table, times = [], [], []
     sizes = {c: int(results.numbers[c]["robots"][0]) for c in results.training}
     bodies = _counted(results.columns, sizes)
     for condition, training in results.training.items():
@@ -191,6 +194,8 @@ def analyse(results: Results) -> Scaling:
             "team [MB]": 1e-6 * numbers["team_bytes"],
             "step [MB]": 1e-6 * usage["step_bytes"],
         }
+        seeds = results.seeds.get(condition, range(len(steps)))
+        times.append([dict(zip(seeds, costs[title], strict=True)) for title in TIMES.values()])
         if "process_bytes" in usage:
             costs["process [MB]"] = 1e-6 * usage["process_bytes"]
         evaluations = evaluated(results, condition)
@@ -204,9 +209,10 @@ def analyse(results: Results) -> Scaling:
         points.append(Point(evaluator, sizes[condition], agents, passed, period, values))
         shown = {n: values[n] for n in (*COLUMNS[:1], *evaluations, *COLUMNS[1:]) if n in values}
         table.append(Summary(condition, len(steps), shown))
-    exponents = _exponents(points)
+    exponents = _exponents(points, times)
     notes = [
-        f"\n{evaluator}: " + ", ".join(f"{what} ~ n^{power:.2f}" for what, power in by_what.items())
+        f"\n{evaluator}, time by agents n: "
+        + ", ".join(f"{what} ~ n^{_told(power)}" for what, power in by_what.items())
         for evaluator, by_what in exponents.items()
     ]
     notes += _passed(points, bodies)
@@ -247,19 +253,35 @@ def _passed(points: list[Point], bodies: str) -> list[str]:
                 labels.setdefault((p.agents, p.messages), []).append(p.evaluator)
         for (agents, passed), own in labels.items():
             whose = f" ({'; '.join(own)})" if len(labels) > 1 else ""
-            lines.append(f"{robots} {bodies}{whose}: {agents} agents, {passed} messages a step")
+            lines.append(
+                f"{robots} {bodies}{whose}: {agents} agents, {count(passed, 'message')} a step"
+            )
     return lines
 
 
-def _exponents(points: list[Point]) -> dict[str, dict[str, float]]:
-    found: dict[str, dict[str, float]] = {}
+def _told(estimate: Estimate) -> str:
+    """Return an exponent with its interval, if there is one."""
+    e = estimate
+    return f"{e.value:.2f}" + (f" [{e.low:.2f}, {e.high:.2f}]" if np.isfinite(e.low) else "")
+
+
+def _exponents(
+    points: list[Point], times: list[list[dict[int, float]]]
+) -> dict[str, dict[str, Estimate]]:
+    """Return by evaluator the exponent of each of `TIMES` in the number of agents.
+
+    A line through the logarithms is fitted for each seed that ran at all sizes; `times` has one
+    entry for each point: by seed, for each of `TIMES`.
+    """
+    found: dict[str, dict[str, Estimate]] = {}
     for evaluator in dict.fromkeys(p.evaluator for p in points):
-        own = [p for p in points if p.evaluator == evaluator]
-        if len({p.agents for p in own}) < 2:
+        own = [k for k, p in enumerate(points) if p.evaluator == evaluator]
+        seeds = set.intersection(*(set(by_seed) for k in own for by_seed in times[k]))
+        if len({points[k].agents for k in own}) < 2 or not seeds:
             continue
-        sizes = np.log([p.agents for p in own])
-        found[evaluator] = {
-            what: float(np.polyfit(sizes, np.log([p.values[title].value for p in own]), 1)[0])
-            for what, title in (("deciding", "decide [ms]"), ("learning", "learn [ms]"))
-        }
+        sizes = np.log([points[k].agents for k in own])
+        found[evaluator] = {}
+        for i, what in enumerate(TIMES):
+            logs = np.log([[times[k][i][seed] for seed in sorted(seeds)] for k in own])
+            found[evaluator][what] = bootstrap(np.polyfit(sizes, logs, 1)[0])
     return found

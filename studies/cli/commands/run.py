@@ -61,8 +61,9 @@ def command(
     from ..running import run_and_show
     from ..trusting import trust_files
 
-    if trust and out.exists():
-        trust_files(out)
+    for directory in {out.resolve(), spec.resolve().parent} if trust else ():
+        if (directory / DATABASE).exists():
+            trust_files(directory)
     try:
         given = Spec.load(spec, changes, study=out)
     except SpecError as error:

@@ -19,8 +19,10 @@ SIZES = {2: 0.9, 8: 0.9, 64: 0.5}
 
 def test_exponents_and_messages() -> None:
     analysis = analyse(scaling(SIZES))
-    assert analysis.exponents["sums"]["deciding"] == pytest.approx(1.0, abs=0.02)
-    assert analysis.exponents["sampling"]["deciding"] == pytest.approx(2.0, abs=0.02)
+    assert analysis.exponents["sums"]["deciding"].value == pytest.approx(1.0, abs=0.02)
+    assert analysis.exponents["sampling"]["deciding"].value == pytest.approx(2.0, abs=0.02)
+    assert analysis.exponents["sums"]["deciding"].low > 0.95
+    assert analysis.notes[0].startswith("\nsums, time by agents n: deciding ~ n^")
     assert [p.messages for p in analysis.points[:3]] == [6, 120, 8128]
     assert [p.evaluator for p in analysis.points] == ["sums"] * 3 + ["sampling"] * 3
     assert "64 robots: 128 agents, 8128 messages a step" in analysis.notes
@@ -82,7 +84,7 @@ def test_robots_alone_make_one_line() -> None:
     own = [{str(n): part[f"sums, robots={n}"] for n in SIZES} for part in parts]
     analysis = analyse(Results(*own[:2], numbers=own[2], usage=own[3]))
     assert {p.evaluator for p in analysis.points} == {"default"}
-    assert analysis.exponents["default"]["deciding"] == pytest.approx(1.0, abs=0.02)
+    assert analysis.exponents["default"]["deciding"].value == pytest.approx(1.0, abs=0.02)
 
 
 @pytest.mark.parametrize(("made", "lines"), [(scaling(SIZES), 1), (by_topology(PASSED), 3)])
