@@ -303,8 +303,8 @@ class BoxPushingSettings(BoxTaskSettings):
     """Eq. 1, the relational variables, those and the orientation of the box, or state variables by
     name, one's own included."""
     predictor: Literal["push", "rigid", "static", "exact"] = "push"
-    """What predictions take the world for: robots that yield to the box and each other, robots that do
-    not, a box that does not move, or the world itself."""
+    """What predictions take the world for: robots that yield to the box, robots that do not
+    (``rigid``), a box that does not move (``static``), or the world itself."""
     belief: BeliefSettings = BeliefSettings()
     """What the predictor `push` is told of constants that robots cannot see."""
     reward: RewardSettings = RewardSettings()

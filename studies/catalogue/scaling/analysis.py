@@ -211,8 +211,8 @@ def analyse(results: Results) -> Scaling:
         table.append(Summary(condition, len(steps), shown))
     exponents = _exponents(points, times)
     notes = [
-        f"\n{evaluator}, time by agents n: "
-        + ", ".join(f"{what} ~ n^{_told(power)}" for what, power in by_what.items())
+        f"\n{evaluator}, time with n agents: "
+        + ", ".join(f"{what} n^{_told(power)}" for what, power in by_what.items())
         for evaluator, by_what in exponents.items()
     ]
     notes += _passed(points, bodies)

@@ -22,7 +22,7 @@ def test_exponents_and_messages() -> None:
     assert analysis.exponents["sums"]["deciding"].value == pytest.approx(1.0, abs=0.02)
     assert analysis.exponents["sampling"]["deciding"].value == pytest.approx(2.0, abs=0.02)
     assert analysis.exponents["sums"]["deciding"].low > 0.95
-    assert analysis.notes[0].startswith("\nsums, time by agents n: deciding ~ n^")
+    assert analysis.notes[0].startswith("\nsums, time with n agents: deciding n^")
     assert [p.messages for p in analysis.points[:3]] == [6, 120, 8128]
     assert [p.evaluator for p in analysis.points] == ["sums"] * 3 + ["sampling"] * 3
     assert "64 robots: 128 agents, 8128 messages a step" in analysis.notes
