@@ -113,6 +113,8 @@ class Team:
             If the hierarchy is over other agents than the scenario's, or the settings do not fit
             its state space.
         """
+        if not isinstance(settings, LearnerSettings):
+            raise ValueError(f"settings = {settings!r}: must be a learner's, as BatchTDSettings()")
         if hierarchy.agents != tuple(scenario.agents):
             raise ValueError(
                 f"topology: agents {', '.join(hierarchy.agents)} are not the scenario's "

@@ -20,7 +20,10 @@ class Tank:
 
         pumps: int = 3
 
-    measures = (na.SUCCESS, na.Measure("missing_l", "missing", "l", "missing_l", better="lower"))
+    measures = (
+        na.SUCCESS,
+        na.Measure("missing_l", "missing", "l", "missing_l", better="lower", least=0),
+    )
 
     def __init__(self, settings=Settings()):  # noqa: B008 - frozen
         self.agents = tuple(f"pump{i + 1}" for i in range(settings.pumps))

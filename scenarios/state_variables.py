@@ -66,7 +66,10 @@ class StateVariable:
         found: FloatArray = np.asarray(self.function(view, body))
         name, m = self.variable.name, view.n_situations
         if found.shape != (m,):
-            raise ValueError(f"state variable {name!r}: shape {found.shape}, must be {(m,)}")
+            raise ValueError(
+                f"state variable {name!r}: shape {found.shape}, must be {(m,)}: one value for each "
+                "situation of the view"
+            )
         if found.dtype.kind not in "fiu" or not np.isfinite(found).all():
             raise ValueError(f"state variable {name!r}: not all of its values are finite numbers")
         return found

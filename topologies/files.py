@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import tomllib
+import traceback
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -101,7 +102,12 @@ def _returned(builder: Builder, agents: Sequence[str], groups: Sequence[Sequence
     try:
         result = builder.build(tuple(agents), tuple(tuple(group) for group in groups))
     except Exception as error:
-        raise ValueError(f"{name} raised {type(error).__name__}: {error}") from None
+        frame = traceback.extract_tb(error.__traceback__)[-1]
+        where = "" if frame.filename == __file__ else f" in line {frame.lineno}"
+        raise ValueError(
+            f"{name} raised {type(error).__name__}{where}, given {len(agents)} agents of "
+            f"{len(groups)} bodies: {error}"
+        ) from None
     if isinstance(result, nx.Graph):
         return result
     try:

@@ -236,7 +236,8 @@ def printed(shown: HierarchyView, form: Form) -> str:
             "",
             *aligned(rows, "><>><"),
             "",
-            "In order of decision. below: agents seen; tries: joint actions tried a step.",
+            "In order of decision. below: agents whose actions it tries; tries: joint",
+            "actions tried a step.",
         ]
     )
 

@@ -141,6 +141,7 @@ class Plan:
             yield (
                 f"time     {quick} if episodes take {share} of their steps, at most {slow}, {with_}"
             )
+            yield "         once for an installation, compilation comes on top: half a minute"
         if self.memory is not None:
             yield f"memory   up to {self.memory / 1e9:.1f} GB {with_}"
         if self.comparisons:

@@ -26,11 +26,14 @@ Case = tuple[str, Callable[[], Any], list[int]]
 )
 @options.changes
 def command(source: str, steps: int, changes: tuple[str, ...]) -> int:
-    """Check scenarios: equal seeds, equal bits; nothing shared; finite numbers; ...
+    """Check what every scenario must promise, such as equal bits for equal seeds.
 
     SPEC.toml is a spec, whose conditions are checked; FILE.py:NAME a function or class in a Python
     file that makes a scenario of one's own.
     """
+    from shutil import get_terminal_size
+    from textwrap import fill
+
     from ....scenarios.checking.checker import LEAST_STEPS, ScenarioError, check_scenario
     from ...spec.errors import SpecError
 
@@ -46,7 +49,8 @@ def command(source: str, steps: int, changes: tuple[str, ...]) -> int:
         except ValueError as error:
             raise SpecError(str(error)) from None
         else:
-            print(f"passed  {label}: {', '.join(passed)}")
+            told = f"passed  {label}: {', '.join(passed)}"
+            print(fill(told, get_terminal_size().columns, subsequent_indent=8 * " "))
     return 1 if faults else 0
 
 

@@ -17,6 +17,9 @@ def command(directory: Path) -> int:
 
     DIR is where the study is kept.
     """
+    from shutil import get_terminal_size
+    from textwrap import fill
+
     from ...analysis.power import SMALLEST, USUAL_DEVIATION
     from ...analysis.verdicts import power_text
     from ...presentation.words import count, duration
@@ -41,8 +44,9 @@ def command(directory: Path) -> int:
         print(f"code     finished trials are of {versions} versions of the installed code")
     if len(outline.columns) > 1:
         lines = power_text(len(outline.seeds), len(outline.columns) - 1, USUAL_DEVIATION, SMALLEST)
-        for name, line in zip(("power", *[""] * len(lines)), lines, strict=False):
-            print(f"{name:<9}{line.removeprefix('Power: ').strip()}")
+        told = " ".join(map(str.strip, lines)).removeprefix("Power: ")
+        width = get_terminal_size().columns
+        print(fill(told, width, initial_indent="power    ", subsequent_indent=9 * " "))
     if now.refusal:
         print(f"\nnothing can be added: {now.refusal}")
     for line in now.damaged:

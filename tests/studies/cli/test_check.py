@@ -25,6 +25,11 @@ episode = 7
 """
 
 
+def unwrapped(printed: str) -> list[str]:
+    """The lines but for those that go on from the one before."""
+    return [line for line in printed.splitlines() if not line.startswith(" ")]
+
+
 @pytest.fixture
 def spec(tmp_path: Path) -> Path:
     path = tmp_path / "spec.toml"
@@ -33,14 +38,17 @@ def spec(tmp_path: Path) -> Path:
 
 
 def test_each_scenario_of_a_spec_is_checked_once(
-    spec: Path, capsys: pytest.CaptureFixture[str]
+    spec: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
     assert main(["check", str(spec), "--steps", "6"]) == 0
-    lines = capsys.readouterr().out.splitlines()
+    printed = capsys.readouterr().out
+    lines = unwrapped(printed)
     assert [line.split(":")[0] for line in lines] == [
         f"passed  box={box}, discount=0.9" for box in ("square", "circle")
     ]
-    assert all(name in lines[0] for name in CHECKS)
+    assert all(name in " ".join(printed.split()) for name in CHECKS)
+    assert max(map(len, printed.splitlines())) <= 80
 
 
 def test_a_broken_scenario_is_told_in_one_line(
@@ -55,7 +63,7 @@ def test_a_broken_scenario_is_told_in_one_line(
 
     monkeypatch.setattr(BoxPushingSettings, "build", build)
     assert main(["check", str(spec), "--steps", "6"]) == 1
-    passed, fault = capsys.readouterr().out.splitlines()
+    passed, fault = unwrapped(capsys.readouterr().out)
     assert passed.startswith("passed  box=square")
     assert fault == (
         "FAULT   box=circle, discount=0.9: different seeds: seeds 0, 1 give one and the same "

@@ -120,3 +120,12 @@ def test_without_a_list_trust_lasts_as_long_as_the_process(
     trust.trust("x = 8")
     assert trust.is_trusted("x = 8")
     assert not trust.is_trusted("x = 9")
+
+
+def test_the_kept_spec_runs_elsewhere_with_the_copies_beside_it(
+    foreign: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    again = ["run", str(foreign / SPEC_FILE), "--out", str(tmp_path / "again"), "--jobs", "1"]
+    assert main(again) == 2
+    assert f"mine.py came with {foreign}" in capsys.readouterr().err
+    assert main([*again, "--trust"]) == 0

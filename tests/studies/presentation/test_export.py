@@ -162,7 +162,10 @@ def test_a_table_in_every_form(study, form, capsys, monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["{study}", "--columns", "succes"], "--columns 'succes': the table has no such column"),
+        (
+            ["{study}", "--columns", "succes"],
+            "columns: the table has no 'succes'; did you mean 'success last",
+        ),
         (["{study}/nothing"], "nothing: holds no study"),
         (["{study}/study.toml"], "study.toml: holds no published results"),
     ],
