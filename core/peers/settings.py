@@ -39,8 +39,9 @@ class PeerSettings(TeamSettings):
             peer = located(f"{__package__}{place}")
         except ImportError as error:
             raise ValueError(
-                f"learner.kind = {self.kind!r}: needs the extra peers, "
-                f"pip install 'nested-agents[peers]' ({error})"
+                f"learner.kind = {self.kind!r}: needs the extra peers, pip install "
+                "'nested-agents[peers]', in a checkout ./dev exec pip install stable-baselines3 "
+                f"({error})"
             ) from None
         return peer(self, scenario, seed)
 

@@ -16,10 +16,10 @@ import numpy as np
 from ...analysis.comparison import Difference, differences
 from ...analysis.results import Results
 from ...analysis.statistics import Estimate, rate
-from ...analysis.summary import Summary
+from ...analysis.summary import EVALUATED, Summary
 from ...analysis.verdicts import power_lines, told
 
-PHASES = ("training", "evaluation")
+PHASES = {"training success": "training", EVALUATED: "evaluation"}
 """The measures: success rates in these phases."""
 
 
@@ -46,8 +46,8 @@ def analyse(results: Results) -> Ablation:
     """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
     conditions = list(results.training)
     measures = {
-        phase: lambda r, condition, phase=phase: r.phases[phase][condition]["success"].mean(axis=1)
-        for phase in PHASES
+        title: lambda r, condition, phase=phase: r.phases[phase][condition]["success"].mean(axis=1)
+        for title, phase in PHASES.items()
         if phase in results.phases
     }
     found: tuple[Difference, ...] = ()
@@ -59,7 +59,7 @@ def analyse(results: Results) -> Ablation:
     for condition in conditions:
         estimates = {}
         for title in measures:
-            estimates[title] = rate(results.phases[title][condition]["success"])
+            estimates[title] = rate(results.phases[PHASES[title]][condition]["success"])
             estimates[f"{title}, difference"] = by_place.get((condition, title), unknown)
         table.append(Summary(condition, len(results.seeds[condition]), estimates))
     return Ablation(tuple(table), found, tuple(_notes(found)))
@@ -68,6 +68,6 @@ def analyse(results: Results) -> Ablation:
 def _notes(found: tuple[Difference, ...]) -> list[str]:
     lines = []
     for title in dict.fromkeys(d.measure for d in found):
-        lines.append(f"\nsuccess {title}, p adjusted over {len(found)} comparisons:")
+        lines.append(f"\n{title}, p adjusted over {len(found)} comparisons:")
         lines += told([d for d in found if d.measure == title])
     return [*lines, *power_lines(found)]

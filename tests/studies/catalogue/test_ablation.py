@@ -21,8 +21,8 @@ def test_what_matters_is_named_and_what_does_not_is_not() -> None:
     assert "p adjusted over 6 comparisons" in text
     assert [line.condition for line in analysis.table] == list(CHANCES)
     by_name = {line.condition: line.estimates for line in analysis.table}
-    assert by_name["default"]["evaluation, difference"].value == 0.0
-    assert by_name["no replay"]["evaluation, difference"].high < -0.4
+    assert by_name["default"]["evaluation success, difference"].value == 0.0
+    assert by_name["no replay"]["evaluation success, difference"].high < -0.4
 
 
 def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
