@@ -63,6 +63,7 @@ MODULES = {
         "learners.frozen",
         "evaluators.evaluator", "evaluators.auto", "evaluators.exact", "evaluators.sampling",
         "evaluators.additive", "evaluators.best_response", "evaluators.coordination",
+        "evaluators.cross_entropy",
         "coordination.elimination", "coordination.max_plus",
         "self_model", "calibration", "cost", "registry", "plugged", "settings", "acting",
         "peers.settings", "peers.peer", "peers.seen", "peers.inputs",
@@ -80,7 +81,7 @@ MODULES = {
         "kinematic_chain.config", "kinematic_chain.scenario",
         "kinematic_chain.view", "kinematic_chain.variables", "matrix_games.games",
         "matrix_games.scenario", "line_up", "failures.settings", "failures.actuators",
-        "failures.carried", "failures.wrappers", "passing_down",
+        "failures.carried", "failures.wrappers",
         "state_variables", "checking.checker",
     )),
     "studies": ("What is measured, compared and drawn.", (
