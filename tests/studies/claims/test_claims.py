@@ -274,6 +274,9 @@ REST = {
     "games": '[scenario]\nkind = "matrix-game"\n[learner]\nkind = "td-lambda"\ndiscount = 0.0\n'
     'rule_base.order = "full"\ndecision.value_of = "own"\n'
     '[[overrides]]\nname = "nested, observed"\nsweep.scenario.game = ["climbing"]',
+    "related": 'evaluations.star.box = "star"\n[[overrides]]\nname = "nested"\n'
+    '[[overrides]]\nname = "pushing points, team"\n'
+    'scenario = { kind = "pushing-points", observed = "joint" }',
     "scaling": '[[overrides]]\nname = "exact"\nsweep.scenario.robots = [1, 2]',
     "wheel-failure": "scenario.failures = "
     '[{kind = "seized", wheels = "robot1.left", episode = 5}]\n'
