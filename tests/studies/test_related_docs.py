@@ -28,6 +28,7 @@ def test_commands_name_specs_that_can_be_built(path: str) -> None:
     ("name", "columns"),
     [
         ("related", ("evaluation success", "success, L", "success, star", "time [s]")),
+        ("related-arms", ("evaluation success", "decisions", "ms", "messages", "counted")),
         ("climbing", ("evaluation success", "memory [kB]", "messages", "formula", "counted")),
     ],
 )
