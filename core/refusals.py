@@ -14,6 +14,18 @@ Keys = tuple[int | str, ...]
 """Where a value stands: keys of tables, and indices of lists."""
 
 
+def near(name: object, known: Iterable[str], cutoff: float = 0.6) -> str:
+    """Return "did you mean ...?" if a known name is near, else nothing.
+
+    Examples
+    --------
+    >>> near("chian", ["chain", "tree"]), near("ring", ["chain", "tree"])
+    ("did you mean 'chain'?", '')
+    """
+    found = difflib.get_close_matches(str(name), list(known), n=1, cutoff=cutoff)
+    return f"did you mean {found[0]!r}?" if found else ""
+
+
 def closest(name: object, known: Iterable[str]) -> str:
     """Return "did you mean ...?" if a known name is near, and the known names in any case.
 
@@ -23,9 +35,7 @@ def closest(name: object, known: Iterable[str]) -> str:
     "did you mean 'chain'? known: chain, tree"
     """
     known = sorted(known)
-    near = difflib.get_close_matches(str(name), known, n=1)
-    hint = f"did you mean {near[0]!r}? " if near else ""
-    return f"{hint}known: {', '.join(known) or 'none'}"
+    return f"{near(name, known)} known: {', '.join(known) or 'none'}".lstrip()
 
 
 def mistaken(key: object, known: Collection[str]) -> str:
@@ -36,8 +46,8 @@ def mistaken(key: object, known: Collection[str]) -> str:
     >>> mistaken("robot", ["robot", "robots", "box"]), mistaken("box", ["robot", "box"])
     ("; did you mean 'robots'?", '')
     """
-    near = difflib.get_close_matches(str(key), set(known) - {str(key)}, n=1, cutoff=0.85)
-    return f"; did you mean {near[0]!r}?" if near else ""
+    hint = near(key, set(known) - {str(key)}, cutoff=0.85)
+    return f"; {hint}" if hint else ""
 
 
 def rule(message: str) -> str:

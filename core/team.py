@@ -20,6 +20,7 @@ from .mirror import Mirror
 from .protocols import (
     CalibratedPrediction,
     CalibratedScenario,
+    ContinuedPrediction,
     EmbodiedPrediction,
     EmbodiedScenario,
     Prediction,
@@ -183,7 +184,8 @@ class Team:
                 f"learner.decision.rule = {problem.rule!r}: the scenario predicts no rewards, "
                 "use value"
             )
-        if getattr(self.evaluator, "continues", False) and not hasattr(prediction, "after"):
+        goes_on = isinstance(prediction, ContinuedPrediction)
+        if getattr(self.evaluator, "continues", False) and not goes_on:
             raise ValueError(
                 "learner.decision.evaluator: plans of several decisions need a scenario that "
                 "predicts from predicted states"

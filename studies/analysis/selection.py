@@ -5,9 +5,9 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from difflib import get_close_matches
 from typing import Any
 
+from ...core.refusals import near
 from ..spec.errors import SpecError
 from ..spec.overlay import flat
 from ..trials.measures import joined as joined_measures
@@ -110,8 +110,8 @@ class Where:
             return _plain(known[key])
         ends = {name: _plain(value) for name, value in known.items() if name.endswith(f".{key}")}
         if not ends:
-            near = get_close_matches(key, {name.rpartition(".")[2] for name in known}, n=1)
-            hint = f"did you mean {near[0]!r}?" if near else "is no setting of these conditions"
+            hint = near(key, {name.rpartition(".")[2] for name in known})
+            hint = hint or "is no setting of these conditions"
             raise SpecError(f"where = {self.text!r}: {key}: {hint}")
         if len(set(map(repr, ends.values()))) > 1:
             raise SpecError(f"where = {self.text!r}: {key}: may be {' or '.join(sorted(ends))}")

@@ -75,6 +75,14 @@ def power_text(
     Power: with 20 seeds, a difference of .17 is found with probability .80. For a
       difference of .20 it takes about 15 seeds.
     """
+    text = f"Power: {power_told(seeds, comparisons, deviation, smallest)}"
+    return wrap(text, WIDTH, subsequent_indent="  ", break_on_hyphens=False)
+
+
+def power_told(
+    seeds: int, comparisons: int, deviation: float | None, smallest: float | None
+) -> str:
+    """Return the same in one piece, without its head."""
     counted = f"{seeds} seed{'s' * (seeds != 1)}"
     among = f" and {comparisons} comparisons" if comparisons > 1 else ""
     needed = seeds_needed(comparisons)
@@ -98,4 +106,4 @@ def power_text(
         text += f"{two_figures(WANTED)}."
         if smallest is not None and wanted is not None:
             text += f" For a difference of {two_figures(smallest)} it takes about {wanted} seeds."
-    return wrap(f"Power: {text}", WIDTH, subsequent_indent="  ", break_on_hyphens=False)
+    return text

@@ -5,11 +5,11 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
-from difflib import get_close_matches
 from html import escape
 
 import numpy as np
 
+from ...core.refusals import near
 from ..analysis.statistics import FEW, Estimate
 from ..analysis.summary import Summary
 from ..spec.errors import SpecError
@@ -109,9 +109,9 @@ def tabulate(lines: Sequence[Summary], columns: Sequence[str] = ()) -> SummaryTa
     titles = tuple(dict.fromkeys(title for line in lines for title in line.estimates))
     for column in columns:
         if column not in titles:
-            near = [f"did you mean {n!r}? " for n in get_close_matches(column, titles, n=1)]
-            known = ", ".join(map(repr, titles)) or "none"
-            raise SpecError(f"columns: the table has no {column!r}; {''.join(near)}it has {known}")
+            has = f"it has {', '.join(map(repr, titles)) or 'none'}"
+            hint = f"{near(column, titles)} {has}".lstrip()
+            raise SpecError(f"columns: the table has no {column!r}; {hint}")
     titles = tuple(columns) or titles
     rows = tuple(
         (s.condition, s.seeds, tuple(_cell(s.estimates.get(title)) for title in titles))

@@ -41,13 +41,15 @@ class Film:
 def films(store: Store, planned: Iterable[Planned], most_bytes: int) -> list[Film]:
     """Draw the first of the given trials of each condition, until there is no more room."""
     found: list[Film] = []
-    trials = _trials(store)
-    drawn: set[str] = set()
+    first: dict[str, str] = {}
     for plan in planned:
-        trial = trials.get(plan.identity)
-        if trial is None or trial.condition in drawn:
+        first.setdefault(plan.condition, plan.identity)
+    # Of a study that the canvas plays nothing is asked for, and no file of its is run.
+    trials = _trials(store) if first else {}
+    for identity in first.values():
+        if identity not in trials:
             continue
-        drawn.add(trial.condition)
+        trial = trials[identity]
         encoded = base64.b64encode(_drawn(store, trial)).decode("ascii")
         if not 0 < len(encoded) <= most_bytes:
             continue

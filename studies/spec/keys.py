@@ -14,7 +14,6 @@ import re
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 from functools import cache
 from itertools import pairwise
 from types import NoneType, UnionType
@@ -25,6 +24,7 @@ from pydantic.fields import FieldInfo
 from typing_extensions import TypeAliasType
 
 from ...core.plugged import Plugged, SettingsRegistry
+from ...core.refusals import near
 from ...core.settings import Settings
 from .conditions import ConditionSettings, Override
 from .curriculum import StageSettings
@@ -242,16 +242,16 @@ def nearest(prefix: str) -> str:
     Examples
     --------
     >>> nearest("value_of")
-    'did you mean learner.decision.value_of?'
+    "did you mean 'learner.decision.value_of'?"
     """
     found = tables()
     full = dict.fromkeys(name for table in found for name in table.full_names)
     names = [*dict.fromkeys(table.name for table in found if table.name), *full]
-    near = [name for name in full if name.endswith(f".{prefix}")]
-    near = near or get_close_matches(prefix, names, n=1)
-    if near:
-        return f"did you mean {' or '.join(near)}?"
-    return f"known: {', '.join(sorted({name.partition('.')[0] for name in full}))}"
+    ending = [name for name in full if name.endswith(f".{prefix}")]
+    if ending:
+        return f"did you mean {' or '.join(map(repr, ending))}?"
+    tops = sorted({name.partition(".")[0] for name in full})
+    return near(prefix, names) or f"known: {', '.join(tops)}"
 
 
 @cache

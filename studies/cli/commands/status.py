@@ -21,7 +21,7 @@ def command(directory: Path) -> int:
     from textwrap import fill
 
     from ...analysis.power import SMALLEST, USUAL_DEVIATION
-    from ...analysis.verdicts import power_text
+    from ...analysis.verdicts import power_told
     from ...presentation.words import count, duration
     from ...store.store import Store
     from ...workers.progress import progress
@@ -43,8 +43,7 @@ def command(directory: Path) -> int:
     if versions > 1:
         print(f"code     finished trials are of {versions} versions of the installed code")
     if len(outline.columns) > 1:
-        lines = power_text(len(outline.seeds), len(outline.columns) - 1, USUAL_DEVIATION, SMALLEST)
-        told = " ".join(map(str.strip, lines)).removeprefix("Power: ")
+        told = power_told(len(outline.seeds), len(outline.columns) - 1, USUAL_DEVIATION, SMALLEST)
         width = get_terminal_size().columns
         print(fill(told, width, initial_indent="power    ", subsequent_indent=9 * " "))
     if now.refusal:

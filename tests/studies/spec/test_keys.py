@@ -95,6 +95,6 @@ def test_the_command(capsys: pytest.CaptureFixture[str], monkeypatch) -> None:
         "    cm.\n"
     )
     assert main(["keys", "lerner"]) == 2
-    assert "lerner: there is no such key; did you mean learner?" in capsys.readouterr().err
+    assert "lerner: there is no such key; did you mean 'learner'?" in capsys.readouterr().err
     assert main(["keys"]) == 0
     assert max(map(len, capsys.readouterr().out.splitlines())) <= 80
