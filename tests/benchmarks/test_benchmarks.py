@@ -82,6 +82,15 @@ def test_what_can_be_solved_at_a_size_is_told(run: Run) -> None:
     assert "│ 3 " in said
 
 
+def test_what_steering_limits_is_told_as_on_the_page(run: Run) -> None:
+    said = run("benchmarks.steering")
+    rows = [[cell.strip() for cell in line.split("│")[1:-1]] for line in said.splitlines()]
+    page = (ROOT / "docs" / "learning.md").read_text(encoding="utf-8")
+    told = [f"| {' | '.join(row)} |" for row in rows if row]
+    assert len(told) == 5
+    assert [row for row in told if row not in page] == []
+
+
 @pytest.mark.slow
 def test_worlds_in_one_call_are_timed(run: Run) -> None:
     said = run("benchmarks.batched", "--worlds", "1", "2", "--steps", "8", "--rounds", "1")
