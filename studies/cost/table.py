@@ -28,7 +28,7 @@ FORMULAS = (
     ("ratio", "ratio"),
 )
 """Columns by name, with their heading."""
-MEASURED = ("formula", "counted", "rules valued", "updates", "ms", "MiB")
+MEASURED = ("formula", "counted", "rules valued", "updates", "ms", "MB")
 """Headings of what was measured per step."""
 PRINTED = ("2.45e12", "1.1e27")
 """Operations of four agents as the paper prints them (Section VIII)."""
@@ -170,7 +170,7 @@ def _measured_cells(measured: Measured | None) -> list[str]:
         return ["-"] * len(MEASURED)
     m = measured
     counts = (m.joint_actions_formula, m.joint_actions, m.rule_evaluations, m.weight_updates)
-    amounts = (1e3 * (m.deciding + m.learning), m.memory / 2**20)
+    amounts = (1e3 * (m.deciding + m.learning), 1e-6 * m.memory)
     return [*map(scientific, counts), *(f"{a:.3g}" if a < 1000 else f"{a:,.0f}" for a in amounts)]
 
 

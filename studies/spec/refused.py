@@ -6,18 +6,23 @@ value found there, what is allowed, and the closest known name.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from ...core.refusals import closest, dotted, mistaken, place, rule
+from ...core.refusals import closest, dotted, mistaken, near, place, rule
 from .errors import show
-from .overlay import Slot, field_of, kind_of, model_at, models_of
+from .overlay import Slot, field_of, kind_of, model_at, models_of, registry_of
 from .renamed import now_called
 
 
-def explain(error: ValidationError, model: type[BaseModel], data: Mapping[str, Any]) -> str:
+def explain(
+    error: ValidationError,
+    model: type[BaseModel],
+    data: Mapping[str, Any],
+    below: type[BaseModel] | None = None,
+) -> str:
     """Return one line on the first thing that `error` found wrong with `data`.
 
     Parameters
@@ -28,6 +33,8 @@ def explain(error: ValidationError, model: type[BaseModel], data: Mapping[str, A
         The model of the outermost table.
     data
         The table as the user gave it.
+    below
+        The model of the tables in which a misplaced key may belong; none: `model`.
     """
     found = [(place(e["loc"], data), e) for e in error.errors(include_url=False)]
     # Where a name or a table may stand and a table does, what is wrong is in the table.
@@ -42,7 +49,9 @@ def explain(error: ValidationError, model: type[BaseModel], data: Mapping[str, A
         if renamed is not None:
             return f"{path} = {show(first['input'])}: {renamed}"
         known = set() if owner is None else set(owner.model_fields)
-        return f"{path} = {show(first['input'])}: unknown key{kind}; {closest(keys[-1], known)}"
+        misspelt = near(keys[-1], known, cutoff=0.85)
+        hint = misspelt or misplaced(path, below or model) or closest(keys[-1], known)
+        return f"{path} = {show(first['input'])}: unknown key{kind}; {hint}"
     if first["type"] == "missing":
         name = str(first["loc"][-1])
         return f"{path}: missing" if keys == (name,) else f"{path}.{name}: missing"
@@ -63,6 +72,37 @@ def explain(error: ValidationError, model: type[BaseModel], data: Mapping[str, A
     owner = _owner(keys[:-1], model, data) if keys else None
     other = mistaken(keys[-1], owner.model_fields) if owner is not None else ""
     return f"{path} = {show(value)}: {renamed or ', or '.join(rules) + other}"
+
+
+def misplaced(path: str, model: type[BaseModel]) -> str:
+    """Return "did you mean ...?" if the last part of a dotted key is a key of some other table.
+
+    Parameters
+    ----------
+    path
+        The key as it stands in the spec.
+    model
+        The model whose tables are looked through, at any depth.
+    """
+    key = path.rpartition(".")[2]
+    places = (name for name in _places(key, model) if not f".{path}".endswith(f".{name}"))
+    found = dict.fromkeys(places)
+    return f"did you mean {' or '.join(map(repr, found))}?" if found and key != "kind" else ""
+
+
+def _places(key: str, model: type[BaseModel], name: str = "") -> Iterator[str]:
+    """Yield the dotted names that a key has in the tables below a model."""
+    for field, info in model.model_fields.items():
+        registry = registry_of(info)
+        held = (
+            models_of(info.annotation)
+            if registry is None
+            else [registry.model(kind) for kind in registry.built_in]
+        )
+        for inner in held:
+            if key in inner.model_fields:
+                yield f"{name}{field}.{key}"
+            yield from _places(key, inner, f"{name}{field}.")
 
 
 def _slot(keys: Sequence[int | str], model: type[BaseModel], data: Any) -> Slot:

@@ -23,13 +23,13 @@ from ...core.refusals import closest
 from ...core.settings import Settings, tuples
 from ...core.sources import Sources, is_reference, named
 from .. import STUDIES
-from .conditions import SECTIONS, Condition, Override, grid, section
+from .conditions import SECTIONS, Condition, ConditionSettings, Override, grid, section
 from .curriculum import Curriculum, Length, Name
 from .errors import SpecError, show
 from .objects import plain
 from .overlay import TomlTable, assignment, flat, overlay
 from .presets import PRESETS
-from .refused import explain
+from .refused import explain, misplaced
 
 MOST_TRIALS = 100_000
 """A larger grid is taken for a slip of the pen."""
@@ -158,7 +158,7 @@ class Spec(Settings):
         try:
             spec = cls.model_validate(tuples(table), strict=True)
         except ValidationError as error:
-            raise SpecError(explain(error, cls, table)) from None
+            raise SpecError(explain(error, cls, table, ConditionSettings)) from None
         points = spec.n_conditions
         if points * len(spec.seeds) > MOST_TRIALS:
             grid_size = f"{points} conditions x {len(spec.seeds)} seeds"
@@ -295,7 +295,8 @@ def _sweep(table: Mapping[str, Any], where: str) -> Iterable[tuple[str, Any]]:
         head, _, tail = key.partition(".")
         if key not in ("preset", "topology") and not (head in SECTIONS and tail):
             known = [*(f"{name}.*" for name in SECTIONS), "preset", "topology"]
-            raise SpecError(f"{where}.{key}: unknown key; {closest(key, known)}")
+            hint = misplaced(key, ConditionSettings) or closest(key, known)
+            raise SpecError(f"{where}.{key}: unknown key; {hint}")
         if not isinstance(values, list | tuple) or not values:
             raise SpecError(f"{where}.{key} = {show(values)}: must be a list of at least one value")
         yield key, values

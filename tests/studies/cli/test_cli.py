@@ -220,6 +220,12 @@ def test_the_demos_spec_is_valid_toml(capsys, tmp_path):
 
 BAD = {
     "run missing.toml --out x": "missing.toml: No such file or directory",
+    "run {spec} --out x --set robots=3": (
+        "robots = 3: unknown key; did you mean 'scenario.robots'?"
+    ),
+    "run {spec} --out x --set evaluator=exact": (
+        "evaluator = 'exact': unknown key; did you mean 'learner.decision.evaluator'?"
+    ),
     "run {spec} --out x --set episodez=3": "episodez = 3: unknown key; did you mean 'episodes'",
     "run {spec} --out x --set episodes=-3": "episodes = -3: must be at least 1",
     "run {spec} --out x --set episodes": "--set episodes: expected key=value",

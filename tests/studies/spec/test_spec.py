@@ -55,6 +55,8 @@ BAD = {
     "sweep.preset = []": ["sweep.preset = []", "list"],
     "sweep.presett = ['paper']": ["sweep.presett", "did you mean 'preset'"],
     "sweep.episodes = [1, 2]": ["sweep.episodes", "unknown key"],
+    "sweep.robots = [1, 2]": ["sweep.robots", "unknown key", "did you mean 'scenario.robots'?"],
+    "scenario.discount = 0.9": ["scenario.discount", "did you mean 'learner.discount'?"],
     "sweep.preset = ['default', 'papr']": ["preset = 'papr'", "did you mean 'paper'"],
     "sweep.preset = ['paper', 'paper']": ["sweep", "the same"],
     "sweep.learner.kind = ['batch-td']\nsweep.preset = [1]": ["preset = 1"],
