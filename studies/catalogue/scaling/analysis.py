@@ -208,7 +208,8 @@ def analyse(results: Results) -> Scaling:
         period = float(numbers["period_s"][0]) if "period_s" in numbers else None
         points.append(Point(evaluator, sizes[condition], agents, passed, period, values))
         shown = {n: values[n] for n in (*COLUMNS[:1], *evaluations, *COLUMNS[1:]) if n in values}
-        table.append(Summary(condition, len(steps), shown))
+        named = _with_size(condition, sizes[condition], bodies)
+        table.append(Summary(named, len(steps), shown))
     exponents = _exponents(points, times)
     notes = [
         f"\n{evaluator}, time with n agents: "
@@ -233,6 +234,15 @@ def _counted(columns: Mapping[str, Mapping[str, Any]], sizes: Mapping[str, int])
         and all(columns.get(c, {}).get(key) == size for c, size in sizes.items())
     )
     return next(swept, "robots")
+
+
+def _with_size(condition: str, size: int, bodies: str) -> str:
+    """Return a condition's label, with what it counts if it is a number alone.
+
+    >>> _with_size("8", 8, "robots"), _with_size("frozen, robots=1", 1, "robots")
+    ('8 robots', 'frozen, robots=1')
+    """
+    return count(size, bodies.removesuffix("s")) if condition == str(size) else condition
 
 
 def _without_size(condition: str, sizes: Mapping[str, int], bodies: str) -> str:
