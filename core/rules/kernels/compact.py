@@ -123,6 +123,15 @@ def _add_values(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _numbered(n: int) -> IntArray:
+    """Return 0, 1, ..., n - 1: `np.arange` takes half a second to compile."""
+    numbers = np.empty(n, np.int64)
+    for i in range(n):
+        numbers[i] = i
+    return numbers
+
+
+@njit(cache=True)
 def values_compact(theta: FloatArray, states: FloatArray, packed: Packed) -> FloatArray:
     """Return f ``(m,)`` of states ``(m, d)``, triangular partitions."""
     return each_compact(theta[None], states[None], packed)[0]
@@ -132,7 +141,7 @@ def values_compact(theta: FloatArray, states: FloatArray, packed: Packed) -> Flo
 def each_compact(theta: FloatArray, states: FloatArray, packed: Packed) -> FloatArray:
     """Return f ``(n, s)`` of states ``(n, s, d)``, each by its row of theta ``(n, n_rules)``."""
     out, lay = np.zeros(states.shape[:2]), unpack(packed)
-    terms, rows = np.arange(len(lay.lengths)), np.arange(states.shape[1])
+    terms, rows = _numbered(len(lay.lengths)), _numbered(states.shape[1])
     for i in range(len(states)):
         _add_values(theta[i], terms, states[i], rows, states[i], rows, 0, lay, out[i])
     return out
@@ -163,7 +172,7 @@ def total_compact(  # type: ignore[no-untyped-def]
     of_agents, of_bodies, of_all = weights
     of_own, of_body, of_common = kinds
     lay, m = unpack(packed), own.shape[1]
-    rows, n_own = np.arange(m), lay.n_own
+    rows, n_own = _numbered(m), lay.n_own
     mine, theirs, total = np.zeros(m), np.zeros(m), np.zeros(m)
     for b in range(len(shared)):
         for i in range(firsts[b], firsts[b + 1]):
@@ -222,8 +231,10 @@ def looked_up(  # type: ignore[no-untyped-def]
     """Return f of joint-action indices from block tables: every active rule is looked up."""
     n_local = len(own_rows) if len(own_rows) else len(own)
     # The own block with which a shared one was last met, and the number of that pair.
-    known = np.full(len(shared) if len(shared_rows) else 0, -1)
-    number = np.empty(len(known), np.int64)
+    n_known = len(shared) if len(shared_rows) else 0
+    known, number = np.empty(n_known, np.int64), np.empty(n_known, np.int64)
+    for row in range(n_known):
+        known[row] = -1
     mine, theirs = np.empty(len(indices), np.int64), np.empty(len(indices), np.int64)
     pair_of, n_pairs = np.empty(len(indices), np.int64), 0
     for c in range(len(indices)):
@@ -238,7 +249,8 @@ def looked_up(  # type: ignore[no-untyped-def]
             known[row], number[row] = a, n_pairs
         n_pairs += 1
     values, n_own = np.zeros(n_pairs), lay.n_own
-    _add_values(theta, np.arange(len(lay.lengths)), own, mine, shared, theirs, n_own, lay, values)
+    terms = _numbered(len(lay.lengths))
+    _add_values(theta, terms, own, mine, shared, theirs, n_own, lay, values)
     out = np.empty(len(indices))
     for c in range(len(indices)):
         out[c] = values[pair_of[c]]

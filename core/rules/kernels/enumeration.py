@@ -58,7 +58,9 @@ def _aggregate(values, n_own: int, below, probabilities):  # type: ignore[no-unt
             for c in range(a * m + 1, (a + 1) * m):
                 out[a] = max(out[a], values[c])
         return out
-    joint, size = np.ones(m), 1
+    joint, size = np.empty(m), 1
+    for c in range(m):
+        joint[c] = 1.0
     for agent in below:
         n_actions = probabilities.shape[1]
         for c in range(size - 1, -1, -1):

@@ -76,8 +76,9 @@ def wheel_commands_of(commands: FloatArray, effects: FloatArray, merge: bool) ->
     # Per wheel the distinct speeds in increasing order, and which of them each action commands.
     told, number = np.zeros((n, w, a)), np.empty((n, w, a), np.int64)
     sizes = np.empty((n, w), np.int64)
-    counts = np.ones(n, np.int64)
+    counts = np.empty(n, np.int64)
     for r in range(n):
+        counts[r] = 1
         for j in range(w):
             # By insertion: of so few speeds that is quick, and quick to compile.
             sizes[r, j] = 0

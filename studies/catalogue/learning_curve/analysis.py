@@ -6,14 +6,15 @@ from luck, one that has the reward function tells it from what the predictor alo
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
 from ....core.protocols import SUCCESS, Measure
-from ...analysis.results import Results
+from ...analysis.results import Arrays, Results
 from ...analysis.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, rates
 from ...analysis.summary import EVALUATED, Summary, evaluated
 
@@ -74,16 +75,33 @@ class LearningCurves:
     ----------
     table
         One line per condition.
-    curves
-        By condition and measure, estimates ``(n_episodes,)`` over seeds; of a condition, those
-        that its scenario has.
+    training
+        By condition and measure, what was measured ``(n_seeds, n_episodes)``; of a condition, what
+        its scenario has.
     followed
         The measures that are followed from episode to episode: success and all that are no rates.
     """
 
     table: tuple[Summary, ...]
-    curves: dict[str, dict[str, Estimate]]
+    training: Mapping[str, Arrays]
     followed: tuple[Measure, ...]
+
+    @cached_property
+    def curves(self) -> dict[str, dict[str, Estimate]]:
+        """Estimates ``(n_episodes,)`` over seeds of what is followed, by condition and measure.
+
+        They are made when they are first asked for: of thousands of seeds that takes seconds.
+        """
+        return {
+            condition: {
+                m.name: rates(training[m.name])
+                if m.is_rate
+                else bootstrap(training[m.name], bounds=m.bounds)
+                for m in self.followed
+                if m.name in training
+            }
+            for condition, training in self.training.items()
+        }
 
     @property
     def headline(self) -> str:
@@ -111,19 +129,11 @@ def analyse(results: Results) -> LearningCurves:
             if metric.title == EVALUATED:
                 estimates |= evaluated(results, condition)
         table.append(Summary(condition, len(training["success"]), estimates))
-    followed = [m for m in results.measures if m.name == SUCCESS.name or not m.is_rate]
-    curves = {
-        condition: {
-            m.name: rates(training[m.name])
-            if m.is_rate
-            else bootstrap(training[m.name], bounds=m.bounds)
-            for m in followed
-            if m.name in training
-        }
-        for condition, training in results.training.items()
-    }
-    known = {name for by_measure in curves.values() for name in by_measure}
-    return LearningCurves(tuple(table), curves, tuple(m for m in followed if m.name in known))
+    measured = {name for training in results.training.values() for name in training}
+    followed = (m for m in results.measures if m.name == SUCCESS.name or not m.is_rate)
+    return LearningCurves(
+        tuple(table), results.training, tuple(m for m in followed if m.name in measured)
+    )
 
 
 def _runs(values: np.ndarray) -> np.ndarray:
