@@ -11,6 +11,8 @@ from .statistics import Estimate, rate
 
 EVALUATED = "evaluation success"
 """Title of the success of a trained team in the scenario of its condition."""
+MANY = 1e6
+"""From here on a number in a table has a power of ten."""
 
 
 @dataclass(frozen=True)
@@ -47,16 +49,21 @@ def evaluated(results: Results, condition: str) -> dict[str, Estimate]:
 def two_figures(value: float) -> str:
     """Return a number in two figures and at most two decimals, without a leading zero.
 
+    From a million on it has a power of ten.
+
     Examples
     --------
-    >>> [two_figures(x) for x in (0.975, 0.998, -0.0312, 0.0021, 12.34, 240.0)]
-    ['.97', '1.0', '-.03', '0', '12', '240']
+    >>> [two_figures(x) for x in (0.975, 0.998, -0.0312, 0.0021, 12.34, 240.0, 2.7e11)]
+    ['.97', '1.0', '-.03', '0', '12', '240', '2.7e11']
     """
     if np.isnan(value):
         return "?"
     if abs(value) < 0.005:
         return "0"
     value = float(f"{value:.2g}")
+    if abs(value) >= MANY:
+        mantissa, power = f"{value:.1e}".split("e")
+        return f"{mantissa}e{int(power)}"
     digits = min(2, max(0, 1 - int(np.floor(np.log10(abs(value))))))
     text = f"{value:.{digits}f}"
     return text.replace("0.", ".", 1) if text.lstrip("-").startswith("0.") else text
