@@ -30,6 +30,7 @@ def test_commands_name_specs_that_can_be_built(path: str) -> None:
         ("related", ("evaluation success", "success, L", "success, star", "time [s]")),
         ("related-arms", ("evaluation success", "decisions", "ms", "messages", "counted")),
         ("related-boxes", ("evaluation success", "success, star", "decisions", "ms", "messages")),
+        ("related-seized", ("evaluation success", "success, seized")),
         ("climbing", ("evaluation success", "memory [kB]", "messages", "formula", "counted")),
     ],
 )

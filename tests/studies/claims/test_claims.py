@@ -229,6 +229,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "hierarchies",
         "related-arms",
         "related-boxes",
+        "related-seized",
     }
     assert all(path.stat().st_size < 300_000 for path in files)
     assert main(["claims", "--format", "markdown"]) == 0
