@@ -8,6 +8,7 @@ face that the team stands at and the direction from the box to the goal. No tria
 from __future__ import annotations
 
 import argparse
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -17,6 +18,7 @@ from rich.table import Table
 from nested_agents.core.arrays import FloatArray
 from nested_agents.core.loop import world_seed
 from nested_agents.scenarios import BoxPushingSettings
+from nested_agents.scenarios.box_pushing.states.view import wrap
 from nested_agents.studies.analysis import published
 from nested_agents.studies.claims import claims
 from nested_agents.studies.trials.session import EVALUATION_WORLDS
@@ -33,6 +35,7 @@ TEAMS = (
 """A row's name, the number of robots, published results, and their phase and condition."""
 
 
+@cache
 def heading_errors(robots: int, seed: int, episodes: int) -> FloatArray:
     """Return the absolute initial heading errors ``(episodes,)`` of evaluation worlds [deg]."""
     scenario = BoxPushingSettings(robots=robots).build()
@@ -42,7 +45,7 @@ def heading_errors(robots: int, seed: int, episodes: int) -> FloatArray:
         situation = scenario.measure()
         box, goal = situation["box_pose"], situation["goal_pose"]
         course = np.arctan2(goal[1] - box[1], goal[0] - box[0])
-        errors.append(abs((course - box[2] + np.pi) % (2.0 * np.pi) - np.pi))
+        errors.append(abs(wrap(course - box[2])))
     return np.degrees(errors)
 
 
