@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import os
 import signal
 
@@ -12,6 +13,8 @@ def main() -> int:
     if is_usual:
         # Until a command begins there is nothing to tidy up. Some imports swallow exceptions.
         signal.signal(signal.SIGINT, lambda *_: os._exit(130))
+        # What is done cannot be interrupted; other handlers Python puts away before it has ended.
+        atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
     from .studies.cli.main import main as run
 
     if is_usual:
