@@ -47,8 +47,9 @@ from nested_agents.studies.spec.toml import dumps
 from nested_agents.studies.store import durable
 from nested_agents.studies.store.running import LOCK
 from nested_agents.studies.store.store import DATABASE, Store
+from nested_agents.studies.trials.arrangement import check
 from nested_agents.studies.trials.session import run_trial
-from nested_agents.studies.trials.trial import Trial, TrialResult, check, trials_of
+from nested_agents.studies.trials.trial import Trial, TrialResult, trials_of
 from nested_agents.studies.workers.worker import Arrival, RunTrial
 
 SPEC = Spec.of(

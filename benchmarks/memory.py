@@ -18,8 +18,9 @@ from rich.console import Console
 
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.store import Store
+from nested_agents.studies.trials.arrangement import check
 from nested_agents.studies.trials.episodes import EpisodeRow
-from nested_agents.studies.trials.trial import Trial, TrialResult, check, trials_of
+from nested_agents.studies.trials.trial import Trial, TrialResult, trials_of
 
 from .startup import used_by
 from .tables import Row, show

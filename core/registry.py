@@ -15,7 +15,6 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Mapping
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +62,8 @@ class Registry:
         ValueError
             If a name is offered twice, or is a built-in one.
         """
+        from importlib.metadata import entry_points
+
         found: dict[str, str] = {}
         for point in entry_points(group=self.group):
             known = self.built_in.get(point.name) or found.get(point.name)

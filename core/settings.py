@@ -66,7 +66,7 @@ class Settings(BaseModel, metaclass=_Made):
     'wheels'? known: wheels
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
     @classmethod
     def made(cls, **table: Any) -> Any:

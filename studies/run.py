@@ -15,7 +15,8 @@ from .catalogue.study import load_study, measured
 from .loggers import logged, make
 from .spec.spec import Spec
 from .store.store import Store
-from .trials.trial import check, trials_of
+from .trials.arrangement import check
+from .trials.trial import trials_of
 from .workers.runner import Outcome, run_trials
 from .workers.worker import RunTrial
 from .workers.workers import Backend, start_workers

@@ -8,7 +8,7 @@ import pytest
 
 from nested_agents.studies.cli.main import COMMANDS
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.trial import check
+from nested_agents.studies.trials.arrangement import check
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = {name: (ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "docs/start.md")}

@@ -10,8 +10,8 @@ import numpy as np
 
 from ...core.protocols import Measure
 from ...core.refusals import closest
-from ..spec.conditions import label
 from ..spec.errors import SpecError
+from ..spec.labels import label
 from .comparison import Array, Difference, adjusted, aligned
 from .numbers import shown
 from .paired_tests import LEVEL

@@ -6,10 +6,17 @@ All are permutation tests: they need no distribution, and bear the many ties of 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike, NDArray
+
+from ...core.deferred import Deferred
+
+if TYPE_CHECKING:
+    from scipy import stats
+else:
+    stats = Deferred("scipy.stats")
 
 Array = NDArray[np.float64]
 
@@ -52,7 +59,7 @@ def friedman(values: ArrayLike, permutations: int = 9999, seed: int = 0) -> Frie
     n, k = array.shape
     if n < 2 or k < 2:
         raise ValueError(f"friedman: {n} seeds x {k} conditions, allowed: 2 x 2 or more")
-    ranks = scipy.stats.rankdata(array, axis=1) - (k + 1) / 2
+    ranks = stats.rankdata(array, axis=1) - (k + 1) / 2
     spread = (ranks**2).sum() / (k - 1)  # per-seed variance summed: what ties leave of the ranks
     if spread == 0.0:
         return Friedman(0.0, 1.0, 0.0)

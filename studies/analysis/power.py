@@ -12,18 +12,12 @@ import math
 from collections.abc import Sequence
 from functools import lru_cache
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.deferred import Deferred
+from .distributions import power_of_t, t_quantile
 from .paired_tests import EXACT, LEVEL
-
-if TYPE_CHECKING:
-    from scipy import special
-else:
-    special = Deferred("scipy.special")
 
 Array = NDArray[np.float64]
 
@@ -173,10 +167,7 @@ def _power(effect: float, seeds: int, comparisons: int) -> float:
             return _simulated(effect, seeds, extreme)
         level = extreme * 2.0 ** (1 - seeds)
     shift, freedom = effect * math.sqrt(seeds), seeds - 1
-    beyond = -special.stdtrit(freedom, level / 2.0)
-    found = 1.0 - special.nctdtr(freedom, shift, beyond) + special.nctdtr(freedom, shift, -beyond)
-    # Far out scipy's tails are not numbers: there every study finds the difference.
-    return float(found) if np.isfinite(found) else 1.0
+    return power_of_t(freedom, shift, float(t_quantile(freedom, 1.0 - level / 2.0)))
 
 
 @lru_cache(maxsize=256)

@@ -18,8 +18,8 @@ from ...core.protocols import SUCCESS, Measure
 from ..spec.errors import SpecError
 from ..spec.outline import Outline
 from ..store import durable
+from ..trials.code import RESULTS_VERSION
 from ..trials.measures import measures_from, tables
-from ..trials.trial import RESULTS_VERSION
 from .results import Arrays, Results
 
 SUCCESS_ALONE = ("ablation", "chain-order", "games", "hierarchies", "scaling", "wheel-failure")

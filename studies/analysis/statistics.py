@@ -7,26 +7,27 @@ few different values: below `FEW` seeds intervals of means are Student's.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.deferred import Deferred
+from .distributions import normal_cdf, normal_quantile, t_quantile
 
 if TYPE_CHECKING:
-    from scipy import special
+    from scipy import stats
 else:
-    special = Deferred("scipy.special")
+    stats = Deferred("scipy.stats")
 
 Array = NDArray[np.float64]
 
 STATISTICS: dict[str, Callable[[Array], Array]] = {
     "mean": lambda x: np.mean(x, axis=-1),
-    "iqm": lambda x: scipy.stats.trim_mean(x, 0.25, axis=-1),
+    "iqm": lambda x: stats.trim_mean(x, 0.25, axis=-1),
     "median": lambda x: np.median(x, axis=-1),
 }
 """Statistics of the last axis by name; the interquartile mean leaves out a quarter at each end."""
@@ -148,7 +149,7 @@ def _bounded(
     least, greatest = bounds
     low, high = np.clip(low, *bounds), np.clip(high, *bounds)
     if np.isfinite(greatest - least):
-        z = special.ndtri(0.5 + level / 2.0)
+        z = normal_quantile(0.5 + level / 2.0)
         reach = (greatest - least) * z**2 / (n_runs + z**2)
         low = np.where(value >= greatest, np.minimum(low, greatest - reach), low)
         high = np.where(value <= least, np.maximum(high, least + reach), high)
@@ -164,13 +165,13 @@ def _student(strata: list[Array], level: float) -> Array:
     shares = np.divide(parts, variance, out=np.zeros_like(parts), where=variance > 0)
     # Where nothing varies the interval has no width, with any degrees of freedom.
     degrees = 1.0 / np.maximum((shares**2 / freedom).sum(axis=0), 1e-300)
-    return np.asarray(special.stdtrit(degrees, 0.5 + level / 2.0) * np.sqrt(variance))
+    return t_quantile(degrees, 0.5 + level / 2.0) * np.sqrt(variance)
 
 
 def _tail(level: float, n_runs: int) -> float:
     """Return the share of resamples beyond either end of an interval."""
-    reach = special.stdtrit(n_runs - 1, 0.5 + level / 2.0) * np.sqrt(n_runs / (n_runs - 1))
-    return float(special.ndtr(-reach))
+    quantile = float(t_quantile(n_runs - 1, 0.5 + level / 2.0))
+    return normal_cdf(-quantile * math.sqrt(n_runs / (n_runs - 1)))
 
 
 def rate(outcomes: ArrayLike, level: float = 0.95) -> Estimate:
@@ -208,7 +209,7 @@ def rate(outcomes: ArrayLike, level: float = 0.95) -> Estimate:
         alike = (np.clip(effect, 1.0, n_episodes) - 1.0) / (n_episodes - 1)
     alike = (ALIKE + rarer * alike) / (ALIKE + rarer)
     n = array.size / (1.0 + (n_episodes - 1) * alike)
-    z = special.ndtri(0.5 + level / 2.0)
+    z = normal_quantile(0.5 + level / 2.0)
     centre = (p + z**2 / (2.0 * n)) / (1.0 + z**2 / n)
     half = z / (1.0 + z**2 / n) * np.sqrt(p * (1.0 - p) / n + z**2 / (4.0 * n**2))
     low, high = np.clip([centre - half, centre + half], 0.0, 1.0)

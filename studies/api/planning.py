@@ -13,11 +13,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from textwrap import wrap
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import scipy
 
+from ...core.deferred import Deferred
 from ..analysis.power import SMALLEST, USUAL_DEVIATION, detectable, seeds_for
 from ..analysis.verdicts import WIDTH, power_text
 from ..catalogue.study import load_study
@@ -25,9 +25,15 @@ from ..presentation.words import count, duration
 from ..spec.errors import SpecError
 from ..spec.outline import Outline
 from ..spec.spec import Spec
+from ..trials.arrangement import check
 from ..trials.session import Session
-from ..trials.trial import Trial, check, trials_of
+from ..trials.trial import Trial, trials_of
 from ..workers.worker import cores
+
+if TYPE_CHECKING:
+    from scipy import optimize
+else:
+    optimize = Deferred("scipy.optimize")
 
 SEED = 10_000
 """Of the trials that are tried out."""
@@ -246,7 +252,7 @@ def paced(trial: Trial) -> Pace:
     steps = np.array([len(episode) for episode in learning], dtype=float)
     taken = np.array([sum(episode) for episode in learning])
     # An episode of T steps takes T (a + b N) to learn from, N being the steps kept by its end.
-    (per_step, per_kept), _ = scipy.optimize.nnls(
+    (per_step, per_kept), _ = optimize.nnls(
         np.stack([steps, steps * np.cumsum(steps)], axis=1), taken
     )
     more = max(_bytes(session) - held, 0.0) / steps.sum()

@@ -10,7 +10,6 @@ from ...core.protocols import DrawnScenario
 from ...core.refusals import closest
 from ..spec.errors import SpecError
 from ..store.store import Store
-from ..trials.trial import trials_of
 
 MOST_BYTES = 20_000_000
 """Of an animation that a notebook is given."""
@@ -60,6 +59,8 @@ def draw(
     SpecError
         If there is no such trial or recording, or its scenario does not draw.
     """
+    from ..trials.trial import trials_of
+
     with Store.open(directory) as store:
         spec = store.spec()
         trials = [t for t in trials_of(spec) if condition in (None, t.condition)]

@@ -34,10 +34,8 @@ from ..catalogue.study import analysed, load_study
 from ..presentation.progress import Terminal
 from ..presentation.tables import SummaryTable, tabulate
 from ..presentation.words import count
-from ..run import Observer, Silent, run_study
 from ..spec.errors import SpecError
 from ..spec.outline import Outline
-from ..spec.spec import Spec
 from ..store import durable
 from ..store.store import Store
 from ..workers.workers import Backend
@@ -48,6 +46,9 @@ from .frames import Part
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from pandas import DataFrame
+
+    from ..run import Observer
+    from ..spec.spec import Spec
 
 Place = str | PathLike[str]
 """Of a directory or a file."""
@@ -323,6 +324,9 @@ def run(
     SpecError
         If the study cannot be run or continued; one line says why.
     """
+    from ..run import Silent, run_study
+    from ..spec.spec import Spec
+
     out = Path(out)
     spec = Spec.meant(spec, study=out)
     told = observer or (Terminal() if progress else Silent())

@@ -10,15 +10,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
-from ...core.learners import LEARNERS, LearnerSettings
 from .. import STUDIES
 from ..analysis.results import Results
 from ..spec.errors import SpecError
-from ..spec.spec import Spec
-from ..trials.trial import Trial, TrialResult
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from ..spec.spec import Spec
+    from ..trials.trial import Trial, TrialResult
 
 
 PARTS = ("measure", "analyse", "draw")
@@ -79,18 +79,16 @@ def check_rule_bases(spec: Spec, why: str) -> None:
     SpecError
         If there is such a condition; one line, which names the learners that will do.
     """
+    from ...core.learners import LEARNERS, LearnerSettings
+
     for condition in spec.conditions():
         learner = condition.settings.learner
         if not isinstance(learner, LearnerSettings):
+            able = [n for n in LEARNERS.names() if issubclass(LEARNERS.model(n), LearnerSettings)]
             raise SpecError(
                 f"learner.kind = {learner.kind!r}: {spec.study} needs agents with rule bases, "
-                f"{why}, allowed {', '.join(_with_rule_bases())} (condition {condition.label!r})"
+                f"{why}, allowed {', '.join(able)} (condition {condition.label!r})"
             )
-
-
-def _with_rule_bases() -> list[str]:
-    """Return the names of the learners of hierarchies of fuzzy agents."""
-    return [n for n in LEARNERS.names() if issubclass(LEARNERS.model(n), LearnerSettings)]
 
 
 def analysed(name: str, results: Results) -> Any:

@@ -6,8 +6,6 @@ import tomllib
 from pathlib import Path
 
 from ...topologies.view import HierarchyView
-from ..spec.spec import Spec
-from ..trials.hierarchies import views
 
 TOPOLOGY = {"kind", "members", "edges", "nodes"}
 """Keys of a file that holds a topology and no more."""
@@ -23,4 +21,7 @@ def of_spec(path: str) -> list[HierarchyView] | None:
         return None  # told by whoever reads it as a topology
     if TOPOLOGY & table.keys() or (list(table) == ["topology"] and "kind" not in table["topology"]):
         return None
+    from ..spec.spec import Spec
+    from ..trials.hierarchies import views
+
     return views(Spec.load(Path(path)))

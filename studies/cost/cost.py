@@ -20,13 +20,13 @@ from fractions import Fraction
 from functools import cache
 from math import log
 from statistics import median
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-import scipy
 
 from ...core.cost import Problem, below_counts, is_chain
 from ...core.decision import Decision
+from ...core.deferred import Deferred
 from ...core.evaluators.coordination import VariableEliminationSettings
 from ...core.evaluators.exact import ExactSettings
 from ...core.learners.td import TDLambdaSettings
@@ -44,7 +44,13 @@ from ...topologies.config import (
     SingleAgentSettings,
 )
 from ...topologies.view import team_of
+from ..analysis.distributions import t_quantile
 from ..analysis.statistics import Estimate
+
+if TYPE_CHECKING:
+    from scipy import stats
+else:
+    stats = Deferred("scipy.stats")
 
 MEMBERSHIPS = 5
 PAPER = Problem(5**7, 4, 450)
@@ -263,8 +269,8 @@ def exponent(
     if not points:
         return None
     x, y = zip(*points, strict=True)
-    fit = scipy.stats.linregress(x, y)
-    half = scipy.stats.t.ppf(0.5 + level / 2, len(points) - 2) * fit.stderr
+    fit = stats.linregress(x, y)
+    half = float(t_quantile(len(points) - 2, 0.5 + level / 2)) * fit.stderr
     value, low, high = (np.asarray(v) for v in (fit.slope, fit.slope - half, fit.slope + half))
     return Estimate(value, low, high)
 

@@ -7,11 +7,14 @@ import time
 from collections.abc import Iterable
 from html import escape
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..spec.outline import Outline
-from ..spec.spec import Spec
 from ..workers.runner import Outcome
 from .words import count, duration
+
+if TYPE_CHECKING:
+    from ..spec.spec import Spec
 
 PLAIN_SECONDS = 10.0
 """How often a line tells of the progress when there is no terminal."""

@@ -15,7 +15,7 @@ from ..claims.table import result
 from ..presentation.tables import tabulate
 from ..spec.toml import dumps
 from ..store.store import Store
-from ..trials.trial import RESULTS_VERSION
+from ..trials.code import RESULTS_VERSION
 from . import words
 from .pictures import pictures
 from .replays import replays

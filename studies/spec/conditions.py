@@ -7,10 +7,9 @@ what the scenario lays over it, the spec's tables, the override's tables, the po
 
 from __future__ import annotations
 
-import hashlib
 import itertools
 import json
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -26,14 +25,13 @@ from ...scenarios.box_pushing.config import BoxPushingSettings
 from ...topologies.config import ChainSettings, Topology, parse
 from .curriculum import Curriculum, Name, Stage, StageSettings
 from .errors import SpecError, show
+from .labels import label, scalar
 from .overlay import TomlTable, nested, overlay
 from .presets import PRESETS
 from .refused import explain
 from .renamed import now_called
 
 SECTIONS = ("scenario", "topology", "learner")
-LONGEST_TABLE = 40
-"""A longer table is not spelled out in labels [characters]."""
 
 
 class ConditionSettings(Settings):
@@ -157,7 +155,7 @@ def grid(
             raise SpecError(f"{source}: conditions {other!r} and {name!r} are the same")
         labels.add(name)
         columns: dict[str, Any] = {"name": override.name} if override else {}
-        columns |= {key: _scalar(point[key]) if key in point else "" for key in keys}
+        columns |= {key: scalar(point[key]) if key in point else "" for key in keys}
         elsewhere = tuple(
             (other, _beside(settings, changes, f" (evaluation {other!r}){where}"))
             for other, changes in (evaluations or {}).items()
@@ -244,68 +242,3 @@ def section(name: str, value: object) -> TomlTable:
         return parse(value).model_dump()
     except ValueError as error:
         raise SpecError(f"{name.removesuffix('topology')}{error}") from None
-
-
-def label(point: Mapping[str, Any], name: str = "") -> str:
-    """Return a short name for a point of the sweeps of an override.
-
-    Examples
-    --------
-    >>> label({"preset": "frozen"}), label({"preset": "default", "learner.rule_base.order": 2})
-    ('frozen', 'default, order=2')
-    >>> label({"scenario.robots": 3}, "no replay")
-    'no replay, robots=3'
-    """
-    if len(point) == 1 and not name:
-        return _brief(next(iter(point.values())))
-    last = [key.rpartition(".")[2] for key in point]
-    parts = [name] if name else []
-    for key, short in zip(point, last, strict=True):
-        shown = short if last.count(short) == 1 else key
-        value = _brief(point[key])
-        parts.append(value if key == "preset" else f"{shown}={value}")
-    return ", ".join(parts)
-
-
-def label_but(columns: Mapping[str, Any], keys: Collection[str]) -> str:
-    """Return the label that a condition of these columns would have without some swept keys.
-
-    Examples
-    --------
-    >>> label_but({"name": "no replay", "scenario.robots": 3, "topology": ""}, ["scenario.robots"])
-    'no replay'
-    """
-    point = {k: v for k, v in columns.items() if k not in (*keys, "name") and v != ""}
-    return label(point, columns.get("name", ""))
-
-
-def _brief(value: object) -> str:
-    """Return a value for a label.
-
-    A table is called by its name; a long one without is told from others by a checksum, as is a
-    list that is cut.
-
-    Examples
-    --------
-    >>> kite = {"vertices": [[0, 0], [0.2, 0.1], [0.3, 0], [0.2, -0.1]]}
-    >>> _brief({"name": "kite", **kite}), _brief(kite), _brief({"branching": 2})
-    ('kite', 'described e5dea0', '{branching = 2}')
-    """
-    text = str(_scalar(value))
-    if isinstance(value, Mapping):
-        if "name" in value:
-            return str(value["name"])
-        kind = value.get("kind", "described")
-        return text if len(text) <= LONGEST_TABLE else f"{kind} {_checksum(text)}"
-    if isinstance(value, str) or len(text) <= 60:
-        return text
-    return f"{text[:50]}... {_checksum(text)}"
-
-
-def _checksum(text: str) -> str:
-    return hashlib.sha256(text.encode(errors="replace")).hexdigest()[:6]
-
-
-def _scalar(value: object) -> object:
-    is_scalar = isinstance(value, int | float | str) and not isinstance(value, bool)
-    return value if is_scalar else show(value, width=None)

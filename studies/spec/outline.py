@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from .curriculum import lengths
-from .spec import Spec
+if TYPE_CHECKING:
+    from .spec import Spec
 
 
 @dataclass(frozen=True)
@@ -66,3 +66,22 @@ class Outline:
             columns=columns,
             table=table,
         )
+
+
+def lengths(curricula: Iterable[Sequence[int]], episodes: int) -> str:
+    """Return in words the episodes of training, stage by stage, that there are.
+
+    Parameters
+    ----------
+    curricula
+        Of every condition, the episodes of its stages.
+    episodes
+        Those after them.
+
+    Examples
+    --------
+    >>> lengths([[10, 6], [10, 6]], 8), lengths([[10, 6], []], 8), lengths([[]], 1)
+    ('10 + 6 + 8 episodes', '10 + 6 + 8 or 8 episodes', '1 episode')
+    """
+    told = dict.fromkeys(" + ".join(map(str, [*stages, episodes])) for stages in curricula)
+    return f"{' or '.join(told)} episode{'' if list(told) == ['1'] else 's'}"

@@ -14,6 +14,8 @@ from ..spec.errors import SpecError
 
 DATABASE = "results.sqlite"
 """Name of the file, in the directory of a study."""
+SPEC_FILE = "study.toml"
+"""Name of a study's own copy of its spec, beside it."""
 
 CIRCUMSTANCES = (
     sqlite3.SQLITE_PERM,

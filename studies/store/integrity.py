@@ -9,7 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from ..spec.errors import SpecError
-from ..trials.trial import RESULTS_VERSION
+from ..trials.code import RESULTS_VERSION
 from . import database
 from .schema import OF_A_TRIAL, study_checksum, trial_checksums
 

@@ -8,20 +8,22 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol, Self, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self, TypeVar
 
 from ...core.protocols import Measure
 from ...core.sources import Sources
 from ..spec.errors import SpecError
 from ..spec.outline import Outline
-from ..spec.spec import Spec
 from ..trials import code
+from ..trials.code import RESULTS_VERSION
 from ..trials.episodes import ELSEWHERE, STAGE
 from ..trials.measures import measures_from
-from ..trials.trial import RESULTS_VERSION
 from . import database, integrity
 from .database import DATABASE
 from .schema import PLANNED, SECONDS, trial_checksums
+
+if TYPE_CHECKING:
+    from ..spec.spec import Spec
 
 
 class Identified(Protocol):
@@ -97,6 +99,8 @@ class Reading:
         sources
             The files; those that are kept with the study unless others are given.
         """
+        from ..spec.spec import Spec
+
         return Spec.of(self._table("spec"), self.sources() if sources is None else sources)
 
     def sources(self) -> Sources:

@@ -14,11 +14,8 @@ from ..spec.errors import SpecError
 from ..spec.spec import Spec
 from ..trials.measures import column_of
 from . import integrity
-from .database import DATABASE
+from .database import DATABASE, SPEC_FILE
 from .reading import Reading
-
-SPEC_FILE = "study.toml"
-"""Name of a study's own copy of its spec."""
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,10 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
+from typing import TYPE_CHECKING
 
-from ..trials.trial import Trial
+if TYPE_CHECKING:
+    from ..trials.trial import Trial
 
 LOCK = ".lock"
 MARK = "running.json"

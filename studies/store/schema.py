@@ -13,15 +13,16 @@ import sqlite3
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import groupby
 from operator import itemgetter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ...core.protocols import Measure
-from ..spec.spec import Spec
-from ..trials.code import Code
+from ..trials.code import RESULTS_VERSION, Code
 from ..trials.episodes import STAGE
 from ..trials.measures import columns, tables
-from ..trials.trial import RESULTS_VERSION, trials_of
 from .database import insert, quoted
+
+if TYPE_CHECKING:
+    from ..spec.spec import Spec
 
 SECONDS = ("decision", "physics", "sensors", "learning", "total")
 
@@ -59,6 +60,8 @@ def prepare(
     db: sqlite3.Connection, spec: Spec, measures: Sequence[Measure], computed_by: Code
 ) -> None:
     """Make the tables, and note what the study is and what computes it; within a transaction."""
+    from ..trials.trial import trials_of
+
     conditions = spec.conditions()
     settings = {c.label: c.settings.model_dump(mode="json") for c in conditions}
     swept = [quoted(key) for key in conditions[0].columns]

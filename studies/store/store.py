@@ -19,22 +19,23 @@ import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from ...core.protocols import Measure
 from ...core.sources import FOLDER, kept_name
 from ..spec.errors import SpecError
-from ..spec.spec import Spec
 from ..spec.toml import dumps
 from ..trials import code
 from ..trials.episodes import Recording
-from ..trials.trial import Trial, TrialResult
 from . import database, durable, integrity
-from .database import DATABASE
+from .database import DATABASE, SPEC_FILE
 from .reading import Identified, Planned, Reading, T
-from .refusal import SPEC_FILE, Given, examine, is_copy
 from .running import LOCK
 from .schema import SECONDS, prepare, trial_checksums
+
+if TYPE_CHECKING:
+    from ..spec.spec import Spec
+    from ..trials.trial import Trial, TrialResult
 
 __all__ = ["DATABASE", "SPEC_FILE", "Identified", "Planned", "Store"]
 
@@ -76,7 +77,7 @@ class Store(Reading):
         spec
             The study.
         measures
-            What it measures of its episodes, see `nested_agents.studies.trials.trial.check`.
+            What it measures of its episodes, see `nested_agents.studies.trials.arrangement.check`.
         accept_code
             Whether to go on although the installed code has changed since.
 
@@ -86,6 +87,8 @@ class Store(Reading):
             If it cannot be written, holds a study that differs by more than additional seeds, or
             another process is writing to it. Nothing has been changed then.
         """
+        from .refusal import Given, examine
+
         given = Given(spec, measures, accept_code)
         examine(directory, given)  # what is refused leaves nothing behind
         path = directory / DATABASE
@@ -117,6 +120,8 @@ class Store(Reading):
 
     def _keep_spec(self, spec: Spec) -> None:
         """Keep copies of the spec and of users' files, to read and to run them again."""
+        from .refusal import is_copy
+
         path = self.directory / SPEC_FILE
         if not is_copy(path, spec):
             durable.write(path, dumps(spec.table()).encode())

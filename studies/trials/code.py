@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping
-from importlib.metadata import entry_points
 from importlib.util import find_spec
 from pathlib import Path
 
 from ...core.sources import meaning
 
+RESULTS_VERSION = 4
+"""Raise it when the code changes so that the same trial gives other results."""
 PACKAGE = Path(__file__).parents[2]
 """Where the package is installed."""
 COMPUTING = ("core", "topologies", "scenarios", "studies/trials", "studies/catalogue")
@@ -44,6 +45,8 @@ def modules() -> dict[str, str]:
 
 def _offering() -> Iterator[Path]:
     """Yield the folders, or files, of installed packages that offer things to studies."""
+    from importlib.metadata import entry_points
+
     points = entry_points()
     groups = [group for group in points.groups if group.startswith(GROUPS)]
     modules = {p.module.partition(".")[0] for g in groups for p in points.select(group=g)}

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from math import inf, isfinite
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.loop import StepRecord
 from ...core.protocols import Measure, RecordedScenario, Transition
+
+if TYPE_CHECKING:
+    from ...core.loop import StepRecord
 
 STAGE = "training:"
 """With what the phase of a stage of a curriculum begins; the stage's name follows."""

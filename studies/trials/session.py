@@ -16,6 +16,7 @@ from ...core.loop import (
 from ...core.protocols import Measure, RecordedScenario, measures_of
 from ...core.settings import ScenarioSettings
 from ...core.team import Team
+from .arrangement import Arrangement, arrange
 from .episodes import (
     ELSEWHERE,
     STAGE,
@@ -26,7 +27,7 @@ from .episodes import (
     Stopwatch,
 )
 from .measures import joined
-from .trial import Arrangement, Trial, TrialResult, arrange
+from .trial import Trial, TrialResult
 
 EVALUATION_WORLDS = 10**6
 """Number of the first evaluation episode's world: after any training, and the same for all."""

@@ -8,13 +8,16 @@ from __future__ import annotations
 from collections.abc import Generator, Sequence
 from contextlib import closing
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from ..store.running import Running
 from ..store.store import Store
-from ..trials.trial import Trial, TrialResult
 from .interrupts import undisturbed
 from .worker import Arrival, RunTrial
 from .workers import Workers
+
+if TYPE_CHECKING:
+    from ..trials.trial import Trial, TrialResult
 
 ATTEMPTS = 2
 """How often a trial is run alone whose worker has died."""

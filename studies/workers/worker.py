@@ -7,7 +7,6 @@ import threading
 import time
 import traceback
 from collections.abc import Callable
-from importlib.metadata import version
 from platform import python_version
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -112,7 +111,7 @@ def attempt_alike(expected: dict[str, str], run_trial: RunTrial, trial: Trial) -
 
 def versions() -> dict[str, str]:
     """Return the versions of what a trial's bits may depend on, by name."""
-    from ..trials.trial import RESULTS_VERSION
+    from ..trials.code import RESULTS_VERSION
 
     packages = {name: installed(name) for name in PACKAGES}
     return {"results version": str(RESULTS_VERSION), "Python": python_version(), **packages}
@@ -124,4 +123,6 @@ def installed(package: str) -> str:
         import Box2D
 
         return str(Box2D.__version__)
+    from importlib.metadata import version
+
     return version(package)

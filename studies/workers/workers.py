@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Literal, Protocol
+from typing import TYPE_CHECKING, Literal, Protocol
 
 from ..spec.errors import SpecError
-from ..trials.trial import Trial
 from .worker import Arrival, RunTrial, cores
+
+if TYPE_CHECKING:
+    from ..trials.trial import Trial
 
 Backend = Literal["loky", "dask"]
 """``loky``: processes of this machine. ``dask``: workers of a Dask cluster."""

@@ -24,8 +24,9 @@ from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store import reading
 from nested_agents.studies.store.store import Store
+from nested_agents.studies.trials.arrangement import check
 from nested_agents.studies.trials.session import Session, run_trial
-from nested_agents.studies.trials.trial import check, trials_of
+from nested_agents.studies.trials.trial import trials_of
 
 SPREAD = Measure("spread_m", "greatest spread of the carts", "m", "spread_m", "max", "lower")
 LEVEL = Measure("level", "ever level", source="level", gathering="max", is_rate=True)

@@ -13,8 +13,9 @@ from nested_agents.studies.report import words
 from nested_agents.studies.spec.outline import Outline
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.store import Store
+from nested_agents.studies.trials.arrangement import check
 from nested_agents.studies.trials.session import run_trial
-from nested_agents.studies.trials.trial import check, trials_of
+from nested_agents.studies.trials.trial import trials_of
 
 SPEC = Spec.of(
     {

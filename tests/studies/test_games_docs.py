@@ -10,7 +10,7 @@ from nested_agents.studies.catalogue.games.analysis import analyse
 from nested_agents.studies.claims import claims
 from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.trial import check
+from nested_agents.studies.trials.arrangement import check
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 GAMES = (DOCS / "games.md").read_text(encoding="utf-8")

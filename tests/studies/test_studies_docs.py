@@ -6,7 +6,7 @@ from pathlib import Path
 from nested_agents import studies
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.trial import check
+from nested_agents.studies.trials.arrangement import check
 
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "docs" / "studies.md").read_text(encoding="utf-8")

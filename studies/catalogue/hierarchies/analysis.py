@@ -29,8 +29,8 @@ from ...analysis.results import Arrays, Results
 from ...analysis.statistics import Estimate, bootstrap, rate
 from ...analysis.summary import EVALUATED, Summary, two_figures
 from ...analysis.verdicts import power_lines
-from ...spec.conditions import label_but
 from ...spec.errors import SpecError
+from ...spec.labels import label_but
 from ...spec.spec import Spec
 
 VALUE_OF = "learner.decision.value_of"

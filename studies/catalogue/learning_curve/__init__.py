@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ...spec.errors import SpecError
-from ...spec.spec import Spec
-from ...trials.session import run_trial as measure
 from .analysis import LearningCurves, analyse
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from ...spec.spec import Spec
+    from ...trials.trial import Trial, TrialResult
 
 
 def check(spec: Spec) -> None:
@@ -23,6 +24,13 @@ def check(spec: Spec) -> None:
                     f"{spec.episodes - 1} of {spec.episodes} episodes "
                     f"(condition {condition.label!r})"
                 )
+
+
+def measure(trial: Trial) -> TrialResult:
+    """Run a trial."""
+    from ...trials.session import run_trial  # who only reads results needs nothing that learns
+
+    return run_trial(trial)
 
 
 def draw(analysis: LearningCurves) -> dict[str, Figure]:

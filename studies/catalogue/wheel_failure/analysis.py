@@ -28,11 +28,12 @@ from ...analysis.results import Arrays, Results
 from ...analysis.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, rates
 from ...analysis.summary import Summary
 from ...analysis.verdicts import power_lines
-from ...spec.conditions import label_but
 from ...spec.errors import SpecError
+from ...spec.labels import label_but
 from ...spec.spec import Spec
+from ...trials.arrangement import build
 from ...trials.session import Session
-from ...trials.trial import Trial, TrialResult, build
+from ...trials.trial import Trial, TrialResult
 from ..study import check_rule_bases
 
 BLOCK = 5

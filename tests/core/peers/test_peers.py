@@ -13,8 +13,9 @@ from nested_agents.core.spaces import ActionSet, StateSpace, Variable
 from nested_agents.scenarios.line_up import LineUpSettings
 from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.trials.arrangement import check
 from nested_agents.studies.trials.session import Session, run_trial
-from nested_agents.studies.trials.trial import check, trials_of
+from nested_agents.studies.trials.trial import trials_of
 
 TABLE: dict[str, Any] = {
     "study": "peers", "seeds": [10_000], "episodes": 3, "steps": 20, "evaluation": 2,

@@ -14,7 +14,8 @@ from nested_agents.scenarios.kinematic_chain.scenario import KinematicChain
 from nested_agents.scenarios.kinematic_chain.view import ChainView
 from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.trial import check, trials_of
+from nested_agents.studies.trials.arrangement import check
+from nested_agents.studies.trials.trial import trials_of
 
 FAILURES = (
     {"kind": "locked", "joints": "joint2", "step": 3},

@@ -14,7 +14,7 @@ from nested_agents.studies.presentation.tables import tabulate
 from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.store import Store
-from nested_agents.studies.trials.trial import check as measures_of
+from nested_agents.studies.trials.arrangement import check as measures_of
 from nested_agents.studies.trials.trial import trials_of
 
 CHANCES = {

@@ -11,8 +11,9 @@ from nested_agents.studies.catalogue.scaling import figure as scaling_figure
 from nested_agents.studies.catalogue.scaling.analysis import analyse, measure, messages
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.trials.arrangement import build, check
 from nested_agents.studies.trials.session import run_trial
-from nested_agents.studies.trials.trial import build, check, trials_of
+from nested_agents.studies.trials.trial import trials_of
 
 SIZES = {2: 0.9, 8: 0.9, 64: 0.5}
 

@@ -20,7 +20,7 @@ from nested_agents.studies.claims.table import markdown, print_claims
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.outline import Outline
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.trial import check
+from nested_agents.studies.trials.arrangement import check
 
 QUICK = Path(claims.__file__).parent / "quick"
 CATALOGUE = QUICK.parents[1] / "catalogue"

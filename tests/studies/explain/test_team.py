@@ -14,8 +14,10 @@ from nested_agents.studies.spec.conditions import ConditionSettings
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store import reading
 from nested_agents.studies.store.store import DATABASE, Store
+from nested_agents.studies.trials.arrangement import build
+from nested_agents.studies.trials.code import RESULTS_VERSION
 from nested_agents.studies.trials.session import run_trial
-from nested_agents.studies.trials.trial import RESULTS_VERSION, build, trials_of
+from nested_agents.studies.trials.trial import trials_of
 
 SPEC = Spec.of(
     {

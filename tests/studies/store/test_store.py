@@ -10,7 +10,8 @@ from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store import reading
 from nested_agents.studies.store import store as store_module
 from nested_agents.studies.store.store import DATABASE, SPEC_FILE, Store
-from nested_agents.studies.trials.trial import RESULTS_VERSION, trials_of
+from nested_agents.studies.trials.code import RESULTS_VERSION
+from nested_agents.studies.trials.trial import trials_of
 
 NAMES = [measure.name for measure in made_up.MEASURES]
 

@@ -11,8 +11,9 @@ from nested_agents.core.sources import Sources
 from nested_agents.scenarios.line_up import LineUp
 from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.trials.arrangement import check
 from nested_agents.studies.trials.session import CURRICULUM_WORLDS, Session, run_trial
-from nested_agents.studies.trials.trial import check, trials_of
+from nested_agents.studies.trials.trial import trials_of
 
 SHORT = {
     "seeds": [7], "episodes": 2, "steps": 12, "evaluation": 2,

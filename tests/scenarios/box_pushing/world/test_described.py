@@ -17,8 +17,9 @@ from nested_agents.scenarios.box_pushing.world.robots import (
 from nested_agents.scenarios.checking.checker import CHECKS, check_scenario
 from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.trials.arrangement import check
 from nested_agents.studies.trials.session import run_trial
-from nested_agents.studies.trials.trial import check, trials_of
+from nested_agents.studies.trials.trial import trials_of
 
 SPEC = """
 preset = "frozen"
