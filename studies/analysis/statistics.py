@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -116,13 +117,12 @@ def bootstrap(
     if sum(map(len, arrays)) < FEW:
         half = _student(arrays, level) * SPREAD[statistic]
         return _bounded(value, value - half, value + half, bounds, level, sum(map(len, arrays)))
-    rng = np.random.default_rng(seed)
-    drawn = [_drawn(rng, len(array), resamples) for array in arrays]
+    drawn = _drawn(tuple(map(len, arrays)), resamples, seed)
     n_runs, found = sum(map(len, arrays)), []
     for part in _parts(resamples, sum(array.size for array in arrays)):
-        samples = [array[runs[part]] for array, runs in zip(arrays, drawn, strict=True)]
-        # (resamples, n_runs) or (resamples, n_runs, n_points): runs last for the statistic.
-        found.append(compute(np.moveaxis(np.concatenate(samples, axis=1), 1, -1)))
+        samples = [_taken(array, runs[part]) for array, runs in zip(arrays, drawn, strict=True)]
+        pooled = samples[0] if len(samples) == 1 else np.concatenate(samples)
+        found.append(compute(np.moveaxis(pooled, 0, -1)))
     tail = _tail(level, n_runs)
     low, high = np.quantile(np.concatenate(found), [tail, 1.0 - tail], axis=0)
     return _bounded(value, low, high, bounds, level, n_runs)
@@ -134,12 +134,31 @@ def _parts(resamples: int, size: int) -> Iterator[slice]:
     return (slice(first, first + number) for first in range(0, resamples, number))
 
 
-def _drawn(rng: np.random.Generator, n: int, resamples: int) -> NDArray[Any]:
-    """Return the runs ``(resamples, n)`` of n that each resample is made of, in few bytes."""
-    runs = np.empty((resamples, n), np.min_scalar_type(n - 1))
-    for part in _parts(resamples, n):
-        runs[part] = rng.integers(n, size=runs[part].shape)
-    return runs
+@lru_cache(maxsize=1)
+def _drawn(sizes: tuple[int, ...], resamples: int, seed: int) -> list[NDArray[Any]]:
+    """Return of strata of n runs each the ``(resamples, n)`` that resamples are made of.
+
+    In few bytes. They are kept, as the conditions of a study mostly have equally many seeds.
+    """
+    rng, drawn = np.random.default_rng(seed), []
+    for n in sizes:
+        runs = np.empty((resamples, n), np.min_scalar_type(n - 1))
+        for part in _parts(resamples, n):
+            runs[part] = rng.integers(n, size=runs[part].shape)
+        runs.flags.writeable = False
+        drawn.append(runs)
+    return drawn
+
+
+def _taken(array: Array, runs: NDArray[Any]) -> Array:
+    """Return resamples ``(n, resamples)`` or ``(n, resamples, n_points)`` of values ``(n, ...)``.
+
+    Memory holds next to each other what statistics run along fastest: with one point the runs of a
+    resample, with several all resamples of a run.
+    """
+    if array.ndim == 1 or array.shape[1] == 1:
+        return np.moveaxis(array.take(runs, axis=0), 1, 0)
+    return array.take(runs.T, axis=0)
 
 
 def _bounded(

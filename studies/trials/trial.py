@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -70,11 +70,16 @@ class Trial:
     @cached_property
     def identity(self) -> str:
         """Hash of the canonical content and of the version of the code that matters."""
+        before, after = self._content
+        return hashlib.sha256(f'{{{before}"seed":{self.seed},{after}}}'.encode()).hexdigest()[:32]
+
+    @cached_property
+    def _content(self) -> tuple[str, str]:
+        """What is hashed, as JSON with sorted keys: the text before and that after the seed."""
         content: dict[str, Any] = {
             "version": RESULTS_VERSION,
             "study": self.study,
             "settings": json.loads(self.settings.canonical()),
-            "seed": self.seed,
             "episodes": self.episodes,
             "steps": self.steps,
             "evaluation": self.evaluation,
@@ -89,8 +94,21 @@ class Trial:
             content["curriculum"] = [stage.table() for stage in self.curriculum]
         if files := sorted(named([self.study, content])):
             content["sources"] = {name: self.sources.digest(name) for name in files}
-        text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
-        return hashlib.sha256(text.encode()).hexdigest()[:32]
+        parts = (
+            {key: value for key, value in content.items() if (key < "seed") == is_before}
+            for is_before in (True, False)
+        )
+        before, after = (
+            json.dumps(part, sort_keys=True, separators=(",", ":"), allow_nan=False)[1:-1]
+            for part in parts
+        )
+        return f"{before},", after
+
+    def with_seed(self, seed: int) -> Trial:
+        """Return the trial with another seed; what both have in common is not written out again."""
+        other = replace(self, seed=seed)
+        vars(other)["_content"] = self._content
+        return other
 
     def world(self) -> Scenario:
         """Return its scenario as the settings describe it, built anew."""
@@ -148,12 +166,12 @@ class TrialResult:
 
 def trials_of(spec: Spec) -> tuple[Trial, ...]:
     """Return the trials of a spec: seed by seed, so that every condition advances alike."""
-    return tuple(
+    first = [
         Trial(
             study=spec.study,
             condition=condition.label,
             settings=condition.settings,
-            seed=seed,
+            seed=spec.seeds[0],
             episodes=spec.episodes,
             steps=spec.steps,
             evaluation=spec.evaluation,
@@ -162,9 +180,9 @@ def trials_of(spec: Spec) -> tuple[Trial, ...]:
             evaluation_steps=spec.evaluation_steps,
             sources=spec.sources,
         )
-        for seed in spec.seeds
         for condition in spec.conditions()
-    )
+    ]
+    return tuple(trial.with_seed(seed) for seed in spec.seeds for trial in first)
 
 
 def _revived(sources: Sources, content: dict[str, Any]) -> Trial:

@@ -4,7 +4,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from nested_agents.studies.analysis.statistics import STATISTICS, _tail, bootstrap, rate, rates
+from nested_agents.studies.analysis.statistics import (
+    STATISTICS,
+    _drawn,
+    _tail,
+    _taken,
+    bootstrap,
+    rate,
+    rates,
+)
 
 RNG = np.random.default_rng(0)
 
@@ -186,3 +194,17 @@ def test_what_cannot_be_estimated_is_refused():
     for strata in ([], [[]], [np.zeros((2, 2, 2))]):
         with pytest.raises(ValueError, match="every stratum needs values"):
             bootstrap(*strata)
+
+
+@pytest.mark.parametrize("statistic", STATISTICS)
+@pytest.mark.parametrize(
+    "shapes", [[(25,)], [(24, 1)], [(30, 7)], [(12, 3), (13, 3)], [(9,), (20,)]]
+)
+def test_how_resamples_lie_in_memory_changes_no_bit(statistic, shapes):
+    strata = [RNG.normal(size=shape) for shape in shapes]
+    drawn = _drawn(tuple(map(len, strata)), 50, 0)
+    plain = np.concatenate([s[runs] for s, runs in zip(strata, drawn, strict=True)], axis=1)
+    laid = np.concatenate([_taken(s, runs) for s, runs in zip(strata, drawn, strict=True)])
+    compute = STATISTICS[statistic]
+    expected = compute(np.moveaxis(plain, 1, -1))
+    np.testing.assert_array_equal(compute(np.moveaxis(laid, 0, -1)), expected)

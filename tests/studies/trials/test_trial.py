@@ -1,3 +1,5 @@
+import hashlib
+import json
 import pickle
 import subprocess
 import sys
@@ -12,6 +14,7 @@ from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials import trial as trial_module
 from nested_agents.studies.trials.arrangement import check
+from nested_agents.studies.trials.code import RESULTS_VERSION
 from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import trials_of
 
@@ -113,6 +116,17 @@ def test_the_identity_is_of_the_content_not_of_its_wording():
     assert trial.identity == only(learner={"ridge": 10}).identity
     assert trial.identity == replace(trial, condition="by another name").identity
     assert trial == replace(trial, condition="by another name")
+
+
+def test_the_identity_is_that_of_the_content_with_sorted_keys():
+    (_, trial) = trials_of(Spec.of(SHORT | {"seeds": [3, 8]}))
+    content = {
+        "version": RESULTS_VERSION, "study": trial.study, "seed": 8, "episodes": trial.episodes,
+        "steps": trial.steps, "evaluation": trial.evaluation,
+        "settings": json.loads(trial.settings.canonical()),
+    }  # fmt: skip
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
+    assert trial.identity == hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
 def test_the_identity_is_the_same_in_another_process():
