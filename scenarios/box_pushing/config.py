@@ -299,7 +299,9 @@ class BoxPushingSettings(BoxTaskSettings):
 
     kind: Literal["box-pushing"] = "box-pushing"
     factory: ClassVar[str] = f"{__package__}.scenario:BoxPushing"
-    state_space: Literal["paper", "relational", "pose", "crowd"] | tuple[str, ...] = "relational"
+    state_space: Literal["paper", "relational", "pose", "crowd", "wide"] | tuple[str, ...] = (
+        "relational"
+    )
     """Eq. 1, the relational variables, those and the orientation of the box, or state variables by
     name, one's own included."""
     predictor: Literal["push", "rigid", "static", "exact"] = "push"

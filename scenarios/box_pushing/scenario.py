@@ -194,7 +194,7 @@ class BoxPushing:
             self._failures.begin(seed, episode)
             self.world.set_grip(self._failures.grip)
         self._save()
-        return self._observe(self._distance())
+        return self._observe(self.world.box_pose)
 
     def step(self, joint_action: IntArray) -> Transition:
         """Command the wheels, let the world go on for one decision period, observe and reward."""
@@ -205,7 +205,7 @@ class BoxPushing:
         begin = perf_counter()
         self._advance(self._speeds)
         moved = perf_counter()
-        states = self._observe(before)
+        states = self._observe(box)
         period = self.settings.period
         motions = mean_twists(poses, self.world.robot_poses, period)
         pushed = None
@@ -347,15 +347,15 @@ class BoxPushing:
         self._advance(np.zeros(len(self.agents)))
         return self._reached()
 
-    def _observe(self, before: float) -> FloatArray:
+    def _observe(self, origin: FloatArray) -> FloatArray:
         """Return the states ``(n, d)`` of all agents: the error observation layer.
 
-        `before` is the distance of the box from the goal one decision period ago [m].
+        `origin` is the pose ``(3,)`` of the box one decision period ago.
         """
         world, poses = self.world, self.world.robot_poses
         view = View(
-            poses[None], world.box_pose[None], world.gaps[None], self._goal, before, 1.0,
-            self.box.outline,
+            poses[None], world.box_pose[None], world.gaps[None], self._goal, origin, 1.0,
+            self.box.outline, self.box.friction_radius,
         )  # fmt: skip
         rows = []
         for r, group in enumerate(self.groups):

@@ -81,14 +81,10 @@ class BoxPrediction:
 
     def seen(self, robots: FloatArray, box: FloatArray, gaps: FloatArray, seconds: float) -> View:
         """Return a view of situations that the present leads to in `seconds`."""
-        periods, outline = seconds / self.premises.hold, self.premises.outline
-        return View(robots, box, gaps, self.situation.goal, self._before, periods, outline)
-
-    @cached_property
-    def _before(self) -> float:
-        """How far the box is from the goal now [m]."""
-        goal, now = self.situation.goal, self.situation.box
-        return float(np.hypot(goal[0] - now[0], goal[1] - now[1]))
+        return View(
+            robots, box, gaps, self.situation.goal, self.situation.box,
+            seconds / self.premises.hold, self.premises.outline, self.model.friction_radius,
+        )  # fmt: skip
 
     def _choices(self, joint_actions: IntArray) -> IntArray:
         """Return the wheel command ``(m, M)`` of each robot in joint actions ``(m, n)``."""

@@ -16,7 +16,7 @@ from ....core.arrays import FloatArray, IntArray
 from ....core.compiling import njit
 from ..world.geometry import ON_SURFACE
 from .relational import AWAY
-from .view import CLOSE, LEAST, View
+from .view import ARRIVED, CLOSE, KEPT, LEAST, STILL, View
 
 LANES = 32
 """Situations side by side."""
@@ -25,19 +25,20 @@ _EXACT = {"contract", "nsz"}
 COMPILED = (
     "gap", "box_bearing", "side", "others_gap", "push_bearing", "cross_track_error",
     "box_distance", "approach", "box_turn", "bend", "face_bearing", "others_away",
-    "contact_push_bearing", "contact_cross_track_error",
+    "contact_push_bearing", "contact_cross_track_error", "path_bearing", "path_cross_track_error",
 )  # fmt: skip
 """The built-in variables that are computed here, each in a row of scratch of its own."""
 (
     GAP, BEARING, SIDE, OTHERS, PUSH, CROSS_TRACK, DISTANCE, APPROACH, TURN, BEND, FACE_BEARING,
-    AWAY_OTHERS, CONTACT_PUSH, CONTACT_CROSS_TRACK,
+    AWAY_OTHERS, CONTACT_PUSH, CONTACT_CROSS_TRACK, PATH, PATH_CROSS_TRACK,
 ) = range(len(COMPILED))  # fmt: skip
 # Rows of what several variables need; no column can name them.
 _COURSE, _X, _Y, _WEIGHT, _SQUARE, _NEAR_X, _NEAR_Y, _INSIDE = range(
     len(COMPILED), len(COMPILED) + 8
 )
 _ROWS = len(COMPILED) + 8
-_OF_CONTACT = (CONTACT_PUSH, CONTACT_CROSS_TRACK)
+_OF_CONTACT = (CONTACT_PUSH, CONTACT_CROSS_TRACK, PATH, PATH_CROSS_TRACK)
+_OF_PATH = (PATH, PATH_CROSS_TRACK)
 
 
 class Columns:
@@ -59,14 +60,16 @@ class Columns:
         self.rows: IntArray = np.array([COMPILED.index(name) for name in names], dtype=np.int64)
         self._of_face = bool((self.rows == FACE_BEARING).any())
         self._of_contact = bool(np.isin(self.rows, _OF_CONTACT).any())
+        self._of_path = bool(np.isin(self.rows, _OF_PATH).any())
 
     def of(self, view: View, robots: Sequence[int]) -> FloatArray:
         """Return the variables ``(len(robots), m, columns)`` of robots in the view's situations."""
         found: FloatArray = _relational(
             np.ascontiguousarray(view.robots.transpose(1, 2, 0)),
             np.ascontiguousarray(view.box.T), np.ascontiguousarray(view.gaps.T),
-            view.goal, view.before, view.periods, view.outline.edges,
-            np.array(robots), self.rows, self._of_face, self._of_contact,
+            view.goal, view.origin, view.before, view.periods, view.outline.edges,
+            view.friction_radius,
+            np.array(robots), self.rows, self._of_face, self._of_contact, self._of_path,
         )  # fmt: skip
         return found
 
@@ -238,6 +241,39 @@ def _of_face(robot, box, edges, first, count, work):  # type: ignore[no-untyped-
 
 
 @njit(cache=True, error_model="numpy", fastmath=_EXACT)
+def _of_path(  # type: ignore[no-untyped-def]
+    box, origin, periods, edges, friction_radius, middle, first, count, work
+):
+    """Write where the box is going and by how much it will miss the goal, see `View.path`.
+
+    Behind `_of_contact_push`, whose weighted middle it takes; `middle` ``(3, m)`` is scratch.
+    """
+    bx, by = box[0, first : first + count], box[1, first : first + count]
+    for k in range(count):
+        weight = work[_WEIGHT * LANES + k]
+        middle[0, first + k] = work[_X * LANES + k] / weight
+        middle[1, first + k] = work[_Y * LANES + k] / weight
+        middle[2, first + k] = 0.0
+    _of_face(middle, box, edges, first, count, work)
+    x, y = middle[0, first : first + count], middle[1, first : first + count]
+    for k in range(count):
+        inward = work[FACE_BEARING * LANES + k]
+        ux, uy = np.cos(inward), np.sin(inward)
+        px, py = bx[k] - x[k], by[k] - y[k]
+        mx, my = bx[k] - origin[0], by[k] - origin[1]
+        depth, lever = px * ux + py * uy, py * ux - px * uy
+        along, across = mx * ux + my * uy, my * ux - mx * uy
+        drift = angle_of(abs(along) + STILL * periods, across)
+        distance = work[DISTANCE * LANES + k]
+        reach = 2.0 * friction_radius * friction_radius / max(distance, ARRIVED)
+        path = inward + KEPT * drift + angle_of(max(depth, reach), lever)
+        off = wrapped(path - work[_COURSE * LANES + k])
+        work[PATH * LANES + k] = off
+        ahead = min(max(off, -0.5 * pi), 0.5 * pi)
+        work[PATH_CROSS_TRACK * LANES + k] = distance * np.sin(ahead)
+
+
+@njit(cache=True, error_model="numpy", fastmath=_EXACT)
 def _of_others(gaps, robot, first, count, work):  # type: ignore[no-untyped-def]
     """Write the greatest gap of the other robots and how many are away; of one alone its own."""
     n = len(gaps)
@@ -260,13 +296,16 @@ def _relational(  # type: ignore[no-untyped-def]
     box,
     gaps,
     goal,
+    origin,
     before: float,
     periods: float,
     edges: FloatArray,
+    friction_radius: float,
     wanted: IntArray,
     columns: IntArray,
     of_face: bool,
     of_contact: bool,
+    of_path: bool,
 ) -> FloatArray:
     """Return relational shared blocks ``(robots wanted, m, columns)``.
 
@@ -274,23 +313,26 @@ def _relational(  # type: ignore[no-untyped-def]
     ----------
     robots, box, gaps
         ``(M, 3, m)``, ``(3, m)`` and ``(M, m)``: a `View`, its situations last.
-    goal, before, periods, edges
+    goal, origin, before, periods, edges, friction_radius
         Of the view and the outline of its box.
     wanted
         Indices of robots.
     columns
         Rows of scratch of variables, see `Columns`.
-    of_face, of_contact
-        Whether some are what `_of_face` and `_of_contact_push` write.
+    of_face, of_contact, of_path
+        Whether some are what `_of_face`, `_of_contact_push` and `_of_path` write.
     """
     m = box.shape[1]
     out, work = np.empty((len(wanted), m, len(columns))), np.empty(_ROWS * LANES)
+    middle = np.empty((3, m if of_path else 0))
     for first in range(0, m, LANES):
         count = min(LANES, m - first)
         _of_box(box, goal, before, periods, first, count, work)
         _of_push(robots, box, goal, first, count, work)
         if of_contact:
             _of_contact_push(robots, gaps, box, goal, first, count, work)
+        if of_path:
+            _of_path(box, origin, periods, edges, friction_radius, middle, first, count, work)
         for i in range(len(wanted)):
             r = wanted[i]
             _of_robot(robots[r], gaps[r], box, first, count, work)

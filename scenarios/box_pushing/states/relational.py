@@ -34,6 +34,12 @@ def _angle(
     )  # fmt: skip
 
 
+def _missed(view: View, bearing: FloatArray) -> FloatArray:
+    off = np.clip(bearing, -0.5 * pi, 0.5 * pi)
+    missed: FloatArray = view.distance * np.sin(off)
+    return missed
+
+
 @state_variable("m", 0.0, 0.5, centres=GAPS, labels=NEARNESS, mirrored="same")
 def gap(view: View, robot: int) -> FloatArray:
     """Gap between robot and box."""
@@ -72,9 +78,7 @@ def push_bearing(view: View, robot: int) -> FloatArray:
 )  # fmt: skip
 def cross_track_error(view: View, robot: int) -> FloatArray:
     """By how much that push would miss the goal; beyond it the whole distance."""
-    off = np.clip(push_bearing(view, robot), -0.5 * pi, 0.5 * pi)
-    missed: FloatArray = view.distance * np.sin(off)
-    return missed
+    return _missed(view, push_bearing(view, robot))
 
 
 @state_variable(
@@ -133,13 +137,26 @@ def contact_push_bearing(view: View, robot: int) -> FloatArray:
     return wrap(view.contact_push - view.course)
 
 
-@state_variable(
+_wide_error = state_variable(
     "m", -1.0, 1.0, centres=(-0.8, -0.3, -0.08, 0.0, 0.08, 0.3, 0.8),
     labels=("very far right", "far right", "right", "none", "left", "far left", "very far left"),
     common=True, mirrored="opposite",
 )  # fmt: skip
+
+
+@_wide_error
 def contact_cross_track_error(view: View, robot: int) -> FloatArray:
     """By how much that push would miss the goal; beyond it the whole distance."""
-    off = np.clip(contact_push_bearing(view, robot), -0.5 * pi, 0.5 * pi)
-    missed: FloatArray = view.distance * np.sin(off)
-    return missed
+    return _missed(view, contact_push_bearing(view, robot))
+
+
+@_angle((-1.2, -0.4, 0.0, 0.4, 1.2), common=True)
+def path_bearing(view: View, robot: int) -> FloatArray:
+    """Where the box is going, off the course."""
+    return wrap(view.path - view.course)
+
+
+@_wide_error
+def path_cross_track_error(view: View, robot: int) -> FloatArray:
+    """By how much that path would miss the goal; beyond it the whole distance."""
+    return _missed(view, path_bearing(view, robot))

@@ -184,6 +184,17 @@ _PUSHING_TOGETHER = (
     "approach",
 )
 
+_STEERING = (
+    "gap",
+    "face_bearing",
+    "side",
+    "others_away",
+    "path_bearing",
+    "path_cross_track_error",
+    "box_distance",
+    "approach",
+)
+
 STATE_SPACES: dict[str, BoxStateSpace] = {
     # Eq. 1, in the order of its own and its shared part.
     "paper": BoxStateSpace(
@@ -211,6 +222,8 @@ STATE_SPACES: dict[str, BoxStateSpace] = {
     "pose": listed("pose", *_PUSHING, "bend", "box_turn"),
     # The same for boxes that are wide for a robot, and for any number of robots.
     "crowd": listed("crowd", *_PUSHING_TOGETHER),
+    # For boxes so wide that they hardly turn on the way: where the box goes, not how it is pushed.
+    "wide": listed("wide", *_STEERING),
 }
 """State spaces by the name that specs use."""
 

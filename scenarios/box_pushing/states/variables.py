@@ -27,7 +27,8 @@ STATE_VARIABLES = Registry(
         for name in (
             "gap", "box_bearing", "side", "others_gap", "push_bearing", "cross_track_error",
             "box_distance", "approach", "box_turn", "bend", "face_bearing",
-            "others_away", "contact_push_bearing", "contact_cross_track_error",
+            "others_away", "contact_push_bearing", "contact_cross_track_error", "path_bearing",
+            "path_cross_track_error",
         )
     },
 )  # fmt: skip

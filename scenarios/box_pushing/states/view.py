@@ -16,6 +16,12 @@ CLOSE = 0.02
 """Gap [m] over which the weight of a robot's contact falls to 1/e."""
 LEAST = 0.001
 """Weight of a robot far away: where none is close, all count alike."""
+KEPT = 0.7
+"""How much of its drift a box is taken to keep; with 1 large teams steer less than they could."""
+STILL = 0.005
+"""Way per decision period [m] below which hardly any of it is taken for drift."""
+ARRIVED = 0.1
+"""Distance from the goal [m] below which a box is taken to turn no less on the way."""
 
 
 @dataclass(frozen=True)
@@ -32,29 +38,34 @@ class View:
         ``(m, M)`` distances between robot and box surfaces [m]; slightly negative in contact.
     goal
         ``(3,)`` goal pose of the box.
-    before
-        Distance of the box from the goal before the motion that led here [m].
+    origin
+        ``(3,)`` pose of the box before the motion that led here.
     periods
         How many decision periods that motion took.
     outline
         Of the box, in its own frame.
+    friction_radius
+        Lever with which ground friction resists turning of the box [m].
     """
 
     robots: FloatArray
     box: FloatArray
     gaps: FloatArray
     goal: FloatArray
-    before: float
+    origin: FloatArray
     periods: float
     outline: Outline
+    friction_radius: float
 
     # What all robots share is computed once, and must stay as it is.
 
     def guarded(self) -> View:
         """Return the same situations, not to be written to."""
         robots, box, gaps = (_fixed(a.view()) for a in (self.robots, self.box, self.gaps))
-        goal = _fixed(self.goal.view())
-        return View(robots, box, gaps, goal, self.before, self.periods, self.outline)
+        goal, origin = _fixed(self.goal.view()), _fixed(self.origin.view())
+        return View(
+            robots, box, gaps, goal, origin, self.periods, self.outline, self.friction_radius
+        )
 
     @property
     def n_situations(self) -> int:
@@ -66,6 +77,11 @@ class View:
         """Distance ``(m,)`` of the box from the goal [m]."""
         ahead = self.goal[:2] - self.box[:, :2]
         return _fixed(np.hypot(ahead[:, 0], ahead[:, 1]))
+
+    @cached_property
+    def before(self) -> float:
+        """Distance of the box from the goal before the motion that led here [m]."""
+        return float(np.hypot(self.goal[0] - self.origin[0], self.goal[1] - self.origin[1]))
 
     @property
     def approach(self) -> FloatArray:
@@ -91,10 +107,36 @@ class View:
 
         The weight of a robot is ``exp(-gap / CLOSE) + LEAST``: those that do not push do not count.
         """
-        weights = (np.exp(-np.maximum(self.gaps, 0.0) / CLOSE) + LEAST)[:, :, None]
-        middle = (weights * self.robots[:, :, :2]).sum(axis=1) / weights.sum(axis=1)
-        ahead = self.box[:, :2] - middle
+        ahead = self.box[:, :2] - self._contact
         return _fixed(np.arctan2(ahead[:, 1], ahead[:, 0]))
+
+    @cached_property
+    def _contact(self) -> FloatArray:
+        """The middle ``(m, 2)`` of the robots in contact [m], see `contact_push`."""
+        weights = (np.exp(-np.maximum(self.gaps, 0.0) / CLOSE) + LEAST)[:, :, None]
+        middle: FloatArray = (weights * self.robots[:, :, :2]).sum(axis=1) / weights.sum(axis=1)
+        return middle
+
+    @cached_property
+    def path(self) -> FloatArray:
+        """Direction ``(m,)`` of the straight way to where the box is going [rad].
+
+        It is made up of three angles: the way straight into the face that is pushed; `KEPT` of the
+        drift, which is the angle of the last motion off that way; and half of the turn that the
+        lever of the robots in contact brings about over the distance to the goal. The turn per
+        metre is that lever over the square of the friction radius (Lynch and Mason 1996: a limit
+        surface that is an ellipsoid), but a box turns at most as if robots pushed its centre.
+        """
+        inward = _inward(self._contact, self.box, self.outline.edges, self.outline.rounding)
+        x, y = np.cos(inward), np.sin(inward)
+        push = self.box[:, :2] - self._contact
+        depth, lever = push[:, 0] * x + push[:, 1] * y, push[:, 1] * x - push[:, 0] * y
+        way = self.box[:, :2] - self.origin[:2]
+        along, across = way[:, 0] * x + way[:, 1] * y, way[:, 1] * x - way[:, 0] * y
+        drift = np.arctan2(across, np.abs(along) + STILL * self.periods)
+        reach = 2.0 * self.friction_radius**2 / np.maximum(self.distance, ARRIVED)
+        turn = np.arctan2(lever, np.maximum(depth, reach))
+        return _fixed(inward + KEPT * drift + turn)
 
     @cached_property
     def turn(self) -> FloatArray:

@@ -22,11 +22,12 @@ from nested_agents.scenarios.state_variables import found
 
 GOAL = np.array([1.0, 0.0, 0.0])
 SQUARE = BOXES["square"].outline
+ORIGIN = np.array([-0.03, 0.0, 0.0])
 
 
 def view(robots, box, gaps) -> View:
     described = np.array([robots], float), np.array([box], float), np.array([gaps], float)
-    return View(*described, GOAL, before=1.03, periods=3.0, outline=SQUARE)
+    return View(*described, GOAL, ORIGIN, 3.0, SQUARE, BOXES["square"].friction_radius)
 
 
 VARIABLES = tuple(STATE_VARIABLES.built_in)
@@ -37,7 +38,7 @@ EVERY = listed("every", *VARIABLES)
 def test_functions_fill_the_space_they_describe(name: str) -> None:
     spec = STATE_SPACES[name]
     poses = np.random.default_rng(0).uniform(-1, 1, (5, 2, 3))
-    seen = View(poses, poses[:, 0], np.abs(poses[:, :, 0]), GOAL, 1.0, 1.0, SQUARE)
+    seen = View(poses, poses[:, 0], np.abs(poses[:, :, 0]), GOAL, ORIGIN, 1.0, SQUARE, 0.08)
     assert spec.own(poses[:, 0], poses[:, 0, 0], GOAL).shape == (5, spec.space.n_own)
     assert spec.shared(seen, 1).shape == (5, spec.space.n_variables - spec.space.n_own)
 
@@ -80,7 +81,9 @@ def test_variables_of_crowds_by_hand() -> None:
 def test_common_variables_are_the_same_for_all_robots() -> None:
     rng = np.random.default_rng(0)
     poses = rng.normal(size=(20, 5, 3))
-    seen = View(poses, poses[:, 0].copy(), rng.normal(size=(20, 5)), GOAL, 0.7, 3.0, SQUARE)
+    seen = View(
+        poses, poses[:, 0].copy(), rng.normal(size=(20, 5)), GOAL, ORIGIN, 3.0, SQUARE, 0.08
+    )
     blocks = dict(enumerate(EVERY.shared(seen, r) for r in range(5)))
     for column, name in enumerate(VARIABLES):
         alike = all((blocks[r][:, column] == blocks[0][:, column]).all() for r in range(5))
@@ -171,8 +174,8 @@ def test_compiled_blocks_are_those_of_the_definition(
     rng = np.random.default_rng(robots)
     seen = View(
         rng.normal(size=(100, robots, 3)) * [1, 1, 9], rng.normal(size=(100, 3)) * [1, 1, 9],
-        rng.normal(size=(100, robots)), rng.normal(size=3), 0.7, 3.0,
-        BOXES[box].outline,
+        rng.normal(size=(100, robots)), rng.normal(size=3), rng.normal(size=3),
+        3.0, BOXES[box].outline, BOXES[box].friction_radius,
     )  # fmt: skip
     space, wanted = listed("some", *names), list(range(robots))[::-1]
     expected = np.array([space.shared(seen, r) for r in wanted])
@@ -292,7 +295,7 @@ def wrong(view, robot):
     with Sources(texts={"wrong.py": text}).active():
         space = listed("own", "gap", "wrong.py:wrong")
     poses = np.random.default_rng(0).normal(size=(5, 2, 3))
-    seen = View(poses, poses[:, 0].copy(), np.abs(poses[:, :, 0]), GOAL, 1.0, 1.0, SQUARE)
+    seen = View(poses, poses[:, 0].copy(), np.abs(poses[:, :, 0]), GOAL, ORIGIN, 1.0, SQUARE, 0.08)
     for compute in (lambda: space.shared(seen, 0), lambda: space.shared_of(seen, [0, 1])):
         with pytest.raises(ValueError, match=complaint) as error:
             compute()
