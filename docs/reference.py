@@ -87,7 +87,8 @@ MODULES = {
     "studies": ("What is measured, compared and drawn.", (
         "api.study", "api.planning", "api.costs", "api.comparison", "api.recovery", "api.frames",
         "run",
-        "spec.spec", "spec.errors", "spec.keys", "spec.presets", "trials.trial", "trials.session",
+        "spec.spec", "spec.errors", "spec.keys", "spec.presets", "trials.trial",
+        "trials.arrangement", "trials.session",
         "store.store", "analysis.results", "analysis.statistics", "analysis.comparison",
         "analysis.power", "analysis.summary", "catalogue.study", "cost.cost", "claims.claims",
         "course.grading",

@@ -1,6 +1,7 @@
 """Registries: names, files, entry points and objects; whatever cannot be is refused in one line."""
 
 import sys
+from importlib import metadata
 from importlib.metadata import EntryPoint
 from pathlib import Path
 from types import ModuleType
@@ -8,7 +9,6 @@ from typing import Annotated
 
 import pytest
 
-from nested_agents.core import registry
 from nested_agents.core.hierarchy import Hierarchy
 from nested_agents.core.plugged import Plugged, SettingsRegistry
 from nested_agents.core.registry import Registry
@@ -72,7 +72,7 @@ def carts(monkeypatch: pytest.MonkeyPatch) -> SettingsRegistry:
 def offered(monkeypatch: pytest.MonkeyPatch) -> list[EntryPoint]:
     points: list[EntryPoint] = []
     monkeypatch.setattr(
-        registry, "entry_points", lambda group: [p for p in points if p.group == group]
+        metadata, "entry_points", lambda group: [p for p in points if p.group == group]
     )
     return points
 

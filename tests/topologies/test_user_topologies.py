@@ -1,12 +1,12 @@
 """Topologies of users: Python files and entry points."""
 
+from importlib import metadata
 from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import networkx as nx
 import pytest
 
-from nested_agents.core import registry
 from nested_agents.topologies import TOPOLOGIES, build, parse
 
 AGENTS = ("a", "b", "c", "d")
@@ -121,7 +121,7 @@ def points(*pairs: tuple[str, str]):
 
 
 def test_entry_points(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(registry, "entry_points", points(("line", f"{__name__}:path_of")))
+    monkeypatch.setattr(metadata, "entry_points", points(("line", f"{__name__}:path_of")))
     assert build(parse("line"), AGENTS).edges == ((0, 1), (1, 2), (2, 3))
     with pytest.raises(ValueError, match=r"did you mean 'line'\? known: chain, .*, or a file"):
         parse("lime")
@@ -137,11 +137,11 @@ def test_a_function_must_return_the_same_twice(tmp_path: Path) -> None:
 
 def test_bad_entry_points(monkeypatch: pytest.MonkeyPatch) -> None:
     offered = points(("line", "absent_package:f"), ("pi", "math:pi"))
-    monkeypatch.setattr(registry, "entry_points", offered)
+    monkeypatch.setattr(metadata, "entry_points", offered)
     with pytest.raises(ValueError, match="topology 'line': cannot be loaded: ModuleNotFoundError"):
         build(parse("line"), AGENTS)
     with pytest.raises(ValueError, match="is no topology, but a float"):
         build(parse("pi"), AGENTS)
-    monkeypatch.setattr(registry, "entry_points", points(("line", "a:f"), ("line", "b:f")))
+    monkeypatch.setattr(metadata, "entry_points", points(("line", "a:f"), ("line", "b:f")))
     with pytest.raises(ValueError, match="'line' is offered twice: a:f, b:f"):
         parse("line")
