@@ -31,6 +31,7 @@ TEAMS = (
     ("32", 32, "crowds", "evaluation", "32"),
     ("64, sixteen first", 64, "sixty-four", "evaluation", "64, sixteen first"),
     ("64, trained with 8", 64, "from-eight", "evaluation:sixty-four", "default"),
+    ("64, wide box first", 64, "wide", "evaluation:sixty-four", "8, wide box"),
 )
 """A row's name, the number of robots, published results, and their phase and condition."""
 

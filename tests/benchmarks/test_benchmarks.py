@@ -87,7 +87,7 @@ def test_what_steering_limits_is_told_as_on_the_page(run: Run) -> None:
     rows = [[cell.strip() for cell in line.split("│")[1:-1]] for line in said.splitlines()]
     page = (ROOT / "docs" / "learning.md").read_text(encoding="utf-8")
     told = [f"| {' | '.join(row)} |" for row in rows if row]
-    assert len(told) == 5
+    assert len(told) == 6
     assert [row for row in told if row not in page] == []
 
 

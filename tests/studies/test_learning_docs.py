@@ -26,6 +26,7 @@ COLUMNS = ("success last 5", "evaluation success", "evaluation steps")
         ("crowds", ("evaluation success", "all touch")),
         ("sixty-four", ("evaluation success",)),
         ("from-eight", ("evaluation success", "success, sixty-four")),
+        ("wide", ("evaluation success", "success, sixty-four")),
         ("large-team", LARGE_TEAM),
         ("controls", ("evaluation success",)),
         ("four-robots-hard", ("evaluation success", "evaluation steps")),

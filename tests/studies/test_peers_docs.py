@@ -14,10 +14,18 @@ TEXT = (ROOT / "docs" / "peers.md").read_text(encoding="utf-8")
 COLUMNS = ("success, 4", "success, 12", "evaluation success", "decisions", "CPU [s]")
 
 
-@pytest.mark.parametrize("name", ["peers-arm", "peers-boxes"])
-def test_tables(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    ("name", "columns"),
+    [
+        ("peers-arm", COLUMNS),
+        ("peers-boxes", COLUMNS),
+        ("peers-tuning", ("success, 12", "evaluation success")),
+        ("peers-predictors", ("success, 2", "success, 6", "evaluation success", "decisions")),
+    ],
+)
+def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
     path = claims.PUBLISHED / f"{name}.json"
-    assert main(["table", str(path), "--columns", *COLUMNS, "--format", "markdown"]) == 0
+    assert main(["table", str(path), "--columns", *columns, "--format", "markdown"]) == 0
     table = capsys.readouterr().out
     assert table in TEXT, f"docs/peers.md: put in\n{table}"
 
