@@ -121,11 +121,11 @@ class View:
     def path(self) -> FloatArray:
         """Direction ``(m,)`` of the straight way to where the box is going [rad].
 
-        It is made up of three angles: the way straight into the face that is pushed; `KEPT` of the
+        It is the sum of three angles: the way straight into the face that is pushed; `KEPT` of the
         drift, which is the angle of the last motion off that way; and half of the turn that the
-        lever of the robots in contact brings about over the distance to the goal. The turn per
-        metre is that lever over the square of the friction radius (Lynch and Mason 1996: a limit
-        surface that is an ellipsoid), but a box turns at most as if robots pushed its centre.
+        robots in contact bring about on the way to the goal, by their lever over the square of the
+        friction radius per metre, as in `prediction.push`. The last one is at most the angle at
+        which they push the centre of the box, see `contact_push`.
         """
         inward = _inward(self._contact, self.box, self.outline.edges, self.outline.rounding)
         x, y = np.cos(inward), np.sin(inward)
