@@ -19,6 +19,9 @@ COLUMNS = ("success, 4", "success, 12", "evaluation success", "decisions", "CPU 
     [
         ("peers-arm", COLUMNS),
         ("peers-boxes", COLUMNS),
+        ("peers-one-robot", COLUMNS),
+        ("peers-four-robots", COLUMNS),
+        ("peers-100", ("success, 4", "success, 40", "success, 120", *COLUMNS[2:])),
         ("peers-tuning", ("success, 12", "evaluation success")),
         ("peers-predictors", ("success, 2", "success, 6", "evaluation success", "decisions")),
     ],
