@@ -21,7 +21,7 @@ ACROSS = np.array([1.0, -1.0, -1.0])
 """What a mirror along the x axis does to a pose."""
 
 
-@pytest.mark.parametrize("state_space", ["paper", "relational", "pose", "crowd"])
+@pytest.mark.parametrize("state_space", ["paper", "relational", "pose", "crowd", "wide"])
 @pytest.mark.parametrize("robot", ["e-puck", "three-wheel", "four-wheel"])
 def test_the_image_of_a_state_is_the_state_of_the_mirrored_world(
     state_space: str, robot: str
@@ -31,12 +31,13 @@ def test_the_image_of_a_state_is_the_state_of_the_mirrored_world(
     scenario.reset(1)
     poses, box = scenario.world.robot_poses.copy(), scenario.world.box_pose.copy()
     scenario._speeds = np.linspace(-0.13, 0.13, len(scenario.agents))
-    seen = scenario._observe(0.9)
+    origin = box + [-0.03, 0.01, 0.05]
+    seen = scenario._observe(origin)
 
     scenario.world.place(poses * ACROSS, box * ACROSS)
     scenario._goal = scenario._goal * ACROSS
     scenario._speeds = scenario._speeds[mirror.partners]
-    found = scenario._observe(0.9)[mirror.partners]
+    found = scenario._observe(origin * ACROSS)[mirror.partners]
     off = found - mirror.states(seen)[len(seen) :]
     is_angle = [variable.periodic for variable in scenario.state_space.variables]
     off[:, is_angle] = np.angle(np.exp(1j * off[:, is_angle]))
