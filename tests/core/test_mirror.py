@@ -31,7 +31,7 @@ def test_the_image_of_a_state_is_the_state_of_the_mirrored_world(
     scenario.reset(1)
     poses, box = scenario.world.robot_poses.copy(), scenario.world.box_pose.copy()
     scenario._speeds = np.linspace(-0.13, 0.13, len(scenario.agents))
-    origin = box + [-0.03, 0.01, 0.05]
+    origin = box + np.array([-0.03, 0.01, 0.05])
     seen = scenario._observe(origin)
 
     scenario.world.place(poses * ACROSS, box * ACROSS)
