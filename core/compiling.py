@@ -38,6 +38,9 @@ FROM_PYTHON = {"no_cfunc_wrapper": True}
 FROM_KERNELS = {"no_cfunc_wrapper": True, "no_cpython_wrapper": True}
 """What nobody calls is not compiled: a third to a half of a small kernel is its wrappers."""
 
+DIVISION = {"error_model": "numpy"}
+"""Division by zero gives what it gives in NumPy: that compiles sooner than raising an exception."""
+
 _threads = threading.RLock()
 
 
@@ -54,7 +57,7 @@ class Kernel:
 
     def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
         update_wrapper(self, function)
-        self.py_func, self._options = function, options
+        self.py_func, self._options = function, DIVISION | options
         self._ready: Callable[..., Any] | None = None
 
     @cached_property

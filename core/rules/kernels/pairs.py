@@ -7,7 +7,7 @@ import numpy as np
 from ...compiling import njit
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def pairs(own, own_rows, shared, shared_rows, divisor: int, indices):  # type: ignore[no-untyped-def]
     """Sort joint-action indices by the blocks that they lead to.
 

@@ -70,7 +70,7 @@ _POWERS = 2.0 ** np.arange(-1000, 1001)
 _FAST = {"contract", "nsz"}
 
 
-@njit(cache=True, error_model="numpy", fastmath=_FAST)
+@njit(cache=True, fastmath=_FAST)
 def exponential(x: float) -> float:
     """Return exp(x) to its last bits for -690 <= x <= 690, without a branch or a call."""
     k = np.floor(x * 1.4426950408889634074 + 0.5)
@@ -92,14 +92,14 @@ def exponential(x: float) -> float:
     return p * _POWERS[int(k) + 1000]
 
 
-@njit(cache=True, error_model="numpy", fastmath=_FAST)
+@njit(cache=True, fastmath=_FAST)
 def _cut_exponential(x: float) -> float:
     """Return exp(x), or what it is at the nearer of -FAR and FAR."""
     x = x if x < FAR else FAR
     return exponential(x if x > -FAR else -FAR)
 
 
-@njit(cache=True, error_model="numpy", fastmath=_FAST)
+@njit(cache=True, fastmath=_FAST)
 def _even_levels(x, last, slope, bound, series, levels):  # type: ignore[no-untyped-def]
     """Write the levels S_k of Eq. 6 after the first, one, and before the last, zero."""
     first = _cut_exponential(-slope * (x - bound))
@@ -108,7 +108,7 @@ def _even_levels(x, last, slope, bound, series, levels):  # type: ignore[no-unty
         levels[k + 1] = 1.0 / (1.0 + power) if power < LARGE else 0.0
 
 
-@njit(cache=True, error_model="numpy", fastmath=_FAST)
+@njit(cache=True, fastmath=_FAST)
 def _uneven_levels(x, last, slopes, bounds, levels):  # type: ignore[no-untyped-def]
     """Do the same for sigmoids of unequal slope, which cross in their far tails."""
     for k in range(last):
@@ -172,7 +172,7 @@ def product_of(term: int, first: int, last: int, lay: Layout, strengths, out) ->
         size *= lay.counts[j]
 
 
-@njit(cache=True, error_model="numpy", fastmath=_FAST)
+@njit(cache=True, fastmath=_FAST)
 def _rise(x, sigmoid, fresh, slope, bound, times, knot, width, power, rising):  # type: ignore[no-untyped-def]
     """Write by how much the functions up to one are left behind at every x: S_k of Eq. 6.
 
@@ -192,7 +192,7 @@ def _rise(x, sigmoid, fresh, slope, bound, times, knot, width, power, rising):  
         rising[i] = 1.0 / (1.0 + other) if other < LARGE else 0.0
 
 
-@njit(cache=True, error_model="numpy", fastmath=_FAST)
+@njit(cache=True, fastmath=_FAST)
 def _fall(level, rising, out):  # type: ignore[no-untyped-def]
     """Add what lies between two levels, and go down to the lower."""
     for i in range(len(level)):

@@ -58,7 +58,7 @@ class PushBelief(NamedTuple):
         return model
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def believing(belief, constants):  # type: ignore[no-untyped-def]
     """Return the push model of constants ``(3,)``: as `PushBelief.believing`."""
     model, factors = belief.model, np.exp(constants)
@@ -72,7 +72,7 @@ def believing(belief, constants):  # type: ignore[no-untyped-def]
     )  # fmt: skip
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def outcomes(  # type: ignore[no-untyped-def]
     robots: FloatArray, box: FloatArray, twists: FloatArray, seconds: float, belief,
     constants: FloatArray,

@@ -20,7 +20,7 @@ import numpy as np
 from ....core.arrays import FloatArray, IntArray
 from ....core.compiling import njit
 from . import push_lanes as lanes
-from .push_lanes import BODY_ROWS, BOX_ROWS, LANES, MARGIN
+from .push_lanes import BODY_SIZE, BOX_SIZE, LANES, MARGIN
 
 SUBSTEPS = 4
 SWEEPS = 4
@@ -92,7 +92,7 @@ def push(
     return after.transpose(2, 0, 1), boxes.T, gaps.T
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def pushed(  # type: ignore[no-untyped-def]
     robots: FloatArray,
     box: FloatArray,
@@ -114,7 +114,7 @@ def pushed(  # type: ignore[no-untyped-def]
         for k in range(twists.shape[1]):
             fastest = max(fastest, np.hypot(twists[r, k, 0], twists[r, k, 1]))
         reach[r] = model.reach + model.radii[r] + 2.0 * dt * fastest + MARGIN
-    bodies, shared = np.zeros((n, BODY_ROWS * LANES)), np.zeros(BOX_ROWS * LANES)
+    bodies, shared = np.zeros((n, BODY_SIZE)), np.zeros(BOX_SIZE)
     near = np.zeros(n, np.bool_)
     for first in range(0, m, LANES):
         used = min(LANES, m - first)
@@ -126,7 +126,7 @@ def pushed(  # type: ignore[no-untyped-def]
                 shared[j * LANES + k] = box[j]
                 for r in range(n):
                     bodies[r, j * LANES + k] = robots[r, j]
-                    bodies[r, (lanes.AHEAD + j) * LANES + k] = twists[r, choices[c, r], j]
+                    bodies[r, lanes.AHEAD + j * LANES + k] = twists[r, choices[c, r], j]
         for _ in range(SUBSTEPS):
             _substep(bodies, shared, near, reach, dt, model, width)
         lanes.head(shared, width)
@@ -134,7 +134,7 @@ def pushed(  # type: ignore[no-untyped-def]
             lanes.localise(bodies[r], shared, reach[r], width)
             lanes.approach(model.edges, shared, width)
             for k in range(used):
-                gap = np.sqrt(shared[lanes.SQUARE * LANES + k]) * shared[lanes.SIDE * LANES + k]
+                gap = np.sqrt(shared[lanes.SQUARE + k]) * shared[lanes.SIDE + k]
                 out_gaps[r, first + k] = gap - model.rounding - model.radii[r]
                 for j in range(3):
                     out_robots[r, j, first + k] = bodies[r, j * LANES + k]
@@ -144,7 +144,7 @@ def pushed(  # type: ignore[no-untyped-def]
     return out_robots, out_box, out_gaps
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True)
 def _substep(bodies, box, near, reach, dt, model, width) -> None:  # type: ignore[no-untyped-def]
     """Find the contacts of all robots, their forces, and move everything for `dt` seconds."""
     rho2 = model.friction_radius**2

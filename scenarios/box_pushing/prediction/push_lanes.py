@@ -24,32 +24,36 @@ START_SPEED = 0.05
 MARGIN = 0.01
 """How far [m] a moving box may carry its surface towards a robot within a substep."""
 
-# Rows of a robot: pose and heading, the twist that it is asked for, and its contact. In the frame
-# of the contact, n is into the box, t to its left.
-X, Y, PSI, COS, SIN = 0, 1, 2, 3, 4
-AHEAD, LEFT, TURN = 5, 6, 7
-NX, NY = 8, 9  # the direction n, world frame
-LEVER_N, LEVER_T = 10, 11  # torque on the box per force along n and t
-YIELD_NN, YIELD_NT, YIELD_TT = 12, 13, 14  # how the robot yields there to force
-WANT_N, WANT_T = 15, 16  # velocity there of the robot if free, less what closes the gap
-FORCE_N, FORCE_T = 17, 18  # on the box
-ACTIVE = 19  # 1 if the robot may touch the box within the substep, else 0
-BODY_ROWS = 20
+# Where the rows of a robot begin: pose and heading, the twist that it is asked for, and its
+# contact. In the frame of the contact, n is into the box, t to its left.
+(
+    X, Y, PSI, COS, SIN,
+    AHEAD, LEFT, TURN,
+    NX, NY,  # the direction n, world frame
+    LEVER_N, LEVER_T,  # torque on the box per force along n and t
+    YIELD_NN, YIELD_NT, YIELD_TT,  # how the robot yields there to force
+    WANT_N, WANT_T,  # velocity there of the robot if free, less what closes the gap
+    FORCE_N, FORCE_T,  # on the box
+    ACTIVE,  # 1 if the robot may touch the box within the substep, else 0
+) = range(0, 20 * LANES, LANES)  # fmt: skip
+BODY_SIZE = ACTIVE + LANES
 
-# Rows of the box: pose and heading as for a robot, velocity, how readily it moves, the wrench of
+# Those of the box: pose and heading as for a robot, velocity, how readily it moves, the wrench of
 # all contacts on it; and of one robot at a time where it stands relative to the surface.
-U_X, U_Y, U_W, MOBILITY = 5, 6, 7, 8
-FORCE_X, FORCE_Y, TORQUE = 9, 10, 11
-LOCAL_X, LOCAL_Y = 12, 13  # the point, in the frame of the box
-SQUARE, NEAR_X, NEAR_Y, SIDE = 14, 15, 16, 17
-EDGE_X, EDGE_Y = 18, 19  # unit vector along the nearest edge
-BOX_ROWS = 20
+(
+    U_X, U_Y, U_W, MOBILITY,
+    FORCE_X, FORCE_Y, TORQUE,
+    LOCAL_X, LOCAL_Y,  # the point, in the frame of the box
+    SQUARE, NEAR_X, NEAR_Y, SIDE,
+    EDGE_X, EDGE_Y,  # unit vector along the nearest edge
+) = range(AHEAD, AHEAD + 15 * LANES, LANES)  # fmt: skip
+BOX_SIZE = EDGE_Y + LANES
 
 _EXACT = {"contract", "nsz"}
 """What the compiler may do: multiply and add in one rounding, ignore the sign of zero."""
 
 
-@njit(cache=True, error_model="numpy", fastmath=_EXACT)
+@njit(cache=True, fastmath=_EXACT)
 def head(rows, lanes):  # type: ignore[no-untyped-def]
     """Write cosine and sine of the heading: to the last bit but one, for any sane angle.
 
@@ -57,7 +61,7 @@ def head(rows, lanes):  # type: ignore[no-untyped-def]
     accuracy, and the polynomials there are those of Sun's fdlibm.
     """
     for k in range(lanes):
-        x = rows[PSI * LANES + k]
+        x = rows[PSI + k]
         quarters = np.floor(x * 0.6366197723675814 + 0.5)
         r = x - quarters * 1.57079632673412561417 - quarters * 6.07710050650619224932e-11
         z = r * r
@@ -78,32 +82,32 @@ def head(rows, lanes):  # type: ignore[no-untyped-def]
         quarter = quarters - 4.0 * np.floor(0.25 * quarters)
         odd = quarter == 1.0 or quarter == 3.0
         sine, cosine = c if odd else s, s if odd else c
-        rows[SIN * LANES + k] = -sine if quarter >= 2.0 else sine
-        rows[COS * LANES + k] = -cosine if quarter == 1.0 or quarter == 2.0 else cosine
+        rows[SIN + k] = -sine if quarter >= 2.0 else sine
+        rows[COS + k] = -cosine if quarter == 1.0 or quarter == 2.0 else cosine
 
 
-@njit(cache=True, error_model="numpy", fastmath=_EXACT)
+@njit(cache=True, fastmath=_EXACT)
 def localise(body, box, reach, lanes):  # type: ignore[no-untyped-def]
     """Write where the robot is in the frame of the box; return in how many lanes within reach."""
     within, square = 0, reach * reach
     for k in range(lanes):
-        dx, dy = body[X * LANES + k] - box[X * LANES + k], body[Y * LANES + k] - box[Y * LANES + k]
-        cos, sin = box[COS * LANES + k], box[SIN * LANES + k]
-        box[LOCAL_X * LANES + k] = cos * dx + sin * dy
-        box[LOCAL_Y * LANES + k] = cos * dy - sin * dx
+        dx, dy = body[X + k] - box[X + k], body[Y + k] - box[Y + k]
+        cos, sin = box[COS + k], box[SIN + k]
+        box[LOCAL_X + k] = cos * dx + sin * dy
+        box[LOCAL_Y + k] = cos * dy - sin * dx
         within += 1 if dx * dx + dy * dy <= square else 0
     return within
 
 
-@njit(cache=True, error_model="numpy", fastmath=_EXACT)
+@njit(cache=True, fastmath=_EXACT)
 def approach(edges, box, lanes):  # type: ignore[no-untyped-def]
     """Write the nearest point of an outline without rounding, and which side of it one is on.
 
     As `box_pushing.world.geometry.surface`.
     """
     for k in range(lanes):
-        box[SQUARE * LANES + k] = np.inf
-        box[SIDE * LANES + k] = 1.0
+        box[SQUARE + k] = np.inf
+        box[SIDE + k] = 1.0
     for i in range(len(edges)):
         x0, y0, x1, y1 = edges[i, 0], edges[i, 1], edges[i, 2], edges[i, 3]
         dx, dy = x1 - x0, y1 - y0
@@ -113,24 +117,24 @@ def approach(edges, box, lanes):  # type: ignore[no-untyped-def]
         ex = dx / np.sqrt(length2) if length2 > 0.0 else 0.0
         ey = dy / np.sqrt(length2) if length2 > 0.0 else 1.0
         for k in range(lanes):
-            x, y = box[LOCAL_X * LANES + k], box[LOCAL_Y * LANES + k]
+            x, y = box[LOCAL_X + k], box[LOCAL_Y + k]
             t = ((x - x0) * dx + (y - y0) * dy) * scale
             t = t if t > 0.0 else 0.0
             t = t if t < 1.0 else 1.0
             cx, cy = x0 + t * dx, y0 + t * dy
             square = (x - cx) * (x - cx) + (y - cy) * (y - cy)
-            nearer = square < box[SQUARE * LANES + k]
-            box[SQUARE * LANES + k] = square if nearer else box[SQUARE * LANES + k]
-            box[NEAR_X * LANES + k] = cx if nearer else box[NEAR_X * LANES + k]
-            box[NEAR_Y * LANES + k] = cy if nearer else box[NEAR_Y * LANES + k]
-            box[EDGE_X * LANES + k] = ex if nearer else box[EDGE_X * LANES + k]
-            box[EDGE_Y * LANES + k] = ey if nearer else box[EDGE_Y * LANES + k]
+            nearer = square < box[SQUARE + k]
+            box[SQUARE + k] = square if nearer else box[SQUARE + k]
+            box[NEAR_X + k] = cx if nearer else box[NEAR_X + k]
+            box[NEAR_Y + k] = cy if nearer else box[NEAR_Y + k]
+            box[EDGE_X + k] = ex if nearer else box[EDGE_X + k]
+            box[EDGE_Y + k] = ey if nearer else box[EDGE_Y + k]
             crosses = ((y0 > y) != (y1 > y)) & (x < x0 + (y - y0) * slope)
-            side = box[SIDE * LANES + k]
-            box[SIDE * LANES + k] = -side if crosses else side
+            side = box[SIDE + k]
+            box[SIDE + k] = -side if crosses else side
 
 
-@njit(cache=True, error_model="numpy", fastmath=_EXACT)
+@njit(cache=True, fastmath=_EXACT)
 def touch(body, box, radius, rounding, compliance, dt, lanes):  # type: ignore[no-untyped-def]
     """Write the contact rows of a robot; return in how many lanes it may touch the box."""
     c00, c01, c02 = compliance[0, 0], compliance[0, 1], compliance[0, 2]
@@ -139,77 +143,77 @@ def touch(body, box, radius, rounding, compliance, dt, lanes):  # type: ignore[n
     touching = 0
     for k in range(lanes):
         ahead, left, turn = (
-            body[AHEAD * LANES + k], body[LEFT * LANES + k], body[TURN * LANES + k],
+            body[AHEAD + k], body[LEFT + k], body[TURN + k],
         )  # fmt: skip
-        qx, qy, side = box[NEAR_X * LANES + k], box[NEAR_Y * LANES + k], box[SIDE * LANES + k]
-        off = np.sqrt(box[SQUARE * LANES + k])
+        qx, qy, side = box[NEAR_X + k], box[NEAR_Y + k], box[SIDE + k]
+        off = np.sqrt(box[SQUARE + k])
         # Away from the surface the normal points from the nearest point, on it across the edge.
         apart = off > 1e-12
         scale = side / (off if apart else 1.0)
-        mx = scale * (box[LOCAL_X * LANES + k] - qx) if apart else box[EDGE_Y * LANES + k]
-        my = scale * (box[LOCAL_Y * LANES + k] - qy) if apart else -box[EDGE_X * LANES + k]
+        mx = scale * (box[LOCAL_X + k] - qx) if apart else box[EDGE_Y + k]
+        my = scale * (box[LOCAL_Y + k] - qy) if apart else -box[EDGE_X + k]
         px, py = qx + rounding * mx, qy + rounding * my
         gap = side * off - rounding - radius
         travel = dt * np.sqrt(ahead * ahead + left * left)
         touches = gap <= 2.0 * travel + MARGIN
         touching += 1 if touches else 0
-        cos, sin = box[COS * LANES + k], box[SIN * LANES + k]
+        cos, sin = box[COS + k], box[SIN + k]
         ix, iy = sin * my - cos * mx, -sin * mx - cos * my
         wx, wy = cos * px - sin * py, sin * px + cos * py
-        ch, sh = body[COS * LANES + k], body[SIN * LANES + k]
+        ch, sh = body[COS + k], body[SIN + k]
         n0, n1 = ch * ix + sh * iy, ch * iy - sh * ix
         t0, t1 = -n1, n0
-        body[ACTIVE * LANES + k] = 1.0 if touches else 0.0
-        body[NX * LANES + k], body[NY * LANES + k] = ix, iy
-        body[LEVER_N * LANES + k] = wx * iy - wy * ix
-        body[LEVER_T * LANES + k] = wx * ix + wy * iy
+        body[ACTIVE + k] = 1.0 if touches else 0.0
+        body[NX + k], body[NY + k] = ix, iy
+        body[LEVER_N + k] = wx * iy - wy * ix
+        body[LEVER_T + k] = wx * ix + wy * iy
         # Compliance times t, with the radius as its arm.
         yt0 = c00 * t0 + c01 * t1 + c02 * radius
         yt1 = c10 * t0 + c11 * t1 + c12 * radius
         yt2 = c20 * t0 + c21 * t1 + c22 * radius
-        body[YIELD_NN * LANES + k] = n0 * (c00 * n0 + c01 * n1) + n1 * (c10 * n0 + c11 * n1)
-        body[YIELD_NT * LANES + k] = n0 * yt0 + n1 * yt1
-        body[YIELD_TT * LANES + k] = t0 * yt0 + t1 * yt1 + radius * yt2
-        body[WANT_N * LANES + k] = n0 * ahead + n1 * left - gap / dt
-        body[WANT_T * LANES + k] = t0 * ahead + t1 * left + radius * turn
+        body[YIELD_NN + k] = n0 * (c00 * n0 + c01 * n1) + n1 * (c10 * n0 + c11 * n1)
+        body[YIELD_NT + k] = n0 * yt0 + n1 * yt1
+        body[YIELD_TT + k] = t0 * yt0 + t1 * yt1 + radius * yt2
+        body[WANT_N + k] = n0 * ahead + n1 * left - gap / dt
+        body[WANT_T + k] = t0 * ahead + t1 * left + radius * turn
     return touching
 
 
-@njit(cache=True, error_model="numpy", fastmath=_EXACT)
+@njit(cache=True, fastmath=_EXACT)
 def rest(box, force, lanes):  # type: ignore[no-untyped-def]
     """Begin the sweeps: no forces, and a box that moves as readily as at `START_SPEED`."""
     for k in range(lanes):
-        box[U_X * LANES + k] = box[U_Y * LANES + k] = box[U_W * LANES + k] = 0.0
-        box[FORCE_X * LANES + k] = box[FORCE_Y * LANES + k] = box[TORQUE * LANES + k] = 0.0
-        box[MOBILITY * LANES + k] = START_SPEED / force
+        box[U_X + k] = box[U_Y + k] = box[U_W + k] = 0.0
+        box[FORCE_X + k] = box[FORCE_Y + k] = box[TORQUE + k] = 0.0
+        box[MOBILITY + k] = START_SPEED / force
 
 
-@njit(cache=True, error_model="numpy", fastmath=_EXACT)
+@njit(cache=True, fastmath=_EXACT)
 def release(body, lanes):  # type: ignore[no-untyped-def]
     """Take the contact force off a robot."""
     for k in range(lanes):
-        body[FORCE_N * LANES + k] = body[FORCE_T * LANES + k] = 0.0
+        body[FORCE_N + k] = body[FORCE_T + k] = 0.0
 
 
-@njit(cache=True, error_model="numpy", fastmath=_EXACT)
+@njit(cache=True, fastmath=_EXACT)
 def answer(body, box, rho2, friction, lanes):  # type: ignore[no-untyped-def]
     """Let one robot find its contact force, the others' given."""
     for k in range(lanes):
-        ix, iy = body[NX * LANES + k], body[NY * LANES + k]
-        pn, pt = body[LEVER_N * LANES + k], body[LEVER_T * LANES + k]
-        before_n, before_t = body[FORCE_N * LANES + k], body[FORCE_T * LANES + k]
-        mobility = box[MOBILITY * LANES + k]
+        ix, iy = body[NX + k], body[NY + k]
+        pn, pt = body[LEVER_N + k], body[LEVER_T + k]
+        before_n, before_t = body[FORCE_N + k], body[FORCE_T + k]
+        mobility = box[MOBILITY + k]
         # The wrench on the box of all others.
-        fx = box[FORCE_X * LANES + k] - (before_n * ix - before_t * iy)
-        fy = box[FORCE_Y * LANES + k] - (before_n * iy + before_t * ix)
-        torque = box[TORQUE * LANES + k] - (before_n * pn + before_t * pt)
+        fx = box[FORCE_X + k] - (before_n * ix - before_t * iy)
+        fy = box[FORCE_Y + k] - (before_n * iy + before_t * ix)
+        torque = box[TORQUE + k] - (before_n * pn + before_t * pt)
         # What is left to give by this robot once the others' forces have acted.
         lever = mobility / rho2
-        want_n = body[WANT_N * LANES + k] - mobility * (fx * ix + fy * iy) - lever * torque * pn
-        want_t = body[WANT_T * LANES + k] - mobility * (fy * ix - fx * iy) - lever * torque * pt
-        nn = body[YIELD_NN * LANES + k] + mobility + lever * pn * pn
-        nt = body[YIELD_NT * LANES + k] + lever * pn * pt
-        tt = body[YIELD_TT * LANES + k] + mobility + lever * pt * pt
+        want_n = body[WANT_N + k] - mobility * (fx * ix + fy * iy) - lever * torque * pn
+        want_t = body[WANT_T + k] - mobility * (fy * ix - fx * iy) - lever * torque * pt
+        nn = body[YIELD_NN + k] + mobility + lever * pn * pn
+        nt = body[YIELD_NT + k] + lever * pn * pt
+        tt = body[YIELD_TT + k] + mobility + lever * pt * pt
         # The force at which both bodies move alike there: a contact that sticks.
         det = nn * tt - nt * nt
         scale = 1.0 / det if det > 1e-12 * nn * tt else 0.0
@@ -221,39 +225,39 @@ def answer(body, box, rho2, friction, lanes):  # type: ignore[no-untyped-def]
         slipping = want_n / (nn + ratio * nt)
         force_n = slipping if slips else force_n
         force_t = ratio * slipping if slips else force_t
-        pushes = (force_n > 0.0) & (body[ACTIVE * LANES + k] > 0.0)
+        pushes = (force_n > 0.0) & (body[ACTIVE + k] > 0.0)
         force_n = force_n if pushes else 0.0
         force_t = force_t if pushes else 0.0
-        body[FORCE_N * LANES + k], body[FORCE_T * LANES + k] = force_n, force_t
-        box[FORCE_X * LANES + k] = fx + (force_n * ix - force_t * iy)
-        box[FORCE_Y * LANES + k] = fy + (force_n * iy + force_t * ix)
-        box[TORQUE * LANES + k] = torque + (force_n * pn + force_t * pt)
+        body[FORCE_N + k], body[FORCE_T + k] = force_n, force_t
+        box[FORCE_X + k] = fx + (force_n * ix - force_t * iy)
+        box[FORCE_Y + k] = fy + (force_n * iy + force_t * ix)
+        box[TORQUE + k] = torque + (force_n * pn + force_t * pt)
 
 
-@njit(cache=True, error_model="numpy", fastmath=_EXACT)
+@njit(cache=True, fastmath=_EXACT)
 def drag(box, rho2, force, lanes):  # type: ignore[no-untyped-def]
     """Let the box move as the contact forces have it."""
     for k in range(lanes):
-        mobility = box[MOBILITY * LANES + k]
-        ux, uy = mobility * box[FORCE_X * LANES + k], mobility * box[FORCE_Y * LANES + k]
-        uw = mobility * box[TORQUE * LANES + k] / rho2
+        mobility = box[MOBILITY + k]
+        ux, uy = mobility * box[FORCE_X + k], mobility * box[FORCE_Y + k]
+        uw = mobility * box[TORQUE + k] / rho2
         speed = np.sqrt(ux * ux + uy * uy + rho2 * uw * uw)
-        box[U_X * LANES + k], box[U_Y * LANES + k], box[U_W * LANES + k] = ux, uy, uw
-        box[MOBILITY * LANES + k] = (speed if speed > CREEP else CREEP) / force
+        box[U_X + k], box[U_Y + k], box[U_W + k] = ux, uy, uw
+        box[MOBILITY + k] = (speed if speed > CREEP else CREEP) / force
 
 
-@njit(cache=True, error_model="numpy", fastmath=_EXACT)
+@njit(cache=True, fastmath=_EXACT)
 def move(body, radius, compliance, dt, lanes):  # type: ignore[no-untyped-def]
     """Move a robot for one substep under its twist and its contact force."""
     c00, c01, c02 = compliance[0, 0], compliance[0, 1], compliance[0, 2]
     c10, c11, c12 = compliance[1, 0], compliance[1, 1], compliance[1, 2]
     c20, c21, c22 = compliance[2, 0], compliance[2, 1], compliance[2, 2]
     for k in range(lanes):
-        cos, sin = body[COS * LANES + k], body[SIN * LANES + k]
-        ahead, left = body[AHEAD * LANES + k], body[LEFT * LANES + k]
-        turn = body[TURN * LANES + k]
-        force_n, force_t = body[FORCE_N * LANES + k], body[FORCE_T * LANES + k]
-        ix, iy = body[NX * LANES + k], body[NY * LANES + k]
+        cos, sin = body[COS + k], body[SIN + k]
+        ahead, left = body[AHEAD + k], body[LEFT + k]
+        turn = body[TURN + k]
+        force_n, force_t = body[FORCE_N + k], body[FORCE_T + k]
+        ix, iy = body[NX + k], body[NY + k]
         fx, fy = force_t * iy - force_n * ix, -force_n * iy - force_t * ix
         lx, ly = cos * fx + sin * fy, cos * fy - sin * fx
         torque = -radius * force_t
@@ -264,15 +268,15 @@ def move(body, radius, compliance, dt, lanes):  # type: ignore[no-untyped-def]
         half = 0.5 * turn * dt
         c = cos - half * sin - 0.5 * half * half * cos
         s = sin + half * cos - 0.5 * half * half * sin
-        body[X * LANES + k] += (c * ahead - s * left) * dt
-        body[Y * LANES + k] += (s * ahead + c * left) * dt
-        body[PSI * LANES + k] += turn * dt
+        body[X + k] += (c * ahead - s * left) * dt
+        body[Y + k] += (s * ahead + c * left) * dt
+        body[PSI + k] += turn * dt
 
 
-@njit(cache=True, error_model="numpy", fastmath=_EXACT)
+@njit(cache=True, fastmath=_EXACT)
 def carry(box, dt, lanes):  # type: ignore[no-untyped-def]
     """Move the box for one substep."""
     for k in range(lanes):
-        box[X * LANES + k] += box[U_X * LANES + k] * dt
-        box[Y * LANES + k] += box[U_Y * LANES + k] * dt
-        box[PSI * LANES + k] += box[U_W * LANES + k] * dt
+        box[X + k] += box[U_X + k] * dt
+        box[Y + k] += box[U_Y + k] * dt
+        box[PSI + k] += box[U_W + k] * dt

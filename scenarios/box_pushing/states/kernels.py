@@ -28,15 +28,17 @@ COMPILED = (
     "contact_push_bearing", "contact_cross_track_error", "path_bearing", "path_cross_track_error",
 )  # fmt: skip
 """The built-in variables that are computed here, each in a row of scratch of its own."""
+# Where these rows begin.
 (
     GAP, BEARING, SIDE, OTHERS, PUSH, CROSS_TRACK, DISTANCE, APPROACH, TURN, BEND, FACE_BEARING,
     AWAY_OTHERS, CONTACT_PUSH, CONTACT_CROSS_TRACK, PATH, PATH_CROSS_TRACK,
-) = range(len(COMPILED))  # fmt: skip
+) = range(0, len(COMPILED) * LANES, LANES)  # fmt: skip
 # Rows of what several variables need; no column can name them.
 _COURSE, _X, _Y, _WEIGHT, _SQUARE, _NEAR_X, _NEAR_Y, _INSIDE = range(
-    len(COMPILED), len(COMPILED) + 8
+    len(COMPILED) * LANES, (len(COMPILED) + 8) * LANES, LANES
 )
-_ROWS = len(COMPILED) + 8
+_SIZE = _INSIDE + LANES
+_OF_PUSH = (PUSH, CROSS_TRACK)
 _OF_CONTACT = (CONTACT_PUSH, CONTACT_CROSS_TRACK, PATH, PATH_CROSS_TRACK)
 _OF_PATH = (PATH, PATH_CROSS_TRACK)
 
@@ -52,15 +54,17 @@ class Columns:
     Examples
     --------
     >>> Columns(["cross_track_error", "gap"]).rows.tolist()
-    [5, 0]
+    [160, 0]
     """
 
     def __init__(self, names: Sequence[str]) -> None:
         assert set(names) <= set(COMPILED), f"{list(names)}: not all of them are compiled"
-        self.rows: IntArray = np.array([COMPILED.index(name) for name in names], dtype=np.int64)
-        self._of_face = bool((self.rows == FACE_BEARING).any())
-        self._of_contact = bool(np.isin(self.rows, _OF_CONTACT).any())
-        self._of_path = bool(np.isin(self.rows, _OF_PATH).any())
+        self.rows: IntArray = np.array([LANES * COMPILED.index(n) for n in names], dtype=np.int64)
+        # Of push, contact push, path and face: True or None, see `_relational`.
+        self._groups = tuple(
+            bool(np.isin(self.rows, group).any()) or None
+            for group in (_OF_PUSH, _OF_CONTACT, _OF_PATH, FACE_BEARING)
+        )
 
     def of(self, view: View, robots: Sequence[int]) -> FloatArray:
         """Return the variables ``(len(robots), m, columns)`` of robots in the view's situations."""
@@ -69,12 +73,12 @@ class Columns:
             np.ascontiguousarray(view.box.T), np.ascontiguousarray(view.gaps.T),
             view.goal, view.origin, view.before, view.periods, view.outline.edges,
             view.friction_radius,
-            np.array(robots), self.rows, self._of_face, self._of_contact, self._of_path,
+            np.array(robots), self.rows, *self._groups,
         )  # fmt: skip
         return found
 
 
-@njit(cache=True, error_model="numpy", fastmath=_EXACT)
+@njit(cache=True, fastmath=_EXACT)
 def angle_of(x, y):  # type: ignore[no-untyped-def]
     """Return the angle of a vector, as ``arctan2(y, x)`` to its last bits.
 
@@ -105,13 +109,13 @@ def angle_of(x, y):  # type: ignore[no-untyped-def]
     return -angle if y < 0.0 else angle
 
 
-@njit(cache=True, error_model="numpy", fastmath=_EXACT)
+@njit(cache=True, fastmath=_EXACT)
 def wrapped(angle):  # type: ignore[no-untyped-def]
     """Map an angle to [-pi, pi)."""
     return angle - 2.0 * pi * np.floor((angle + pi) / (2.0 * pi))
 
 
-@njit(cache=True, error_model="numpy", fastmath=_EXACT)
+@njit(cache=True, fastmath=_EXACT)
 def _of_box(box, goal, before, periods, first, count, work):  # type: ignore[no-untyped-def]
     """Write how far the box has to go and has come, and how it is turned."""
     gx, gy, turned = goal[0], goal[1], goal[2]
@@ -121,63 +125,63 @@ def _of_box(box, goal, before, periods, first, count, work):  # type: ignore[no-
     for k in range(count):
         dx, dy = gx - bx[k], gy - by[k]
         course, distance = angle_of(dx, dy), np.sqrt(dx * dx + dy * dy)
-        work[_COURSE * LANES + k] = course
-        work[DISTANCE * LANES + k] = distance
-        work[APPROACH * LANES + k] = (before - distance) / periods
+        work[_COURSE + k] = course
+        work[DISTANCE + k] = distance
+        work[APPROACH + k] = (before - distance) / periods
         turn = wrapped(psi[k] - turned)
-        work[TURN * LANES + k] = turn
-        work[BEND * LANES + k] = wrapped(turn - 2.0 * wrapped(course - turned))
+        work[TURN + k] = turn
+        work[BEND + k] = wrapped(turn - 2.0 * wrapped(course - turned))
 
 
-@njit(cache=True, error_model="numpy", fastmath=_EXACT)
+@njit(cache=True, fastmath=_EXACT)
 def _of_push(robots, box, goal, first, count, work):  # type: ignore[no-untyped-def]
     """Write where the robots' middle would push the box, and its cross-track error."""
     n = len(robots)
     for k in range(count):
-        work[_X * LANES + k] = work[_Y * LANES + k] = 0.0
+        work[_X + k] = work[_Y + k] = 0.0
     for r in range(n):
         x, y = robots[r, 0, first : first + count], robots[r, 1, first : first + count]
         for k in range(count):
-            work[_X * LANES + k] += x[k]
-            work[_Y * LANES + k] += y[k]
+            work[_X + k] += x[k]
+            work[_Y + k] += y[k]
     for k in range(count):
-        work[_WEIGHT * LANES + k] = n
+        work[_WEIGHT + k] = n
     _of_middle(box, goal, first, count, work, PUSH, CROSS_TRACK)
 
 
-@njit(cache=True, error_model="numpy", fastmath=_EXACT)
+@njit(cache=True, fastmath=_EXACT)
 def _of_contact_push(robots, gaps, box, goal, first, count, work):  # type: ignore[no-untyped-def]
     """Write the same of the robots in contact, see `View.contact_push`."""
     for k in range(count):
-        work[_X * LANES + k] = work[_Y * LANES + k] = work[_WEIGHT * LANES + k] = 0.0
+        work[_X + k] = work[_Y + k] = work[_WEIGHT + k] = 0.0
     for r in range(len(robots)):
         x, y = robots[r, 0, first : first + count], robots[r, 1, first : first + count]
         apart = gaps[r, first : first + count]
         for k in range(count):
             weight = np.exp(-max(apart[k], 0.0) / CLOSE) + LEAST
-            work[_X * LANES + k] += weight * x[k]
-            work[_Y * LANES + k] += weight * y[k]
-            work[_WEIGHT * LANES + k] += weight
+            work[_X + k] += weight * x[k]
+            work[_Y + k] += weight * y[k]
+            work[_WEIGHT + k] += weight
     _of_middle(box, goal, first, count, work, CONTACT_PUSH, CONTACT_CROSS_TRACK)
 
 
-@njit(cache=True, error_model="numpy", fastmath=_EXACT)
+@njit(cache=True, fastmath=_EXACT)
 def _of_middle(box, goal, first, count, work, push, cross_track):  # type: ignore[no-untyped-def]
     """Write into two rows where a weighted middle would push the box, and its cross-track error."""
     gx, gy = goal[0], goal[1]
     bx, by = box[0, first : first + count], box[1, first : first + count]
     for k in range(count):
-        weight = work[_WEIGHT * LANES + k]
-        dx, dy = bx[k] - work[_X * LANES + k] / weight, by[k] - work[_Y * LANES + k] / weight
+        weight = work[_WEIGHT + k]
+        dx, dy = bx[k] - work[_X + k] / weight, by[k] - work[_Y + k] / weight
         ahead, left = gx - bx[k], gy - by[k]
-        work[push * LANES + k] = wrapped(angle_of(dx, dy) - work[_COURSE * LANES + k])
+        work[push + k] = wrapped(angle_of(dx, dy) - work[_COURSE + k])
         length = np.sqrt(dx * dx + dy * dy)
         across = (ahead * dy - left * dx) / (length if length > 0.0 else 1.0)
-        beyond = np.copysign(work[DISTANCE * LANES + k], across)
-        work[cross_track * LANES + k] = across if ahead * dx + left * dy >= 0.0 else beyond
+        beyond = np.copysign(work[DISTANCE + k], across)
+        work[cross_track + k] = across if ahead * dx + left * dy >= 0.0 else beyond
 
 
-@njit(cache=True, error_model="numpy", fastmath=_EXACT)
+@njit(cache=True, fastmath=_EXACT)
 def _of_robot(robot, gap, box, first, count, work):  # type: ignore[no-untyped-def]
     """Write the gap of a robot, the bearing of the box from it, and on which side it stands."""
     x, y = robot[0, first : first + count], robot[1, first : first + count]
@@ -185,12 +189,12 @@ def _of_robot(robot, gap, box, first, count, work):  # type: ignore[no-untyped-d
     psi, apart = robot[2, first : first + count], gap[first : first + count]
     for k in range(count):
         azimuth = angle_of(bx[k] - x[k], by[k] - y[k])
-        work[GAP * LANES + k] = apart[k]
-        work[BEARING * LANES + k] = wrapped(azimuth - psi[k])
-        work[SIDE * LANES + k] = wrapped(azimuth - work[_COURSE * LANES + k])
+        work[GAP + k] = apart[k]
+        work[BEARING + k] = wrapped(azimuth - psi[k])
+        work[SIDE + k] = wrapped(azimuth - work[_COURSE + k])
 
 
-@njit(cache=True, error_model="numpy", fastmath=_EXACT)
+@njit(cache=True, fastmath=_EXACT)
 def _of_face(robot, box, edges, first, count, work):  # type: ignore[no-untyped-def]
     """Write the bearing of the way into the face of the box that is next to a robot.
 
@@ -207,10 +211,10 @@ def _of_face(robot, box, edges, first, count, work):  # type: ignore[no-untyped-
     for k in range(count):
         cos, sin = np.cos(turn[k]), np.sin(turn[k])
         dx, dy = x[k] - bx[k], y[k] - by[k]
-        work[_X * LANES + k] = cos * dx + sin * dy
-        work[_Y * LANES + k] = cos * dy - sin * dx
-        work[_SQUARE * LANES + k] = np.inf
-        work[_INSIDE * LANES + k] = 1.0
+        work[_X + k] = cos * dx + sin * dy
+        work[_Y + k] = cos * dy - sin * dx
+        work[_SQUARE + k] = np.inf
+        work[_INSIDE + k] = 1.0
     for i in range(len(edges)):
         x0, y0, x1, y1 = edges[i, 0], edges[i, 1], edges[i, 2], edges[i, 3]
         dx, dy = x1 - x0, y1 - y0
@@ -218,29 +222,27 @@ def _of_face(robot, box, edges, first, count, work):  # type: ignore[no-untyped-
         scale = 1.0 / length2 if length2 > 0.0 else 0.0
         slope = dx / dy if dy != 0.0 else 0.0
         for k in range(count):
-            px, py = work[_X * LANES + k], work[_Y * LANES + k]
+            px, py = work[_X + k], work[_Y + k]
             t = min(max(((px - x0) * dx + (py - y0) * dy) * scale, 0.0), 1.0)
             cx, cy = x0 + t * dx - px, y0 + t * dy - py
             square = cx * cx + cy * cy
-            nearer = square < work[_SQUARE * LANES + k]
+            nearer = square < work[_SQUARE + k]
             if square <= ON_SURFACE * ON_SURFACE:  # straight across the edge
                 cx, cy = -dy, dx
-            work[_SQUARE * LANES + k] = square if nearer else work[_SQUARE * LANES + k]
-            work[_NEAR_X * LANES + k] = cx if nearer else work[_NEAR_X * LANES + k]
-            work[_NEAR_Y * LANES + k] = cy if nearer else work[_NEAR_Y * LANES + k]
+            work[_SQUARE + k] = square if nearer else work[_SQUARE + k]
+            work[_NEAR_X + k] = cx if nearer else work[_NEAR_X + k]
+            work[_NEAR_Y + k] = cy if nearer else work[_NEAR_Y + k]
             crosses = ((y0 > py) != (y1 > py)) & (px < x0 + (py - y0) * slope)
-            side = work[_INSIDE * LANES + k]
-            work[_INSIDE * LANES + k] = -side if crosses else side
+            side = work[_INSIDE + k]
+            work[_INSIDE + k] = -side if crosses else side
     for k in range(count):
-        on_surface = work[_SQUARE * LANES + k] <= ON_SURFACE * ON_SURFACE
-        sign = 1.0 if on_surface else work[_INSIDE * LANES + k]
-        inward = turn[k] + angle_of(
-            sign * work[_NEAR_X * LANES + k], sign * work[_NEAR_Y * LANES + k]
-        )
-        work[FACE_BEARING * LANES + k] = wrapped(inward - psi[k])
+        on_surface = work[_SQUARE + k] <= ON_SURFACE * ON_SURFACE
+        sign = 1.0 if on_surface else work[_INSIDE + k]
+        inward = turn[k] + angle_of(sign * work[_NEAR_X + k], sign * work[_NEAR_Y + k])
+        work[FACE_BEARING + k] = wrapped(inward - psi[k])
 
 
-@njit(cache=True, error_model="numpy", fastmath=_EXACT)
+@njit(cache=True, fastmath=_EXACT)
 def _of_path(  # type: ignore[no-untyped-def]
     box, origin, periods, edges, friction_radius, middle, first, count, work
 ):
@@ -250,44 +252,44 @@ def _of_path(  # type: ignore[no-untyped-def]
     """
     bx, by = box[0, first : first + count], box[1, first : first + count]
     for k in range(count):
-        weight = work[_WEIGHT * LANES + k]
-        middle[0, first + k] = work[_X * LANES + k] / weight
-        middle[1, first + k] = work[_Y * LANES + k] / weight
+        weight = work[_WEIGHT + k]
+        middle[0, first + k] = work[_X + k] / weight
+        middle[1, first + k] = work[_Y + k] / weight
         middle[2, first + k] = 0.0
     _of_face(middle, box, edges, first, count, work)
     x, y = middle[0, first : first + count], middle[1, first : first + count]
     for k in range(count):
-        inward = work[FACE_BEARING * LANES + k]
+        inward = work[FACE_BEARING + k]
         ux, uy = np.cos(inward), np.sin(inward)
         px, py = bx[k] - x[k], by[k] - y[k]
         mx, my = bx[k] - origin[0], by[k] - origin[1]
         depth, lever = px * ux + py * uy, py * ux - px * uy
         along, across = mx * ux + my * uy, my * ux - mx * uy
         drift = angle_of(abs(along) + STILL * periods, across)
-        distance = work[DISTANCE * LANES + k]
+        distance = work[DISTANCE + k]
         reach = 2.0 * friction_radius * friction_radius / max(distance, ARRIVED)
         path = inward + KEPT * drift + angle_of(max(depth, reach), lever)
-        off = wrapped(path - work[_COURSE * LANES + k])
-        work[PATH * LANES + k] = off
+        off = wrapped(path - work[_COURSE + k])
+        work[PATH + k] = off
         ahead = min(max(off, -0.5 * pi), 0.5 * pi)
-        work[PATH_CROSS_TRACK * LANES + k] = distance * np.sin(ahead)
+        work[PATH_CROSS_TRACK + k] = distance * np.sin(ahead)
 
 
-@njit(cache=True, error_model="numpy", fastmath=_EXACT)
+@njit(cache=True, fastmath=_EXACT)
 def _of_others(gaps, robot, first, count, work):  # type: ignore[no-untyped-def]
     """Write the greatest gap of the other robots and how many are away; of one alone its own."""
     n = len(gaps)
     share = 1.0 / max(n - 1, 1)
     for k in range(count):
-        work[OTHERS * LANES + k] = -np.inf
-        work[AWAY_OTHERS * LANES + k] = 0.0
+        work[OTHERS + k] = -np.inf
+        work[AWAY_OTHERS + k] = 0.0
     for r in range(n):
         if r != robot or n == 1:
             gap = gaps[r, first : first + count]
             for k in range(count):
-                work[OTHERS * LANES + k] = max(work[OTHERS * LANES + k], gap[k])
+                work[OTHERS + k] = max(work[OTHERS + k], gap[k])
                 away = min(max(gap[k] / AWAY, 0.0), 1.0)
-                work[AWAY_OTHERS * LANES + k] += share * away
+                work[AWAY_OTHERS + k] += share * away
 
 
 @njit(cache=True)
@@ -303,9 +305,10 @@ def _relational(  # type: ignore[no-untyped-def]
     friction_radius: float,
     wanted: IntArray,
     columns: IntArray,
-    of_face: bool,
-    of_contact: bool,
-    of_path: bool,
+    of_push: bool | None,
+    of_contact: bool | None,
+    of_path: bool | None,
+    of_face: bool | None,
 ) -> FloatArray:
     """Return relational shared blocks ``(robots wanted, m, columns)``.
 
@@ -318,29 +321,31 @@ def _relational(  # type: ignore[no-untyped-def]
     wanted
         Indices of robots.
     columns
-        Rows of scratch of variables, see `Columns`.
-    of_face, of_contact, of_path
-        Whether some are what `_of_face`, `_of_contact_push` and `_of_path` write.
+        Where the rows of the variables begin, see `Columns`.
+    of_push, of_contact, of_path, of_face
+        None where nothing is wanted that `_of_push`, `_of_contact_push`, `_of_path` or `_of_face`
+        writes: numba leaves out branches on None, so that this is not even compiled.
     """
     m = box.shape[1]
-    out, work = np.empty((len(wanted), m, len(columns))), np.empty(_ROWS * LANES)
-    middle = np.empty((3, m if of_path else 0))
+    out, work = np.empty((len(wanted), m, len(columns))), np.empty(_SIZE)
+    middle = np.empty((3, m if of_path is not None else 0))
     for first in range(0, m, LANES):
         count = min(LANES, m - first)
         _of_box(box, goal, before, periods, first, count, work)
-        _of_push(robots, box, goal, first, count, work)
-        if of_contact:
+        if of_push is not None:
+            _of_push(robots, box, goal, first, count, work)
+        if of_contact is not None:
             _of_contact_push(robots, gaps, box, goal, first, count, work)
-        if of_path:
+        if of_path is not None:
             _of_path(box, origin, periods, edges, friction_radius, middle, first, count, work)
         for i in range(len(wanted)):
             r = wanted[i]
             _of_robot(robots[r], gaps[r], box, first, count, work)
             _of_others(gaps, r, first, count, work)
-            if of_face:
+            if of_face is not None:
                 _of_face(robots[r], box, edges, first, count, work)
             for k in range(count):
                 row = out[i, first + k]
                 for c in range(len(columns)):
-                    row[c] = work[columns[c] * LANES + k]
+                    row[c] = work[columns[c] + k]
     return out

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from nested_agents.scenarios import BoxPushing, BoxPushingSettings
 from nested_agents.scenarios.box_pushing.prediction.push import PushModel, push
 from nested_agents.scenarios.box_pushing.prediction.push_lanes import (
-    BOX_ROWS,
+    BOX_SIZE,
     COS,
     LANES,
     PSI,
@@ -113,11 +113,11 @@ def test_the_lanes_compute_what_is_written(name: str, rigid: bool) -> None:
 
 @given(st.lists(st.floats(-1e4, 1e4), min_size=1, max_size=LANES))
 def test_headings_are_exact_to_the_last_bit_but_one(angles: list[float]) -> None:
-    rows = np.zeros(BOX_ROWS * LANES)
-    rows[PSI * LANES : PSI * LANES + len(angles)] = angles
+    rows = np.zeros(BOX_SIZE)
+    rows[PSI : PSI + len(angles)] = angles
     head(rows, len(angles))
     for row, function in ((COS, np.cos), (SIN, np.sin)):
-        found = rows[row * LANES : row * LANES + len(angles)]
+        found = rows[row : row + len(angles)]
         np.testing.assert_allclose(found, function(angles), rtol=0, atol=3e-16)
 
 
