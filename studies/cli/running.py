@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from ..api.study import StudyResults, run
-from ..presentation import figures
 from ..presentation.progress import Terminal, say
 from ..presentation.words import count
 from ..spec.errors import SpecError
@@ -24,7 +23,7 @@ def run_and_show(
     replay: bool = False,
     retry_failed: bool = False,
     accept_code: bool = False,
-    formats: tuple[str, ...] = figures.USUAL,
+    formats: tuple[str, ...] = (),
     loggers: tuple[str, ...] = (),
 ) -> int:
     """Run what is left of a study, print its table, draw its figures.
@@ -36,7 +35,7 @@ def run_and_show(
     replay
         Whether to draw a replay of the first condition's first seed.
     formats
-        Of the figures.
+        Of the figures; none: PNG and SVG.
 
     Returns
     -------
@@ -47,11 +46,14 @@ def run_and_show(
         spec, directory, jobs=jobs, backend=backend, address=address, retry_failed=retry_failed,
         accept_code=accept_code, observer=Terminal(), loggers=loggers,
     )  # fmt: skip
+    from ..presentation import figures  # Matplotlib takes its time, for which no trial has to wait
+
     replays = _replays(study, spec.episodes) if replay and not study.failed else []
     display.print_study(study)
     folder = directory / "figures"
     folder.mkdir(exist_ok=True)
-    display.print_places(directory, figures.save(study.figures, folder, formats), replays)
+    drawn = figures.save(study.figures, folder, formats or figures.USUAL)
+    display.print_places(directory, drawn, replays)
     if study.failed:
         say(f"{count(len(study.failed), 'trial')} failed: nested-agents status {directory}")
     return 1 if study.failed else 0
