@@ -9,7 +9,7 @@ the scenario's business: each has a registry and a view of its own.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
@@ -26,6 +26,10 @@ class Situations(Protocol):
     @property
     def n_situations(self) -> int:
         """How many situations it holds."""
+        ...
+
+    def guarded(self) -> Situations:
+        """Return the same situations, not to be written to."""
         ...
 
 
@@ -73,6 +77,28 @@ class StateVariable:
         if found.dtype.kind not in "fiu" or not np.isfinite(found).all():
             raise ValueError(f"state variable {name!r}: not all of its values are finite numbers")
         return found
+
+
+def sensed(
+    things: Sequence[StateVariable], view: Situations, bodies: Sequence[int], trusted: Container[str]
+) -> FloatArray:
+    """Return state variables ``(len(bodies), m, variables)`` of bodies, by the functions alone.
+
+    Those that are the same for all bodies are computed once; what functions that are not trusted
+    by name return is checked.
+    """
+    found = np.empty((len(bodies), view.n_situations, len(things)))
+    are_trusted = [thing.variable.name in trusted for thing in things]
+    guarded = view if all(are_trusted) else view.guarded()
+    for column, (thing, is_trusted) in enumerate(zip(things, are_trusted, strict=True)):
+        for k, body in enumerate(bodies):
+            if k and thing.common:
+                found[k, :, column] = found[0, :, column]
+            elif is_trusted:
+                found[k, :, column] = thing(view, body)
+            else:
+                found[k, :, column] = thing.checked(guarded, body)
+    return found
 
 
 def state_variable(

@@ -225,7 +225,8 @@ class BatchTD(Replay):
         self._regressed = 0
 
     def _regress(self) -> int:
-        from scipy.linalg import cho_factor, cho_solve
+        from scipy.linalg import cho_factor
+        from scipy.linalg.lapack import dpotrs  # `cho_solve` without what that does around it
 
         from ..rules.kernels import regression
 
@@ -235,7 +236,7 @@ class BatchTD(Replay):
             rewards, follower, known, low, high = self.experience(row)
             gram = s.ridge * np.eye(self.rules.n_rules)
             regression.add_gram(gram, active, strengths, known)
-            factor = cho_factor(gram, check_finite=False)
+            factor, lower = cho_factor(gram, check_finite=False)
             theta = self.theta[row].astype(float) * REWARD_SCALE
             for _ in range(s.regression_iterations):
                 values = regression.row_values(theta, active, strengths)
@@ -244,7 +245,7 @@ class BatchTD(Replay):
                 )
                 targets = known * np.clip(returns, low, high)
                 moment = regression.moment(active, strengths, targets, self.rules.n_rules)
-                theta = cho_solve(factor, moment, check_finite=False)
+                theta, _ = dpotrs(factor, moment, lower)
             change = theta / REWARD_SCALE - self.theta[row]
             self.theta[row] += s.target_averaging_rate * change
         return self.theta.size

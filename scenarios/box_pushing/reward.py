@@ -89,8 +89,13 @@ def reward(
     near = -r2_r3 + (r1 if settings.attraction_without_contact else 0.0)
     nearer = approach < -settings.least_approach
     there = task.reached(distance, orientation) & settings.pays_at_goal
-    return np.select(
-        [there, touching & nearer, touching, within.all(axis=2), ~within.any(axis=2)],
-        [settings.c1, r1 - r2_r3 - r4, settings.receding, near, settings.all_out_of_range],
-        default=settings.some_out_of_range,
-    )
+    gained = np.full(near.shape, settings.some_out_of_range)
+    for condition, pay in (  # from the least specific on
+        (~within.any(axis=2), settings.all_out_of_range),
+        (within.all(axis=2), near),
+        (touching, settings.receding),
+        (touching & nearer, r1 - r2_r3 - r4),
+        (there, settings.c1),
+    ):
+        gained = np.where(condition, pay, gained)
+    return gained

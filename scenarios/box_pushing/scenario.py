@@ -357,10 +357,10 @@ class BoxPushing:
             poses[None], world.box_pose[None], world.gaps[None], self._goal, origin, 1.0,
             self.box.outline, self.box.friction_radius,
         )  # fmt: skip
-        rows = []
+        n_own, shared = self._space.space.n_own, self._space.sensed(view)
+        states = np.empty((len(self.agents), self._space.space.n_variables))
         for r, group in enumerate(self.groups):
-            shared = self._space.shared(view, r)[0]
             for agent in group:
                 own = self._space.own(poses[r : r + 1], self._speeds[agent : agent + 1], self._goal)
-                rows.append(np.concatenate([own[0], shared]))
-        return np.array(rows)
+                states[agent, :n_own], states[agent, n_own:] = own[0], shared[r, 0]
+        return states

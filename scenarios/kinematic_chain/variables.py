@@ -20,7 +20,7 @@ import numpy as np
 from ...core.arrays import FloatArray
 from ...core.registry import Registry
 from ...core.spaces import StateSpace, Variable
-from ..state_variables import found
+from ..state_variables import found, sensed
 from .kernels import COMPILED, columns
 from .view import ChainView
 
@@ -65,14 +65,9 @@ class ChainStates:
 
     def sensed(self, view: ChainView) -> FloatArray:
         """Return the states ``(m, n, d)`` of all joints, by the functions alone."""
-        n, guarded = view.angles.shape[1], view.guarded()
-        return np.stack(
-            [
-                np.stack([view.speeds[:, i], *(t.checked(guarded, i) for t in self._things)], -1)
-                for i in range(n)
-            ],
-            axis=1,
-        )
+        of_joints = sensed(self._things, view, range(view.angles.shape[1]), COMPILED)
+        speeds = view.speeds.T[:, :, None]
+        return np.concatenate([speeds, of_joints], axis=2).swapaxes(0, 1)
 
     def predicted(self, view: ChainView, first: int, count: int) -> FloatArray:
         """Return the states ``(count, m, d)`` of joints from `first` on, compiled if possible."""

@@ -17,7 +17,7 @@ import numpy as np
 
 from ....core.arrays import FloatArray
 from ....core.spaces import StateSpace, Variable
-from ...state_variables import found
+from ...state_variables import found, sensed
 from .kernels import COMPILED, Columns
 from .variables import STATE_VARIABLES
 from .view import View, wrap
@@ -49,6 +49,13 @@ class BoxStateSpace:
     own_needs_pose: bool
     alike: bool = False
     listed: Listed | None = None
+
+    def sensed(self, view: View) -> FloatArray:
+        """Return the shared blocks ``(M, m, d - n_own)`` of all robots, by the functions alone."""
+        robots = range(view.robots.shape[1])
+        if self.listed is not None:
+            return self.listed.sensed(view, robots)
+        return self.shared_of(view, robots)
 
     def shared_of(self, view: View, robots: Sequence[int]) -> FloatArray:
         """Return the shared blocks ``(k, m, d - n_own)`` of k robots, fast for many situations."""
@@ -88,14 +95,9 @@ class Listed:
         self._things, self._is_compiled = things, is_compiled
         self._columns = Columns([name for name in names if name in COMPILED])
 
-    def sensed(self, view: View, robot: int) -> FloatArray:
-        """Return the shared block ``(m, variables)`` of a robot, by the functions alone."""
-        guarded = view.guarded() if self.functions else view
-        columns = [
-            thing(view, robot) if is_compiled else thing.checked(guarded, robot)
-            for thing, is_compiled in zip(self._things, self._is_compiled, strict=True)
-        ]
-        return np.stack(columns, axis=1)
+    def sensed(self, view: View, robots: Sequence[int]) -> FloatArray:
+        """Return the shared blocks ``(k, m, variables)`` of robots, by the functions alone."""
+        return sensed(self._things, view, robots, COMPILED)
 
     def predicted(self, view: View, robots: Sequence[int]) -> FloatArray:
         """Return the shared blocks ``(k, m, variables)`` of robots, compiled where it can be."""
@@ -157,7 +159,7 @@ def listed(name: str, *shared: str) -> BoxStateSpace:
     return BoxStateSpace(
         StateSpace(name, (_SPEED, *variables.variables), 1, variables.common),
         lambda poses, speeds, goal: speeds[:, None],
-        variables.sensed,
+        lambda view, robot: variables.sensed(view, [robot])[0],
         own_needs_pose=False,
         listed=variables,
     )
