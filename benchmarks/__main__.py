@@ -46,6 +46,11 @@ def main() -> None:
     imports = measures.import_seconds(1 if options.smoke else 3)
     for name, seconds in imports.items():
         console.print(f"{name:>14} {seconds:5.2f} s to start and import")
+    trial = measures.trial_seconds(1 if options.smoke else 20, compiled=options.smoke)
+    console.print(
+        "a trial by default: {compile_s:.1f} s to compile, then {trial_s:.2f} s, "
+        "{decision_us:.0f} us per decision".format(**trial)
+    )
     ended = os.getloadavg()[0]
     console.print(
         f"load {began:.1f} before, {ended:.1f} after, on {os.cpu_count()} cores; ja: joint action"
@@ -56,7 +61,10 @@ def main() -> None:
         "memory {memory_gb_s:.1f} GB/s".format(**ran_on["speed"]),
     )
     ran_on |= {"load_at_start": began, "load_at_end": ended}
-    result = {"machine": ran_on, "exact": steps, "beyond": large, "import_seconds": imports}
+    result = {
+        "machine": ran_on, "exact": steps, "beyond": large, "trial": trial,
+        "import_seconds": imports,
+    }  # fmt: skip
     path = options.json or FOLDER / f"{ran_on['date'].replace(':', '-')}.json"
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")

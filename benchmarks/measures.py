@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
+import os
 import subprocess
 import sys
+import tempfile
 import time
 from typing import Any
 
@@ -21,6 +24,23 @@ RULE_BASES = {
     "dense": DENSE, "dense32": {**DENSE, "precision": "float32"}, "compact": COMPACT,
     "order 1": ADDITIVE,
 }  # fmt: skip
+TRIAL = """
+import json, sys, time
+from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.trials.session import run_trial
+from nested_agents.studies.trials.trial import trials_of
+
+trial = trials_of(Spec.of({"seeds": 1, "episodes": int(sys.argv[1])}))[0]
+begin = time.process_time()
+run_trial(trial)
+first = time.process_time()
+rows = run_trial(trial).rows
+again = time.process_time() - first
+print(json.dumps({"compile_s": first - begin - again, "trial_s": again,
+                  "decision_us": 1e6 * again / sum(row.steps for row in rows)}))
+"""
+"""A trial by default in a process of its own, and once more."""
+
 LARGEST_LITERAL = 4
 """Agents up to which the literal step is timed whole; it takes 20 s for 8."""
 
@@ -132,4 +152,28 @@ def import_seconds(repeats: int = 3) -> Row:
             subprocess.run([sys.executable, "-c", statement], check=True)
             taken.append(time.perf_counter() - begin)
         row[name] = min(taken)
+    return row
+
+
+def trial_seconds(episodes: int, *, compiled: bool) -> Row:
+    """Return what a trial by default takes, in processor time.
+
+    Parameters
+    ----------
+    episodes
+        Of training; as many as usual of evaluation.
+    compiled
+        Whether cached kernels may be used; otherwise all are compiled.
+
+    Returns
+    -------
+    dict
+        ``compile_s``: what the first trial of a process takes more than the second [s].
+        ``trial_s``: what that takes [s]. ``decision_us``: the same per decision [us].
+    """
+    with tempfile.TemporaryDirectory() as empty:
+        environment = os.environ if compiled else os.environ | {"NUMBA_CACHE_DIR": empty}
+        line = [sys.executable, "-c", TRIAL, str(episodes)]
+        said = subprocess.run(line, check=True, capture_output=True, text=True, env=environment)
+    row: Row = json.loads(said.stdout)
     return row

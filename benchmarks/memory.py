@@ -8,6 +8,7 @@ commands that read it. Its rows are written as those of any study, but not waite
 from __future__ import annotations
 
 import argparse
+import os
 import subprocess
 import sys
 import tempfile
@@ -17,7 +18,7 @@ import numpy as np
 from rich.console import Console
 
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.store.store import Store
+from nested_agents.studies.store.store import SPEC_FILE, Store
 from nested_agents.studies.trials.arrangement import check
 from nested_agents.studies.trials.episodes import EpisodeRow
 from nested_agents.studies.trials.trial import Trial, TrialResult, trials_of
@@ -115,6 +116,23 @@ def commands(directory: Path) -> list[Row]:
     return rows
 
 
+def going_on(directory: Path) -> Row:
+    """Return what `run` takes until it goes on with the trials that are left: here none."""
+    line = [sys.executable, "-m", "nested_agents", "run", str(directory / SPEC_FILE), "--out"]
+    with subprocess.Popen(
+        [*line, str(directory)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stderr is not None
+        assert "were run before" in process.stderr.readline()
+        status = Path(f"/proc/{process.pid}/status").read_text(encoding="utf-8")
+        times = Path(f"/proc/{process.pid}/stat").read_text(encoding="utf-8").split()
+        process.stderr.read()
+    ticks = int(times[13]) + int(times[14])
+    peak = next(int(x.split()[1]) for x in status.splitlines() if x.startswith("VmHWM"))
+    seconds = ticks / os.sysconf("SC_CLK_TCK")
+    return {"command": "run, until it goes on", "s": seconds, "peak": round(peak / 1024)}
+
+
 def main() -> None:
     """Print both tables."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.memory", description=__doc__)
@@ -126,7 +144,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         directory = Path(folder) / "study"
         fill(directory, options.trials, options.episodes)
-        rows = commands(directory)
+        rows = [*commands(directory), going_on(directory)]
     show(console, f"{options.trials} trials of {options.episodes} episodes", STUDY, rows)
 
 

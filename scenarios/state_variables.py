@@ -80,7 +80,10 @@ class StateVariable:
 
 
 def sensed(
-    things: Sequence[StateVariable], view: Situations, bodies: Sequence[int], trusted: Container[str]
+    things: Sequence[StateVariable],
+    view: Situations,
+    bodies: Sequence[int],
+    trusted: Container[str],
 ) -> FloatArray:
     """Return state variables ``(len(bodies), m, variables)`` of bodies, by the functions alone.
 

@@ -33,7 +33,13 @@ def test_the_smallest_benchmark_runs(run: Run, tmp_path: Path) -> None:
     assert [row["agents"] for row in result["exact"]] == [2, 2]
     assert result["exact"][0]["literal_ratio"] > 0
     assert result["beyond"][0]["total_ms"] > 0
+    assert 0 < result["trial"]["decision_us"] < 1e6 * result["trial"]["trial_s"]
     assert all(speed > 0 for speed in result["machine"]["speed"].values())
+
+
+def test_docs_hold_the_table_of_releases(run: Run) -> None:
+    table = run("benchmarks.releases")
+    assert table in (ROOT / "docs" / "benchmarks.md").read_text(encoding="utf-8"), table
 
 
 @pytest.mark.slow

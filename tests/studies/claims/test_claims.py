@@ -229,6 +229,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "peers-one-robot",
         "peers-four-robots",
         "peers-100",
+        "peers-arm-long",
         "peers-predictors",
         "locked-joint",
         "climbing",
