@@ -118,8 +118,8 @@ def state_variable(
     """Make a function of a view and a body a state variable of the function's name.
 
     Parameters are those of `nested_agents.core.spaces.Variable`, and `common`: whether it is the
-    same for all bodies, which makes decisions by the values of many agents faster. What the
-    function is given is read-only. A variable that says what it is in the mirror image of the
+    same for all bodies, which makes sensing and decisions by the values of many agents faster. What
+    the function is given is read-only. A variable that says what it is in the mirror image of the
     world, the ``same`` or of ``opposite`` sign, can be used with ``learner.mirrored``.
 
     Examples

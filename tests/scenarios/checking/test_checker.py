@@ -302,8 +302,14 @@ def stale(view: View, robot: int) -> Any:
     return np.full(len(view.box), float(next(times) % 7))
 
 
-def perceiving(variable: StateVariable) -> Callable[[], Scenario]:
-    return BoxPushingSettings(robots=1, state_space=("gap", variable)).build  # type: ignore[arg-type]
+@state_variable("m", 0.0, 0.5, common=True)
+def not_common(view: View, robot: int) -> Any:
+    """Differ between robots, unlike what is said of it."""
+    return np.minimum(view.gaps[:, robot], 0.5)
+
+
+def perceiving(variable: StateVariable, robots: int = 1) -> Callable[[], Scenario]:
+    return BoxPushingSettings(robots=robots, state_space=("gap", variable)).build  # type: ignore[arg-type]
 
 
 BLOCKS = "predictions: blocks of agent 1: "
@@ -407,6 +413,7 @@ FAULTS: dict[str, tuple[Callable[[], Scenario], str]] = {
         perceiving(per_period),
         SENSED + r"per_period of agent 0 is \S+, predicted \S+, at step 1 of seed 0, at rest",
     ),
+    "not common": (perceiving(not_common, 2), SENSED + "not_common of agent . is"),
     "hidden state": (perceiving(stale), "equal seeds: two runs with seed 0 differ"),
     "no scenario": (lambda: object(), "form: object lacks agents, .*predict"),  # type: ignore[dict-item,return-value]
 }

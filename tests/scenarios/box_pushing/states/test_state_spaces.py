@@ -7,18 +7,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from nested_agents.core.arrays import FloatArray
 from nested_agents.core.sources import Sources
+from nested_agents.core.spaces import Variable
 from nested_agents.scenarios import BoxPushing, BoxPushingSettings
 from nested_agents.scenarios.box_pushing.states.kernels import COMPILED, Columns, angle_of
 from nested_agents.scenarios.box_pushing.states.state_spaces import (
     STATE_SPACES,
+    BoxStateSpace,
     listed,
     state_space_for,
 )
 from nested_agents.scenarios.box_pushing.states.variables import STATE_VARIABLES
 from nested_agents.scenarios.box_pushing.states.view import View, wrap
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
-from nested_agents.scenarios.state_variables import found
+from nested_agents.scenarios.state_variables import StateVariable, found, sensed
 
 GOAL = np.array([1.0, 0.0, 0.0])
 SQUARE = BOXES["square"].outline
@@ -269,6 +272,29 @@ def test_what_is_no_state_variable_is_refused_in_one_line(name: str, complaint: 
     with sources.active(), pytest.raises(ValueError, match=complaint) as error:
         BoxPushing(BoxPushingSettings(state_space=(name,)))
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("space", [*STATE_SPACES.values(), EVERY])
+def test_all_robots_sense_what_each_does_alone(space: BoxStateSpace) -> None:
+    rng = np.random.default_rng(0)
+    poses, gaps = rng.normal(size=(1, 4, 3)), np.abs(rng.normal(size=(1, 4)))
+    seen = View(poses, poses[:, 0] + 0.3, gaps, GOAL, ORIGIN, 1.0, SQUARE, 0.08)
+    np.testing.assert_array_equal(space.sensed(seen), [space.shared(seen, r) for r in range(4)])
+
+
+def test_what_is_common_is_sensed_once() -> None:
+    asked = []
+
+    def counted(name: str, common: bool) -> StateVariable:
+        def function(view: View, robot: int) -> FloatArray:
+            asked.append((name, robot))
+            return view.distance
+
+        return StateVariable(Variable(name, "m", 0.0, 1.0), function, common)
+
+    seen = view([[-0.2, 0, 0], [0.2, 0, 0]], [0, 0, 0], [0.06, 0.1])
+    sensed([counted("same", True), counted("own", False)], seen, [0, 1], ())
+    assert asked == [("same", 0), ("own", 0), ("own", 1)]
 
 
 @pytest.mark.parametrize(
