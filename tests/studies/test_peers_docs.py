@@ -12,6 +12,7 @@ from nested_agents.studies.spec.spec import Spec
 ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "docs" / "peers.md").read_text(encoding="utf-8")
 COLUMNS = ("success, 4", "success, 12", "evaluation success", "decisions", "CPU [s]")
+PREDICTORS = ("success, 2", "success, 6", "evaluation success", "decisions")
 LONG = ("success, 4", "success, 40", "success, 120", *COLUMNS[2:])
 
 
@@ -25,7 +26,8 @@ LONG = ("success, 4", "success, 40", "success, 120", *COLUMNS[2:])
         ("peers-100", LONG),
         ("peers-arm-long", LONG),
         ("peers-tuning", ("success, 12", "evaluation success")),
-        ("peers-predictors", ("success, 2", "success, 6", "evaluation success", "decisions")),
+        ("peers-predictors", PREDICTORS),
+        ("peers-plans", PREDICTORS),
     ],
 )
 def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
