@@ -9,7 +9,7 @@ the scenario's business: each has a registry and a view of its own.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
@@ -81,19 +81,18 @@ class StateVariable:
 
 def sensed(
     things: Sequence[StateVariable],
+    trusted: Sequence[bool],
     view: Situations,
     bodies: Sequence[int],
-    trusted: Container[str],
 ) -> FloatArray:
     """Return state variables ``(len(bodies), m, variables)`` of bodies, by the functions alone.
 
     Those that are the same for all bodies are computed once; what functions that are not trusted
-    by name return is checked.
+    return is checked.
     """
     found = np.empty((len(bodies), view.n_situations, len(things)))
-    are_trusted = [thing.variable.name in trusted for thing in things]
-    guarded = view if all(are_trusted) else view.guarded()
-    for column, (thing, is_trusted) in enumerate(zip(things, are_trusted, strict=True)):
+    guarded = view if all(trusted) else view.guarded()
+    for column, (thing, is_trusted) in enumerate(zip(things, trusted, strict=True)):
         for k, body in enumerate(bodies):
             if k and thing.common:
                 found[k, :, column] = found[0, :, column]

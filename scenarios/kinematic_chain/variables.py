@@ -59,13 +59,15 @@ class ChainStates:
             )
         common = tuple(thing.variable.name for thing in self._things if thing.common)
         self.space = StateSpace("+".join(names), (SPEED, *variables), 1, common)
-        own = [k for k, name in enumerate(names) if name not in COMPILED]
+        self._is_compiled = [name in COMPILED for name in names]
+        own = [k for k, is_compiled in enumerate(self._is_compiled) if not is_compiled]
         self._own = [(1 + k, self._things[k]) for k in own]
         self._rows = np.array([-1] + [_row(name) for name in names])
 
     def sensed(self, view: ChainView) -> FloatArray:
         """Return the states ``(m, n, d)`` of all joints, by the functions alone."""
-        of_joints = sensed(self._things, view, range(view.angles.shape[1]), COMPILED)
+        joints = range(view.angles.shape[1])
+        of_joints = sensed(self._things, self._is_compiled, view, joints)
         speeds = view.speeds.T[:, :, None]
         return np.concatenate([speeds, of_joints], axis=2).swapaxes(0, 1)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
+from math import pi
 from typing import ClassVar
 
 import numpy as np
@@ -16,7 +17,7 @@ import numpy as np
 from ....core.arrays import FloatArray, IntArray
 from ....core.protocols import Blocks
 from ..reward import reward
-from ..states.view import View, wrap
+from ..states.view import View
 from ..world.infrared import expected_reading
 from .additive import PushSuperposition
 from .belief import outcomes
@@ -278,11 +279,16 @@ def first_alike(keys: IntArray) -> IntArray:
 
 
 def mean_twists(before: FloatArray, after: FloatArray, seconds: float) -> FloatArray:
-    """Return the constant twists ``(M, 3)``, own frame, between poses ``(M, 3)``."""
-    turn = wrap(after[:, 2] - before[:, 2])
+    """Return the constant twists ``(M, 3)``, own frame, between poses ``(M, 3)``.
+
+    Headings count whole turns. Of arcs beyond half a turn the speed is too small, as their chords
+    tell ever less of it.
+    """
+    turn = after[:, 2] - before[:, 2]
     heading = before[:, 2] + 0.5 * turn
     # The chord of an arc is shorter than the arc by the sinc of half its angle.
-    chord = (after[:, :2] - before[:, :2]) / np.sinc(0.5 * turn / np.pi)[:, None]
+    shorter = np.maximum(np.sinc(0.5 * turn / pi), 2.0 / pi)
+    chord = (after[:, :2] - before[:, :2]) / shorter[:, None]
     cos, sin = np.cos(heading), np.sin(heading)
     ahead = cos * chord[:, 0] + sin * chord[:, 1]
     left = cos * chord[:, 1] - sin * chord[:, 0]

@@ -88,7 +88,7 @@ class Listed:
 
     def __init__(self, names: Sequence[str]) -> None:
         things = [found(STATE_VARIABLES, name) for name in names]
-        is_compiled = np.array([name in COMPILED for name in names], dtype=bool)
+        is_compiled = [name in COMPILED for name in names]
         self.variables = tuple(thing.variable for thing in things)
         self.common = tuple(thing.variable.name for thing in things if thing.common)
         self.functions = tuple(thing for thing, c in zip(things, is_compiled, strict=True) if not c)
@@ -97,7 +97,7 @@ class Listed:
 
     def sensed(self, view: View, robots: Sequence[int]) -> FloatArray:
         """Return the shared blocks ``(k, m, variables)`` of robots, by the functions alone."""
-        return sensed(self._things, view, robots, COMPILED)
+        return sensed(self._things, self._is_compiled, view, robots)
 
     def predicted(self, view: View, robots: Sequence[int]) -> FloatArray:
         """Return the shared blocks ``(k, m, variables)`` of robots, compiled where it can be."""
@@ -105,8 +105,8 @@ class Listed:
         if not self.functions:
             return compiled
         blocks = np.empty((len(robots), len(view.box), len(self._things)))
-        blocks[:, :, self._is_compiled] = compiled
-        columns, guarded = np.flatnonzero(~self._is_compiled), view.guarded()
+        blocks[:, :, np.flatnonzero(self._is_compiled)] = compiled
+        columns, guarded = np.flatnonzero(np.logical_not(self._is_compiled)), view.guarded()
         for block, robot in zip(blocks, robots, strict=True):
             for column, function in zip(columns, self.functions, strict=True):
                 block[:, column] = function.checked(guarded, robot)

@@ -99,6 +99,30 @@ def test_mean_twists_invert_driving_an_arc() -> None:
     np.testing.assert_allclose(found, [[ahead, 0.0, turn]], atol=1e-12)
 
 
+def test_mean_twists_count_whole_turns_and_stay_finite() -> None:
+    turns = np.array([0.5, -0.9, 1.0, 2.5, -7.0]) * 2.0 * np.pi
+    before = np.zeros((5, 3))
+    after = np.column_stack([np.full(5, 1e-3), np.zeros(5), turns])
+    found = mean_twists(before, after, 0.5)
+    np.testing.assert_allclose(found[:, 2], turns / 0.5)
+    assert np.hypot(found[:, 0], found[:, 1]).max() < 0.004
+
+
+@pytest.mark.parametrize("rate", [5.0, 9.0, 40.0, 3000.0])
+def test_contact_takes_nothing_from_robots_in_the_open_however_fast_they_are_believed(
+    rate: float,
+) -> None:
+    scenario = BoxPushing(BoxPushingSettings())
+    scenario.reset(0)
+    scenario.world.place(
+        np.array([[-1.0, 0.3, 0.4], [-1.0, -0.3, 1.0]]), scenario.world.box_pose.copy()
+    )
+    believed = [effect.copy() for effect in scenario.nominal_effects]
+    believed[0][2, -1] = rate  # turns by itself [rad/s]
+    slips = scenario.predict_with(believed).slips(np.full(4, 2))
+    np.testing.assert_allclose(slips[:, 2], 0.0, atol=1e-9)
+
+
 @pytest.mark.parametrize(
     "settings", [{}, {"state_space": "paper"}, {"robots": 1}, {"predictor": "exact"}], ids=str
 )

@@ -293,8 +293,22 @@ def test_what_is_common_is_sensed_once() -> None:
         return StateVariable(Variable(name, "m", 0.0, 1.0), function, common)
 
     seen = view([[-0.2, 0, 0], [0.2, 0, 0]], [0, 0, 0], [0.06, 0.1])
-    sensed([counted("same", True), counted("own", False)], seen, [0, 1], ())
+    sensed([counted("same", True), counted("own", False)], [True, False], seen, [0, 1])
     assert asked == [("same", 0), ("own", 0), ("own", 1)]
+
+
+def test_a_function_of_a_user_is_checked_whatever_its_name() -> None:
+    text = """
+from nested_agents import state_variable
+
+@state_variable("m", 0.0, 1.0)
+def gap(view, robot):
+    return view.box
+"""
+    with Sources(texts={"mine.py": text}).active():
+        space = listed("own", "mine.py:gap")
+    with pytest.raises(ValueError, match="state variable 'gap': shape"):
+        space.sensed(view([[-0.2, 0, 0]], [0, 0, 0], [0.06]))
 
 
 @pytest.mark.parametrize(
