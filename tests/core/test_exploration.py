@@ -78,6 +78,11 @@ def test_the_clock_counts_the_run_or_the_episode(clock: str, expected: float) ->
     assert after(after(explorer, 5), 4).memory[0] == expected
 
 
+def test_of_values_that_are_no_numbers_none_is_greatest(rng: np.random.Generator) -> None:
+    with pytest.raises(ArithmeticError, match="none of 2 actions is worth most"):
+        greatest(np.full(2, np.nan), rng)
+
+
 def test_without_epsilon_the_greatest_is_taken(rng: np.random.Generator) -> None:
     explorer = EpsilonDecreasingBoltzmann(PaperExploration(epsilon=0.0))
     assert {explorer.choose(0, VALUES, rng) for _ in range(200)} == {1}
