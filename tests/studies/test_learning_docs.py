@@ -1,5 +1,6 @@
 """docs/learning.md holds the tables that the committed results give."""
 
+import csv
 from pathlib import Path
 
 import pytest
@@ -40,3 +41,22 @@ def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixtu
     assert main(["table", str(path), "--columns", *columns, "--format", "markdown"]) == 0
     table = capsys.readouterr().out
     assert table in PAGE.read_text(encoding="utf-8"), f"docs/learning.md: put in\n{table}"
+
+
+def test_failures_of_large_teams(capsys: pytest.CaptureFixture[str]) -> None:
+    path = claims.PUBLISHED / "large-failures.json"
+    assert main(["table", str(path), "--columns", "just after", "end", "--format", "csv"]) == 0
+    rows: dict[str, list[str]] = {}
+    for row in csv.DictReader(capsys.readouterr().out.splitlines()):
+        fault, adapting = row["condition"].split(": ")
+        if adapting == "nothing":
+            rows[fault] = [_rounded(row["just after"])]
+        rows[fault].append(_rounded(row["end"]))
+    page = PAGE.read_text(encoding="utf-8")
+    for fault, cells in rows.items():
+        line = f"| {fault.replace(' seized', '')} | {' | '.join(cells)} |"
+        assert line in page, f"docs/learning.md: put in\n{line}"
+
+
+def _rounded(rate: str) -> str:
+    return f"{float(rate):.2f}".removeprefix("0") if 0 < float(rate) < 1 else rate.split(".")[0]

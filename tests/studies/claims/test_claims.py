@@ -233,6 +233,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "peers-predictors",
         "peers-plans",
         "locked-joint",
+        "large-failures",
         "climbing",
         "hierarchies",
         "related-arms",
