@@ -9,6 +9,7 @@ factors of what was believed at first, in logarithms.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import pi
 from typing import NamedTuple
 
 import numpy as np
@@ -111,13 +112,11 @@ def outcomes(  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _twist(before, after, seconds, out) -> None:  # type: ignore[no-untyped-def]
-    """Write the constant twist between two poses: as `box_pushing.prediction.prediction` has it.
-
-    Turns of less than half a revolution.
-    """
+    """Write the constant twist between two poses, as `prediction.mean_twists` does."""
     half = 0.5 * (after[2] - before[2])
     # The chord of an arc is shorter than the arc by the sinc of half its angle.
-    longer = half / np.sin(half) if abs(half) > 1e-9 else 1.0
+    told = min(max(half, -0.5 * pi), 0.5 * pi)
+    longer = told / np.sin(told) if abs(told) > 1e-9 else 1.0
     cos, sin = np.cos(before[2] + half), np.sin(before[2] + half)
     x, y = (after[0] - before[0]) * longer, (after[1] - before[1]) * longer
     out[0], out[1], out[2] = (cos * x + sin * y), (cos * y - sin * x), 2.0 * half

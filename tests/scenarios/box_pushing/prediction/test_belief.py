@@ -42,9 +42,9 @@ def calibrating(world, topology="chain"):
     return seen, Team.build(settings, seen, hierarchy, policy_seed(0))
 
 
-def pushed(model):
+def pushed(model, twists=TWISTS):
     after, box, _ = push(
-        ROBOTS, np.zeros(3), TWISTS[:, None], np.zeros((1, 2), np.int64), 0.512, model
+        ROBOTS, np.zeros(3), twists[:, None], np.zeros((1, 2), np.int64), 0.512, model
     )
     return np.vstack([box, after[0]])
 
@@ -81,13 +81,14 @@ def test_only_ratios_of_forces_can_be_told_by_moving():
     assert abs(pushed(heavier._model) - pushed(usual._model)).max() > 0.005
 
 
-def test_outcomes_are_the_twists_of_the_push():
-    belief = scenario()._belief
+@pytest.mark.parametrize("turning", [0.0, 9.0, 12.3, -40.0])  # 12.3: once round
+def test_outcomes_are_the_twists_of_the_push(turning: float):
+    belief, twists = scenario()._belief, TWISTS + np.array([0.0, 0.0, turning])
     constants = np.array([[0.0, 0.0, 0.0], [0.7, -0.3, 0.2]])
-    found = outcomes(ROBOTS, np.zeros(3), TWISTS, 0.512, belief, constants)
+    found = outcomes(ROBOTS, np.zeros(3), twists, 0.512, belief, constants)
     before = np.vstack([np.zeros(3), ROBOTS])
     for row, own in zip(found, constants, strict=True):
-        expected = mean_twists(before, pushed(believing(belief, own)), 0.512)
+        expected = mean_twists(before, pushed(believing(belief, own), twists), 0.512)
         np.testing.assert_allclose(row, expected, rtol=0, atol=1e-12)
 
 
