@@ -18,7 +18,7 @@ import numpy as np
 from rich.console import Console
 
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.store.store import SPEC_FILE, Store
+from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.arrangement import check
 from nested_agents.studies.trials.episodes import EpisodeRow
 from nested_agents.studies.trials.trial import Trial, TrialResult, trials_of
@@ -55,10 +55,8 @@ for stage in sys.argv[1:]:
     print(kilobytes["Rss"] / 1024, private / 1024)
 """
 
-COMMANDS = (
-    ["status", "DIR"], ["table", "DIR"], ["export", "DIR", "--overwrite"],
-    ["run", "DIR/study.toml", "--out", "DIR"],
-)  # fmt: skip
+RUN = ["run", "DIR/study.toml", "--out", "DIR"]
+COMMANDS = (["status", "DIR"], ["table", "DIR"], ["export", "DIR", "--overwrite"], RUN)
 WORKER = {"after": "after", "resident": "resident\n\\[MB]", "private": "private\n\\[MB]"}
 STUDY = {"command": "command", "s": "processor\n\\[s]", "peak": "greatest\n\\[MB]"}
 
@@ -109,18 +107,21 @@ def commands(directory: Path) -> list[Row]:
     """Return what each command takes."""
     rows: list[Row] = []
     for words in COMMANDS:
-        given = [word.replace("DIR", str(directory)) for word in words]
-        used = used_by(["-m", "nested_agents", *given], stderr=subprocess.DEVNULL)
+        used = used_by(_line(words, directory), stderr=subprocess.DEVNULL)
         spent = used.ru_utime + used.ru_stime
         rows.append({"command": words[0], "s": spent, "peak": round(used.ru_maxrss / 1024)})
     return rows
 
 
+def _line(words: list[str], directory: Path) -> list[str]:
+    return ["-m", "nested_agents", *(word.replace("DIR", str(directory)) for word in words)]
+
+
 def going_on(directory: Path) -> Row:
     """Return what `run` takes until it goes on with the trials that are left: here none."""
-    line = [sys.executable, "-m", "nested_agents", "run", str(directory / SPEC_FILE), "--out"]
+    line = [sys.executable, *_line(RUN, directory)]
     with subprocess.Popen(
-        [*line, str(directory)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
+        line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
     ) as process:
         assert process.stderr is not None
         assert "were run before" in process.stderr.readline()

@@ -88,16 +88,18 @@ class Listed:
 
     def __init__(self, names: Sequence[str]) -> None:
         things = [found(STATE_VARIABLES, name) for name in names]
-        is_compiled = [name in COMPILED for name in names]
+        is_compiled = np.array([name in COMPILED for name in names], dtype=bool)
         self.variables = tuple(thing.variable for thing in things)
         self.common = tuple(thing.variable.name for thing in things if thing.common)
         self.functions = tuple(thing for thing, c in zip(things, is_compiled, strict=True) if not c)
-        self._things, self._is_compiled = things, is_compiled
+        self._things, self._trusted = things, is_compiled.tolist()
+        # The columns of what is compiled, and of functions of users.
+        self._compiled, self._own = np.flatnonzero(is_compiled), np.flatnonzero(~is_compiled)
         self._columns = Columns([name for name in names if name in COMPILED])
 
     def sensed(self, view: View, robots: Sequence[int]) -> FloatArray:
         """Return the shared blocks ``(k, m, variables)`` of robots, by the functions alone."""
-        return sensed(self._things, self._is_compiled, view, robots)
+        return sensed(self._things, self._trusted, view, robots)
 
     def predicted(self, view: View, robots: Sequence[int]) -> FloatArray:
         """Return the shared blocks ``(k, m, variables)`` of robots, compiled where it can be."""
@@ -105,10 +107,11 @@ class Listed:
         if not self.functions:
             return compiled
         blocks = np.empty((len(robots), len(view.box), len(self._things)))
-        blocks[:, :, np.flatnonzero(self._is_compiled)] = compiled
-        columns, guarded = np.flatnonzero(np.logical_not(self._is_compiled)), view.guarded()
+        blocks[:, :, self._compiled] = compiled
+        guarded = view.guarded()
+        # Every robot is asked, so that `check` finds what is wrongly called common.
         for block, robot in zip(blocks, robots, strict=True):
-            for column, function in zip(columns, self.functions, strict=True):
+            for column, function in zip(self._own, self.functions, strict=True):
                 block[:, column] = function.checked(guarded, robot)
         return blocks
 
