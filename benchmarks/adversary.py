@@ -38,7 +38,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from pathlib import Path
 
 from nested_agents.scenarios.box_pushing.world.boxes import BoxSpec
-from nested_agents.studies import run as studies_run
+from nested_agents.studies.api import run_study as studies_run
 from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli.main import main as command_line
 from nested_agents.studies.spec.errors import SpecError

@@ -13,8 +13,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from nested_agents.core.arrays import FloatArray, IntArray
 from nested_agents.core.learners.td import TDLambda
+from nested_agents.core.numerics.arrays import FloatArray, IntArray
 
 from .situations import Situation
 

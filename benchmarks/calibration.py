@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from nested_agents.core.calibration import CalibrationSettings
+from nested_agents.core.adaptation.calibration import CalibrationSettings
+from nested_agents.core.adaptation.self_model import SelfModelSettings
+from nested_agents.core.agents.loop import policy_seed, world_seed
+from nested_agents.core.agents.team import Team
 from nested_agents.core.learners.batch import BatchTDSettings
-from nested_agents.core.loop import policy_seed, world_seed
-from nested_agents.core.self_model import SelfModelSettings
-from nested_agents.core.team import Team
 from nested_agents.scenarios import BoxPushing, BoxPushingSettings
 from nested_agents.topologies import build, parse
 

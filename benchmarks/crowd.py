@@ -10,11 +10,11 @@ import argparse
 from itertools import pairwise
 from pathlib import Path
 
-from nested_agents.core.decision import Decision
-from nested_agents.core.hierarchy import Hierarchy
+from nested_agents.core.agents.loop import control_loop, policy_seed, world_seed
+from nested_agents.core.agents.team import Team
+from nested_agents.core.decision.settings import Decision
+from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.learners.td import TDLambdaSettings
-from nested_agents.core.loop import control_loop, policy_seed, world_seed
-from nested_agents.core.team import Team
 from nested_agents.scenarios import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.pictures.rendering import snapshot
 from nested_agents.studies.trials.episodes import EpisodeRecorder, Stopwatch

@@ -16,8 +16,8 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
-from nested_agents.core.loop import world_seed
-from nested_agents.core.team import of_fuzzy_agents
+from nested_agents.core.agents.loop import world_seed
+from nested_agents.core.agents.team import of_fuzzy_agents
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import Session
 from nested_agents.studies.trials.trial import trials_of

@@ -23,8 +23,9 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
-from nested_agents.core.arrays import FloatArray
-from nested_agents.core.decision import Decision
+from nested_agents.core.agents.loop import control_loop, policy_seed
+from nested_agents.core.agents.team import Team
+from nested_agents.core.decision.settings import Decision
 from nested_agents.core.evaluators.additive import Extremes, Moments
 from nested_agents.core.evaluators.evaluator import (
     DecisionProblem,
@@ -34,10 +35,9 @@ from nested_agents.core.evaluators.evaluator import (
 )
 from nested_agents.core.evaluators.exact import ExactEnumeration
 from nested_agents.core.evaluators.sampling import Sampling, SamplingSettings
-from nested_agents.core.hierarchy import Hierarchy
+from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.learners.batch import BatchTDSettings
-from nested_agents.core.loop import control_loop, policy_seed
-from nested_agents.core.team import Team
+from nested_agents.core.numerics.arrays import FloatArray
 from nested_agents.scenarios import BoxPushingSettings
 
 from .situations import ADDITIVE, situation

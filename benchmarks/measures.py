@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from nested_agents.core.arrays import FloatArray
+from nested_agents.core.numerics.arrays import FloatArray
 
 from .baselines import Baselines
 from .situations import ADDITIVE, COMPACT, DENSE, Situation, situation
@@ -143,7 +143,7 @@ def import_seconds(repeats: int = 3) -> Row:
     for name, statement in {
         "interpreter": "pass",
         "nested_agents": "import nested_agents",
-        "core.team": "import nested_agents.core.team",
+        "core.team": "import nested_agents.core.agents.team",
         "studies.cli": "import nested_agents.studies.cli.main",
     }.items():
         taken = []

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from nested_agents.core.arrays import FloatArray, IntArray
-from nested_agents.core.hierarchy import Hierarchy
+from nested_agents.core.agents.team import Team
+from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.core.interface.protocols import Prediction
 from nested_agents.core.learners import LEARNERS
 from nested_agents.core.learners.td import TDLambda
-from nested_agents.core.protocols import Prediction
-from nested_agents.core.team import Team
+from nested_agents.core.numerics.arrays import FloatArray, IntArray
 from nested_agents.scenarios import BoxPushing, BoxPushingSettings
 
 SETTLING = 12

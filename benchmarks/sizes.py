@@ -19,7 +19,7 @@ from rich.table import Table
 from nested_agents.scenarios import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.config import BoxSettings
 from nested_agents.scenarios.box_pushing.scripted.controller import decisions_to_goal
-from nested_agents.studies.analysis.statistics import rate
+from nested_agents.studies.results.statistics import rate
 
 STARTS = ("easy", "medium")
 SIZES = (2, 4, 8, 16, 32, 64)

@@ -15,12 +15,12 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from nested_agents.core.arrays import FloatArray
-from nested_agents.core.loop import world_seed
+from nested_agents.core.agents.loop import world_seed
+from nested_agents.core.numerics.arrays import FloatArray
 from nested_agents.scenarios import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.states.view import wrap
-from nested_agents.studies.analysis import published
 from nested_agents.studies.claims import claims
+from nested_agents.studies.results import published
 from nested_agents.studies.trials.session import EVALUATION_WORLDS
 
 EDGES = (0.0, 10.0, 15.0, 20.0, 30.0, 50.0)

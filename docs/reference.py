@@ -11,16 +11,16 @@ from pathlib import Path
 import click
 
 import nested_agents
-from nested_agents.core.protocols import Measure
+from nested_agents.core.interface.protocols import Measure
 from nested_agents.scenarios import SCENARIOS
 from nested_agents.scenarios.box_pushing.states.variables import STATE_VARIABLES
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
 from nested_agents.scenarios.kinematic_chain.variables import CHAIN_VARIABLES
-from nested_agents.studies.analysis.numbers import NUMBERS
 from nested_agents.studies.api.frames import EPISODE_COLUMNS, TRIAL_COLUMNS
 from nested_agents.studies.cli.main import COMMANDS
 from nested_agents.studies.cli.main import nested_agents as program
+from nested_agents.studies.results.numbers import NUMBERS
 from nested_agents.studies.spec.keys import tables
 from nested_agents.studies.spec.presets import PRESETS
 from nested_agents.studies.spec.toml import dumps
@@ -54,24 +54,23 @@ VARIABLES = {"box-pushing": STATE_VARIABLES, "kinematic-chain": CHAIN_VARIABLES}
 """State variables by the scenario that has them."""
 MODULES = {
     "core": ("How agents perceive, predict, decide and learn, and what that costs.", (
-        "hierarchy", "spaces", "protocols", "team", "rows", "mirror", "loop", "decision",
-        "exploration",
-        "rules.fuzzy", "rules.rule_base", "rules.settings",
+        "interface.hierarchy", "interface.spaces", "interface.protocols", "agents.team",
+        "agents.rows", "adaptation.mirror", "agents.loop", "decision.settings",
+        "decision.exploration", "rules.fuzzy", "rules.rule_base", "rules.settings",
         "learners.learner", "learners.td", "learners.batch", "learners.anova",
-        "learners.gradient", "learners.optimistic", "learners.fmq",
-        "learners.sparse_cooperative", "learners.vdn", "learners.q_learning",
-        "learners.frozen",
-        "evaluators.evaluator", "evaluators.auto", "evaluators.exact", "evaluators.sampling",
-        "evaluators.additive", "evaluators.best_response", "evaluators.coordination",
-        "evaluators.cross_entropy",
-        "coordination.elimination", "coordination.max_plus",
-        "self_model", "calibration", "cost", "registry", "plugged", "settings", "acting",
-        "peers.settings", "peers.peer", "peers.seen", "peers.inputs",
+        "learners.gradient", "learners.optimistic", "learners.fmq", "learners.sparse_cooperative",
+        "learners.vdn", "learners.q_learning", "learners.frozen", "evaluators.evaluator",
+        "evaluators.auto", "evaluators.exact", "evaluators.sampling", "evaluators.additive",
+        "evaluators.best_response", "evaluators.coordination", "evaluators.cross_entropy",
+        "coordination.elimination", "coordination.max_plus", "adaptation.self_model",
+        "adaptation.calibration", "agents.cost", "plugins.registry", "plugins.plugged",
+        "plugins.settings", "interface.acting", "numerics.ties", "policies.settings", "policies.peer",
+        "policies.seen", "policies.inputs",
     )),
     "topologies": ("Who is above whom.", ("builders", "checks", "config", "drawing", "files")),
     "scenarios": ("Where agents act.", (
         "box_pushing.config", "box_pushing.scenario", "box_pushing.environments",
-        "box_pushing.batched.environments", "passing_down",
+        "box_pushing.batched.environments", "adapters.passing_down",
         "box_pushing.reward", "box_pushing.starts", "box_pushing.states.view",
         "box_pushing.states.variables", "box_pushing.states.state_spaces",
         "box_pushing.prediction.predictors", "box_pushing.world.boxes",
@@ -80,17 +79,17 @@ MODULES = {
         "box_pushing.options.points", "box_pushing.options.scenario",
         "kinematic_chain.config", "kinematic_chain.scenario",
         "kinematic_chain.view", "kinematic_chain.variables", "matrix_games.games",
-        "matrix_games.scenario", "line_up", "failures.settings", "failures.actuators",
-        "failures.carried", "failures.wrappers",
+        "matrix_games.scenario", "line_up", "faults.settings", "faults.actuators",
+        "faults.carried", "faults.wrappers",
         "state_variables", "checking.checker",
     )),
     "studies": ("What is measured, compared and drawn.", (
         "api.study", "api.planning", "api.costs", "api.comparison", "api.recovery", "api.frames",
-        "run",
+        "api.run_study",
         "spec.spec", "spec.errors", "spec.keys", "spec.presets", "trials.trial",
         "trials.arrangement", "trials.session",
-        "store.store", "analysis.results", "analysis.statistics", "analysis.comparison",
-        "analysis.power", "analysis.summary", "catalogue.study", "cost.cost", "claims.claims",
+        "store.store", "results.results", "results.statistics", "results.comparison",
+        "results.power", "results.summary", "catalogue.study", "cost.cost", "claims.claims",
         "course.grading",
     )),
 }  # fmt: skip

@@ -8,7 +8,7 @@ Operations of value iteration by Eq. 18 and 23 of the paper, in exact integers, 
 import matplotlib.pyplot as plt
 
 import nested_agents as na
-from nested_agents.core.cost import Problem, below_counts
+from nested_agents.core.agents.cost import Problem, below_counts
 
 problem = Problem(rules=5**7, actions=4, iterations=450)
 sizes = range(1, 11)

@@ -11,7 +11,7 @@ import networkx as nx
 import numpy as np
 
 import nested_agents as na
-from nested_agents.core.cost import below_counts
+from nested_agents.core.agents.cost import below_counts
 
 agents = na.BoxPushingSettings(robots=3).build().agents
 groups = [(0, 1), (2, 3), (4, 5)]

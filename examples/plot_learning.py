@@ -12,8 +12,8 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 
 from nested_agents import Spec
-from nested_agents.studies.analysis.results import read
-from nested_agents.studies.run import run_study
+from nested_agents.studies.api.run_study import run_study
+from nested_agents.studies.results.results import read
 
 spec = Spec.of(
     {

@@ -14,7 +14,7 @@ Examples
 ('0',)
 """
 
-from .scenarios.failures.actuators import (
+from .scenarios.faults.actuators import (
     ActuatorFault,
     Delayed,
     Free,
@@ -25,7 +25,7 @@ from .scenarios.failures.actuators import (
     Weak,
     draw_faults,
 )
-from .scenarios.failures.wrappers import FaultyEnv, FaultyParallelEnv
+from .scenarios.faults.wrappers import FaultyEnv, FaultyParallelEnv
 from .studies.api.recovery import RandomPolicy, RecoveryTable, recovery_table
 
 __all__ = [

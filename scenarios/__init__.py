@@ -13,8 +13,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ..core.plugged import SettingsRegistry
-from ..core.settings import ScenarioSettings
+from ..core.plugins.plugged import SettingsRegistry
+from ..core.plugins.settings import ScenarioSettings
 from .box_pushing.config import BoxPushingSettings
 
 if TYPE_CHECKING:

@@ -20,10 +20,10 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from ..core.arrays import FloatArray, IntArray
-from ..core.protocols import SUCCESS, Blocks, Measure, Transition
-from ..core.settings import ScenarioSettings
-from ..core.spaces import ActionSet, StateSpace, Variable
+from ..core.interface.protocols import SUCCESS, Blocks, Measure, Transition
+from ..core.interface.spaces import ActionSet, StateSpace, Variable
+from ..core.numerics.arrays import FloatArray, IntArray
+from ..core.plugins.settings import ScenarioSettings
 
 PERIOD = 0.25
 """One decision [s]."""
@@ -58,7 +58,7 @@ class LineUpSettings(ScenarioSettings):
 
 
 class LineUp:
-    """The line-up scenario; a `nested_agents.core.protocols.Scenario`.
+    """The line-up scenario; a `Scenario`.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ class LineUp:
 
 
 class LineUpPrediction:
-    """Exact prediction; a `nested_agents.core.protocols.Prediction`.
+    """Exact prediction; a `Prediction`.
 
     Parameters
     ----------

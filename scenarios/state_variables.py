@@ -15,9 +15,9 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 
-from ..core.arrays import FloatArray
-from ..core.registry import Registry
-from ..core.spaces import Variable
+from ..core.interface.spaces import Variable
+from ..core.numerics.arrays import FloatArray
+from ..core.plugins.registry import Registry
 
 
 class Situations(Protocol):
@@ -116,7 +116,7 @@ def state_variable(
 ) -> Callable[[StateFunction], StateVariable]:
     """Make a function of a view and a body a state variable of the function's name.
 
-    Parameters are those of `nested_agents.core.spaces.Variable`, and `common`: whether it is the
+    Parameters are those of `Variable`, and `common`: whether it is the
     same for all bodies, which makes sensing and decisions by the values of many agents faster. What
     the function is given is read-only. A variable that says what it is in the mirror image of the
     world, the ``same`` or of ``opposite`` sign, can be used with ``learner.mirrored``.

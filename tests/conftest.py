@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
-from nested_agents.core.protocols import Blocks, Transition
-from nested_agents.core.spaces import ActionSet, StateSpace, Variable
+from nested_agents.core.interface.protocols import Blocks, Transition
+from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 
 # The first example of a test may compile a kernel.
 settings.register_profile("no deadline", deadline=None)

@@ -21,8 +21,8 @@ ALLOWED = {
     "studies": {"studies", "core", "topologies", "scenarios"},
 }
 STUDIES = (
-    "spec", "trials", "store", "workers", "analysis", "presentation", "catalogue", "loggers", "run",
-    "claims", "cost", "explain", "report", "api", "course", "cli",
+    "spec", "trials", "store", "workers", "results", "presentation", "catalogue", "claims", "cost",
+    "explain", "report", "api", "course", "cli",
 )  # fmt: skip
 """The rooms of studies/, each of which may import those before it."""
 MAX_BYTES = 1_000_000

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..core.hierarchy import Hierarchy
+from ..core.interface.hierarchy import Hierarchy
 from .builders import from_networkx
 from .config import TOPOLOGIES, Topology, TopologySettings, hierarchy_of, parse
 

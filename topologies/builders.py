@@ -2,7 +2,7 @@
 
 An edge leads from a superior to its subordinate, and every agent is a node; an undirected graph
 joins neighbours. Agents are given in agent order; *groups* are the agents of one robot each. A
-graph becomes a `nested_agents.core.hierarchy.Hierarchy` in `nested_agents.topologies.build`.
+graph becomes a `Hierarchy` in `nested_agents.topologies.build`.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
-from ..core.deferred import Deferred
-from ..core.hierarchy import Hierarchy
+from ..core.interface.hierarchy import Hierarchy
+from ..core.plugins.deferred import Deferred
 from .checks import check_names, with_edges
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from ..core.deferred import Deferred
+from ..core.plugins.deferred import Deferred
 
 if TYPE_CHECKING:
     import networkx as nx

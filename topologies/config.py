@@ -13,15 +13,15 @@ import numpy as np
 from pydantic import Field
 from typing_extensions import TypeAliasType
 
-from ..core import sources
-from ..core.deferred import Deferred
-from ..core.hierarchy import Hierarchy
-from ..core.plugged import Plugged, SettingsRegistry
-from ..core.protocols import Scenario, groups_of
-from ..core.refusals import closest
-from ..core.robot_agents import per_robot
-from ..core.settings import Fraction, Settings, SettingsError, tuples
-from ..core.single_agent import SingleAgent
+from ..core.agents.robot_agents import per_robot
+from ..core.agents.single_agent import SingleAgent
+from ..core.interface.hierarchy import Hierarchy
+from ..core.interface.protocols import Scenario, groups_of
+from ..core.plugins import sources
+from ..core.plugins.deferred import Deferred
+from ..core.plugins.messages import closest
+from ..core.plugins.plugged import Plugged, SettingsRegistry
+from ..core.plugins.settings import Fraction, Settings, SettingsError, tuples
 from . import builders, files
 from .builders import from_networkx
 from .checks import check_names

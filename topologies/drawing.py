@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..core.arrays import FloatArray
-from ..core.deferred import Deferred
-from ..core.hierarchy import Hierarchy
+from ..core.interface.hierarchy import Hierarchy
+from ..core.numerics.arrays import FloatArray
+from ..core.plugins.deferred import Deferred
 
 if TYPE_CHECKING:
     import networkx as nx

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 from xml.etree import ElementTree
 
-from ..core import sources
-from ..core.deferred import Deferred
+from ..core.plugins import sources
+from ..core.plugins.deferred import Deferred
 from .checks import check_legible, shown, with_edges
 
 if TYPE_CHECKING:

@@ -11,9 +11,9 @@ from decimal import Decimal
 from pathlib import Path
 from typing import Any, Literal
 
-from ..core.cost import below_counts
-from ..core.hierarchy import Hierarchy
-from ..core.robot_agents import MOST_ACTIONS, robot_of
+from ..core.agents.cost import below_counts
+from ..core.agents.robot_agents import MOST_ACTIONS, robot_of
+from ..core.interface.hierarchy import Hierarchy
 from . import TOPOLOGIES, TopologySettings, build, builders, parse
 from .checks import check_legible
 from .config import (

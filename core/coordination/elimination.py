@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..arrays import FloatArray, IntArray
-from ..deferred import Deferred
+from ..numerics.arrays import FloatArray, IntArray
+from ..plugins.deferred import Deferred
 
 if TYPE_CHECKING:
     import networkx as nx

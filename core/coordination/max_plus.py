@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..arrays import FloatArray, IntArray
-from ..deferred import Deferred
+from ..numerics.arrays import FloatArray, IntArray
+from ..plugins.deferred import Deferred
 from .elimination import Scope
 
 if TYPE_CHECKING:

@@ -1,6 +1,6 @@
 """Evaluators for many agents: the agents below enter through the sum of what their groups do.
 
-Both need a prediction that can be had to first order (`nested_agents.core.protocols.Superposition`)
+Both need a prediction that can be had to first order (`Superposition`)
 and value by f alone. Their cost per agent is linear in the number of groups. The own group is
 enumerated; for the other groups
 
@@ -20,8 +20,8 @@ from typing import Literal, cast
 
 import numpy as np
 
-from ..arrays import FloatArray
-from ..protocols import SummedPrediction
+from ..interface.protocols import SummedPrediction
+from ..numerics.arrays import FloatArray
 from .evaluator import Aggregation, DecisionProblem, Deliberation, EvaluatorSettings, Teammates
 from .grouping import Grouping
 

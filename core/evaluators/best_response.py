@@ -21,9 +21,9 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ..arrays import FloatArray, IntArray
-from ..exploration import greatest
-from ..protocols import Prediction
+from ..interface.protocols import Prediction
+from ..numerics.arrays import FloatArray, IntArray
+from ..numerics.ties import greatest
 from .evaluator import (
     Aggregation,
     DecisionProblem,

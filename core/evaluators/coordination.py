@@ -17,10 +17,10 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from ..arrays import FloatArray, IntArray
 from ..coordination.elimination import Elimination, Scope
 from ..coordination.max_plus import MaxPlus
-from ..protocols import Prediction
+from ..interface.protocols import Prediction
+from ..numerics.arrays import FloatArray, IntArray
 from .evaluator import Aggregation, DecisionProblem, Deliberation, EvaluatorSettings, combinations
 
 FIRST = 1e-9

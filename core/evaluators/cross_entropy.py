@@ -15,8 +15,8 @@ from typing import Annotated, Literal, cast
 import numpy as np
 from pydantic import Field
 
-from ..arrays import FloatArray, IntArray
-from ..protocols import ContinuedPrediction, Prediction
+from ..interface.protocols import ContinuedPrediction, Prediction
+from ..numerics.arrays import FloatArray, IntArray
 from .evaluator import Aggregation, DecisionProblem, Deliberation, EvaluatorSettings
 
 NAME = "cross-entropy"
@@ -52,7 +52,7 @@ class CrossEntropy(Aggregation):
     """
 
     continues = True
-    """It needs a `nested_agents.core.protocols.ContinuedPrediction`."""
+    """It needs a `ContinuedPrediction`."""
 
     def __init__(self, settings: CrossEntropySettings, problem: DecisionProblem) -> None:
         super().__init__(problem)

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol, cast
 
 import numpy as np
 
-from ..arrays import FloatArray, IntArray
-from ..hierarchy import Hierarchy
-from ..protocols import Prediction, RewardPrediction
-from ..settings import Settings
+from ..interface.hierarchy import Hierarchy
+from ..interface.protocols import Prediction, RewardPrediction
+from ..numerics.arrays import FloatArray, IntArray
+from ..plugins.settings import Settings
 from .pooled import Pooled, Pooling
 
 if TYPE_CHECKING:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Literal, cast
 
 import numpy as np
 
-from ..arrays import FloatArray, IntArray
-from ..protocols import TabulatedPrediction
+from ..interface.protocols import TabulatedPrediction
+from ..numerics.arrays import FloatArray, IntArray
 from .evaluator import (
     Aggregation,
     DecisionProblem,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import FloatArray, IntArray
-from ..hierarchy import Hierarchy
+from ..interface.hierarchy import Hierarchy
+from ..numerics.arrays import FloatArray, IntArray
 from .evaluator import Teammates
 
 

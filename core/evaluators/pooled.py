@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..arrays import FloatArray, IntArray
-from ..protocols import Prediction, states_by_group
+from ..interface.protocols import Prediction, states_by_group
+from ..numerics.arrays import FloatArray, IntArray
 
 if TYPE_CHECKING:
     from ..rules.rule_base import RuleBase

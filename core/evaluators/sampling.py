@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from ..arrays import FloatArray
+from ..numerics.arrays import FloatArray
 from .evaluator import (
     Aggregation,
     DecisionProblem,

@@ -6,10 +6,10 @@ and is not learned from. A terminal state counts as entered again for ever: its 
 R(s) / (1 - discount). Siblings differ where their mathematics differs.
 """
 
-from ..plugged import SettingsRegistry
+from ..plugins.plugged import SettingsRegistry
 from .learner import LearnerSettings, TeamSettings
 
-PEERS = f"{__name__.rpartition('.')[0]}.peers.settings"
+PEERS = f"{__name__.rpartition('.')[0]}.policies.settings"
 
 LEARNERS = SettingsRegistry(
     "learner",

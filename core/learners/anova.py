@@ -34,8 +34,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from ..arrays import FloatArray, IntArray
-from ..settings import Fraction
+from ..numerics.arrays import FloatArray, IntArray
+from ..plugins.settings import Fraction
 from .batch import REWARD_SCALE, Replay, ReplaySettings
 
 if TYPE_CHECKING:

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from ..arrays import FloatArray, IntArray
-from ..settings import Fraction, Positive
+from ..numerics.arrays import FloatArray, IntArray
+from ..plugins.settings import Fraction, Positive
 from .learner import LearnerSettings
 
 if TYPE_CHECKING:

@@ -16,8 +16,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..arrays import FloatArray, IntArray
-from ..compiling import njit
+from ..numerics.arrays import FloatArray, IntArray
+from ..numerics.compiling import njit
 
 
 class Dictionary:

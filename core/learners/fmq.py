@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from ..arrays import FloatArray, IntArray
-from ..settings import NonNegative, Positive
+from ..numerics.arrays import FloatArray, IntArray
+from ..plugins.settings import NonNegative, Positive
 from .learner import LearnerSettings
 from .online import OneStep
 

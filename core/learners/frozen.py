@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from ..arrays import FloatArray, IntArray
+from ..numerics.arrays import FloatArray, IntArray
 from .learner import LearnerSettings
 
 if TYPE_CHECKING:

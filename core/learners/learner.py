@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol, runtime_che
 
 from pydantic import Field
 
-from ..arrays import FloatArray, IntArray
-from ..calibration import CalibrationSettings
-from ..decision import Decision
-from ..exploration import EXPLORATIONS, BurstExploration, ExplorationSettings
-from ..plugged import Plugged
+from ..adaptation.calibration import CalibrationSettings
+from ..adaptation.self_model import SelfModelSettings
+from ..decision.exploration import EXPLORATIONS, BurstExploration, ExplorationSettings
+from ..decision.settings import Decision
+from ..numerics.arrays import FloatArray, IntArray
+from ..plugins.plugged import Plugged
+from ..plugins.settings import Settings
 from ..rules.settings import RuleBaseSettings
-from ..self_model import SelfModelSettings
-from ..settings import Settings
 
 if TYPE_CHECKING:
     from ..rules.rule_base import RuleBase
@@ -81,8 +81,8 @@ class SuccessorLearner(Protocol):
 class TeamSettings(Settings):
     """What stands in the ``[learner]`` table of a spec: how those who act learn.
 
-    `LearnerSettings` are of a hierarchy of fuzzy agents, which `nested_agents.core.team` builds;
-    those of whoever acts for all by itself are built as they are, see `nested_agents.core.peers`.
+    `LearnerSettings` are of a hierarchy of fuzzy agents, built by `core.agents.team`; those of
+    whoever acts for all by itself are built as they are, see `core.policies`.
     """
 
     kind: str = ""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from ..arrays import FloatArray, IntArray
+from ..numerics.arrays import FloatArray, IntArray
 
 if TYPE_CHECKING:
     from ..rules.rule_base import RuleBase

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from ..arrays import FloatArray, IntArray
-from ..settings import Fraction, Positive
+from ..numerics.arrays import FloatArray, IntArray
+from ..plugins.settings import Fraction, Positive
 from .learner import LearnerSettings
 from .online import OneStep
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal
 
-from ..arrays import FloatArray, IntArray
-from ..settings import Positive
+from ..numerics.arrays import FloatArray, IntArray
+from ..plugins.settings import Positive
 from .learner import LearnerSettings
 from .online import OfASum
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from ..arrays import FloatArray, IntArray
-from ..settings import Positive
+from ..numerics.arrays import FloatArray, IntArray
+from ..plugins.settings import Positive
 from .learner import LearnerSettings
 from .online import OfASum
 

@@ -22,8 +22,8 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from ..arrays import FloatArray
-from ..spaces import Variable
+from ..interface.spaces import Variable
+from ..numerics.arrays import FloatArray
 
 Membership = Literal["triangular", "sigmoid"]
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import FloatArray, IntArray
-from ..protocols import Blocks
+from ..interface.protocols import Blocks
+from ..numerics.arrays import FloatArray, IntArray
 from .rule_base import RuleBase
 
 

@@ -20,9 +20,9 @@ from typing import Literal
 
 import numpy as np
 
-from ..arrays import FloatArray, IntArray
-from ..protocols import Blocks
-from ..spaces import StateSpace
+from ..interface.protocols import Blocks
+from ..interface.spaces import StateSpace
+from ..numerics.arrays import FloatArray, IntArray
 from . import kernels
 from .fuzzy import Partition
 from .settings import RuleBaseSettings
@@ -41,7 +41,7 @@ class RuleBase:
     terms
         Index tuples into the variables, each increasing, all distinct.
     n_own
-        How many leading variables form the own block (see `nested_agents.core.spaces`).
+        How many leading variables form the own block (see `nested_agents.core.interface.spaces`).
     dtype
         Type of the consequent weights that learners keep; states are double precision always.
     common

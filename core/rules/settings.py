@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from ..settings import Positive, Settings
+from ..plugins.settings import Positive, Settings
 
 
 class RuleBaseSettings(Settings):

@@ -18,7 +18,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 
 import nested_agents as na
-from nested_agents.core.cost import Problem, below_counts
+from nested_agents.core.agents.cost import Problem, below_counts
 from nested_agents.studies.presentation.figures import COLOURS, STYLES
 
 TOPOLOGIES = {"chain": "chain", "binary tree": "tree:2", "line of neighbours": "coordination-graph"}

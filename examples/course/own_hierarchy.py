@@ -17,7 +17,7 @@ the chain of the paper, and against agents who see nobody.
 import matplotlib.pyplot as plt
 
 import nested_agents as na
-from nested_agents.core.cost import Problem, below_counts
+from nested_agents.core.agents.cost import Problem, below_counts
 from nested_agents.studies.presentation.figures import COLOURS
 
 agents = na.BoxPushingSettings(robots=2).build().agents

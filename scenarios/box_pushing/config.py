@@ -13,8 +13,8 @@ from pydantic import (
     model_validator,
 )
 
-from ...core.settings import NonNegative, Positive, ScenarioSettings, Settings
-from ..failures.settings import (
+from ...core.plugins.settings import NonNegative, Positive, ScenarioSettings, Settings
+from ..faults.settings import (
     Delayed,
     FailureSettings,
     Free,

@@ -23,8 +23,8 @@ import numpy as np
 from gymnasium.spaces import Box, Discrete, MultiDiscrete
 from pettingzoo import ParallelEnv
 
-from ...core.arrays import FloatArray, IntArray
-from ...core.protocols import Transition
+from ...core.interface.protocols import Transition
+from ...core.numerics.arrays import FloatArray, IntArray
 from .config import BoxPushingSettings
 from .pictures.screen import Screen
 from .scenario import BoxPushing

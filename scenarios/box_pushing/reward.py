@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.arrays import BoolArray, FloatArray
+from ...core.numerics.arrays import BoolArray, FloatArray
 from .config import RewardSettings
 
 

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from ...core.arrays import BoolArray, FloatArray, IntArray
-from ...core.protocols import SUCCESS, Measure, Transition
-from ...core.spaces import ActionSet, StateSpace
+from ...core.interface.protocols import SUCCESS, Measure, Transition
+from ...core.interface.spaces import ActionSet, StateSpace
+from ...core.numerics.arrays import BoolArray, FloatArray, IntArray
 from .config import CONTROL_PERIOD, BeliefSettings, BoxPushingSettings
 from .prediction.belief import APART, CONSTANTS, PushBelief, least_gap
 from .prediction.prediction import BoxPrediction, mean_twists
@@ -58,7 +58,7 @@ speed, whether it was there once the robots had stopped, ..."""
 class BoxPushing:
     """A box, a goal, and robots whose wheels are the agents.
 
-    Fulfils `nested_agents.core.protocols.Scenario`, and can be drawn, calibrated and predicted
+    Fulfils `Scenario`, and can be drawn, calibrated and predicted
     exactly.
 
     Parameters

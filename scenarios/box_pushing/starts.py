@@ -14,7 +14,7 @@ from math import cos, pi, radians, sin
 
 import numpy as np
 
-from ...core.arrays import FloatArray
+from ...core.numerics.arrays import FloatArray
 from .world.boxes import BoxSpec
 from .world.geometry import surface
 from .world.robots import RobotSpec

@@ -21,14 +21,14 @@ from typing import Any
 
 import numpy as np
 
-from ...core.arrays import IntArray
-from ...core.protocols import (
+from ...core.interface.protocols import (
     ExactlyPredictedScenario,
     RecordedScenario,
     Scenario,
     groups_of,
     roles_of,
 )
+from ...core.numerics.arrays import IntArray
 from .frames import (
     FIELDS,
     Frame,

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ...core.arrays import IntArray
-from ...core.loop import world_seed
-from ...core.protocols import MeasuredScenario, RewardPrediction, Scenario, Transition
+from ...core.agents.loop import world_seed
+from ...core.interface.protocols import MeasuredScenario, RewardPrediction, Scenario, Transition
+from ...core.numerics.arrays import IntArray
 
 Frame = dict[str, Any]
 """What one step gave, by dotted name; without the measured times."""

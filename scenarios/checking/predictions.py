@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.arrays import FloatArray, IntArray
-from ...core.protocols import (
+from ...core.interface.protocols import (
     Blocks,
     GroupPrediction,
     RewardPrediction,
@@ -22,6 +21,7 @@ from ...core.protocols import (
     groups_of,
     states_by_group,
 )
+from ...core.numerics.arrays import FloatArray, IntArray
 
 MOST_JOINT_ACTIONS = 4**8
 """Joint actions beyond which no tables are asked for: they might not fit into memory."""

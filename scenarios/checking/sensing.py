@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...core.arrays import FloatArray, IntArray
-from ...core.loop import world_seed
-from ...core.protocols import Scenario
+from ...core.agents.loop import world_seed
+from ...core.interface.protocols import Scenario
+from ...core.numerics.arrays import FloatArray, IntArray
 from .frames import at
 from .predictions import apart
 

@@ -7,8 +7,8 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, field_validator
 
-from ...core.settings import NonNegative, Positive, ScenarioSettings, Settings
-from ..failures.settings import FailureSettings, Names, Reversed, Seized, Stuck, Weak
+from ...core.plugins.settings import NonNegative, Positive, ScenarioSettings, Settings
+from ..faults.settings import FailureSettings, Names, Reversed, Seized, Stuck, Weak
 from ..state_variables import referred
 
 PERIOD = 0.1

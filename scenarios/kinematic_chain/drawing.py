@@ -20,7 +20,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from ...core.arrays import FloatArray
+from ...core.numerics.arrays import FloatArray
 from ..movies import Pixels, film
 from .kinematics import postures_of
 

@@ -6,7 +6,7 @@ from math import pi
 
 import numpy as np
 
-from ...core.compiling import njit
+from ...core.numerics.compiling import njit
 
 COMPILED = ("bearing", "distance", "approach", "angle", "lever", "excess")
 """The built-in variables; a row of -1 is the joint's speed."""

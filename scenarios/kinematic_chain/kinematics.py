@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...core.compiling import njit
+from ...core.numerics.compiling import njit
 
 
 @njit(cache=True)

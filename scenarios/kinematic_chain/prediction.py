@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...core.arrays import FloatArray, IntArray
+from ...core.numerics.arrays import FloatArray, IntArray
 from .kinematics import ends_of, postures_of, turned_about
 from .variables import ChainStates
 from .view import ChainView
@@ -43,7 +43,7 @@ class Premises:
 
 
 class ChainPrediction:
-    """Prediction of one decision; a `nested_agents.core.protocols.TeamPrediction` and more.
+    """Prediction of one decision; a `TeamPrediction` and more.
 
     It knows rewards, can be had as sums, and serves self-models, every joint being a body.
 
@@ -132,7 +132,7 @@ class ChainPrediction:
 
 
 class ChainSuperposition:
-    """A `nested_agents.core.protocols.Superposition` of the kinematic chain.
+    """A `Superposition` of the kinematic chain.
 
     The sum is how far the tip moves away from the mean posture. Of those joints whose actions are
     known, and of the deciding one, kinematics are exact: only what may yet be decided adds up.

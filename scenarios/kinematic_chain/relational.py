@@ -10,7 +10,7 @@ from math import pi
 
 import numpy as np
 
-from ...core.arrays import FloatArray
+from ...core.numerics.arrays import FloatArray
 from ..state_variables import state_variable
 from .view import ChainView
 

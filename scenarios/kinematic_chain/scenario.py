@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from ...core.arrays import BoolArray, FloatArray, IntArray
-from ...core.protocols import SUCCESS, Measure, Transition
-from ...core.spaces import ActionSet, StateSpace
-from ..failures.schedule import Failures
+from ...core.interface.protocols import SUCCESS, Measure, Transition
+from ...core.interface.spaces import ActionSet, StateSpace
+from ...core.numerics.arrays import BoolArray, FloatArray, IntArray
+from ..faults.schedule import Failures
 from .config import PERIOD, REACH, KinematicChainSettings
 from .kinematics import postures_of
 from .prediction import ChainPrediction, Premises
@@ -39,7 +39,7 @@ MOST_BEND = 2.5
 
 
 class KinematicChain:
-    """A planar arm; a `nested_agents.core.protocols.Scenario` that can be drawn.
+    """A planar arm; a `Scenario` that can be drawn.
 
     It is predicted exactly and as sums, and open to self-models.
 

@@ -25,9 +25,9 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from ...core.arrays import FloatArray, IntArray
 from ...core.evaluators import EvaluatorSettings
 from ...core.evaluators.evaluator import Counts, DecisionProblem, Deliberation
+from ...core.numerics.arrays import FloatArray, IntArray
 from .kinematics import ends_of, jacobian_of
 from .prediction import ChainPrediction
 

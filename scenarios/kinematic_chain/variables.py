@@ -17,9 +17,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...core.arrays import FloatArray
-from ...core.registry import Registry
-from ...core.spaces import StateSpace, Variable
+from ...core.interface.spaces import StateSpace, Variable
+from ...core.numerics.arrays import FloatArray
+from ...core.plugins.registry import Registry
 from ..state_variables import found, sensed
 from .kernels import COMPILED, columns
 from .view import ChainView

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...core.arrays import FloatArray
+from ...core.numerics.arrays import FloatArray
 
 
 @dataclass(frozen=True)

@@ -24,8 +24,8 @@ from math import isfinite
 
 import numpy as np
 
-from ...core.arrays import FloatArray
-from ...core.refusals import closest
+from ...core.numerics.arrays import FloatArray
+from ...core.plugins.messages import closest
 
 CLIMBING = ((11, -30, 0), (-30, 7, 6), (0, 0, 5))
 PARTIALLY_STOCHASTIC = ((11, -30, 0), (-30, (14, 0), 6), (0, 0, 5))

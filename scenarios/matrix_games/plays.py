@@ -1,7 +1,7 @@
 """An episode of a matrix game in one compiled loop, thousands of plays in a few milliseconds.
 
 A play is a few table look-ups and a random number; in the control loop nearly all of its time goes
-into passing it from part to part. `run` does the same as `nested_agents.core.loop.control_loop`, by
+into passing it from part to part. `run` does the same as `control_loop`, by
 the same random numbers in the same order, for teams made of parts that it knows; the control loop
 is the reference that it is tested against.
 
@@ -16,15 +16,15 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from ...core.arrays import FloatArray, IntArray
+from ...core.agents.loop import EpisodeSummary
+from ...core.agents.team import Team
+from ...core.decision.exploration import Boltzmann, EpsilonDecreasingBoltzmann
 from ...core.evaluators.exact import ExactEnumeration
-from ...core.exploration import Boltzmann, EpsilonDecreasingBoltzmann
 from ...core.learners.fmq import FMQ
 from ...core.learners.frozen import Frozen
 from ...core.learners.optimistic import OptimisticTD
 from ...core.learners.td import TDLambda
-from ...core.loop import EpisodeSummary
-from ...core.team import Team
+from ...core.numerics.arrays import FloatArray, IntArray
 from .kernel import DECREASING, GREEDY, SAMPLED, Deciding, Exploring, Learning, play
 
 TEAMMATES = ("best-response", "uniform", "empirical", "conditional")

@@ -15,12 +15,12 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import AfterValidator, Field
 
-from ...core.arrays import FloatArray, IntArray
-from ...core.loop import EpisodeSummary
-from ...core.protocols import SUCCESS, Measure, Transition
-from ...core.settings import ScenarioSettings
-from ...core.spaces import ActionSet, StateSpace, Variable
-from ...core.team import Team
+from ...core.agents.loop import EpisodeSummary
+from ...core.agents.team import Team
+from ...core.interface.protocols import SUCCESS, Measure, Transition
+from ...core.interface.spaces import ActionSet, StateSpace, Variable
+from ...core.numerics.arrays import FloatArray, IntArray
+from ...core.plugins.settings import ScenarioSettings
 from .games import of_two, optimal, payoffs_of
 
 MOST_ACTIONS = 26
@@ -63,7 +63,7 @@ class MatrixGameSettings(ScenarioSettings):
 
 
 class MatrixGame:
-    """A matrix game; a `nested_agents.core.protocols.Scenario`.
+    """A matrix game; a `Scenario`.
 
     Parameters
     ----------
@@ -141,7 +141,7 @@ class MatrixGame:
     def run_episode(
         self, team: Team, seed: np.random.SeedSequence, episode: int, steps: int, *, learn: bool
     ) -> EpisodeSummary | None:
-        """Run an episode at once, see `nested_agents.core.loop.EpisodicScenario`."""
+        """Run an episode at once, see `nested_agents.core.agents.loop.EpisodicScenario`."""
         from .plays import parts_of, run  # the kernel takes its time to load
 
         parts = parts_of(self, team, learn=learn)
@@ -157,7 +157,7 @@ class MatrixGame:
 
 
 class MatrixGamePrediction:
-    """What joint actions lead to; a `nested_agents.core.protocols.RewardPrediction`."""
+    """What joint actions lead to; a `RewardPrediction`."""
 
     def __init__(self, game: MatrixGame) -> None:
         self._game = game

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from html import escape
 
-from ..analysis.comparison import Difference
-from ..analysis.contrasts import Contrasts
 from ..presentation.tables import SummaryTable, tabulate
+from ..results.comparison import Difference
+from ..results.contrasts import Contrasts
 
 
 @dataclass(frozen=True)

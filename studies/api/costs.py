@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
 
-from ...core.cost import Problem
+from ...core.agents.cost import Problem
 from ..cost.cost import PAPER, CostRow, cost_rows
 from ..cost.table import written
 

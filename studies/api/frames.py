@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ...core.protocols import Measure
-from ..analysis.numbers import NUMBERS
+from ...core.interface.protocols import Measure
+from ..results.numbers import NUMBERS
 from ..spec.errors import SpecError
 from ..store.reading import NamesAndRows
 from ..store.store import Store

@@ -17,11 +17,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...core.deferred import Deferred
-from ..analysis.power import SMALLEST, USUAL_DEVIATION, detectable, seeds_for
-from ..analysis.verdicts import WIDTH, power_text
+from ...core.plugins.deferred import Deferred
 from ..catalogue.study import load_study
 from ..presentation.words import count, duration
+from ..results.power import SMALLEST, USUAL_DEVIATION, detectable, seeds_for
+from ..results.verdicts import WIDTH, power_text
 from ..spec.errors import SpecError
 from ..spec.outline import Outline
 from ..spec.spec import Spec

@@ -19,12 +19,12 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from ...core.arrays import FloatArray
-from ...scenarios.failures.actuators import ActuatorFault
-from ...scenarios.failures.wrappers import FaultyEnv, FaultyParallelEnv
-from ..analysis.statistics import NOT_NEGATIVE, bootstrap, rate
-from ..analysis.summary import Summary
+from ...core.numerics.arrays import FloatArray
+from ...scenarios.faults.actuators import ActuatorFault
+from ...scenarios.faults.wrappers import FaultyEnv, FaultyParallelEnv
 from ..presentation.tables import SummaryTable, tabulate
+from ..results.statistics import NOT_NEGATIVE, bootstrap, rate
+from ..results.summary import Summary
 
 BLOCK = 5
 """Episodes that a level is measured over."""

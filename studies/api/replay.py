@@ -6,8 +6,8 @@ import base64
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...core.protocols import DrawnScenario
-from ...core.refusals import closest
+from ...core.interface.protocols import DrawnScenario
+from ...core.plugins.messages import closest
 from ..spec.errors import SpecError
 from ..store.store import Store
 

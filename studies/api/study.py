@@ -22,18 +22,18 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...core.refusals import closest
-from ...core.sources import Sources
-from ..analysis import published
-from ..analysis.contrasts import contrasts
-from ..analysis.power import SMALLEST, USUAL_DEVIATION
-from ..analysis.results import Results, read
-from ..analysis.selection import Where, selected, together
-from ..analysis.verdicts import power_text
+from ...core.plugins.messages import closest
+from ...core.plugins.sources import Sources
 from ..catalogue.study import analysed, load_study
 from ..presentation.progress import Terminal
 from ..presentation.tables import SummaryTable, tabulate
 from ..presentation.words import count
+from ..results import published
+from ..results.contrasts import contrasts
+from ..results.power import SMALLEST, USUAL_DEVIATION
+from ..results.results import Results, read
+from ..results.selection import Where, selected, together
+from ..results.verdicts import power_text
 from ..spec.errors import SpecError
 from ..spec.outline import Outline
 from ..store import durable
@@ -47,8 +47,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from pandas import DataFrame
 
-    from ..run import Observer
     from ..spec.spec import Spec
+    from .run_study import Observer
 
 Place = str | PathLike[str]
 """Of a directory or a file."""
@@ -308,11 +308,11 @@ def run(
         Where the study is kept; made if it does not exist. Every trial is kept the moment it
         finishes.
     jobs, backend, address, retry_failed, accept_code, loggers
-        As those of `nested_agents.studies.run.run_study`.
+        As those of `nested_agents.studies.api.run_study.run_study`.
     progress
         Whether to show how it goes.
     observer
-        Who is told how it goes instead, see `nested_agents.studies.run.Observer`.
+        Who is told how it goes instead, see `nested_agents.studies.api.run_study.Observer`.
 
     Warns
     -----
@@ -324,8 +324,8 @@ def run(
     SpecError
         If the study cannot be run or continued; one line says why.
     """
-    from ..run import Silent, run_study
     from ..spec.spec import Spec
+    from .run_study import Silent, run_study
 
     out = Path(out)
     spec = Spec.meant(spec, study=out)

@@ -1,6 +1,6 @@
 """What a study is: a measure of one trial, an analysis of all, and figures of the analysis.
 
-A study is a module, or a class, that offers these, and one line in `nested_agents.studies.STUDIES`
+A study is a module, or a class, that offers these, and one line in `STUDIES`
 or ``study = "mine.py:Mine"`` in a spec. It may also offer ``check(spec)``, which raises `SpecError`
 if the spec has not what it needs; and ``NUMBERS``, names of the numbers of whole trials that its
 analysis rests on, so that trials of other studies that lack them are refused.
@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
-from .. import STUDIES
-from ..analysis.results import Results
+from ..results.results import Results
 from ..spec.errors import SpecError
+from ..spec.studies import STUDIES
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -46,7 +46,7 @@ class Study(Protocol):
 
 
 def load_study(name: str) -> Study:
-    """Return the study of a name in `nested_agents.studies.STUDIES`, or of a user's file.
+    """Return the study of a name in `STUDIES`, or of a user's file.
 
     Raises
     ------

@@ -14,7 +14,7 @@ from typing import Literal, Protocol
 
 import numpy as np
 
-from ..analysis.results import Results
+from ..results.results import Results
 from . import measures as measured
 from .measures import Measured
 

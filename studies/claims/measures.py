@@ -11,13 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...core.cost import Problem
-from ..analysis.comparison import difference, paired, ratio
-from ..analysis.results import Results
-from ..analysis.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
+from ...core.agents.cost import Problem
 from ..catalogue.chain_order.analysis import analyse as analyse_orders
 from ..catalogue.shapes.analysis import least_ratio, ratios_of
 from ..catalogue.wheel_failure.analysis import courses_of
+from ..results.comparison import difference, paired, ratio
+from ..results.results import Results
+from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
 
 Compute = Callable[[Results], "Measured | None"]
 """Computes what a claim is about from the results of a study."""

@@ -13,7 +13,7 @@ from typing import Any
 
 import click
 
-from ...core.refusals import closest
+from ...core.plugins.messages import closest
 
 
 class Text(click.ParamType):

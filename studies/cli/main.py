@@ -15,7 +15,7 @@ from importlib import import_module
 
 import click
 
-from ...core.refusals import closest
+from ...core.plugins.messages import closest
 from ..spec.errors import SpecError
 from .arguments import complaint
 

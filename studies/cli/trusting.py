@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ...core import trust
+from ...core.plugins import trust
 from ..presentation.progress import say
 from ..store.store import Store
 

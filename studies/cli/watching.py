@@ -12,8 +12,8 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from ..analysis.results import Results, read
 from ..presentation.words import count, duration
+from ..results.results import Results, read
 from ..store.store import Store
 from ..workers.progress import Progress, progress
 

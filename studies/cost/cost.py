@@ -24,16 +24,16 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from ...core.cost import Problem, below_counts, is_chain
-from ...core.decision import Decision
-from ...core.deferred import Deferred
+from ...core.agents.cost import Problem, below_counts, is_chain
+from ...core.agents.loop import control_loop, policy_seed
+from ...core.agents.team import Team
+from ...core.decision.settings import Decision
 from ...core.evaluators.coordination import VariableEliminationSettings
 from ...core.evaluators.exact import ExactSettings
+from ...core.interface.protocols import Scenario
 from ...core.learners.td import TDLambdaSettings
-from ...core.loop import control_loop, policy_seed
-from ...core.protocols import Scenario
+from ...core.plugins.deferred import Deferred
 from ...core.rules.settings import RuleBaseSettings
-from ...core.team import Team
 from ...scenarios.line_up import LineUpSettings
 from ...topologies import build, parse
 from ...topologies.config import (
@@ -44,8 +44,8 @@ from ...topologies.config import (
     SingleAgentSettings,
 )
 from ...topologies.view import team_of
-from ..analysis.distributions import t_quantile
-from ..analysis.statistics import Estimate
+from ..results.distributions import t_quantile
+from ..results.statistics import Estimate
 
 if TYPE_CHECKING:
     from scipy import stats

@@ -14,8 +14,8 @@ from fractions import Fraction
 from typing import Any, Literal
 
 from ...topologies.view import aligned, readable
-from ..analysis.statistics import Estimate
 from ..presentation.csv_text import write_csv
+from ..results.statistics import Estimate
 from .cost import PAPER, RULES, CostRow, Measured, exponent, fitted
 
 Form = Literal["table", "json", "csv", "latex"]

@@ -9,7 +9,7 @@ from pathlib import Path
 from textwrap import fill
 from typing import Any, Literal
 
-from ...core.refusals import closest
+from ...core.plugins.messages import closest
 from ..spec.errors import SpecError, show
 from .labs import LABS, Lab
 

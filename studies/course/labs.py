@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ...core.cost import Problem, below_counts
+from ...core.agents.cost import Problem, below_counts
 from ...topologies import build
 from .questions import Choice, Edges, Number, Question
 

@@ -12,8 +12,8 @@ from typing import Any, Protocol
 
 import networkx as nx
 
-from ...core.cost import PAPER_ACTIONS, Problem, below_counts
-from ...core.hierarchy import Hierarchy
+from ...core.agents.cost import PAPER_ACTIONS, Problem, below_counts
+from ...core.interface.hierarchy import Hierarchy
 
 
 class Question(Protocol):

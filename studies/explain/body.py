@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...core.arrays import FloatArray
-from ...core.self_model import SelfModel
+from ...core.adaptation.self_model import SelfModel
+from ...core.numerics.arrays import FloatArray
 
 ROWS = (("ahead", "m/s"), ("left", "m/s"), ("turning", "rad/s"))
 """The rows of an effect, in units per m/s of wheel speed."""

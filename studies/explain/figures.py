@@ -14,7 +14,7 @@ from matplotlib.patches import Circle, PathPatch
 from matplotlib.path import Path as Outline
 from matplotlib.ticker import MultipleLocator
 
-from ...core.arrays import FloatArray
+from ...core.numerics.arrays import FloatArray
 from ...scenarios.box_pushing.config import BoxPushingSettings
 from ...scenarios.box_pushing.world.boxes import BoxSpec, box_for
 from ...scenarios.box_pushing.world.robots import robot_for

@@ -15,8 +15,8 @@ from math import radians
 import numpy as np
 from shapely.geometry import Point, Polygon
 
-from ...core.arrays import FloatArray
-from ...core.team import Team
+from ...core.agents.team import Team
+from ...core.numerics.arrays import FloatArray
 from ...scenarios.box_pushing.prediction.prediction import BoxPrediction
 from ...scenarios.box_pushing.prediction.situation import Situation
 from ...scenarios.box_pushing.scenario import BoxPushing

@@ -21,10 +21,10 @@ from math import degrees
 
 import numpy as np
 
-from ...core.arrays import FloatArray
+from ...core.interface.spaces import Variable
+from ...core.numerics.arrays import FloatArray
 from ...core.rules.fuzzy import Partition
 from ...core.rules.rule_base import RuleBase
-from ...core.spaces import Variable
 from .body import headed
 
 WORDS = {

@@ -16,12 +16,12 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import track
 
+from ...core.agents.team import Team, of_fuzzy_agents
+from ...core.interface.protocols import Scenario
+from ...core.interface.spaces import Variable
 from ...core.learners import LearnerSettings
-from ...core.protocols import Scenario
-from ...core.refusals import closest
+from ...core.plugins.messages import closest
 from ...core.rules.rule_base import RuleBase
-from ...core.spaces import Variable
-from ...core.team import Team, of_fuzzy_agents
 from ...scenarios.box_pushing.scenario import BoxPushing
 from ..spec.errors import SpecError
 from ..store.store import Store

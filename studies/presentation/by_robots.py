@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import NullLocator
 
-from ..analysis.statistics import Estimate
+from ..results.statistics import Estimate
 from .figures import COLOURS, MARKERS, STYLES
 
 APART = 0.06

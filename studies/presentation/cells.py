@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..analysis.statistics import Estimate
-from ..analysis.summary import between, two_figures
+from ..results.statistics import Estimate
+from ..results.summary import between, two_figures
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence, Set
 from pathlib import Path
 from typing import Any, Literal
 
-from ..analysis import published
-from ..analysis.results import read
+from ..results import published
+from ..results.results import read
 from ..spec.errors import SpecError
 from ..store.durable import replacing
 from ..store.reading import NamesAndRows
@@ -30,7 +30,7 @@ def export(store: Store, folder: Path, form: Form, *, overwrite: bool = False) -
         exist.
     form
         Of the files, and their suffix; JSON is the form of
-        `nested_agents.studies.analysis.published`.
+        `nested_agents.studies.results.published`.
     overwrite
         Whether files of these names may be replaced.
 

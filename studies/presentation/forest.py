@@ -11,8 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ..analysis.comparison import Difference
-from ..analysis.paired_tests import LEVEL
+from ..results.comparison import Difference
+from ..results.paired_tests import LEVEL
 from .figures import COLOURS, SETTINGS
 
 

@@ -26,7 +26,7 @@ def say(line: str) -> None:
 
 
 class Terminal:
-    """Shows how a study goes, see `nested_agents.studies.run.Observer`.
+    """Shows how a study goes, see `nested_agents.studies.api.run_study.Observer`.
 
     On standard error; in a notebook as a bar below the cell.
     """

@@ -9,9 +9,9 @@ from html import escape
 
 import numpy as np
 
-from ...core.refusals import near
-from ..analysis.statistics import FEW, Estimate
-from ..analysis.summary import Summary
+from ...core.plugins.messages import near
+from ..results.statistics import FEW, Estimate
+from ..results.summary import Summary
 from ..spec.errors import SpecError
 from .cells import Cell, Row, ends
 from .csv_text import write_csv

@@ -1,7 +1,7 @@
 """Recorded episodes as animations, where the canvas of a report cannot play them.
 
 The canvas knows robots that push a box. Any other scenario that draws its episodes, one's own
-included, has them drawn as it does itself (`nested_agents.core.protocols.DrawnScenario`).
+included, has them drawn as it does itself (`DrawnScenario`).
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...core.protocols import DrawnScenario
+from ...core.interface.protocols import DrawnScenario
 from ..spec.errors import SpecError
 from ..store.store import Planned, Store
 from ..trials.trial import Trial, trials_of

@@ -8,11 +8,11 @@ from pathlib import Path
 import jinja2
 from markupsafe import Markup
 
-from ..analysis.results import read
 from ..catalogue.study import analysed, load_study
 from ..claims.claims import judge
 from ..claims.table import result
 from ..presentation.tables import tabulate
+from ..results.results import read
 from ..spec.toml import dumps
 from ..store.store import Store
 from ..trials.code import RESULTS_VERSION

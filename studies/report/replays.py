@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.arrays import FloatArray
+from ...core.numerics.arrays import FloatArray
 from ...scenarios.box_pushing.world.boxes import box_for
 from ...scenarios.box_pushing.world.robots import robot_for
 from ..spec.errors import SpecError

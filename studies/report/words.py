@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.summary import Summary, interval, two_figures
+from ..results.summary import Summary, interval, two_figures
 from ..spec.outline import Outline
 from ..workers.worker import installed
 
@@ -109,7 +109,7 @@ def contest(table: Sequence[Summary], headline: str | None) -> str:
 
     Examples
     --------
-    >>> from nested_agents.studies.analysis.statistics import Estimate
+    >>> from nested_agents.studies.results.statistics import Estimate
     >>> e = {"ours": (0.9, 0.8, 0.95), "frozen": (0.1, 0.0, 0.3), "other": (0.85, 0.7, 0.9)}
     >>> table = [Summary(k, 8, {"success": Estimate(*map(np.asarray, v))}) for k, v in e.items()]
     >>> contest(table, "success")

@@ -17,9 +17,9 @@ from pydantic import Field, ValidationError
 
 from ...core.learners import LEARNERS, TeamSettings
 from ...core.learners.batch import BatchTDSettings
-from ...core.plugged import Plugged
-from ...core.refusals import closest
-from ...core.settings import ScenarioSettings, Settings, tuples
+from ...core.plugins.messages import closest
+from ...core.plugins.plugged import Plugged
+from ...core.plugins.settings import ScenarioSettings, Settings, tuples
 from ...scenarios import SCENARIOS
 from ...scenarios.box_pushing.config import BoxPushingSettings
 from ...topologies.config import ChainSettings, Topology, parse

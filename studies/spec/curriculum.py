@@ -11,7 +11,7 @@ from typing import Annotated, Any, NamedTuple
 
 from pydantic import AfterValidator, Field
 
-from ...core.settings import ScenarioSettings, Settings
+from ...core.plugins.settings import ScenarioSettings, Settings
 
 Length = Annotated[int, Field(ge=1, le=1_000_000)]
 """A number of episodes, or of steps."""

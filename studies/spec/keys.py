@@ -23,9 +23,9 @@ from annotated_types import Ge, Gt, Le, Lt, MinLen
 from pydantic.fields import FieldInfo
 from typing_extensions import TypeAliasType
 
-from ...core.plugged import Plugged, SettingsRegistry
-from ...core.refusals import near
-from ...core.settings import Settings
+from ...core.plugins.messages import near
+from ...core.plugins.plugged import Plugged, SettingsRegistry
+from ...core.plugins.settings import Settings
 from .conditions import ConditionSettings, Override
 from .curriculum import StageSettings
 from .presets import PRESETS

@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from ...core.deferred import Deferred
+from ...core.decision.exploration import EXPLORATIONS
 from ...core.evaluators import EVALUATORS
-from ...core.exploration import EXPLORATIONS
-from ...core.hierarchy import Hierarchy
+from ...core.interface.hierarchy import Hierarchy
 from ...core.learners import LEARNERS
-from ...core.places import located
-from ...core.registry import Registry
-from ...core.settings import Settings
+from ...core.plugins.deferred import Deferred
+from ...core.plugins.places import located
+from ...core.plugins.registry import Registry
+from ...core.plugins.settings import Settings
 from ...scenarios import SCENARIOS
 from ...topologies import TOPOLOGIES
 from ...topologies.config import EdgesSettings
-from .. import STUDIES
 from .errors import SpecError
+from .studies import STUDIES
 
 if TYPE_CHECKING:
     import networkx as nx

@@ -15,7 +15,7 @@ from typing import Any
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from ...core.plugged import Plugged, SettingsRegistry
+from ...core.plugins.plugged import Plugged, SettingsRegistry
 
 TomlTable = dict[str, Any]
 

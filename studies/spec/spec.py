@@ -19,10 +19,9 @@ from typing import Annotated, Any
 
 from pydantic import Field, PrivateAttr, ValidationError, field_validator
 
-from ...core.refusals import closest
-from ...core.settings import Settings, tuples
-from ...core.sources import Sources, is_reference, named
-from .. import STUDIES
+from ...core.plugins.messages import closest
+from ...core.plugins.settings import Settings, tuples
+from ...core.plugins.sources import Sources, is_reference, named
 from .conditions import SECTIONS, Condition, ConditionSettings, Override, grid, section
 from .curriculum import Curriculum, Length, Name
 from .errors import SpecError, show
@@ -30,6 +29,7 @@ from .objects import plain
 from .overlay import TomlTable, assignment, flat, overlay
 from .presets import PRESETS
 from .refused import explain, misplaced
+from .studies import STUDIES
 
 MOST_TRIALS = 100_000
 """A larger grid is taken for a slip of the pen."""

@@ -10,8 +10,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self, TypeVar
 
-from ...core.protocols import Measure
-from ...core.sources import Sources
+from ...core.interface.protocols import Measure
+from ...core.plugins.sources import Sources
 from ..spec.errors import SpecError
 from ..spec.outline import Outline
 from ..trials import code

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...core.protocols import Measure
-from ...core.sources import Sources, named
+from ...core.interface.protocols import Measure
+from ...core.plugins.sources import Sources, named
 from ..spec.difference import difference
 from ..spec.errors import SpecError
 from ..spec.spec import Spec

@@ -21,8 +21,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
-from ...core.protocols import Measure
-from ...core.sources import FOLDER, kept_name
+from ...core.interface.protocols import Measure
+from ...core.plugins.sources import FOLDER, kept_name
 from ..spec.errors import SpecError
 from ..spec.toml import dumps
 from ..trials import code

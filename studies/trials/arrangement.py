@@ -10,15 +10,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import NamedTuple
 
-from ...core.acting import Actors
-from ...core.arrays import IntArray
+from ...core.agents.loop import policy_seed
+from ...core.agents.rows import carried_rows
+from ...core.agents.team import Team, of_fuzzy_agents
+from ...core.interface.acting import Actors
+from ...core.interface.protocols import Measure, Scenario, measures_of
 from ...core.learners import LearnerSettings, TeamSettings
-from ...core.loop import policy_seed
-from ...core.peers.seen import SeenScenario
-from ...core.protocols import Measure, Scenario, measures_of
-from ...core.rows import carried_rows
-from ...core.settings import ScenarioSettings
-from ...core.team import Team, of_fuzzy_agents
+from ...core.numerics.arrays import IntArray
+from ...core.plugins.settings import ScenarioSettings
+from ...core.policies.seen import SeenScenario
 from ..spec.conditions import Condition, ConditionSettings
 from ..spec.errors import SpecError
 from ..spec.spec import Spec

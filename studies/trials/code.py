@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping
 from importlib.util import find_spec
 from pathlib import Path
 
-from ...core.sources import meaning
+from ...core.plugins.sources import meaning
 
 RESULTS_VERSION = 4
 """Raise it when the code changes so that the same trial gives other results."""

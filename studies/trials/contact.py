@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...core.arrays import FloatArray
-from ...core.loop import StepRecord
+from ...core.agents.loop import StepRecord
+from ...core.numerics.arrays import FloatArray
 
 
 class ContactShares:

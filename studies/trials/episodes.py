@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.protocols import Measure, RecordedScenario, Transition
+from ...core.interface.protocols import Measure, RecordedScenario, Transition
 
 if TYPE_CHECKING:
-    from ...core.loop import StepRecord
+    from ...core.agents.loop import StepRecord
 
 STAGE = "training:"
 """With what the phase of a stage of a curriculum begins; the stage's name follows."""

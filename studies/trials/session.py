@@ -6,16 +6,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from time import perf_counter
 
-from ...core.acting import Actors
-from ...core.loop import (
-    EpisodicScenario,
-    StepRecord,
-    control_loop,
-    world_seed,
-)
-from ...core.protocols import Measure, RecordedScenario, measures_of
-from ...core.settings import ScenarioSettings
-from ...core.team import Team
+from ...core.agents.loop import EpisodicScenario, StepRecord, control_loop, world_seed
+from ...core.agents.team import Team
+from ...core.interface.acting import Actors
+from ...core.interface.protocols import Measure, RecordedScenario, measures_of
+from ...core.plugins.settings import ScenarioSettings
 from .arrangement import Arrangement, arrange
 from .episodes import (
     ELSEWHERE,

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-from ...core.protocols import Measure, Scenario
-from ...core.settings import ScenarioSettings
-from ...core.sources import Sources, named
+from ...core.interface.protocols import Measure, Scenario
+from ...core.plugins.settings import ScenarioSettings
+from ...core.plugins.sources import Sources, named
 from ..spec.conditions import ConditionSettings
 from ..spec.curriculum import Stage
 from ..spec.outline import lengths

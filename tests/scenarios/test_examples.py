@@ -6,7 +6,7 @@ from types import ModuleType
 
 import pytest
 
-from nested_agents.core.sources import Sources
+from nested_agents.core.plugins.sources import Sources
 from nested_agents.scenarios import SCENARIOS
 from nested_agents.scenarios.checking.checker import CHECKS, check_scenario
 

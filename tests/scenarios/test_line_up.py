@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from nested_agents.core.protocols import (
+from nested_agents.core.interface.protocols import (
     ExactlyPredictedScenario,
     RecordedScenario,
     TeamPrediction,
     measures_of,
     roles_of,
 )
-from nested_agents.core.settings import SettingsError
+from nested_agents.core.plugins.settings import SettingsError
 from nested_agents.scenarios import SCENARIOS
 from nested_agents.scenarios.line_up import LineUp, LineUpSettings
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
-from nested_agents.studies.analysis.results import Results
+from nested_agents.studies.results.results import Results
 
 SEEDS = 20
 

@@ -8,11 +8,9 @@ from contextlib import redirect_stdout
 import numpy as np
 import pytest
 
-from nested_agents.core.protocols import SUCCESS, Measure, groups_of
+from nested_agents.core.interface.protocols import SUCCESS, Measure, groups_of
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.line_up import LineUp, LineUpSettings
-from nested_agents.studies.analysis import published
-from nested_agents.studies.analysis.results import read
 from nested_agents.studies.api.study import load
 from nested_agents.studies.catalogue import scaling
 from nested_agents.studies.catalogue.study import load_study
@@ -20,6 +18,8 @@ from nested_agents.studies.cli import running
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.presentation.tables import tabulate
 from nested_agents.studies.report.replays import replays
+from nested_agents.studies.results import published
+from nested_agents.studies.results.results import read
 from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store import reading

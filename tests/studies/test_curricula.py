@@ -5,11 +5,11 @@ import io
 
 import pytest
 
-from nested_agents.studies.analysis.results import read
 from nested_agents.studies.catalogue.study import load_study
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.presentation.tables import tabulate
 from nested_agents.studies.report import words
+from nested_agents.studies.results.results import read
 from nested_agents.studies.spec.outline import Outline
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.store import Store

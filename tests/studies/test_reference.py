@@ -7,9 +7,9 @@ from types import ModuleType
 import pytest
 
 import nested_agents as na
-from nested_agents.studies.analysis.numbers import NUMBERS
+from nested_agents.studies.api.run_study import run_study
 from nested_agents.studies.cli.main import COMMANDS
-from nested_agents.studies.run import run_study
+from nested_agents.studies.results.numbers import NUMBERS
 from nested_agents.studies.spec.keys import tables
 from nested_agents.studies.spec.spec import Spec
 
@@ -51,7 +51,7 @@ def test_every_public_name_is_there_and_its_module_has_a_page(
 ) -> None:
     for name in set(na.__all__) - {"__version__"}:
         assert f"`{name} <" in pages["api"]
-        home = getattr(getattr(na, name), "__module__", "nested_agents.core.protocols")
+        home = getattr(getattr(na, name), "__module__", "nested_agents.core.interface.protocols")
         _, package, *rest = home.split(".")
         assert not rest or ".".join(rest) in reference.MODULES[package][1], name
 

@@ -3,9 +3,9 @@
 import re
 from pathlib import Path
 
-from nested_agents import studies
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.spec.studies import STUDIES
 from nested_agents.studies.trials.arrangement import check
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -18,7 +18,7 @@ def blocks(language: str) -> list[str]:
 
 def test_every_study_is_told_with_its_spec() -> None:
     told = dict(re.findall(r"\| `([a-z-]+)` \| .* \| `(\w+\.toml)` \|", TEXT))
-    assert set(told) == set(studies.STUDIES.built_in)
+    assert set(told) == set(STUDIES.built_in)
     for study, name in told.items():
         assert (
             Spec.load(ROOT / "studies" / "catalogue" / study.replace("-", "_") / name).study

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
-from nested_agents.core.decision import Decision
+from nested_agents.core.agents.loop import control_loop, policy_seed
+from nested_agents.core.agents.team import Team
+from nested_agents.core.decision.settings import Decision
 from nested_agents.core.evaluators.evaluator import Deliberation
-from nested_agents.core.hierarchy import Hierarchy
+from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.learners.td import TDLambdaSettings
-from nested_agents.core.loop import control_loop, policy_seed
 from nested_agents.core.rules.settings import RuleBaseSettings
-from nested_agents.core.team import Team
 from nested_agents.scenarios.line_up import LineUp, LineUpSettings
 from nested_agents.topologies import TOPOLOGIES, Topology, build, parse
 

@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from nested_agents.core.hierarchy import Hierarchy
+from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.topologies import build, parse
 from nested_agents.topologies.drawing import ACROSS, DOWN, HEIGHT, WIDTH, draw, positions
 

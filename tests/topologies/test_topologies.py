@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
-from nested_agents.core.hierarchy import Hierarchy
-from nested_agents.core.single_agent import SingleAgent
+from nested_agents.core.agents.single_agent import SingleAgent
+from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.topologies import (
     TOPOLOGIES,
     Topology,

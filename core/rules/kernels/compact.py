@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...arrays import FloatArray, IntArray
-from ...compiling import njit
+from ...numerics.arrays import FloatArray, IntArray
+from ...numerics.compiling import njit
 from .contraction import total_width
 from .layout import Layout, Packed, unpack
 from .pairs import pairs

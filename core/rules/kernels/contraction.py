@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...compiling import njit
+from ...numerics.compiling import njit
 from .layout import Layout
 from .strengths import hull, negligible, product_of, strengths_of, strengths_room
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...arrays import FloatArray, IntArray
-from ...compiling import njit
+from ...numerics.arrays import FloatArray, IntArray
+from ...numerics.compiling import njit
 from .contraction import contract, total_width
 from .folding import fold
 from .layout import Layout, Packed, unpack

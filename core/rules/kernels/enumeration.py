@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...arrays import FloatArray, IntArray
-from ...compiling import njit
+from ...numerics.arrays import FloatArray, IntArray
+from ...numerics.compiling import njit
 from .compact import contracted, looked_up
 from .dense import folded
 from .layout import Packed, unpack
@@ -101,7 +101,7 @@ def enumerate_looked_up(  # type: ignore[no-untyped-def]
     theta
         ``(n_rules,)`` the agent's consequent weights.
     own, own_rows, shared, shared_rows, divisor
-        As in `nested_agents.core.protocols.Blocks`.
+        As in `Blocks`.
     tried, places, below
         Which joint actions: the parts of a `Tried`.
     joint_action

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...arrays import FloatArray, IntArray
-from ...compiling import njit
+from ...numerics.arrays import FloatArray, IntArray
+from ...numerics.compiling import njit
 from .layout import Layout, Packed, unpack
 from .strengths import all_strengths, hull, negligible, product_of, strengths_room
 from .updates import advance

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...compiling import njit
+from ...numerics.compiling import njit
 from .layout import Layout
 
 _FAST = {"reassoc", "contract"}

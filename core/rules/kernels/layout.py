@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 
-from ...arrays import FloatArray, IntArray
-from ...compiling import njit
+from ...numerics.arrays import FloatArray, IntArray
+from ...numerics.compiling import njit
 
 if TYPE_CHECKING:
     from ..fuzzy import Partition

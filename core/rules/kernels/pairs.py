@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...compiling import njit
+from ...numerics.compiling import njit
 
 
 @njit(cache=True)
@@ -14,7 +14,7 @@ def pairs(own, own_rows, shared, shared_rows, divisor: int, indices):  # type: i
     Parameters
     ----------
     own, own_rows, shared, shared_rows, divisor
-        As in `nested_agents.core.protocols.Blocks`.
+        As in `Blocks`.
     indices
         ``(m,)`` joint-action indices.
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...arrays import FloatArray, IntArray
-from ...compiling import njit
+from ...numerics.arrays import FloatArray, IntArray
+from ...numerics.compiling import njit
 
 TERMINAL, CUT_OFF = -1, -2
 """In place of the index of the next after-state: it is entered for ever; it is not known."""

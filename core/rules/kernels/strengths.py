@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...arrays import FloatArray
-from ...compiling import njit
+from ...numerics.arrays import FloatArray
+from ...numerics.compiling import njit
 from .layout import Layout
 
 NEGLIGIBLE, NEGLIGIBLE_SINGLE = 1e-15, 1e-8

@@ -15,7 +15,7 @@ import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from ....core.arrays import BoolArray
+from ....core.numerics.arrays import BoolArray
 from ..environments import SettingsLike, meant
 from .processes import Processes
 from .worlds import Recipe, row_type

@@ -16,7 +16,7 @@ import numpy as np
 from gymnasium.spaces import Box, MultiDiscrete
 from gymnasium.vector import AutoresetMode
 
-from ....core.arrays import FloatArray
+from ....core.numerics.arrays import FloatArray
 from ..config import BoxPushingSettings
 from ..environments import Game, Seat
 from ..scenario import BoxPushing

@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
-from ....core.settings import Positive
+from ....core.plugins.settings import Positive
 from ..config import BoxTaskSettings
 
 CONTROLS = ("frozen", "random", "planner")

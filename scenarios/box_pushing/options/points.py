@@ -14,7 +14,7 @@ import numpy as np
 from shapely.geometry import Point, Polygon
 from shapely.geometry.polygon import orient
 
-from ....core.arrays import FloatArray
+from ....core.numerics.arrays import FloatArray
 from ..world.boxes import BoxSpec
 from ..world.geometry import surface
 

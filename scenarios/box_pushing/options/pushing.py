@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ....core.arrays import FloatArray, IntArray
+from ....core.numerics.arrays import FloatArray, IntArray
 from ..prediction.predictors import push_model
 from ..scenario import BoxPushing
 from ..scripted.driving import Drivers, wrap

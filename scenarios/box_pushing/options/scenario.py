@@ -20,9 +20,9 @@ from typing import Any
 
 import numpy as np
 
-from ....core.arrays import FloatArray, IntArray
-from ....core.protocols import Transition
-from ....core.spaces import ActionSet, StateSpace, Variable
+from ....core.interface.protocols import Transition
+from ....core.interface.spaces import ActionSet, StateSpace, Variable
+from ....core.numerics.arrays import FloatArray, IntArray
 from ..config import BoxPushingSettings, BoxTaskSettings
 from ..scenario import MEASURES, BoxPushing
 from .config import PushingPointsSettings
@@ -35,7 +35,7 @@ MOST_VALUES = 10**6
 class PushingPoints:
     """A box, a goal, and robots as agents that choose where to push.
 
-    Fulfils `nested_agents.core.protocols.Scenario`; its episodes can be recorded and drawn.
+    Fulfils `Scenario`; its episodes can be recorded and drawn.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ class PushingPoints:
 
 
 class PushingPointsPrediction:
-    """The situation as it is, with what would be chosen; `nested_agents.core.protocols.Prediction`.
+    """The situation as it is, with what would be chosen; `Prediction`.
 
     Parameters
     ----------

@@ -28,7 +28,7 @@ from matplotlib.patches import Circle, Patch, PathPatch, Polygon, Rectangle
 from matplotlib.path import Path as Curve
 from matplotlib.transforms import Affine2D
 
-from ....core.arrays import FloatArray
+from ....core.numerics.arrays import FloatArray
 from ...movies import Pixels, film
 from ..config import InfraredSettings
 from ..world.boxes import BoxSpec, box_for

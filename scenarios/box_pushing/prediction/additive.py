@@ -13,8 +13,8 @@ from typing import Protocol
 
 import numpy as np
 
-from ....core.arrays import BoolArray, FloatArray, IntArray
-from ....core.compiling import njit
+from ....core.numerics.arrays import BoolArray, FloatArray, IntArray
+from ....core.numerics.compiling import njit
 from ..states.view import View
 from ..world.geometry import surface
 from .push import PushModel, push
@@ -54,7 +54,7 @@ class Predicted(Protocol):
 
 
 class PushSuperposition:
-    """A `nested_agents.core.protocols.Superposition` of box pushing.
+    """A `Superposition` of box pushing.
 
     The sum is the pose of the box relative to the reference; the robot of the deciding agent
     stands where its wheel command takes it, the others where theirs do in the mean.

@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....core.arrays import FloatArray
-from ....core.compiling import njit
+from ....core.numerics.arrays import FloatArray
+from ....core.numerics.compiling import njit
 from ..world.robots import RobotSpec, resistance
 from .push import PushModel, pushed
 

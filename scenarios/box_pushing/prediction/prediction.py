@@ -14,8 +14,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from ....core.arrays import FloatArray, IntArray
-from ....core.protocols import Blocks
+from ....core.interface.protocols import Blocks
+from ....core.numerics.arrays import FloatArray, IntArray
 from ..reward import reward
 from ..states.view import View
 from ..world.infrared import expected_reading
@@ -27,7 +27,7 @@ from .wheel_commands import WheelCommands, choices_of, speeds_of, twist_table, w
 
 
 class BoxPrediction:
-    """Predicts from one situation; see `nested_agents.core.protocols.Prediction`.
+    """Predicts from one situation; see `Prediction`.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ....core.arrays import FloatArray, IntArray
+from ....core.numerics.arrays import FloatArray, IntArray
 from ..config import CONTROL_PERIOD, BeliefSettings
 from ..states.view import View
 from ..world.boxes import BoxSpec

@@ -17,8 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....core.arrays import FloatArray, IntArray
-from ....core.compiling import njit
+from ....core.numerics.arrays import FloatArray, IntArray
+from ....core.numerics.compiling import njit
 from . import push_lanes as lanes
 from .push_lanes import BODY_SIZE, BOX_SIZE, LANES, MARGIN
 

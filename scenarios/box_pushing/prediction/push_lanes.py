@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ....core.compiling import njit
+from ....core.numerics.compiling import njit
 
 LANES = 32
 """Joint actions side by side."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ....core.arrays import FloatArray, IntArray
+from ....core.numerics.arrays import FloatArray, IntArray
 from ..world.geometry import surface_numpy
 from .push import SUBSTEPS, SWEEPS, PushModel
 from .push_lanes import CREEP, MARGIN, START_SPEED

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ....core.arrays import FloatArray
-from ....core.spaces import ActionSet
+from ....core.interface.spaces import ActionSet
+from ....core.numerics.arrays import FloatArray
 from ..reward import Task
 from ..states.state_spaces import BoxStateSpace
 from ..world.geometry import Outline

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....core.arrays import FloatArray, IntArray
-from ....core.compiling import njit
+from ....core.numerics.arrays import FloatArray, IntArray
+from ....core.numerics.compiling import njit
 
 SAME_TWIST = 1e-11
 """Twists [m/s, rad/s] that differ by less are one twist."""

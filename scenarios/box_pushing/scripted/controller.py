@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from ....core.arrays import FloatArray, IntArray
-from ....core.spaces import ActionSet
+from ....core.interface.spaces import ActionSet
+from ....core.numerics.arrays import FloatArray, IntArray
 from ..prediction.predictors import push_model
 from ..prediction.push import push
 from ..scenario import BoxPushing

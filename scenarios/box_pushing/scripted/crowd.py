@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from ....core.arrays import BoolArray, FloatArray, IntArray
+from ....core.numerics.arrays import BoolArray, FloatArray, IntArray
 from ..prediction.push import PushModel, push
 from ..world.boxes import BoxSpec
 from ..world.robots import RobotSpec

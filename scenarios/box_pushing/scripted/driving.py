@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from ....core.arrays import FloatArray, IntArray
-from ....core.spaces import ActionSet
+from ....core.interface.spaces import ActionSet
+from ....core.numerics.arrays import FloatArray, IntArray
 from ..prediction.push import PushModel
 from ..world.boxes import BoxSpec
 from ..world.robots import RobotSpec, nominal_effect

@@ -6,8 +6,8 @@ from math import pi
 
 import numpy as np
 
-from ....core.arrays import FloatArray
-from ....core.compiling import njit
+from ....core.numerics.arrays import FloatArray
+from ....core.numerics.compiling import njit
 from ..world.geometry import surface
 
 

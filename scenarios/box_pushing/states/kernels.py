@@ -12,8 +12,8 @@ from math import pi
 
 import numpy as np
 
-from ....core.arrays import FloatArray, IntArray
-from ....core.compiling import njit
+from ....core.numerics.arrays import FloatArray, IntArray
+from ....core.numerics.compiling import njit
 from ..world.geometry import ON_SURFACE
 from .relational import AWAY
 from .view import ARRIVED, CLOSE, KEPT, LEAST, STILL, View

@@ -13,7 +13,7 @@ from math import pi
 
 import numpy as np
 
-from ....core.arrays import FloatArray
+from ....core.numerics.arrays import FloatArray
 from ...state_variables import StateFunction, StateVariable, state_variable
 from .view import View, wrap
 

@@ -15,8 +15,8 @@ from math import pi
 
 import numpy as np
 
-from ....core.arrays import FloatArray
-from ....core.spaces import StateSpace, Variable
+from ....core.interface.spaces import StateSpace, Variable
+from ....core.numerics.arrays import FloatArray
 from ...state_variables import found, sensed
 from .kernels import COMPILED, Columns
 from .variables import STATE_VARIABLES

@@ -16,7 +16,7 @@ here, the decision of a team of two e-Pucks takes about a third longer.
 
 from __future__ import annotations
 
-from ....core.registry import Registry
+from ....core.plugins.registry import Registry
 
 _PLACE = "nested_agents.scenarios.box_pushing.states.relational"
 

@@ -17,8 +17,8 @@ import numpy as np
 from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 
-from ....core.arrays import FloatArray
-from ....core.refusals import closest
+from ....core.numerics.arrays import FloatArray
+from ....core.plugins.messages import closest
 from ..config import BoxSettings
 from .geometry import Outline
 from .polygons import LARGEST, Moments, Vertices, centred, convex_pieces, moments, polygon_edges

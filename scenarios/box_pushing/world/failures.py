@@ -1,15 +1,15 @@
 """Failures of wheels: the schedule of any failures, and what a wheel without a drive adds to it.
 
 A free wheel has no drive at all: it resists sideways motion only. All other kinds of failure are
-described in `nested_agents.scenarios.failures.schedule`.
+described in `nested_agents.scenarios.faults.schedule`.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from ....core.arrays import FloatArray
-from ...failures.schedule import Failures
+from ....core.numerics.arrays import FloatArray
+from ...faults.schedule import Failures
 from ..config import FreeSettings
 from .world import World
 

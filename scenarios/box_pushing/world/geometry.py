@@ -16,8 +16,8 @@ from math import hypot, inf, sqrt
 
 import numpy as np
 
-from ....core.arrays import FloatArray
-from ....core.compiling import njit
+from ....core.numerics.arrays import FloatArray
+from ....core.numerics.compiling import njit
 
 ON_SURFACE = 1e-12
 """Distance below which the direction to the nearest point is meaningless [m]."""

@@ -20,8 +20,8 @@ from typing import Protocol
 
 import numpy as np
 
-from ....core.arrays import FloatArray
-from ....core.compiling import njit
+from ....core.numerics.arrays import FloatArray
+from ....core.numerics.compiling import njit
 from .geometry import Outline, disc_hit, ray, ray_numpy, surface
 from .robots import RobotSpec
 

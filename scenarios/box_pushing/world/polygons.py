@@ -18,7 +18,7 @@ from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 from shapely.validation import explain_validity
 
-from ....core.arrays import FloatArray
+from ....core.numerics.arrays import FloatArray
 from .geometry import ring_edges
 
 Vertices = Sequence[tuple[float, float]]

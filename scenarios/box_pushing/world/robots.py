@@ -15,8 +15,8 @@ from math import isfinite, radians
 
 import numpy as np
 
-from ....core.arrays import FloatArray
-from ....core.refusals import closest
+from ....core.numerics.arrays import FloatArray
+from ....core.plugins.messages import closest
 from ..config import RobotSettings
 
 GRAVITY = 9.81

@@ -25,8 +25,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....core.arrays import FloatArray, IntArray
-from ....core.compiling import njit
+from ....core.numerics.arrays import FloatArray, IntArray
+from ....core.numerics.compiling import njit
 from .robots import RobotSpec
 
 

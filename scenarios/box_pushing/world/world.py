@@ -26,8 +26,8 @@ import Box2D
 import numpy as np
 from Box2D import _Box2D
 
-from ....core.arrays import FloatArray
-from ....core.compiling import njit
+from ....core.numerics.arrays import FloatArray
+from ....core.numerics.compiling import njit
 from ..config import CONTROL_PERIOD
 from .boxes import BoxSpec
 from .geometry import surface

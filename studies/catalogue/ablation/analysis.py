@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...analysis.comparison import Difference, differences
-from ...analysis.results import Results
-from ...analysis.statistics import Estimate, rate
-from ...analysis.summary import EVALUATED, Summary
-from ...analysis.verdicts import power_lines, told
+from ...results.comparison import Difference, differences
+from ...results.results import Results
+from ...results.statistics import Estimate, rate
+from ...results.summary import EVALUATED, Summary
+from ...results.verdicts import power_lines, told
 
 PHASES = {"training success": "training", EVALUATED: "evaluation"}
 """The measures: success rates in these phases."""

@@ -16,11 +16,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ...analysis.comparison import aligned
-from ...analysis.paired_tests import LEVEL, Friedman, friedman, holm, paired_permutation
-from ...analysis.results import Results
-from ...analysis.statistics import bootstrap, rate
-from ...analysis.summary import Summary
+from ...results.comparison import aligned
+from ...results.paired_tests import LEVEL, Friedman, friedman, holm, paired_permutation
+from ...results.results import Results
+from ...results.statistics import bootstrap, rate
+from ...results.summary import Summary
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ...analysis.statistics import bootstrap
 from ...presentation.figures import COLOURS, SETTINGS
+from ...results.statistics import bootstrap
 from .analysis import ChainOrders, Comparison
 
 

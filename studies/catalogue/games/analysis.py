@@ -15,9 +15,9 @@ from string import ascii_uppercase
 from textwrap import wrap
 from typing import Any
 
-from ...analysis.results import Results
-from ...analysis.statistics import Estimate, rate
-from ...analysis.summary import Summary, two_figures
+from ...results.results import Results
+from ...results.statistics import Estimate, rate
+from ...results.summary import Summary, two_figures
 from ...spec.errors import SpecError
 from ...spec.spec import Spec
 from ...trials.episodes import ELSEWHERE

@@ -22,13 +22,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from ...analysis.comparison import Array, Difference, adjusted, difference, paired
-from ...analysis.paired_tests import LEVEL
-from ...analysis.power import seeds_needed
-from ...analysis.results import Arrays, Results
-from ...analysis.statistics import Estimate, bootstrap, rate
-from ...analysis.summary import EVALUATED, Summary, two_figures
-from ...analysis.verdicts import power_lines
+from ...results.comparison import Array, Difference, adjusted, difference, paired
+from ...results.paired_tests import LEVEL
+from ...results.power import seeds_needed
+from ...results.results import Arrays, Results
+from ...results.statistics import Estimate, bootstrap, rate
+from ...results.summary import EVALUATED, Summary, two_figures
+from ...results.verdicts import power_lines
 from ...spec.errors import SpecError
 from ...spec.labels import label_but
 from ...spec.spec import Spec

@@ -6,9 +6,9 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator
 
-from ...analysis.summary import EVALUATED
 from ...presentation.by_robots import add_legend, draw_line, scale_axis
 from ...presentation.figures import SETTINGS, log_axis
+from ...results.summary import EVALUATED
 from .analysis import DECIDING, Hierarchies
 
 ROWS = (EVALUATED, DECIDING)

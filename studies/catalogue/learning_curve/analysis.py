@@ -13,10 +13,10 @@ from typing import Literal
 
 import numpy as np
 
-from ....core.protocols import SUCCESS, Measure
-from ...analysis.results import Arrays, Results
-from ...analysis.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, rates
-from ...analysis.summary import EVALUATED, Summary, evaluated
+from ....core.interface.protocols import SUCCESS, Measure
+from ...results.results import Arrays, Results
+from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, rates
+from ...results.summary import EVALUATED, Summary, evaluated
 
 BLOCK = 5
 """Episodes at each end of training that the table averages over."""

@@ -7,9 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from ....core.protocols import Measure
-from ...analysis.statistics import Estimate
+from ....core.interface.protocols import Measure
 from ...presentation.figures import COLOURS, SETTINGS, STYLES
+from ...results.statistics import Estimate
 from .analysis import LearningCurves
 
 COLUMNS = 2

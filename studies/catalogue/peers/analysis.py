@@ -13,11 +13,11 @@ from time import process_time
 
 import numpy as np
 
-from ...analysis.comparison import Array, Difference, differences
-from ...analysis.results import Results
-from ...analysis.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
-from ...analysis.summary import EVALUATED, Summary, evaluated
-from ...analysis.verdicts import power_lines
+from ...results.comparison import Array, Difference, differences
+from ...results.results import Results
+from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
+from ...results.summary import EVALUATED, Summary, evaluated
+from ...results.verdicts import power_lines
 from ...spec.errors import SpecError
 from ...spec.spec import Spec
 from ...trials.session import Session

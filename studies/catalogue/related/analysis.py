@@ -20,10 +20,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ....core.team import of_fuzzy_agents
-from ...analysis.results import Results
-from ...analysis.statistics import NOT_NEGATIVE, Estimate, bootstrap
-from ...analysis.summary import EVALUATED, Summary, evaluated
+from ....core.agents.team import of_fuzzy_agents
+from ...results.results import Results
+from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap
+from ...results.summary import EVALUATED, Summary, evaluated
 from ...spec.errors import SpecError
 from ...spec.spec import Spec
 from ...trials.session import Session

@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import SymmetricalLogLocator
 
-from ...analysis.summary import EVALUATED
 from ...presentation.figures import COLOURS, SETTINGS
+from ...results.summary import EVALUATED
 from .analysis import Related
 
 PANELS = {

@@ -20,12 +20,12 @@ from typing import Any
 
 import numpy as np
 
-from ....core.protocols import groups_of
-from ....core.team import of_fuzzy_agents
-from ...analysis.results import Results
-from ...analysis.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
-from ...analysis.summary import Summary, evaluated
+from ....core.agents.team import of_fuzzy_agents
+from ....core.interface.protocols import groups_of
 from ...presentation.words import count
+from ...results.results import Results
+from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
+from ...results.summary import Summary, evaluated
 from ...spec.spec import Spec
 from ...trials.contact import ContactShares
 from ...trials.session import Session

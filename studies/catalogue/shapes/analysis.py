@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...analysis.comparison import Difference, adjusted, ratio
-from ...analysis.results import Arrays, Results
-from ...analysis.statistics import bootstrap, rate
-from ...analysis.summary import Summary
-from ...analysis.verdicts import power_lines
+from ...results.comparison import Difference, adjusted, ratio
+from ...results.results import Arrays, Results
+from ...results.statistics import bootstrap, rate
+from ...results.summary import Summary
+from ...results.verdicts import power_lines
 from ...spec.errors import SpecError
 from ...spec.spec import Spec
 from ...trials.contact import ContactShares

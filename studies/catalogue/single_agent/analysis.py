@@ -13,11 +13,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from ....core.cost import Problem, below_counts
-from ....core.team import of_fuzzy_agents
-from ...analysis.results import Results
-from ...analysis.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, rates
-from ...analysis.summary import Summary
+from ....core.agents.cost import Problem, below_counts
+from ....core.agents.team import of_fuzzy_agents
+from ...results.results import Results
+from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, rates
+from ...results.summary import Summary
 from ...spec.spec import Spec
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult

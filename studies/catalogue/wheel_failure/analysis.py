@@ -20,14 +20,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ....core.agents.team import Team
 from ....core.learners.frozen import FrozenSettings
 from ....core.learners.learner import LearnerSettings
-from ....core.team import Team
-from ...analysis.comparison import Array, Difference, adjusted, of_shared_seeds
-from ...analysis.results import Arrays, Results
-from ...analysis.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, rates
-from ...analysis.summary import Summary
-from ...analysis.verdicts import power_lines
+from ...results.comparison import Array, Difference, adjusted, of_shared_seeds
+from ...results.results import Arrays, Results
+from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, rates
+from ...results.summary import Summary
+from ...results.verdicts import power_lines
 from ...spec.errors import SpecError
 from ...spec.labels import label_but
 from ...spec.spec import Spec

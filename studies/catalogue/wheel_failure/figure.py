@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from ...analysis.statistics import bootstrap
 from ...presentation.figures import COLOURS, SETTINGS, STYLES
+from ...results.statistics import bootstrap
 from .analysis import WheelFailures
 
 SMOOTHED = 3

@@ -56,7 +56,7 @@ def command(source: str, steps: int, changes: tuple[str, ...]) -> int:
 
 def _cases(source: str, changes: tuple[str, ...]) -> Iterator[Case]:
     """Yield what is to be checked, each scenario of a spec once."""
-    from ....core.sources import active
+    from ....core.plugins.sources import active
     from ...spec.errors import SpecError
     from ...spec.spec import Spec
 

@@ -11,8 +11,8 @@ from ..arguments import Choice, Command, File
 from . import options
 
 if TYPE_CHECKING:
-    from ...analysis.published import Published
     from ...claims.table import Format
+    from ...results.published import Published
 
 
 @click.command(cls=Command)
@@ -49,10 +49,10 @@ def command(
 
     Without --out the table is made from the results that come with the program.
     """
-    from ...analysis import published
     from ...claims import claims
     from ...claims.table import print_claims
     from ...presentation.progress import say
+    from ...results import published
     from ...spec.errors import SpecError
 
     if out is None:
@@ -75,11 +75,11 @@ def command(
 
 def _run(out: Path, *, quick: bool, jobs: int | None) -> dict[str, Published]:
     """Run the studies of the claims, or what is left of them; return what they found."""
-    from ...analysis import published
-    from ...analysis.results import read
+    from ...api.run_study import run_study
     from ...claims import claims
     from ...presentation.progress import Terminal
-    from ...run import run_study
+    from ...results import published
+    from ...results.results import read
     from ...spec.errors import SpecError
     from ...spec.spec import Spec
 

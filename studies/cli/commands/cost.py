@@ -62,7 +62,7 @@ def command(
     plot: Path | None,
 ) -> int:
     """Print the cost of hierarchies, by formula (Eq. 18-23) and, if asked, measured."""
-    from ....core.cost import Problem
+    from ....core.agents.cost import Problem
     from ...api.costs import cost_table
     from ...cost.cost import MOST_OPERATIONS
     from ...cost.table import written

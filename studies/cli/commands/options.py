@@ -90,7 +90,7 @@ where = click.option(
     metavar="CHOICE",
     help='Only the trials of a choice: "robots == 8 and seed < 5", "box in [square, circle]".',
 )
-"""A part of the trials, see `nested_agents.studies.analysis.selection.Where`."""
+"""A part of the trials, see `nested_agents.studies.results.selection.Where`."""
 
 form = click.option(
     "--format",

@@ -38,7 +38,7 @@ def command(directory: Path, form: Format, phase: str) -> int:
     """
     import sys
 
-    from ....core.refusals import closest
+    from ....core.plugins.messages import closest
     from ...presentation.row_formats import write_rows
     from ...spec.errors import SpecError
     from ...store.store import Store

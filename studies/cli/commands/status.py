@@ -20,9 +20,9 @@ def command(directory: Path) -> int:
     from shutil import get_terminal_size
     from textwrap import fill
 
-    from ...analysis.power import SMALLEST, USUAL_DEVIATION
-    from ...analysis.verdicts import power_told
     from ...presentation.words import count, duration
+    from ...results.power import SMALLEST, USUAL_DEVIATION
+    from ...results.verdicts import power_told
     from ...store.store import Store
     from ...workers.progress import progress
 

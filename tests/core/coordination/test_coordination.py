@@ -4,9 +4,9 @@ import networkx as nx
 import numpy as np
 import pytest
 
+from nested_agents.core.agents.cost import Problem
 from nested_agents.core.coordination.elimination import Elimination, interaction, order_of, total
 from nested_agents.core.coordination.max_plus import MaxPlus
-from nested_agents.core.cost import Problem
 
 
 def pairwise(graph):

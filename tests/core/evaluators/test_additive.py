@@ -5,18 +5,18 @@ from itertools import product
 import numpy as np
 import pytest
 
-from nested_agents.core.decision import Decision
+from nested_agents.core.agents.team import Team
+from nested_agents.core.decision.settings import Decision
 from nested_agents.core.evaluators.additive import Extremes, Moments, directions, sigma_points
 from nested_agents.core.evaluators.evaluator import DecisionProblem, Deliberation
 from nested_agents.core.evaluators.exact import ExactEnumeration
 from nested_agents.core.evaluators.sampling import Sampling
-from nested_agents.core.hierarchy import Hierarchy
+from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.core.interface.protocols import Blocks
+from nested_agents.core.interface.spaces import StateSpace, Variable
 from nested_agents.core.learners.frozen import FrozenSettings
-from nested_agents.core.protocols import Blocks
 from nested_agents.core.rules.rule_base import RuleBase
 from nested_agents.core.rules.settings import RuleBaseSettings
-from nested_agents.core.spaces import StateSpace, Variable
-from nested_agents.core.team import Team
 
 A, NEUTRAL, N = 4, 2, 4
 GROUPS = ((0, 1), (2, 3))

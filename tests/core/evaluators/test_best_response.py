@@ -5,7 +5,6 @@ from itertools import product
 import numpy as np
 import pytest
 
-from nested_agents.core.arrays import FloatArray
 from nested_agents.core.evaluators.auto import AutoSettings
 from nested_agents.core.evaluators.best_response import BestResponse, BestResponseSettings
 from nested_agents.core.evaluators.evaluator import (
@@ -18,10 +17,11 @@ from nested_agents.core.evaluators.evaluator import (
 from nested_agents.core.evaluators.exact import ExactEnumeration
 from nested_agents.core.evaluators.pooled import Pooling
 from nested_agents.core.evaluators.sampling import Sampling
-from nested_agents.core.hierarchy import Hierarchy
+from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.core.interface.spaces import StateSpace, Variable
+from nested_agents.core.numerics.arrays import FloatArray
 from nested_agents.core.rules.rule_base import RuleBase
 from nested_agents.core.rules.settings import RuleBaseSettings
-from nested_agents.core.spaces import StateSpace, Variable
 
 A = 4
 NEUTRAL = 2

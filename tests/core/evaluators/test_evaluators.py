@@ -15,11 +15,11 @@ from nested_agents.core.evaluators.evaluator import (
 )
 from nested_agents.core.evaluators.exact import MOST_JOINT_ACTIONS, ExactEnumeration
 from nested_agents.core.evaluators.sampling import Sampling
-from nested_agents.core.hierarchy import Hierarchy
-from nested_agents.core.protocols import Blocks
+from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.core.interface.protocols import Blocks
+from nested_agents.core.interface.spaces import StateSpace, Variable
 from nested_agents.core.rules.rule_base import RuleBase
 from nested_agents.core.rules.settings import RuleBaseSettings
-from nested_agents.core.spaces import StateSpace, Variable
 
 A = 4
 NEUTRAL = 2

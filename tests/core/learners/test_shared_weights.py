@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from nested_agents.core.agents.rows import rows_of
 from nested_agents.core.learners import LEARNERS
 from nested_agents.core.learners.batch import REWARD_SCALE, BatchTD, BatchTDSettings
 from nested_agents.core.learners.learner import Learner
 from nested_agents.core.learners.td import TDLambda, TDLambdaSettings
-from nested_agents.core.rows import rows_of
 from nested_agents.core.rules import reference
 from nested_agents.core.rules.fuzzy import Partition
 from nested_agents.core.rules.rule_base import RuleBase

@@ -7,11 +7,11 @@ from math import comb
 import numpy as np
 import pytest
 
-from nested_agents.core.protocols import Blocks
+from nested_agents.core.interface.protocols import Blocks
+from nested_agents.core.interface.spaces import StateSpace, Variable
 from nested_agents.core.rules.fuzzy import Partition
 from nested_agents.core.rules.rule_base import RuleBase
 from nested_agents.core.rules.settings import RuleBaseSettings
-from nested_agents.core.spaces import StateSpace, Variable
 
 LOW_HIGH = Partition((0.0, 1.0), "triangular")
 

@@ -7,12 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nested_agents.core.decision import Decision
+from nested_agents.core.adaptation.self_model import SelfModelSettings
+from nested_agents.core.agents.loop import control_loop, policy_seed
+from nested_agents.core.agents.team import Team
+from nested_agents.core.decision.settings import Decision
+from nested_agents.core.interface.protocols import (
+    DrawnScenario,
+    ExactlyPredictedScenario,
+    measures_of,
+)
 from nested_agents.core.learners.batch import BatchTDSettings
-from nested_agents.core.loop import control_loop, policy_seed
-from nested_agents.core.protocols import DrawnScenario, ExactlyPredictedScenario, measures_of
-from nested_agents.core.self_model import SelfModelSettings
-from nested_agents.core.team import Team
 from nested_agents.scenarios import SCENARIOS, BoxPushing, BoxPushingSettings
 from nested_agents.topologies import build, parse
 

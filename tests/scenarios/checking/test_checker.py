@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from nested_agents import View, state_variable
-from nested_agents.core.protocols import SUCCESS, Blocks, Measure, Scenario, Transition
-from nested_agents.core.robot_agents import per_robot
-from nested_agents.core.single_agent import SingleAgent
-from nested_agents.core.spaces import ActionSet, StateSpace, Variable
+from nested_agents.core.agents.robot_agents import per_robot
+from nested_agents.core.agents.single_agent import SingleAgent
+from nested_agents.core.interface.protocols import SUCCESS, Blocks, Measure, Scenario, Transition
+from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.scenarios import BoxPushing, BoxPushingSettings
 from nested_agents.scenarios.box_pushing.config import (
     DelayedSettings,

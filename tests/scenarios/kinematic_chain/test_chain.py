@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 import nested_agents as na
-from nested_agents.core.arrays import FloatArray
+from nested_agents.core.numerics.arrays import FloatArray
 from nested_agents.scenarios.kinematic_chain.config import KinematicChainSettings
 from nested_agents.scenarios.kinematic_chain.kernels import COMPILED
 from nested_agents.scenarios.kinematic_chain.scenario import KinematicChain

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from nested_agents.core.loop import EpisodicScenario
-from nested_agents.core.protocols import RewardPrediction, Scenario
-from nested_agents.core.settings import SettingsError
+from nested_agents.core.agents.loop import EpisodicScenario
+from nested_agents.core.interface.protocols import RewardPrediction, Scenario
+from nested_agents.core.plugins.settings import SettingsError
 from nested_agents.scenarios.checking.checker import check_scenario
 from nested_agents.scenarios.matrix_games.games import GAMES, optimal, payoffs_of
 from nested_agents.scenarios.matrix_games.scenario import MatrixGame, MatrixGameSettings

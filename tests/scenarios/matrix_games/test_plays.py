@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from nested_agents.core.exploration import BoltzmannExploration, PaperExploration
-from nested_agents.core.loop import control_loop, world_seed
+from nested_agents.core.agents.loop import control_loop, world_seed
+from nested_agents.core.decision.exploration import BoltzmannExploration, PaperExploration
 from nested_agents.scenarios.matrix_games.plays import parts_of
 from nested_agents.studies.spec.conditions import ConditionSettings
 from nested_agents.studies.trials.arrangement import build

@@ -7,8 +7,8 @@ import made_up
 import pytest
 
 import nested_agents as na
-from nested_agents.studies import run as studies_run
 from nested_agents.studies.api import frames
+from nested_agents.studies.api import run_study as studies_run
 from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.presentation import progress
 

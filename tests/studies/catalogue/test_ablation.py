@@ -2,11 +2,11 @@ from pathlib import Path
 
 from made_up_results import ablation
 
-from nested_agents.studies.analysis.results import Results
 from nested_agents.studies.catalogue.ablation import analysis as module
 from nested_agents.studies.catalogue.ablation import draw
 from nested_agents.studies.catalogue.ablation.analysis import analyse
 from nested_agents.studies.presentation.figures import save
+from nested_agents.studies.results.results import Results
 from nested_agents.studies.spec.spec import Spec
 
 CHANCES = {"default": 0.8, "no replay": 0.2, "no termination radius": 0.8, "more of it": 1.0}

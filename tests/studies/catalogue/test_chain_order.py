@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nested_agents.studies.analysis.results import Results
 from nested_agents.studies.catalogue.chain_order import analysis as chain_order
 from nested_agents.studies.catalogue.chain_order import draw
 from nested_agents.studies.catalogue.chain_order.analysis import analyse
 from nested_agents.studies.presentation.figures import save
+from nested_agents.studies.results.results import Results
 from nested_agents.studies.spec.spec import Spec
 
 STUDIES = Path(chain_order.__file__).parent

@@ -3,11 +3,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nested_agents.studies.analysis.results import Results
 from nested_agents.studies.catalogue.games import analysis as module
 from nested_agents.studies.catalogue.games import check, draw
 from nested_agents.studies.catalogue.games.analysis import AFTER_ONE, analyse, measure
 from nested_agents.studies.presentation.figures import save
+from nested_agents.studies.results.results import Results
 from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.trial import trials_of

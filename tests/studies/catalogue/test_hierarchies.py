@@ -5,12 +5,12 @@ from pathlib import Path
 import pytest
 from made_up_results import hierarchies
 
-from nested_agents.studies.analysis.results import Results, read
 from nested_agents.studies.catalogue.hierarchies import analysis as module
 from nested_agents.studies.catalogue.hierarchies import check, draw, measure
 from nested_agents.studies.catalogue.hierarchies.analysis import analyse, seeds_needed
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.presentation.tables import tabulate
+from nested_agents.studies.results.results import Results, read
 from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.store import Store

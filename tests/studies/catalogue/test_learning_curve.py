@@ -3,15 +3,15 @@ import io
 import numpy as np
 import pytest
 
-from nested_agents.core.protocols import SUCCESS, Measure
+from nested_agents.core.interface.protocols import SUCCESS, Measure
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
-from nested_agents.studies.analysis.results import Results
-from nested_agents.studies.analysis.statistics import Estimate
-from nested_agents.studies.analysis.summary import interval, two_figures
 from nested_agents.studies.catalogue.learning_curve import draw
 from nested_agents.studies.catalogue.learning_curve.analysis import analyse, metrics_of
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.presentation.row_formats import write_rows
+from nested_agents.studies.results.results import Results
+from nested_agents.studies.results.statistics import Estimate
+from nested_agents.studies.results.summary import interval, two_figures
 
 
 def arrays(seeds, episodes, success):

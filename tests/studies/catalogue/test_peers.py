@@ -1,6 +1,6 @@
 """The peers study: evaluations on the way, comparison and figure; of ours alone, as they are quick.
 
-What stable-baselines3 learns is in tests/core/peers.
+What stable-baselines3 learns is in tests/core/policies.
 """
 
 from pathlib import Path
@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nested_agents.studies.analysis.results import Results
 from nested_agents.studies.catalogue import wheel_failure
 from nested_agents.studies.catalogue.peers import analyse, check, draw, measure
 from nested_agents.studies.catalogue.peers.analysis import stops
 from nested_agents.studies.catalogue.study import load_study
 from nested_agents.studies.presentation.figures import save
+from nested_agents.studies.results.results import Results
 from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import run_trial

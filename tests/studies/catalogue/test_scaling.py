@@ -4,12 +4,12 @@ import pytest
 from made_up_results import scaling
 from matplotlib.figure import Figure
 
-from nested_agents.studies.analysis.results import Results
 from nested_agents.studies.catalogue.scaling import analysis as module
 from nested_agents.studies.catalogue.scaling import draw
 from nested_agents.studies.catalogue.scaling import figure as scaling_figure
 from nested_agents.studies.catalogue.scaling.analysis import analyse, measure, messages
 from nested_agents.studies.presentation.figures import save
+from nested_agents.studies.results.results import Results
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import build, check
 from nested_agents.studies.trials.session import run_trial

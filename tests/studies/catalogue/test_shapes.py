@@ -3,11 +3,11 @@ from pathlib import Path
 import pytest
 from made_up_results import shapes
 
-from nested_agents.studies.analysis.results import Results
 from nested_agents.studies.catalogue.shapes import analysis as module
 from nested_agents.studies.catalogue.shapes import check, draw
 from nested_agents.studies.catalogue.shapes.analysis import analyse, least_ratio, measure
 from nested_agents.studies.presentation.figures import save
+from nested_agents.studies.results.results import Results
 from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import run_trial

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 from made_up_results import wheel_failure
 
-from nested_agents.studies.analysis.results import Results
 from nested_agents.studies.catalogue.wheel_failure import analysis as module
 from nested_agents.studies.catalogue.wheel_failure import check, draw
 from nested_agents.studies.catalogue.wheel_failure.analysis import (
@@ -15,6 +14,7 @@ from nested_agents.studies.catalogue.wheel_failure.analysis import (
     measure,
 )
 from nested_agents.studies.presentation.figures import save
+from nested_agents.studies.results.results import Results
 from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import Session, run_trial

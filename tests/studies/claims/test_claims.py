@@ -8,18 +8,18 @@ import pytest
 from made_up_results import ablation, arrays, games, related, scaling, shapes, wheel_failure
 
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
-from nested_agents.studies import STUDIES
-from nested_agents.studies.analysis import published
-from nested_agents.studies.analysis.results import Results
-from nested_agents.studies.analysis.statistics import Estimate
 from nested_agents.studies.catalogue.study import load_study
 from nested_agents.studies.claims import claims
 from nested_agents.studies.claims.claims import CLAIMS, AtLeast, AtMost, Within, judge
 from nested_agents.studies.claims.measures import Measured
 from nested_agents.studies.claims.table import markdown, print_claims
 from nested_agents.studies.cli.main import main
+from nested_agents.studies.results import published
+from nested_agents.studies.results.results import Results
+from nested_agents.studies.results.statistics import Estimate
 from nested_agents.studies.spec.outline import Outline
 from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.spec.studies import STUDIES
 from nested_agents.studies.trials.arrangement import check
 
 QUICK = Path(claims.__file__).parent / "quick"

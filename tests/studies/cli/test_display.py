@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from nested_agents.studies.analysis.statistics import Estimate
-from nested_agents.studies.analysis.summary import Summary
 from nested_agents.studies.cli.display import print_table
 from nested_agents.studies.presentation.tables import tabulate
+from nested_agents.studies.results.statistics import Estimate
+from nested_agents.studies.results.summary import Summary
 
 TITLES = ["success", "evaluation success", "final orientation error [rad]", "time in contact"]
 LINES = [

@@ -19,14 +19,14 @@ LOADED = [
     (["status", STUDY], {"numpy"}),
     (["table", STUDY], {"numpy", "pydantic", "rich"}),
     (["topology", "list"], {"numpy", "pydantic", "rich"}),
-    (["cost"], {"numpy", "pydantic", "rich", "core.team"}),
-    (["topology", "show", "chain"], {"numpy", "pydantic", "rich", "core.team", "networkx"}),
+    (["cost"], {"numpy", "pydantic", "rich", "core.agents.team"}),
+    (["topology", "show", "chain"], {"numpy", "pydantic", "rich", "core.agents.team", "networkx"}),
 ]
 """Commands, one after the other in one process, and what may be loaded after each."""
 
 SLOW = {
     "Box2D", "dask", "gymnasium", "joblib", "matplotlib", "networkx", "numba", "numpy", "pandas",
-    "pydantic", "rich", "scipy", "core.team", "studies.spec.spec",
+    "pydantic", "rich", "scipy", "core.agents.team", "studies.spec.spec",
 }  # fmt: skip
 """What takes its time to import; what is ours without the name of the package."""
 

@@ -21,7 +21,7 @@ from nested_agents.studies.store.store import Store
 CLAIMS = """
 import sys
 import made_up, made_up_cli
-from nested_agents.studies import run
+from nested_agents.studies.api import run_study as run
 from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.claims import claims
 from nested_agents.studies.cli.main import main

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from nested_agents.core import trust
+from nested_agents.core.plugins import trust
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.store.store import SPEC_FILE
 

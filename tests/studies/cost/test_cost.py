@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nested_agents.core.cost import Problem
+from nested_agents.core.agents.cost import Problem
 from nested_agents.studies.cli.commands.cost import numbers
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.cost.cost import (

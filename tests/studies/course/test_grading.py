@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import nested_agents as na
-from nested_agents.core.cost import Problem, below_counts
+from nested_agents.core.agents.cost import Problem, below_counts
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.course.grading import blank_sheet, grade, grade_sheet
 from nested_agents.studies.course.labs import LABS, WHEELS

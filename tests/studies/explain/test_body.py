@@ -1,6 +1,6 @@
 import numpy as np
 
-from nested_agents.core.self_model import SelfModel, SelfModelSettings
+from nested_agents.core.adaptation.self_model import SelfModel, SelfModelSettings
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS, nominal_effect
 from nested_agents.studies.explain.body import Bodies, table, verdicts
 

@@ -2,9 +2,9 @@ import Box2D
 import numpy as np
 import pytest
 
-from nested_agents.studies.analysis.statistics import Estimate
-from nested_agents.studies.analysis.summary import Summary
 from nested_agents.studies.report import words
+from nested_agents.studies.results.statistics import Estimate
+from nested_agents.studies.results.summary import Summary
 
 
 def line(condition, *numbers):

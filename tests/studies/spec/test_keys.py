@@ -2,8 +2,8 @@
 
 import pytest
 
-from nested_agents.core.plugged import Plugged
-from nested_agents.core.settings import Settings
+from nested_agents.core.plugins.plugged import Plugged
+from nested_agents.core.plugins.settings import Settings
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.conditions import ConditionSettings
 from nested_agents.studies.spec.keys import Key, Table, keys_below, tables

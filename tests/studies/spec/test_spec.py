@@ -381,7 +381,7 @@ def test_described_boxes_are_called_by_their_names():
 
 
 def test_keywords_make_a_whole_spec_and_objects_stand_for_names():
-    from nested_agents.core.hierarchy import Hierarchy
+    from nested_agents.core.interface.hierarchy import Hierarchy
     from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 
     pair = Hierarchy(["robot1.left", "robot1.right"], [("robot1.left", "robot1.right")])

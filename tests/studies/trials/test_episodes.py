@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from nested_agents.core.protocols import SUCCESS, Measure, Transition
+from nested_agents.core.interface.protocols import SUCCESS, Measure, Transition
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
 from nested_agents.studies.trials.episodes import EpisodeMeter, EpisodeRecorder, EpisodeRow
 

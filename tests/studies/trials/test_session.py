@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nested_agents.core.loop import world_seed
-from nested_agents.core.sources import Sources
+from nested_agents.core.agents.loop import world_seed
+from nested_agents.core.plugins.sources import Sources
 from nested_agents.scenarios.line_up import LineUp
 from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec

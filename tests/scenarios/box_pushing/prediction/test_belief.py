@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from nested_agents.core.calibration import CalibrationSettings
-from nested_agents.core.decision import Decision
+from nested_agents.core.adaptation.calibration import CalibrationSettings
+from nested_agents.core.agents.loop import control_loop, policy_seed
+from nested_agents.core.agents.robot_agents import per_robot
+from nested_agents.core.agents.team import Team
+from nested_agents.core.decision.settings import Decision
+from nested_agents.core.interface.protocols import CalibratedScenario
 from nested_agents.core.learners.batch import BatchTDSettings
-from nested_agents.core.loop import control_loop, policy_seed
-from nested_agents.core.protocols import CalibratedScenario
-from nested_agents.core.robot_agents import per_robot
-from nested_agents.core.team import Team
 from nested_agents.scenarios import BoxPushing, BoxPushingSettings
 from nested_agents.scenarios.box_pushing.prediction.belief import (
     CONSTANTS,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nested_agents.core.loop import world_seed
+from nested_agents.core.agents.loop import world_seed
 from nested_agents.scenarios import BoxPushing, BoxPushingSettings
 from nested_agents.scenarios.box_pushing.config import (
     DelayedSettings,

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from nested_agents.core.spaces import ActionSet
+from nested_agents.core.interface.spaces import ActionSet
 from nested_agents.scenarios.box_pushing.prediction.predictors import push_model
 from nested_agents.scenarios.box_pushing.scripted.driving import Drivers
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES

@@ -5,8 +5,8 @@ import itertools
 import numpy as np
 import pytest
 
-from nested_agents.core.loop import world_seed
-from nested_agents.core.settings import SettingsError
+from nested_agents.core.agents.loop import world_seed
+from nested_agents.core.plugins.settings import SettingsError
 from nested_agents.scenarios import BoxPushing, BoxPushingSettings
 from nested_agents.scenarios.box_pushing.config import BoxSettings, RobotSettings, label
 from nested_agents.scenarios.box_pushing.world.robots import (

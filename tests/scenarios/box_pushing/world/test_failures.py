@@ -7,8 +7,8 @@ import pytest
 from pydantic import TypeAdapter, ValidationError
 from scipy.linalg import expm
 
-from nested_agents.core.arrays import FloatArray
-from nested_agents.core.loop import world_seed
+from nested_agents.core.agents.loop import world_seed
+from nested_agents.core.numerics.arrays import FloatArray
 from nested_agents.scenarios import BoxPushing, BoxPushingSettings
 from nested_agents.scenarios.box_pushing.config import Failure, FailureSettings
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nested_agents.core.arrays import FloatArray
+from nested_agents.core.numerics.arrays import FloatArray
 from nested_agents.scenarios.box_pushing.world.geometry import (
     Outline,
     ray,

@@ -5,7 +5,7 @@ import gc
 import numpy as np
 import pytest
 
-from nested_agents.core.arrays import FloatArray
+from nested_agents.core.numerics.arrays import FloatArray
 from nested_agents.scenarios.box_pushing.config import CONTROL_PERIOD
 from nested_agents.scenarios.box_pushing.starts import place
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES, box_for

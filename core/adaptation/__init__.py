@@ -1,0 +1,1 @@
+"""What a team revises beside its values: self-models, constants of predictors, experience."""

@@ -1,0 +1,147 @@
+"""A robot's model of itself: what each of its wheels does to its motion, learned while moving.
+
+The twist of a robot in its own frame is taken as linear in its commanded wheel speeds::
+
+    twist = effect @ [u_1, ..., u_w, 1] + noise
+
+For each of its three components a Kalman filter tracks the row of the ``(3, w + 1)`` effect,
+starting from the nominal geometry. When an innovation is larger than the filter believes possible,
+its covariance is inflated: something has changed, so old experience counts less. The effect feeds
+the predictor; this is how a team learns that a wheel has failed.
+
+Wheels that pull against each other skid, and a twist is then not linear in their speeds. The
+filter takes what is left over for a change and goes after it, surer of it than it should be. So it
+keeps count of how large its innovations have been, in units of what it expected: its own
+covariance, which decides how fast it learns, stays as it is; the deviations that it reports are
+multiplied by that ratio (Birge 1932).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ..numerics.arrays import FloatArray
+from ..plugins.settings import Positive, Settings
+
+MEMORY = 100
+"""Decisions over which the size of innovations is averaged."""
+
+
+class SelfModelSettings(Settings):
+    """Whether and how fast a robot revises what it believes its wheels to do."""
+
+    enabled: bool = False
+    """Whether robots learn it; otherwise prediction takes every robot as nominal."""
+    prior_effect: Positive = 0.3
+    """Standard deviation of a wheel's effect around the nominal one [m/s per m/s]."""
+    prior_constant: Positive = 0.003
+    """Standard deviation of the constant part of the motion [m/s]."""
+    noise: Positive = 0.004
+    """Standard deviation of a measured speed around the model's [m/s]."""
+    surprise: Positive = 9.0
+    """Squared innovation, in units of its expected square, from which on a change is assumed."""
+    inflation: Positive = 1.0
+    """Share of the prior covariance that is added then."""
+
+
+class SelfModel:
+    """Kalman filters on the wheel effects of all robots.
+
+    Parameters
+    ----------
+    settings
+        Uncertainties of prior and measurement.
+    nominal
+        Per robot the ``(3, w + 1)`` effect of its nominal geometry: rows are the speed ahead and
+        to the left [m/s] and the turning rate [rad/s], columns the wheel speeds [m/s] and 1.
+
+    Examples
+    --------
+    A cart with one wheel, which turns out to be seized.
+
+    >>> nominal = np.array([[1.0, 0.0], [0.0, 0.0], [0.0, 0.0]])
+    >>> model = SelfModel(SelfModelSettings(enabled=True), [nominal])
+    >>> for speed in (0.1, -0.1, 0.1, -0.1):
+    ...     model.observe(0, np.array([speed]), np.zeros(3))
+    >>> abs(float(model.effects[0][0, 0])) < 0.01
+    True
+    """
+
+    def __init__(self, settings: SelfModelSettings, nominal: Sequence[FloatArray]) -> None:
+        self.settings = settings
+        self._nominal = tuple(np.array(effect, dtype=float) for effect in nominal)
+        self.effects = tuple(effect.copy() for effect in self._nominal)
+        # A turning rate is measured in units of the nominal robot's own turning per wheel speed.
+        self._units = tuple(
+            np.array([1.0, 1.0, max(1.0, float(np.abs(effect[2]).max()))]) for effect in nominal
+        )
+        self._prior = tuple(self._spread(effect.shape[1]) for effect in nominal)
+        self._covariances = tuple(np.stack([prior] * 3) for prior in self._prior)
+        # Mean squared innovation of each component in units of the expected square.
+        self._ratios = tuple(np.ones(3) for _ in nominal)
+
+    def _spread(self, size: int) -> FloatArray:
+        spread = np.full(size, self.settings.prior_effect**2)
+        spread[-1] = self.settings.prior_constant**2
+        return np.diag(spread)
+
+    @property
+    def deviations(self) -> tuple[FloatArray, ...]:
+        """Per robot the ``(3, w + 1)`` standard deviations of its effect.
+
+        Those of its filters, times how much larger their innovations are than they expect.
+        """
+        return tuple(
+            unit[:, None]
+            * np.sqrt(np.maximum(1.0, ratios))[:, None]
+            * np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
+            for unit, ratios, covariances in zip(
+                self._units, self._ratios, self._covariances, strict=True
+            )
+        )
+
+    def observe(self, robot: int, speeds: FloatArray, twist: FloatArray) -> None:
+        """Take in one twist ``(3,)`` measured under commanded wheel speeds ``(w,)``."""
+        noise = self.settings.noise**2
+        regressor = np.append(speeds, 1.0)
+        effect, covariances = self.effects[robot], self._covariances[robot]
+        ratios = self._ratios[robot]
+        for row, unit in enumerate(self._units[robot]):
+            innovation = float(twist[row] - effect[row] @ regressor) / unit
+            carried = covariances[row] @ regressor
+            expected = float(regressor @ carried) + noise
+            ratios[row] += (innovation**2 / expected - ratios[row]) / MEMORY
+            if innovation**2 > self.settings.surprise * expected:
+                covariances[row] += self.settings.inflation * self._prior[robot]
+                carried = covariances[row] @ regressor
+                expected = float(regressor @ carried) + noise
+            gain = carried / expected
+            effect[row] += gain * innovation * unit
+            covariances[row] -= np.outer(gain, carried)
+
+    def arrays(self) -> dict[str, FloatArray]:
+        """Return effects, covariances and ratios of innovations by robot."""
+        return {
+            f"{name}{r}": array
+            for name, arrays in self._remembered.items()
+            for r, array in enumerate(arrays)
+        }
+
+    def restore(self, arrays: Mapping[str, FloatArray]) -> None:
+        """Continue from `arrays`."""
+        for name, own in self._remembered.items():
+            for r, array in enumerate(own):
+                array[:] = arrays[f"{name}{r}"]
+
+    def take_over(self, former: SelfModel) -> None:
+        """Go on from what another one has learned, if its bodies are built alike; else anew."""
+        if len(self._nominal) == len(former._nominal) and all(
+            map(np.array_equal, self._nominal, former._nominal)
+        ):
+            self.restore(former.arrays())
+
+    @property
+    def _remembered(self) -> dict[str, tuple[FloatArray, ...]]:
+        return {"effect": self.effects, "covariance": self._covariances, "ratio": self._ratios}

@@ -1,0 +1,169 @@
+"""What a hierarchy costs, counted by the paper's formulas (Section VII, Eq. 18-23).
+
+One iteration updates every state-action pair of every agent by enumeration. Agent i chooses among
+the joint actions of itself and the agents it sees, ``|A| ** (1 + |below(i)|)`` of them; with |S|
+rules per agent, it has that many times |S| pairs, each maximised over as many joint actions. In the
+paper's chain of n agents the exponents are n, n - 1, ..., 1, and the sums have closed forms.
+
+All results are exact integers (one is a fraction) of any size; floats would overflow before n = 50.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from fractions import Fraction
+
+from ..interface.hierarchy import Hierarchy
+
+PAPER_RULES = 5**7
+"""|S_n|: seven state variables of five membership functions (Section VII)."""
+PAPER_ACTIONS = 4
+"""|A| (Section V)."""
+PAPER_ITERATIONS = 450
+"""L, the iterations of a training epoch (Section VII)."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """The quantities that the formulas share.
+
+    Parameters
+    ----------
+    rules
+        |S_n|, states (rules) of one agent.
+    actions
+        |A|, actions of one agent; at least 2.
+    iterations
+        L.
+
+    Raises
+    ------
+    ValueError
+        If a quantity is below its least; in the methods, if n is below 1.
+    """
+
+    rules: int = PAPER_RULES
+    actions: int = PAPER_ACTIONS
+    iterations: int = PAPER_ITERATIONS
+
+    def __post_init__(self) -> None:
+        for name, least in (("rules", 1), ("actions", 2), ("iterations", 1)):
+            if getattr(self, name) < least:
+                raise ValueError(f"{name} = {getattr(self, name)}, allowed: {least} or more")
+
+    def nested(self, below: Iterable[int]) -> int:
+        """Return the cost of any hierarchy (Eq. 18, generalised).
+
+        ``L * sum_i |S| * (|A| ** (1 + below_i)) ** 2``
+
+        Parameters
+        ----------
+        below
+            The number of agents below each agent.
+
+        Examples
+        --------
+        The paper's chain of four agents:
+
+        >>> Problem().nested(range(4))
+        2457562500000
+        """
+        pairs = sum(self.actions ** (2 * (1 + count)) for count in below)
+        return self.iterations * self.rules * pairs
+
+    def chain_closed_form(self, n: int) -> int:
+        """Return the cost of a chain of n agents as a geometric series (Eq. 19).
+
+        ``L * |S| * ((|A|^2)^(n+1) - |A|^2) / (|A|^2 - 1)``; the division leaves no remainder.
+        """
+        _check(n)
+        square = self.actions**2
+        return self.iterations * self.rules * ((square ** (n + 1) - square) // (square - 1))
+
+    def chain_factored(self, n: int) -> Fraction:
+        """Return the same with the largest power taken out (Eq. 20); equal to Eq. 19.
+
+        ``L * |S| * (|A|^2)^n * (|A|^2 - (|A|^2)^(1-n)) / (|A|^2 - 1)``
+        """
+        _check(n)
+        square = self.actions**2
+        numerator = square - Fraction(1, square ** (n - 1))
+        return self.iterations * self.rules * square**n * numerator / (square - 1)
+
+    def chain_asymptotic(self, n: int) -> Fraction:
+        """Return the cost of a chain of many agents (Eq. 21, 22).
+
+        ``L * |S| * (|A|^2)^n * K`` with ``K = |A|^2 / (|A|^2 - 1)``
+
+        Examples
+        --------
+        >>> Problem().chain_asymptotic(4)
+        Fraction(2457600000000, 1)
+        """
+        _check(n)
+        square = self.actions**2
+        return self.iterations * self.rules * square**n * Fraction(square, square - 1)
+
+    def single_agent(self, n: int) -> int:
+        """Return the cost of one agent over the joint state and action of n agents (Eq. 23).
+
+        ``L * |S|^n * (|A|^2)^n``
+
+        Examples
+        --------
+        >>> f"{Problem().single_agent(4):.4e}"
+        '1.0986e+27'
+        """
+        _check(n)
+        return self.iterations * self.rules**n * self.actions ** (2 * n)
+
+    def elimination(self, beside: Iterable[int]) -> int:
+        """Return what variable elimination adds and compares in one decision.
+
+        ``sum_i |A| ** (1 + beside_i)``, exponential in the width of the graph, linear in the agents
+        (Guestrin, Koller and Parr 2002).
+
+        Parameters
+        ----------
+        beside
+            The number of agents in the table that is left when each agent is eliminated.
+
+        Examples
+        --------
+        A line of pairs, and the same agents as one table:
+
+        >>> Problem().elimination([1] * 127 + [0]), Problem().elimination([3, 2, 1, 0])
+        (2036, 340)
+        """
+        return sum(self.actions ** (1 + count) for count in beside)
+
+    def decision(self, below: Iterable[int]) -> int:
+        """Return how many joint actions one step of the running system tries.
+
+        ``sum_i |A| ** (1 + below_i)``: it visits one state per step, where the formulas sweep all,
+        and maximises once, where they do so for every pair.
+        """
+        return sum(self.actions ** (1 + count) for count in below)
+
+
+def below_counts(hierarchy: Hierarchy) -> tuple[int, ...]:
+    """Return the number of agents below each agent, in agent order."""
+    return tuple(len(hierarchy.below(i)) for i in range(len(hierarchy)))
+
+
+def is_chain(below: Iterable[int]) -> bool:
+    """Return whether a hierarchy with these numbers of agents below is a chain.
+
+    Examples
+    --------
+    >>> is_chain([1, 2, 0]), is_chain([1, 0, 0])
+    (True, False)
+    """
+    counts = sorted(below)
+    return counts == list(range(len(counts)))
+
+
+def _check(n: int) -> None:
+    if n < 1:
+        raise ValueError(f"n = {n}, allowed: 1 or more")

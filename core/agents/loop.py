@@ -1,0 +1,150 @@
+"""The three-layer control loop (Section VIII) as a generator of step records.
+
+1. *Error observation*: the scenario turns the goal and what it senses into the agents' states.
+2. *Action selection*, coupled with learning: the team predicts, values and chooses a joint action.
+3. *Servo control*: the scenario turns it into wheel speeds and moves the robots.
+
+Recording, progress and plotting consume the records; none of them enters the loop.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from time import perf_counter
+from typing import NamedTuple, Protocol, runtime_checkable
+
+import numpy as np
+
+from ..interface.acting import Actors
+from ..interface.protocols import Scenario, Transition
+from ..numerics.arrays import FloatArray, IntArray
+from .team import Team
+
+
+@dataclass(frozen=True)
+class StepRecord:
+    """One step of the control loop.
+
+    Attributes
+    ----------
+    episode, step
+        Counted from 0.
+    states
+        ``(n, d)`` states before the step.
+    joint_action
+        ``(n,)`` action indices, in agent order.
+    transition
+        What the step led to.
+    last
+        Whether the episode ends with this step.
+    deciding, learning
+        Seconds spent in the team; the scenario reports its own in ``transition.info``.
+    """
+
+    episode: int
+    step: int
+    states: FloatArray
+    joint_action: IntArray
+    transition: Transition
+    last: bool
+    deciding: float
+    learning: float
+
+
+class EpisodeSummary(NamedTuple):
+    """What a whole episode came to."""
+
+    steps: int
+    measures: Mapping[str, float]
+    """Values of the scenario's measures by name."""
+    return_: float
+    """Sum of the rewards."""
+
+
+@runtime_checkable
+class EpisodicScenario(Scenario, Protocol):
+    """A scenario that runs whole episodes of some teams at once, compiled."""
+
+    def run_episode(
+        self, team: Team, seed: np.random.SeedSequence, episode: int, steps: int, *, learn: bool
+    ) -> EpisodeSummary | None:
+        """Run an episode, and leave scenario and team as `control_loop` would.
+
+        None, and nothing is changed, if the team has parts that it does not know.
+        """
+        ...
+
+
+def world_seed(seed: int, episode: int) -> np.random.SeedSequence:
+    """Return the seed of an episode's world: the same for every condition of a study."""
+    return np.random.SeedSequence(seed, spawn_key=(0, episode))
+
+
+def policy_seed(seed: int) -> np.random.SeedSequence:
+    """Return the seed of a team, independent of all worlds."""
+    return np.random.SeedSequence(seed, spawn_key=(1,))
+
+
+def control_loop(
+    scenario: Scenario,
+    team: Actors,
+    *,
+    episodes: int,
+    steps: int,
+    seed: int,
+    first_episode: int = 0,
+    first_world: int | None = None,
+    learn: bool = True,
+) -> Iterator[StepRecord]:
+    """Run episodes and yield every step.
+
+    Parameters
+    ----------
+    scenario, team
+        The world and those who act in it; both are modified.
+    episodes, steps
+        How many episodes, and how many steps each may take.
+    seed
+        Seed of the worlds, see `world_seed`.
+    first_episode
+        Number of the first episode: a run can be continued with a restored team.
+    first_world
+        Number of its world, see `world_seed`; None: the same.
+    learn
+        Whether the team explores and learns, or is evaluated greedily.
+
+    Raises
+    ------
+    ValueError
+        If the scenario does not predict what the team decides by, see `Team.check`.
+    """
+    first_world = first_episode if first_world is None else first_world
+    for k in range(episodes):
+        episode = first_episode + k
+        states = scenario.reset(world_seed(seed, first_world + k), episode)
+        if learn:
+            team.begin_episode()
+        prediction = team.predict(scenario)
+        team.check(prediction)
+        for step in range(steps):
+            begin = perf_counter()
+            joint_action = team.act(prediction, explore=learn)
+            decided = perf_counter()
+            transition = scenario.step(joint_action)
+            last = transition.terminated or transition.truncated or step == steps - 1
+            moved = perf_counter()
+            if learn:
+                team.adapt(prediction, joint_action, transition)
+            prediction = team.predict(scenario)
+            if learn:
+                team.learn(transition)
+                if last:
+                    team.end_episode()
+            yield StepRecord(
+                episode, step, states, joint_action, transition, last,
+                decided - begin, perf_counter() - moved,
+            )  # fmt: skip
+            states = transition.states
+            if last:
+                break

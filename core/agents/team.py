@@ -1,0 +1,416 @@
+"""A team: a hierarchy of agents that decide together and learn each on its own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+
+from ..adaptation.calibration import Calibration
+from ..adaptation.mirror import Mirror
+from ..adaptation.self_model import SelfModel
+from ..decision.exploration import Explorer, Greedy, SuccessorExplorer
+from ..evaluators.evaluator import NOTHING_GIVEN, DecisionProblem, Deliberation, Evaluator
+from ..interface.acting import Actors
+from ..interface.hierarchy import Hierarchy
+from ..interface.protocols import (
+    CalibratedPrediction,
+    CalibratedScenario,
+    ContinuedPrediction,
+    EmbodiedPrediction,
+    EmbodiedScenario,
+    Prediction,
+    RewardPrediction,
+    Scenario,
+    SummedScenario,
+    Transition,
+    groups_of,
+)
+from ..interface.spaces import ActionSet
+from ..learners.batch import ReplaySettings
+from ..learners.learner import Learner, LearnerSettings, SuccessorLearner
+from ..numerics.arrays import FloatArray, IntArray
+from ..rules.rule_base import RuleBase
+from .rows import rows_of
+
+
+class Team:
+    """Agents in a hierarchy, one rule base each; consequent weights are an agent's own or a role's.
+
+    Use `Team.build` to make one from settings.
+
+    Parameters
+    ----------
+    hierarchy
+        Who decides before whom, and sees whom.
+    action_set
+        What each agent can do.
+    learner
+        Owns the consequent weights.
+    rows
+        ``(n,)`` which row of them each agent has.
+    explorer
+        Chooses actions by value.
+    evaluator
+        Values actions; none: actions are drawn at random.
+    seed
+        Source of everything random in the team.
+    self_model
+        What the wheels do, as learned; none: prediction takes every robot as nominal.
+    calibration
+        The predictor's constants, as learned; none: as the scenario believes them to be.
+    mirror
+        Doubles what is learned from; none: it is what the agents met.
+    """
+
+    def __init__(
+        self,
+        hierarchy: Hierarchy,
+        action_set: ActionSet,
+        learner: Learner,
+        rows: IntArray,
+        explorer: Explorer,
+        evaluator: Evaluator | None,
+        seed: np.random.SeedSequence,
+        self_model: SelfModel | None = None,
+        calibration: Calibration | None = None,
+        mirror: Mirror | None = None,
+    ) -> None:
+        self.hierarchy, self.action_set = hierarchy, action_set
+        self.learner, self.explorer, self.evaluator = learner, explorer, evaluator
+        self.rows = rows
+        self.self_model, self.calibration, self.mirror = self_model, calibration, mirror
+        self.rng = np.random.Generator(np.random.PCG64(seed))
+        self.seen: FloatArray = np.ones((len(hierarchy), len(action_set)))
+        """How often each agent was seen to take each action, one of each to begin with."""
+        shape = (len(hierarchy), len(action_set)) * 2
+        problem = getattr(evaluator, "problem", None)
+        conditional = isinstance(problem, DecisionProblem) and problem.teammates == "conditional"
+        self.given: FloatArray = np.ones(shape if conditional else (0, 0, 0, 0))
+        """The same given each action of another ``(n, A, n, A)``, if the evaluator asks for it."""
+        self._greedy: Explorer = Greedy()
+        # Agents in the order of decision, each with those before it that it does not see.
+        order = hierarchy.order
+        self._order = [
+            (i, np.array(sorted({*order[:k]} - {*hierarchy.above(i)}), dtype=np.int64))
+            for k, i in enumerate(order)
+        ]
+
+    @classmethod
+    def build(
+        cls,
+        settings: LearnerSettings,
+        scenario: Scenario,
+        hierarchy: Hierarchy,
+        seed: np.random.SeedSequence,
+    ) -> Team:
+        """Build the team of `settings` for the agents of a scenario.
+
+        Raises
+        ------
+        ValueError
+            If the hierarchy is over other agents than the scenario's, or the settings do not fit
+            its state space.
+        """
+        if not isinstance(settings, LearnerSettings):
+            raise ValueError(f"settings = {settings!r}: must be a learner's, as BatchTDSettings()")
+        if hierarchy.agents != tuple(scenario.agents):
+            raise ValueError(
+                f"topology: agents {', '.join(hierarchy.agents)} are not the scenario's "
+                f"{', '.join(scenario.agents)}"
+            )
+        self_model = None
+        if settings.self_model.enabled:
+            if not isinstance(scenario, EmbodiedScenario):
+                raise ValueError("learner.self_model.enabled: the scenario has no bodies on wheels")
+            self_model = SelfModel(settings.self_model, scenario.nominal_effects)
+        calibration = None
+        if settings.calibration.enabled:
+            if not isinstance(scenario, CalibratedScenario) or not scenario.constants:
+                raise ValueError(
+                    "learner.calibration.enabled: the scenario's predictor has no constants "
+                    "to calibrate"
+                )
+            calibration = Calibration(
+                settings.calibration, len(scenario.constants), scenario.levers
+            )
+        rules = RuleBase.build(scenario.state_space, settings.rule_base)
+        rows = rows_of(scenario, shared=settings.weights == "role")
+        is_mirrored = isinstance(settings, ReplaySettings) and settings.mirrored
+        mirror = Mirror.of(scenario) if is_mirrored else None
+        evaluator, decision = None, settings.decision
+        if decision.rule != "random":
+            problem = DecisionProblem(
+                rules,
+                hierarchy,
+                len(scenario.action_set),
+                groups_of(scenario),
+                isinstance(scenario, SummedScenario) and scenario.superposes,
+                decision.rule,
+                decision.teammates,
+                settings.discount,
+                decision.value_of,
+            )
+            evaluator = decision.evaluator.build(problem)
+        return cls(
+            hierarchy,
+            scenario.action_set,
+            settings.build(rules, rows if mirror is None else mirror.rows(rows)),
+            rows,
+            settings.exploration.build(len(hierarchy)),
+            evaluator,
+            seed,
+            self_model,
+            calibration,
+            mirror,
+        )
+
+    def check(self, prediction: Prediction) -> None:
+        """Refuse a prediction without what the team decides by.
+
+        Raises
+        ------
+        ValueError
+            If it decides by rewards, and the prediction knows none; or by plans, and the
+            prediction does not go on; one line.
+        """
+        problem = getattr(self.evaluator, "problem", None)
+        if not isinstance(problem, DecisionProblem) or problem.rule == "value":
+            return
+        if not isinstance(prediction, RewardPrediction):
+            raise ValueError(
+                f"learner.decision.rule = {problem.rule!r}: the scenario predicts no rewards, "
+                "use value"
+            )
+        goes_on = isinstance(prediction, ContinuedPrediction)
+        if getattr(self.evaluator, "continues", False) and not goes_on:
+            raise ValueError(
+                "learner.decision.evaluator: plans of several decisions need a scenario that "
+                "predicts from predicted states"
+            )
+
+    def begin_episode(self) -> None:
+        """Note that an episode begins."""
+        self.explorer.begin_episode()
+        self.learner.begin_episode()
+
+    def predict(self, scenario: Scenario) -> Prediction:
+        """Predict from the scenario's present state, by what has been learned of it."""
+        if self.self_model is None and self.calibration is None:
+            return scenario.predict()
+        embodied = cast(EmbodiedScenario, scenario)
+        effects = self.self_model.effects if self.self_model else embodied.nominal_effects
+        if self.calibration is None:
+            return embodied.predict_with(effects)
+        return cast(CalibratedScenario, scenario).predict_with(effects, self.calibration.constants)
+
+    def act(self, prediction: Prediction, *, explore: bool = True) -> IntArray:
+        """Decide a joint action ``(n,)``, from the top of the hierarchy down.
+
+        Without `explore` every agent takes its greatest action and the team's memory stays as it
+        is, apart from the random numbers that break ties.
+        """
+        n, n_actions = len(self.hierarchy), len(self.action_set)
+        if self.evaluator is None:
+            return self.rng.integers(n_actions, size=n)
+        explorer = self.explorer if explore else self._greedy
+        frequencies = self.seen / self.seen.sum(axis=1, keepdims=True)
+        theta = self.learner.theta
+        weights = [theta[row] for row in self.rows]
+        joint = np.full(n, self.action_set.neutral)
+        for i, unseen in self._order:
+            known = joint
+            if len(unseen):  # decided, but not above: taken to maintain
+                known = joint.copy()
+                known[unseen] = self.action_set.neutral
+            deliberation = Deliberation(
+                i, known, prediction, weights, frequencies, self.rng, self._given_by(i)
+            )
+            values = self.evaluator.values(deliberation)
+            joint[i] = explorer.choose(i, values, self.rng)
+        if explore:
+            explorer.advance()
+            every = np.arange(n)
+            self.seen[every, joint] += 1.0
+            if self.given.size:
+                self.given[every[:, None], joint[:, None], every, joint] += 1.0
+        return joint
+
+    def _given_by(self, agent: int) -> FloatArray:
+        """Return how often all took each action ``(A, n, A)`` given each action of an agent."""
+        if not self.given.size:
+            return NOTHING_GIVEN
+        counts = self.given[agent]
+        return counts / counts.sum(axis=2, keepdims=True)
+
+    def adapt(self, prediction: Prediction, joint_action: IntArray, transition: Transition) -> None:
+        """Revise self-model and constants by what `joint_action` did, against what was predicted.
+
+        What contact is predicted to take from the motion is given back to the self-model: a robot
+        that pushes a box is slow, not broken. The constants are held against what was pushed.
+        """
+        if self.calibration is not None:
+            self._calibrate(cast(CalibratedPrediction, prediction), joint_action, transition)
+        if self.self_model is None or transition.motions is None:
+            return
+        embodied = cast(EmbodiedPrediction, prediction)
+        speeds = embodied.commands(joint_action)
+        free = transition.motions - embodied.slips(joint_action)
+        for body, group in enumerate(embodied.groups):
+            self.self_model.observe(body, speeds[list(group)], free[body])
+
+    def _calibrate(
+        self, prediction: CalibratedPrediction, joint_action: IntArray, transition: Transition
+    ) -> None:
+        moved, motions = transition.pushed, transition.motions
+        if self.calibration is None or moved is None or motions is None or not moved.any():
+            return
+        predicted = prediction.outcomes(joint_action, self.calibration.points)
+        self.calibration.observe(np.vstack([moved, motions]), predicted)
+
+    def learn(self, transition: Transition) -> None:
+        """Take in what a step led to."""
+        states, reward = transition.states, transition.reward
+        if self.mirror is not None:
+            states, reward = self.mirror.states(states), self.mirror.reward(reward)
+        self._count(self.learner.observe(states, reward, transition.terminated))
+
+    def end_episode(self) -> None:
+        """Learn what is learned after an episode."""
+        self._count(self.learner.end_episode())
+
+    def _count(self, updates: int) -> None:
+        if self.evaluator is not None:
+            self.evaluator.counts.weight_updates += updates
+
+    def take_over(self, former: Team, rows: IntArray) -> None:
+        """Begin where the team of another scenario ended, between two episodes.
+
+        It goes on with its weights and experience, with how often agents of each row were seen to
+        take each action, with its exploration and its random numbers; with self-model and
+        calibration if the bodies are alike, and with conditional frequencies if the agents are as
+        many, which otherwise begin anew.
+
+        Parameters
+        ----------
+        former
+            A team of the same settings.
+        rows
+            ``(n_rows,)`` the row of its weights that each row goes on from, see `carried_rows`.
+
+        Raises
+        ------
+        ValueError
+            If the learner or the exploration knows no way; one line.
+        """
+        learner, explorer = self.learner, self.explorer
+        if not isinstance(learner, SuccessorLearner):
+            raise ValueError(f"learner.kind: {_no_successor(learner)}")
+        if not isinstance(explorer, SuccessorExplorer):
+            raise ValueError(f"learner.exploration.kind: {_no_successor(explorer)}")
+        learner.take_over(former.learner, rows)
+        explorer.take_over(former.explorer)
+        self.rng.bit_generator.state = former.rng.bit_generator.state
+        self.seen = np.stack(
+            [former.seen[former.rows == rows[row]].mean(axis=0) for row in self.rows]
+        )
+        if self.given.shape == former.given.shape:
+            self.given = former.given.copy()
+        if self.self_model is not None and former.self_model is not None:
+            self.self_model.take_over(former.self_model)
+        if self.calibration is not None and former.calibration is not None:
+            self.calibration.take_over(former.calibration)
+
+    def save(self, path: Path | str) -> None:
+        """Write everything that the team remembers to an ``.npz`` file: arrays only."""
+        with open(path, "wb") as file:
+            np.savez(file, allow_pickle=False, **self.arrays())
+
+    def load(self, path: Path | str) -> None:
+        """Continue from what `save` wrote; the team must be built from the same settings.
+
+        Raises
+        ------
+        ValueError
+            If the file is not of a team of this shape.
+        """
+        with np.load(path, allow_pickle=False) as arrays:
+            self.restore(dict(arrays))
+
+    def arrays(self) -> dict[str, FloatArray]:
+        """Return everything that the team remembers as named arrays."""
+        state = self.rng.bit_generator.state
+        words = [state["state"]["state"], state["state"]["inc"]]
+        generator = [word >> shift & (2**64 - 1) for word in words for shift in (64, 0)]
+        generator += [state["has_uint32"], state["uinteger"]]
+        learner = {f"learner.{name}": array for name, array in self.learner.arrays().items()}
+        if self.self_model is not None:
+            learner |= {f"self_model.{k}": v for k, v in self.self_model.arrays().items()}
+        if self.calibration is not None:
+            learner |= {f"calibration.{k}": v for k, v in self.calibration.arrays().items()}
+        return {
+            "generator": np.array(generator, dtype=np.uint64),
+            "explorer": self.explorer.memory,
+            "seen": self.seen,
+            **({"given": self.given} if self.given.size else {}),
+            **learner,
+        }
+
+    def restore(self, arrays: Mapping[str, FloatArray]) -> None:
+        """Continue from what `arrays` returned."""
+        own = self.arrays()
+        if arrays.keys() != own.keys():
+            raise ValueError(
+                f"team: saved arrays {', '.join(sorted(arrays))} are not this team's "
+                f"{', '.join(sorted(own))}"
+            )
+        fixed = ("learner.theta", "learner.trace", "learner.reach", "seen", "explorer", "generator")
+        for name in (name for name in fixed if name in own):
+            if arrays[name].shape != own[name].shape:
+                raise ValueError(
+                    f"team: saved {name} has shape {arrays[name].shape}, this team's "
+                    f"{own[name].shape}"
+                )
+        words = [int(word) for word in arrays["generator"]]
+        self.rng.bit_generator.state = {
+            "bit_generator": "PCG64",
+            "state": {"state": words[0] << 64 | words[1], "inc": words[2] << 64 | words[3]},
+            "has_uint32": words[4],
+            "uinteger": words[5],
+        }
+        self.explorer.memory[:] = arrays["explorer"]
+        self.seen = arrays["seen"].copy()
+        if self.given.size:
+            self.given = arrays["given"].copy()
+        self.learner.restore(_part(arrays, "learner."))
+        if self.self_model is not None:
+            self.self_model.restore(_part(arrays, "self_model."))
+        if self.calibration is not None:
+            self.calibration.restore(_part(arrays, "calibration."))
+
+
+def _part(arrays: Mapping[str, FloatArray], prefix: str) -> dict[str, FloatArray]:
+    """Return the arrays whose names begin with `prefix`, without it."""
+    return {k.removeprefix(prefix): v for k, v in arrays.items() if k.startswith(prefix)}
+
+
+def of_fuzzy_agents(team: Actors) -> Team:
+    """Return a team that is a hierarchy of fuzzy agents.
+
+    Raises
+    ------
+    ValueError
+        If those who act are no such team, but a learner that acts for all; one line.
+    """
+    if not isinstance(team, Team):
+        raise ValueError(
+            f"learner.kind: {type(team).__name__} acts for all by itself; this needs agents with "
+            "rule bases"
+        )
+    return team
+
+
+def _no_successor(part: object) -> str:
+    return f"{type(part).__name__} has no take_over, by which it would go on with another team"

@@ -1,0 +1,1 @@
+"""How the values of actions become an action."""

@@ -1,0 +1,279 @@
+"""From the values of an agent's actions to one action (Section V).
+
+An explorer serves all agents of a team. It is told when an episode begins and when a step has
+been decided; it is asked for one action at a time. Everything random comes from the generator that
+is passed in; exact ties are broken at random, since they are common (maintaining and zeroing a
+resting wheel lead to the same state).
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Protocol, runtime_checkable
+
+import numpy as np
+from pydantic import Field
+
+from ..numerics.arrays import FloatArray
+from ..numerics.ties import greatest
+from ..plugins.plugged import SettingsRegistry
+from ..plugins.settings import Fraction, NonNegative, Positive, Settings
+
+
+def boltzmann(values: FloatArray, temperature: float) -> FloatArray:
+    """Return the Boltzmann distribution over actions (Eq. 14).
+
+    >>> boltzmann(np.array([0.0, np.log(3.0)]), 1.0).round(2).tolist()
+    [0.25, 0.75]
+    """
+    weights = np.exp((values - values.max()) / temperature)
+    return weights / weights.sum()
+
+
+class Explorer(Protocol):
+    """Chooses actions; its whole memory is one array."""
+
+    memory: FloatArray
+
+    def begin_episode(self) -> None:
+        """Note that an episode begins."""
+
+    def choose(self, agent: int, values: FloatArray, rng: np.random.Generator) -> int:
+        """Return the action of `agent` given the values ``(A,)`` of its actions."""
+
+    def advance(self) -> None:
+        """Note that all agents have decided this step."""
+
+
+@runtime_checkable
+class SuccessorExplorer(Protocol):
+    """An explorer that can go on from where one of the same kind ended with other agents."""
+
+    def take_over(self, former: Any) -> None:
+        """Go on from an explorer of the same settings, between two episodes."""
+        ...
+
+
+class ExplorationSettings(Settings):
+    """What the settings of all kinds of exploration inherit."""
+
+    kind: str = ""
+
+    def build(self, n_agents: int) -> Explorer:
+        """Return the explorer of a team of `n_agents`."""
+        raise TypeError(f"exploration {self.kind!r} says not how it is built")
+
+
+class Greedy:
+    """Always the action of greatest value."""
+
+    def __init__(self) -> None:
+        self.memory: FloatArray = np.zeros(0)
+
+    def begin_episode(self) -> None:
+        """Nothing depends on time."""
+
+    def advance(self) -> None:
+        """Nothing depends on time."""
+
+    def choose(self, agent: int, values: FloatArray, rng: np.random.Generator) -> int:
+        """Return the greatest action."""
+        return greatest(values, rng)
+
+
+class PaperExploration(ExplorationSettings):
+    """Epsilon-decreasing with a diminishing temperature (Section V).
+
+    The temperature is ``T(t) = 1 + T_max exp(-s t)``; with probability
+    ``epsilon (T(t) - 1) / (T_max - 1)``, cut off at 1, an agent explores.
+    """
+
+    kind: Literal["paper"] = "paper"
+    epsilon: Fraction = 1.0
+    """Exploration rate at the start; not printed in the paper."""
+    max_temperature: Annotated[float, Field(gt=1)] = 100.0
+    """T_max; not printed in the paper."""
+    decay: NonNegative = 0.005
+    """Decay of the temperature per step, s; printed in Section IX."""
+    clock: Literal["episode", "run"] = "run"
+    """Whether t counts the steps of the episode or of the whole run; not stated in the paper."""
+    exploit: Literal["greatest", "sample"] = "greatest"
+    """Take the action of greatest probability (Section V), or sample Eq. 14."""
+    explore: Literal["uniform", "boltzmann"] = "uniform"
+    """How the "random action" of the other case is drawn; not stated in the paper."""
+
+    def build(self, n_agents: int) -> Explorer:
+        """Return the explorer of a team."""
+        return EpsilonDecreasingBoltzmann(self)
+
+
+class EpsilonDecreasingBoltzmann:
+    """The paper's epsilon-decreasing exploration with a diminishing temperature (Section V)."""
+
+    def __init__(self, settings: PaperExploration) -> None:
+        self.settings = settings
+        self.memory: FloatArray = np.zeros(1)  # t, the steps counted by the clock
+
+    @property
+    def temperature(self) -> float:
+        """T(t) = 1 + T_max exp(-s t)."""
+        s = self.settings
+        return 1.0 + s.max_temperature * float(np.exp(-s.decay * self.memory[0]))
+
+    @property
+    def rate(self) -> float:
+        """Exploration probability epsilon (T(t) - 1) / (T_max - 1), at most 1."""
+        s = self.settings
+        return min(1.0, s.epsilon * (self.temperature - 1.0) / (s.max_temperature - 1.0))
+
+    def begin_episode(self) -> None:
+        """Restart the clock if it counts the steps of the episode."""
+        if self.settings.clock == "episode":
+            self.memory[0] = 0.0
+
+    def take_over(self, former: EpsilonDecreasingBoltzmann) -> None:
+        """Go on with the clock."""
+        self.memory[:] = former.memory
+
+    def advance(self) -> None:
+        """Let the clock tick."""
+        self.memory[0] += 1.0
+
+    def choose(self, agent: int, values: FloatArray, rng: np.random.Generator) -> int:
+        """Exploit with probability 1 - rate, else explore, each as the settings say."""
+        if rng.random() < self.rate:
+            if self.settings.explore == "uniform":
+                return int(rng.integers(len(values)))
+        elif self.settings.exploit == "greatest":
+            # Eq. 14 is increasing in the value: the greatest probability is the greatest value.
+            return greatest(values, rng)
+        return int(rng.choice(len(values), p=boltzmann(values, self.temperature)))
+
+
+class BoltzmannExploration(ExplorationSettings):
+    """Actions drawn from the Boltzmann distribution (Eq. 14) while its temperature falls.
+
+    ``T(t) = 1 + T_max exp(-s t)`` after t steps; the defaults are those of Kapetanakis and Kudenko
+    (2002) for games of 1,000 plays.
+    """
+
+    kind: Literal["boltzmann"] = "boltzmann"
+    max_temperature: Positive = 500.0
+    """Temperature that is added at first, T_max."""
+    decay: NonNegative = 0.006
+    """Decay of the temperature per step, s."""
+
+    def build(self, n_agents: int) -> Explorer:
+        """Return the explorer of a team."""
+        return Boltzmann(self)
+
+
+class Boltzmann:
+    """Samples the Boltzmann distribution; the clock counts the steps of the whole run."""
+
+    def __init__(self, settings: BoltzmannExploration) -> None:
+        self.settings = settings
+        self.memory: FloatArray = np.zeros(1)
+
+    @property
+    def temperature(self) -> float:
+        """T(t) = 1 + T_max exp(-s t)."""
+        s = self.settings
+        return 1.0 + s.max_temperature * float(np.exp(-s.decay * self.memory[0]))
+
+    def begin_episode(self) -> None:
+        """Go on counting."""
+
+    def take_over(self, former: Boltzmann) -> None:
+        """Go on with the clock."""
+        self.memory[:] = former.memory
+
+    def advance(self) -> None:
+        """Let the clock tick."""
+        self.memory[0] += 1.0
+
+    def choose(self, agent: int, values: FloatArray, rng: np.random.Generator) -> int:
+        """Draw an action."""
+        return int(rng.choice(len(values), p=boltzmann(values, self.temperature)))
+
+
+class BurstExploration(ExplorationSettings):
+    """Random actions that are held for a while, at a rate that falls from episode to episode.
+
+    The fraction of explorative decisions of an agent in episode ``k`` is ``max(floor, rate * decay
+    ** k)``, and at most `team_limit` divided by the number of agents.
+    """
+
+    kind: Literal["burst"] = "burst"
+    rate: Fraction = 0.3
+    """Fraction of explorative decisions in the first episode."""
+    decay: Fraction = 0.75
+    """Factor on that fraction from episode to episode."""
+    floor: Fraction = 0.02
+    """Fraction of explorative decisions below which it does not fall."""
+    team_limit: Positive | None = None
+    """Agents that explore at a time, at most, in the mean: in a large team somebody else disturbs
+    always; none: no limit."""
+    length: Annotated[float, Field(ge=1)] = 4.0
+    """Mean number of decisions for which a random action is repeated."""
+
+    def build(self, n_agents: int) -> Explorer:
+        """Return the explorer of a team of `n_agents`."""
+        return Bursts(self, n_agents)
+
+
+class Bursts:
+    """Random actions held for a geometric number of decisions, less often in later episodes."""
+
+    def __init__(self, settings: BurstExploration, n_agents: int) -> None:
+        self.settings = settings
+        limit = settings.team_limit
+        self._most = 1.0 if limit is None else min(1.0, limit / n_agents)
+        # The episode, then per agent: decisions left in its burst, the action held.
+        self.memory: FloatArray = np.zeros(1 + 2 * n_agents)
+        self.memory[0] = -1.0
+
+    @property
+    def rate(self) -> float:
+        """Fraction of decisions that are explorative in this episode."""
+        s = self.settings
+        return min(self._most, max(s.floor, s.rate * s.decay ** max(0.0, self.memory[0])))
+
+    def begin_episode(self) -> None:
+        """Count the episode and end every burst."""
+        self.memory[0] += 1.0
+        self.memory[1:] = 0.0
+
+    def take_over(self, former: Bursts) -> None:
+        """Go on counting episodes; bursts end with an episode."""
+        self.memory[0] = former.memory[0]
+
+    def advance(self) -> None:
+        """Bursts run down in `choose`."""
+
+    def choose(self, agent: int, values: FloatArray, rng: np.random.Generator) -> int:
+        """Return the held action, start a burst, or take the greatest."""
+        at = 1 + 2 * agent
+        if self.memory[at] > 0:
+            self.memory[at] -= 1.0
+            return int(self.memory[at + 1])
+        length, rate = self.settings.length, self.rate
+        # Starting with probability p a burst of mean length l makes l p / (1 - p + l p)
+        # of all decisions explorative; solved for p at the wanted rate.
+        if rng.random() < rate / (length - rate * (length - 1.0)):
+            action = int(rng.integers(len(values)))
+            self.memory[at] = rng.geometric(1.0 / length) - 1
+            self.memory[at + 1] = action
+            return action
+        return greatest(values, rng)
+
+
+EXPLORATIONS = SettingsRegistry(
+    "exploration",
+    {
+        "burst": f"{__name__}:BurstExploration",
+        "paper": f"{__name__}:PaperExploration",
+        "boltzmann": f"{__name__}:BoltzmannExploration",
+    },
+    ExplorationSettings,
+)
+"""Kinds of exploration by name."""

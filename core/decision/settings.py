@@ -1,0 +1,28 @@
+"""How values become a joint action, as it stands in the ``[learner.decision]`` table of a spec."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from ..evaluators import EVALUATORS, EvaluatorSettings
+from ..evaluators.auto import AutoSettings
+from ..evaluators.evaluator import Teammates, ValueOf
+from ..plugins.plugged import Plugged
+from ..plugins.settings import Settings
+
+
+class Decision(Settings):
+    """How values become a joint action."""
+
+    rule: Literal["value", "reward", "reward-and-value", "random"] = "value"
+    """Decide by f of the predicted state, by its predicted reward, by reward + discount f, or at
+    random. f of an after-state contains its reward already: the sum weighs the reward twice."""
+    teammates: Teammates = "best-response"
+    """What the agents below are expected to do: the best for this agent, anything with equal
+    probability, what they were seen to do so far (the paper's "stochastically observing"), or what
+    they were seen to do when this agent did the same as it considers now (``conditional``)."""
+    value_of: ValueOf = "own"
+    """Whose value decides: the agent's own; the mean of its own and those of the agents below it;
+    or the mean of all agents'."""
+    evaluator: Annotated[EvaluatorSettings, Plugged(EVALUATORS, EVALUATORS.parsed)] = AutoSettings()
+    """Which joint actions of the agents below are tried: the name of an evaluator, or its table."""

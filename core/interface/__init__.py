@@ -1,0 +1,1 @@
+"""What a scenario and those who act in it promise each other."""

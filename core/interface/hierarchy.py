@@ -1,0 +1,163 @@
+"""The hierarchy of agents: who sees and instructs whom (Section II-D, Fig. 1).
+
+A hierarchy is a directed acyclic graph, superior -> subordinate, over named agents. The agents
+decide in topological order, ties in agent order. When an agent decides, every other agent falls in
+one of three classes:
+
+- *above*: an ancestor; its action has been decided and passed down;
+- *below*: a descendant; all its actions are considered (averaged over or maximised over);
+- *unseen*: neither; it is taken to perform the neutral action, maintain, even if it has decided.
+
+In the paper's chain nobody is unseen.
+
+*Neighbours* are joined by an undirected edge: they decide at the same time. Each considers all
+actions of the other, as if it were below, and neither is told what the other does. Neighbours make
+joint-action learners (everybody is everybody's neighbour) and coordination graphs (few are).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING
+
+from ..plugins.deferred import Deferred
+
+if TYPE_CHECKING:
+    import networkx as nx
+else:
+    nx = Deferred("networkx")
+
+
+class Hierarchy:
+    """A directed acyclic graph over agents, some of whom may be neighbours.
+
+    Parameters
+    ----------
+    agents
+        Distinct agent names; their order is the agent order.
+    edges
+        Pairs (superior, subordinate) of names.
+    neighbours
+        Pairs of names of those who decide at the same time, each pair once.
+
+    Raises
+    ------
+    ValueError
+        If an agent is named twice or unknown, an edge occurs twice, leads to itself, or closes a
+        cycle, or two neighbours are superior and subordinate. The message names it.
+
+    Examples
+    --------
+    >>> chain = Hierarchy(["a", "b", "c"], [("a", "b"), ("b", "c")])
+    >>> chain.order, chain.below(0), chain.above(2)
+    ((0, 1, 2), (1, 2), (0, 1))
+    >>> both = Hierarchy(["a", "b"], [], neighbours=[("a", "b")])
+    >>> both.below(0), both.below(1), both.above(1)
+    ((1,), (0,), ())
+    """
+
+    def __init__(
+        self,
+        agents: Sequence[str],
+        edges: Iterable[tuple[str, str]],
+        neighbours: Iterable[tuple[str, str]] = (),
+    ) -> None:
+        agents, edges = tuple(agents), [(str(a), str(b)) for a, b in edges]
+        if not agents:
+            raise ValueError("hierarchy: no agents")
+        for name in agents:
+            if agents.count(name) > 1:
+                raise ValueError(f"hierarchy: agent {name!r} is named more than once")
+        sides = [(str(a), str(b)) for a, b in neighbours]
+        _check_edges(edges, agents, _arrow, "superior")
+        _check_edges([tuple(sorted(pair)) for pair in sides], agents, _line, "neighbour")
+        index = {name: i for i, name in enumerate(agents)}
+        graph = nx.DiGraph()
+        graph.add_nodes_from(range(len(agents)))
+        graph.add_edges_from((index[a], index[b]) for a, b in edges)
+        if not nx.is_directed_acyclic_graph(graph):
+            cycle = [agents[a] for a, _ in nx.find_cycle(graph)]
+            raise ValueError(f"hierarchy: cycle {' -> '.join([*cycle, cycle[0]])}")
+        self.agents = agents
+        self.edges = tuple(sorted(graph.edges))
+        self.neighbours = tuple(
+            sorted((min(p), max(p)) for p in ((index[a], index[b]) for a, b in sides))
+        )
+        """Pairs of neighbours, by index, each once."""
+        self.order: tuple[int, ...] = tuple(nx.lexicographical_topological_sort(graph))
+        beside: list[set[int]] = [set() for _ in agents]
+        for a, b in self.neighbours:
+            if nx.has_path(graph, a, b) or nx.has_path(graph, b, a):
+                pair = _line((agents[a], agents[b]))
+                raise ValueError(f"hierarchy: neighbours {pair} are superior and subordinate, too")
+            beside[a].add(b)
+            beside[b].add(a)
+        self._below = tuple(tuple(sorted(nx.descendants(graph, i) | beside[i])) for i in graph)
+        self._above = tuple(tuple(sorted(nx.ancestors(graph, i))) for i in graph)
+        self.depth: int = nx.dag_longest_path_length(graph) + 1
+        """Number of agents on the longest path."""
+
+    def __len__(self) -> int:
+        return len(self.agents)
+
+    def __repr__(self) -> str:
+        pairs = [_arrow((self.agents[a], self.agents[b])) for a, b in self.edges]
+        pairs += [_line((self.agents[a], self.agents[b])) for a, b in self.neighbours]
+        named = ", ".join(pairs)
+        return f"Hierarchy({len(self)} agents: {named or 'no edges'})"
+
+    def below(self, agent: int) -> tuple[int, ...]:
+        """Return all agents that `agent` can see: descendants and neighbours, in agent order."""
+        return self._below[agent]
+
+    def above(self, agent: int) -> tuple[int, ...]:
+        """Return all agents whose actions are passed down to `agent`: its ancestors."""
+        return self._above[agent]
+
+    def unseen(self, agent: int) -> tuple[int, ...]:
+        """Return the agents that are neither above nor below `agent`."""
+        seen = {agent, *self._below[agent], *self._above[agent]}
+        return tuple(i for i in range(len(self)) if i not in seen)
+
+    def joint_actions(self, n_actions: int) -> int:
+        """Return how many joint actions one decision of all agents enumerates (exact integer)."""
+        return sum(n_actions ** (1 + len(below)) for below in self._below)
+
+    def permuted(self, permutation: Sequence[int]) -> Hierarchy:
+        """Return the same hierarchy with agent ``permutation[k]`` listed as k-th."""
+        names = [self.agents[i] for i in permutation]
+        edges, neighbours = (
+            [(self.agents[a], self.agents[b]) for a, b in pairs]
+            for pairs in (self.edges, self.neighbours)
+        )
+        return Hierarchy(names, edges, neighbours)
+
+
+def _check_edges(
+    edges: Sequence[tuple[str, ...]],
+    agents: tuple[str, ...],
+    shown: Callable[[tuple[str, ...]], str],
+    kind: str,
+) -> None:
+    """Refuse an edge of an unknown agent, to itself, or given twice."""
+    known, seen = set(agents), set()
+    for edge in edges:
+        for name in edge:
+            if name not in known:
+                raise ValueError(
+                    f"hierarchy: edge {shown(edge)} names unknown agent {name!r}, known: "
+                    f"{', '.join(agents)}"
+                )
+        if edge[0] == edge[1]:
+            raise ValueError(f"hierarchy: agent {edge[0]!r} cannot be its own {kind}")
+        if edge in seen:
+            raise ValueError(f"hierarchy: edge {shown(edge)} is given more than once")
+        seen.add(edge)
+
+
+def _arrow(edge: tuple[str, ...]) -> str:
+    return f"{edge[0]} -> {edge[1]}"
+
+
+def _line(edge: tuple[str, ...]) -> str:
+    return f"{edge[0]} - {edge[1]}"

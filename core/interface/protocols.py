@@ -1,0 +1,492 @@
+"""What a learner may know of the world: the protocols that a scenario and its predictor fulfil.
+
+Conventions. ``n`` agents, ``d`` state variables, ``A`` actions. A joint action is an integer array
+``(n,)`` in agent order. Its *joint-action index* is that array read as a number in base ``A``, the
+first agent being the most significant digit; tables of all joint actions are in the order of this
+index. Groups are blocks of consecutive agents that move one body (the wheels of a robot); the
+digits of one group read as a number are its *robot-action index*.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, Protocol, runtime_checkable
+
+import numpy as np
+
+from ..numerics.arrays import FloatArray, IntArray
+from .spaces import ActionSet, StateSpace
+
+
+def _no_rows() -> IntArray:
+    return np.zeros(0, dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Next states of one agent for all joint actions, in their two blocks.
+
+    Attributes
+    ----------
+    own
+        ``(K, n_own)`` own variables, one row per robot-action index of the agent's group of ``w``
+        agents; fewer with `own_rows`, or if there are no own variables: then one row will do.
+    shared
+        ``(R, d - n_own)`` shared variables, one row per joint-action index; fewer with
+        `shared_rows`.
+    divisor
+        ``A`` to the power of the number of agents behind the group: the robot-action index of
+        joint-action index ``c`` is ``c // divisor % A ** w``.
+    own_rows, shared_rows
+        The row of `own` of every robot-action index ``(A ** w,)``, and of `shared` of every
+        joint-action index ``(A ** n,)``, where several lead to one; empty: each has its row.
+    alone
+        Whether own variables are those that the group would reach alone, which is an approximation
+        where others matter to them. If not, the blocks give for every index exactly what
+        `Prediction.states` gives; if so, of the shared variables only.
+
+    Compiled kernels read the tables without looking at their sizes.
+    `nested_agents.scenarios.checking.checker` does look.
+    """
+
+    own: FloatArray
+    shared: FloatArray
+    divisor: int
+    own_rows: IntArray = field(default_factory=_no_rows)
+    shared_rows: IntArray = field(default_factory=_no_rows)
+    alone: bool = False
+
+    def states(self, indices: IntArray) -> FloatArray:
+        """Return the next states ``(m, d)`` of joint-action indices ``(m,)``."""
+        local = indices // self.divisor % (len(self.own_rows) or len(self.own))
+        own = self.own[self.own_rows[local] if len(self.own_rows) else local]
+        shared = self.shared[self.shared_rows[indices] if len(self.shared_rows) else indices]
+        return np.concatenate([own, shared], axis=1)
+
+
+@runtime_checkable
+class Prediction(Protocol):
+    """What joint actions taken now would lead to. Valid until the scenario's next step."""
+
+    def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
+        """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
+        ...
+
+
+@runtime_checkable
+class RewardPrediction(Prediction, Protocol):
+    """A prediction that knows the reward, too: what a planner needs."""
+
+    def rewards(self, joint_actions: IntArray) -> FloatArray:
+        """Return the predicted rewards ``(m,)`` of joint actions ``(m, n)``."""
+        ...
+
+
+@runtime_checkable
+class ContinuedPrediction(RewardPrediction, Protocol):
+    """A prediction that goes on from what it predicts: what plans of several decisions need."""
+
+    def after(self, joint_action: IntArray) -> ContinuedPrediction:
+        """Return the prediction from where a joint action ``(n,)`` leads in one decision."""
+        ...
+
+
+@runtime_checkable
+class TeamPrediction(Prediction, Protocol):
+    """A prediction that gives the next states of all agents for the same joint actions at once."""
+
+    def states_of_all(self, joint_actions: IntArray) -> FloatArray:
+        """Return the next states ``(n, m, d)`` of all agents for joint actions ``(m, n)``."""
+        ...
+
+
+def states_of_all(prediction: Prediction, joint_actions: IntArray) -> FloatArray:
+    """Return the next states ``(n, m, d)`` of all agents for joint actions ``(m, n)``."""
+    if hasattr(prediction, "states_of_all"):  # of a `TeamPrediction`; the test is quicker
+        found: FloatArray = prediction.states_of_all(joint_actions)
+        return found
+    return np.stack([prediction.states(i, joint_actions) for i in range(joint_actions.shape[1])])
+
+
+@runtime_checkable
+class GroupPrediction(TeamPrediction, Protocol):
+    """A prediction that tells what is an agent's own and what the agents of a group share."""
+
+    def states_by_group(self, joint_actions: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Return the own variables ``(n, m, n_own)`` and the shared ones ``(G, m, d - n_own)``."""
+        ...
+
+
+def states_by_group(
+    prediction: Prediction,
+    joint_actions: IntArray,
+    groups: tuple[tuple[int, ...], ...],
+    n_own: int,
+) -> tuple[FloatArray, FloatArray]:
+    """Return what `GroupPrediction.states_by_group` does, of any prediction."""
+    if hasattr(prediction, "states_by_group"):
+        found: tuple[FloatArray, FloatArray] = prediction.states_by_group(joint_actions)
+        return found
+    states = states_of_all(prediction, joint_actions)
+    return states[:, :, :n_own], states[[group[0] for group in groups], :, n_own:]
+
+
+@runtime_checkable
+class TabulatedPrediction(Prediction, Protocol):
+    """A prediction that has tables of all joint actions: quick where few agents are free."""
+
+    def blocks(self, agent: int) -> Blocks:
+        """Return the next states of `agent` for all ``A ** n`` joint actions: as `states` does."""
+        ...
+
+    def reward_table(self) -> FloatArray:
+        """Return the rewards ``(A ** n,)`` of all joint actions by index: as `rewards` does."""
+        ...
+
+
+@dataclass(frozen=True)
+class Transition:
+    """What one step of a scenario returns.
+
+    Attributes
+    ----------
+    states
+        ``(n, d)`` states of the agents after the step.
+    reward
+        Reward received on entering these states: one number for all agents, or ``(n,)``.
+    terminated
+        Whether the task is solved (or lost) for good.
+    truncated
+        Whether the episode ends for lack of time.
+    info
+        Measurements of the step by name, scalars or small arrays; for records, not for learners.
+    motions
+        ``(M, 3)`` mean twist of every group's body in its own frame [m/s, m/s, rad/s], if bodies
+        measure it.
+    pushed
+        ``(3,)`` the same of what the bodies push together, if they see it and push nothing else.
+    """
+
+    states: FloatArray
+    reward: float | FloatArray
+    terminated: bool
+    truncated: bool
+    info: Mapping[str, Any]
+    motions: FloatArray | None = None
+    pushed: FloatArray | None = None
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A number by which an episode is told: a column of results.
+
+    Attributes
+    ----------
+    name
+        Of the column; ``success`` is the one by which scenarios are compared.
+    title
+        Its heading in tables and figures.
+    unit
+        In words of the SI, ``"1"`` for a pure number.
+    source
+        Where it is taken from at every step: a key of `Transition.info`, or ``terminated``; empty:
+        the key of its own name.
+    gathering
+        How the steps of an episode make one number: their ``last``, ``mean``, ``sum`` or ``max``.
+    better
+        Which way is better, if one is.
+    is_rate
+        Whether an episode has it or has it not: 1 or 0.
+    least, greatest
+        What it cannot be below or above, if there is such; intervals end there.
+    """
+
+    name: str
+    title: str
+    unit: str = "1"
+    source: str = ""
+    gathering: Literal["last", "mean", "sum", "max"] = "last"
+    better: Literal["higher", "lower"] | None = None
+    is_rate: bool = False
+    least: float | None = None
+    greatest: float | None = None
+
+    def __post_init__(self) -> None:
+        """Take it from the key of its own name, if no other is given."""
+        object.__setattr__(self, "source", self.source or self.name)
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """The least and the greatest value, infinite where none is known."""
+        least = -math.inf if self.least is None else self.least
+        return least, math.inf if self.greatest is None else self.greatest
+
+    @property
+    def heading(self) -> str:
+        """Title and unit.
+
+        >>> Measure("final_distance_m", "distance", "m").heading
+        'distance [m]'
+        """
+        return self.title if self.unit == "1" else f"{self.title} [{self.unit}]"
+
+
+SUCCESS = Measure("success", "success", source="terminated", better="higher", is_rate=True)
+"""Whether the episode ended with the task solved: success, unless a scenario says otherwise."""
+
+
+@runtime_checkable
+class Scenario(Protocol):
+    """A world with a task. Everything a learner may know of it.
+
+    What else it may have is asked for by `groups_of`, `roles_of` and `measures_of`, which know what
+    holds without; and by the protocols below, its *capabilities*.
+    """
+
+    @property
+    def agents(self) -> tuple[str, ...]:
+        """Names of the agents, in agent order."""
+        ...
+
+    @property
+    def state_space(self) -> StateSpace:
+        """The state variables of every agent."""
+        ...
+
+    @property
+    def action_set(self) -> ActionSet:
+        """The actions of every agent."""
+        ...
+
+    def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
+        """Start an episode and return states ``(n, d)``.
+
+        Everything random in it follows from `seed`; what is scheduled, from its number `episode`.
+        """
+        ...
+
+    def step(self, joint_action: IntArray) -> Transition:
+        """Carry out a joint action ``(n,)`` for one decision period."""
+        ...
+
+    def predict(self) -> Prediction:
+        """Predict from the present state."""
+        ...
+
+
+def groups_of(scenario: Scenario) -> tuple[tuple[int, ...], ...]:
+    """Return the agents by body, consecutive; of a scenario without ``groups``, each alone."""
+    single = tuple((i,) for i in range(len(scenario.agents)))
+    groups: tuple[tuple[int, ...], ...] = getattr(scenario, "groups", single)
+    return groups
+
+
+def joint_reward(reward: float | FloatArray, groups: Sequence[Sequence[int]]) -> float | FloatArray:
+    """Return the reward of those who act for groups of agents: the mean of each group's rewards.
+
+    Examples
+    --------
+    >>> joint_reward(0.5, [(0, 1)]), joint_reward(np.array([1.0, 3.0, 5.0]), [(0, 1), (2,)])
+    (0.5, array([2., 5.]))
+    """
+    if np.ndim(reward) == 0:
+        return reward
+    return np.array([np.asarray(reward)[list(group)].mean() for group in groups])
+
+
+def roles_of(scenario: Scenario) -> tuple[str, ...]:
+    """Return the role of every agent: agents of one role may share weights.
+
+    Of a scenario without ``roles``, every agent has its own.
+    """
+    roles: tuple[str, ...] = getattr(scenario, "roles", tuple(scenario.agents))
+    return roles
+
+
+def measures_of(scenario: Scenario) -> tuple[Measure, ...]:
+    """Return what an episode of a scenario is told by, success first.
+
+    Of a scenario without ``measures`` it is success alone, see `SUCCESS`.
+    """
+    found: tuple[Measure, ...] = tuple(getattr(scenario, "measures", ()))
+    own = [m for m in found if m.name == SUCCESS.name] or [SUCCESS]
+    return (*own, *(m for m in found if m.name != SUCCESS.name))
+
+
+@runtime_checkable
+class MeasuredScenario(Scenario, Protocol):
+    """A scenario that can be measured between steps, as before the first one."""
+
+    def measure(self) -> Mapping[str, Any]:
+        """Return the measurements of the present state, as in `Transition.info`."""
+        ...
+
+
+@runtime_checkable
+class RecordedScenario(MeasuredScenario, Protocol):
+    """A scenario whose episodes are worth keeping step by step."""
+
+    @property
+    def recorded(self) -> tuple[str, ...]:
+        """Names of the measurements that are kept, one array ``(T + 1, ...)`` each."""
+        ...
+
+    def constants_of_episode(self) -> Mapping[str, Any]:
+        """Return what is kept once an episode: numbers, texts, arrays."""
+        ...
+
+
+@runtime_checkable
+class DrawnScenario(RecordedScenario, Protocol):
+    """A scenario whose recordings can be drawn."""
+
+    def animate(self, recording: Mapping[str, FloatArray], path: Path) -> None:
+        """Draw a recorded episode as an animation, GIF or MP4 by the suffix of `path`."""
+        ...
+
+
+@runtime_checkable
+class ExactlyPredictedScenario(Scenario, Protocol):
+    """A scenario of which there is a like whose predictions come true to rounding."""
+
+    def with_exact_prediction(self) -> Scenario:
+        """Return a scenario alike that predicts exactly; perhaps this one."""
+        ...
+
+
+class Superposition(Protocol):
+    """A prediction to first order: groups move what they share by contributions that add up.
+
+    ``G`` groups, ``L`` robot-action indices of the largest, ``k`` components of what is shared.
+    """
+
+    @property
+    def contributions(self) -> FloatArray:
+        """``(G, L, k)`` what each robot-action index of each group contributes to the sum."""
+        ...
+
+    @property
+    def alike(self) -> IntArray:
+        """``(G, L)`` the first robot-action index of the group that comes to the same."""
+        ...
+
+    def states(
+        self, agent: int, local: IntArray, sums: FloatArray, shares: FloatArray
+    ) -> FloatArray:
+        """Return the next states ``(m, d)`` of `agent`.
+
+        Parameters
+        ----------
+        agent
+            Whose states.
+        local
+            ``(m,)`` robot-action index of its own group.
+        sums
+            ``(m, k)`` contributions of all groups, added up.
+        shares
+            ``(G, L)`` probabilities of the robot-action indices of the other groups.
+        """
+        ...
+
+
+class SummedPrediction(Prediction, Protocol):
+    """A prediction that can also be had to first order, for any number of groups."""
+
+    @property
+    def superposition(self) -> Superposition:
+        """The prediction to first order."""
+        ...
+
+
+@runtime_checkable
+class SummedScenario(Scenario, Protocol):
+    """A scenario whose predictions can be had to first order."""
+
+    @property
+    def superposes(self) -> bool:
+        """Whether they can, with the present settings."""
+        ...
+
+
+@runtime_checkable
+class MirroredScenario(Scenario, Protocol):
+    """A scenario whose mirror image is the same task, see `core.adaptation.mirror`."""
+
+    def partners(self) -> tuple[int, ...]:
+        """Return for every agent the one in whose place it stands in the mirror.
+
+        Raises
+        ------
+        ValueError
+            If an agent has none; one line.
+        """
+        ...
+
+
+class EmbodiedPrediction(Prediction, Protocol):
+    """A prediction for bodies that are moved by wheels."""
+
+    @property
+    def groups(self) -> tuple[tuple[int, ...], ...]:
+        """Agents by body."""
+        ...
+
+    def commands(self, joint_action: IntArray) -> FloatArray:
+        """Return the wheel speeds ``(n,)`` that a joint action ``(n,)`` would command."""
+        ...
+
+    def slips(self, joint_action: IntArray) -> FloatArray:
+        """Return by how much contact is predicted to change the bodies' twists, ``(M, 3)``."""
+        ...
+
+
+@runtime_checkable
+class EmbodiedScenario(Scenario, Protocol):
+    """A scenario whose groups are bodies on wheels, open to self-models."""
+
+    @property
+    def nominal_effects(self) -> tuple[FloatArray, ...]:
+        """Per body the ``(3, w + 1)`` effect of its wheel speeds on its twist."""
+        ...
+
+    def predict_with(self, effects: Sequence[FloatArray]) -> EmbodiedPrediction:
+        """Predict from the present state, believing in these effects."""
+        ...
+
+
+class CalibratedPrediction(EmbodiedPrediction, Protocol):
+    """A prediction that rests on constants of which other values could be believed."""
+
+    def outcomes(self, joint_action: IntArray, constants: FloatArray) -> FloatArray:
+        """Return what a joint action would lead to under each of the constants ``(k, n)``.
+
+        Mean twists ``(k, M + 1, 3)`` of what is pushed, and then of the bodies.
+        """
+        ...
+
+
+@runtime_checkable
+class CalibratedScenario(EmbodiedScenario, Protocol):
+    """A scenario whose predictions rest on positive constants that can be calibrated."""
+
+    @property
+    def constants(self) -> tuple[str, ...]:
+        """Names of the constants; none if the present predictor has none."""
+        ...
+
+    @property
+    def levers(self) -> FloatArray:
+        """``(M + 1,)`` speed per turning rate of what is pushed and of the bodies [m]."""
+        ...
+
+    def predict_with(
+        self, effects: Sequence[FloatArray], constants: FloatArray | None = None
+    ) -> CalibratedPrediction:
+        """Predict, believing in these effects and in these constants.
+
+        The constants are logarithms, in units of what is believed without them.
+        """
+        ...

@@ -1,0 +1,187 @@
+"""State variables, state spaces and action sets: what an agent perceives and what it can do.
+
+A state space falls in two blocks. The leading *own* variables of an agent depend on the actions of
+its own group only (the wheels of its robot); the others, the *shared* ones, may depend on every
+agent. Kernels use the split: an own block takes few distinct values while joint actions are
+enumerated, so that its part of a rule base is contracted once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import isfinite
+from typing import Literal
+
+import numpy as np
+
+from ..numerics.arrays import FloatArray, IntArray
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One state variable.
+
+    Parameters
+    ----------
+    name
+        Short identifier, unique within its state space.
+    unit
+        Unit in words of the SI, ``"1"`` for a pure number.
+    low, high
+        Range over which membership functions are laid; values outside are legal and belong to the
+        outermost membership functions. For a periodic variable ``high - low`` is the period.
+    periodic
+        Whether `low` and `high` are the same point (an angle).
+    centres
+        Default centres of the membership functions, increasing, within the range. Empty: spread
+        evenly, see `core.rules.fuzzy.Partition.of`.
+    labels
+        Words for the membership functions, in the order of `centres`; empty: numbered.
+    mirrored
+        What it is in the mirror image of a world: the ``same``, or of ``opposite`` sign; none: it
+        is not known, see `core.adaptation.mirror`.
+
+    Raises
+    ------
+    ValueError
+        If the range is empty or not finite, or the centres do not increase within it.
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    periodic: bool = False
+    centres: tuple[float, ...] = ()
+    labels: tuple[str, ...] = ()
+    mirrored: Literal["same", "opposite"] | None = None
+
+    def __post_init__(self) -> None:
+        if not (isfinite(self.low) and isfinite(self.high) and self.low < self.high):
+            raise ValueError(
+                f"variable {self.name!r}: range [{self.low}, {self.high}] must be finite, low first"
+            )
+        ordered = all(a < b for a, b in zip(self.centres, self.centres[1:], strict=False))
+        inside = all(self.low <= c <= self.high for c in self.centres)
+        if not (ordered and inside):
+            raise ValueError(
+                f"variable {self.name!r}: centres {self.centres} must increase within "
+                f"[{self.low}, {self.high}]"
+            )
+        if self.labels and len(self.labels) != len(self.centres):
+            raise ValueError(
+                f"variable {self.name!r}: {len(self.labels)} labels for {len(self.centres)} centres"
+            )
+
+
+@dataclass(frozen=True)
+class StateSpace:
+    """The state variables of an agent, own block first.
+
+    Parameters
+    ----------
+    name
+        The name under which specs know it.
+    variables
+        The variables, the own ones leading.
+    n_own
+        How many leading variables depend on the actions of the agent's own group only.
+    common
+        Names of shared variables that are the same for all agents: what they are worth to a team
+        is found once.
+    actions
+        Names of variables that are actions taken, of the agent or of others, with a membership
+        function at each: what `QLearning` maximises over.
+
+    Examples
+    --------
+    >>> space = StateSpace("demo", (Variable("speed", "m/s", -1, 1), Variable("gap", "m", 0, 2)), 1)
+    >>> space.n_variables, [v.name for v in space.shared]
+    (2, ['gap'])
+    """
+
+    name: str
+    variables: tuple[Variable, ...]
+    n_own: int = 0
+    common: tuple[str, ...] = ()
+    actions: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        names = [v.name for v in self.variables]
+        if not names or len(set(names)) != len(names):
+            raise ValueError(f"state space {self.name!r}: variable names {names} must be distinct")
+        if not 0 <= self.n_own <= len(names):
+            raise ValueError(
+                f"state space {self.name!r}: n_own = {self.n_own}, allowed 0 to {len(names)}"
+            )
+        for name in self.common:
+            if name not in names[self.n_own :]:
+                raise ValueError(
+                    f"state space {self.name!r}: common variable {name!r} is none of the shared"
+                )
+        for name in self.actions:
+            if name not in names:
+                raise ValueError(f"state space {self.name!r}: action {name!r} is no variable")
+
+    @property
+    def n_variables(self) -> int:
+        """Number of state variables d."""
+        return len(self.variables)
+
+    @property
+    def own(self) -> tuple[Variable, ...]:
+        """The variables that depend on the agent's own group only."""
+        return self.variables[: self.n_own]
+
+    @property
+    def shared(self) -> tuple[Variable, ...]:
+        """The variables that may depend on every agent."""
+        return self.variables[self.n_own :]
+
+
+@dataclass(frozen=True)
+class ActionSet:
+    """The actions that every agent chooses from, and their effect on its commanded speed.
+
+    Action ``a`` turns the commanded speed ``u`` into
+    ``clip(gain[a] * u + increment[a] * unit, -limit, limit)`` where unit and limit belong to the
+    scenario. The paper's four (Section V) are increase, decrease, maintain and make zero.
+    """
+
+    names: tuple[str, ...] = ("increase", "decrease", "maintain", "zero")
+    gains: tuple[float, ...] = (1.0, 1.0, 1.0, 0.0)
+    increments: tuple[float, ...] = (1.0, -1.0, 0.0, 0.0)
+    neutral: int = field(default=2)
+    """The action attributed to agents that the deciding agent cannot see: maintain."""
+
+    def __post_init__(self) -> None:
+        if not len(self.names) == len(self.gains) == len(self.increments):
+            raise ValueError("action set: names, gains and increments must have equal lengths")
+        if not 0 <= self.neutral < len(self.names):
+            raise ValueError(f"action set: neutral = {self.neutral} names no action")
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def apply(
+        self, speeds: FloatArray, actions: IntArray, unit: FloatArray, limit: FloatArray
+    ) -> FloatArray:
+        """Return the commanded speeds ``(..., n)`` after `actions` ``(..., n)``.
+
+        Parameters
+        ----------
+        speeds
+            ``(n,)`` commanded speeds before.
+        actions
+            Action indices.
+        unit, limit
+            ``(n,)`` what an increment changes, and the greatest speed.
+
+        Examples
+        --------
+        >>> ActionSet().apply(np.array([0.5, 0.1]), np.array([0, 3]), np.ones(2), np.ones(2))
+        array([1., 0.])
+        """
+        gains, increments = np.asarray(self.gains), np.asarray(self.increments)
+        wanted = gains[actions] * speeds + increments[actions] * unit
+        return np.clip(wanted, -limit, limit)

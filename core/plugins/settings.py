@@ -1,0 +1,118 @@
+"""What all settings share, and the numbers that they hold.
+
+Settings are the tables of a spec. Each model refuses unknown keys and values outside the stated
+ranges when it is built; every field is documented beside it, with its unit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from .messages import one_line
+from .places import located
+
+NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Fraction = Annotated[float, Field(ge=0, le=1)]
+
+
+class SettingsError(ValueError):
+    """Settings that cannot be made: one line that names the field, the value, what is allowed.
+
+    Attributes
+    ----------
+    problem
+        The line without the name of the settings.
+    """
+
+    def __init__(self, name: str, problem: str) -> None:
+        super().__init__(f"{name}: {problem}")
+        self.problem = problem
+
+
+if TYPE_CHECKING:
+    from pydantic._internal._model_construction import ModelMetaclass
+else:
+    ModelMetaclass = type(BaseModel)
+
+
+class _Made(ModelMetaclass):
+    """What calling a settings class does: what is refused is told in one line, not in pydantic's.
+
+    Tables are validated without being called, so nothing changes there.
+    """
+
+    def __call__(cls: Any, *args: Any, **table: Any) -> Any:  # noqa: N805 - of a metaclass
+        try:
+            return cls.made(*args, **table)
+        except ValidationError as error:
+            problem = one_line(error, table, cls.model_fields)
+            raise SettingsError(cls.__name__, problem) from None
+
+
+class Settings(BaseModel, metaclass=_Made):
+    """A frozen model that refuses unknown keys.
+
+    Examples
+    --------
+    >>> class Cart(Settings):
+    ...     wheels: int = 2
+    >>> Cart(wheel=4)
+    Traceback (most recent call last):
+    nested_agents.core.plugins.settings.SettingsError: Cart: wheel = 4: unknown key; did you mean
+    'wheels'? known: wheels
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
+
+    @classmethod
+    def made(cls, **table: Any) -> Any:
+        """Return the settings that calling the class with keywords makes."""
+        return type(BaseModel).__call__(cls, **table)
+
+
+class ScenarioSettings(Settings):
+    """What the settings of all scenarios inherit."""
+
+    kind: str = ""
+    factory: ClassVar[str] = ""
+    """Where the class is that is built of them, imported when it is wanted."""
+
+    def build(self) -> Any:
+        """Return the scenario.
+
+        Raises
+        ------
+        ValueError
+            If there can be none of these settings; one line.
+        """
+        return located(self.factory)(self)
+
+    def doubts(self) -> tuple[str, ...]:
+        """Return what looks like a slip of the pen, a line each, such as a size in another unit."""
+        return ()
+
+    def suited(self, preset: str) -> Mapping[str, Any]:
+        """Return what this scenario lays over a preset: its ``learner`` and ``topology`` tables.
+
+        A preset is made for box pushing; what learns best elsewhere may be something else, and
+        depend on the settings. What a spec says itself lies over both. Nothing by default.
+        """
+        return {}
+
+    @property
+    def onset(self) -> int | None:
+        """Episode in which something is scheduled to change, such as a failure; none: never."""
+        return None
+
+
+def tuples(value: Any) -> Any:
+    """Return `value` with every list in it as a tuple, which strict validation asks for."""
+    if isinstance(value, Mapping):
+        return {key: tuples(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return tuple(tuples(inner) for inner in value)
+    return value

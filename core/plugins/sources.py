@@ -1,0 +1,322 @@
+"""Files of users: read once, kept as text, and run wherever a trial runs.
+
+A spec names what a user wrote as ``"arm.py:Arm"``, relative to the spec. The text of the file is
+kept with the study and travels to workers, so that nothing else is needed to continue, explain or
+report the study elsewhere. What a file means is its syntax tree: comments and layout do not count.
+
+Names are resolved by the `Sources` that are *active*, see `Sources.active`; outside of any study
+these are the files below the working directory.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import linecache
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from . import trust
+
+FOLDER = "sources"
+"""Where a study keeps copies, below its own directory."""
+MOST_BYTES = 1_000_000
+"""Of a file; a larger one is no program."""
+GRAPHS = (".graphml", ".json", ".toml")
+"""Suffixes of files that hold a hierarchy."""
+
+
+class Sources:
+    """Files by the names under which a spec knows them.
+
+    Parameters
+    ----------
+    folder
+        Where names are relative to; none: only what `texts` hold is known.
+    texts
+        Files that are known already, by name.
+    study
+        Directory of a study, whose copies stand in for files that are not there any more, before
+        those of `folder`, if that is a study too.
+    brought_by
+        What brought the `texts` along, if they are not the user's own: these are run only if they
+        are trusted, see `nested_agents.core.plugins.trust`.
+
+    Examples
+    --------
+    >>> sources = Sources(texts={"arm.py": "LINKS = 3  # links"})
+    >>> sources.load("arm.py:LINKS")
+    3
+    >>> sources.digest("arm.py") == Sources(texts={"arm.py": "LINKS=3"}).digest("arm.py")
+    True
+    """
+
+    def __init__(
+        self,
+        folder: Path | None = None,
+        texts: Mapping[str, str] | None = None,
+        study: Path | None = None,
+        brought_by: str | None = None,
+    ) -> None:
+        self.folder = folder
+        self._texts = dict(texts or {})
+        self._studies = [place for place in (study, folder) if place is not None]
+        # By name; of what was sent to a worker all that is known is that its sender has run it.
+        self._brought = dict.fromkeys(self._texts, brought_by) if brought_by else {}
+        self._was_sent = False
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Sources) and self._texts == other._texts
+
+    def __hash__(self) -> int:
+        return hash(tuple(sorted(self._texts)))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _sent, (self._texts,)
+
+    @property
+    def texts(self) -> dict[str, str]:
+        """The files that have been asked for so far, by name."""
+        return dict(self._texts)
+
+    def only(self, names: set[str]) -> Sources:
+        """Return the files of some names alone."""
+        found = Sources(None, {name: self.text(name) for name in sorted(names)})
+        found._brought = {name: by for name, by in self._brought.items() if name in names}
+        return found
+
+    def text(self, name: str) -> str:
+        """Return the text of a file.
+
+        Raises
+        ------
+        ValueError
+            If there is no such file, or it is no text.
+        """
+        if name not in self._texts:
+            self._texts[name] = self._read(name)
+        return self._texts[name]
+
+    def digest(self, name: str) -> str:
+        """Return a short hash of what a file means: of its syntax tree, if it is Python.
+
+        Raises
+        ------
+        ValueError
+            If there is no such file, or it is no Python.
+        """
+        text = self.text(name)
+        return meaning(text, name) if name.endswith(".py") else _sha256(text)
+
+    def load(self, reference: str) -> Any:
+        """Return what ``"file.py:Name"`` names; the file is run once.
+
+        Raises
+        ------
+        ValueError
+            If there is no such file or name, the file raises when it is run, or it may not be run.
+        """
+        path, name = split(reference)
+        module = self._module(path)
+        found: Any = module
+        for part in name.split("."):
+            found = getattr(found, part, None)
+        if found is None:
+            own = [n for n, f in vars(module).items() if _belongs(f, module)]
+            raise ValueError(f"{path} has no {name!r}, it has: {', '.join(own) or 'nothing'}")
+        return found
+
+    @contextmanager
+    def active(self) -> Iterator[None]:
+        """Resolve names by these files for as long as the context lasts."""
+        token = _ACTIVE.set(self)
+        try:
+            yield
+        finally:
+            _ACTIVE.reset(token)
+
+    def _read(self, name: str) -> str:
+        if self.folder is None:
+            raise ValueError(f"{name}: is not among the files kept with the study")
+        path = self.folder / name
+        if not path.exists():
+            for study in self._studies:
+                kept = study / FOLDER / kept_name(name)
+                if kept.exists():
+                    path, self._brought[name] = kept, str(study)
+                    break
+        try:
+            content = path.read_bytes()
+        except OSError as error:
+            raise ValueError(f"{name}: {error.strerror or error}") from None
+        if len(content) > MOST_BYTES:
+            raise ValueError(f"{name}: {len(content)} bytes, allowed: {MOST_BYTES} or fewer")
+        try:
+            text = content.decode("utf-8-sig").replace("\r\n", "\n")
+        except UnicodeDecodeError:
+            raise ValueError(f"{name}: is not UTF-8 text") from None
+        for other in imported(text) - {"nested_agents"} if name.endswith(".py") else ():
+            if any(
+                (path.parent / place).exists() for place in (f"{other}.py", f"{other}/__init__.py")
+            ):
+                raise ValueError(
+                    f"{name}: imports {other}, which stands beside it; a study keeps single files: "
+                    "put both in one, or install what is shared as a package"
+                )
+        return text
+
+    def _module(self, name: str) -> ModuleType:
+        text = self.text(name)
+        key = f"_nested_agents_{_sha256(name + chr(0) + text)}"
+        if key in sys.modules:
+            return sys.modules[key]
+        if name in self._brought and not trust.is_trusted(text):
+            raise ValueError(
+                f"{name} came with {self._brought[name]} and was not run from a spec of yours: it "
+                "can do whatever you can; --trust runs it"
+            )
+        if not self._was_sent:
+            trust.trust(text)
+        module = ModuleType(key)
+        path = None if self.folder is None else self.folder / name
+        # Compiled code can be cached beside a file that exists.
+        module.__file__ = str(path.resolve()) if path is not None and path.exists() else name
+        module.__dict__["__source_name__"] = name
+        linecache.cache[name] = (len(text), None, text.splitlines(keepends=True), name)
+        sys.modules[key] = module  # dataclasses look their own module up
+        try:
+            exec(compile(text, module.__file__, "exec"), module.__dict__)
+        except (Exception, SystemExit) as error:
+            del sys.modules[key]
+            raise ValueError(f"{name} cannot be run: {told(error)}") from None
+        return module
+
+
+def _sent(texts: Mapping[str, str]) -> Sources:
+    """Return the files that another process has sent."""
+    sources = Sources(None, texts)
+    sources._was_sent = True
+    return sources
+
+
+_ACTIVE: ContextVar[Sources | None] = ContextVar("sources", default=None)
+
+
+def active() -> Sources:
+    """Return the sources by which names are resolved now."""
+    return _ACTIVE.get() or Sources(Path())
+
+
+def is_reference(text: object) -> bool:
+    """Tell whether a text names something in a Python file.
+
+    Examples
+    --------
+    >>> is_reference("arm.py:Arm"), is_reference("chain:reversed")
+    (True, False)
+    """
+    return isinstance(text, str) and ".py:" in text
+
+
+def is_file(text: object) -> bool:
+    """Tell whether a text names a file that holds a hierarchy."""
+    return isinstance(text, str) and text.endswith(GRAPHS)
+
+
+def named(value: Any) -> set[str]:
+    """Return the names of all files that settings mention, at any depth.
+
+    Examples
+    --------
+    >>> sorted(named({"kind": "arm.py:Arm", "graphs": ["teams.json"]}))
+    ['arm.py', 'teams.json']
+    """
+    if isinstance(value, Mapping):
+        return set().union(*map(named, value.values()))
+    if isinstance(value, list | tuple):
+        return set().union(*map(named, value))
+    if is_reference(value):
+        return {split(value)[0]}
+    return {value} if is_file(value) else set()
+
+
+def split(reference: str) -> tuple[str, str]:
+    """Split ``"path/to/file.py:name"``.
+
+    Examples
+    --------
+    >>> split("ring.py:ring")
+    ('ring.py', 'ring')
+    """
+    path, colon, name = reference.rpartition(":")
+    good = colon and path.endswith(".py") and all(part.isidentifier() for part in name.split("."))
+    if not good:
+        raise ValueError(f"{reference!r} must be written path/to/file.py:name")
+    return path, name
+
+
+def kept_name(name: str) -> str:
+    """Return the name of a study's copy of a file.
+
+    Examples
+    --------
+    >>> kept_name("../arms/arm.py")
+    '..__arms__arm.py'
+    """
+    return name.replace("\\", "/").replace("/", "__")
+
+
+def meaning(text: str, name: str) -> str:
+    """Return a short hash of the syntax tree of Python text.
+
+    Raises
+    ------
+    ValueError
+        If it is no Python.
+    """
+    try:
+        tree = ast.dump(ast.parse(text, name))
+    except (SyntaxError, ValueError, RecursionError) as error:
+        raise ValueError(f"{name} cannot be run: {told(error)}") from None
+    return _sha256(tree)
+
+
+def imported(text: str) -> set[str]:
+    """Return the top-level names of all modules that Python text imports; none if it is no Python.
+
+    Examples
+    --------
+    >>> sorted(imported("import numpy.linalg; from tank import Tank"))
+    ['numpy', 'tank']
+    """
+    try:
+        nodes = list(ast.walk(ast.parse(text)))
+    except (SyntaxError, ValueError, RecursionError):
+        return set()
+    names = {alias.name for n in nodes if isinstance(n, ast.Import) for alias in n.names}
+    names |= {n.module or "" for n in nodes if isinstance(n, ast.ImportFrom) and not n.level}
+    return {name.partition(".")[0] for name in names}
+
+
+def told(error: BaseException) -> str:
+    r"""Return what an exception says, in one line.
+
+    Examples
+    --------
+    >>> told(ValueError("two\nlines"))
+    'ValueError: two lines'
+    """
+    return f"{type(error).__name__}: {' '.join(str(error).split())}"
+
+
+def _sha256(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _belongs(thing: object, module: ModuleType) -> bool:
+    return getattr(thing, "__module__", "") == module.__name__

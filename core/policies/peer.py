@@ -1,0 +1,47 @@
+"""What all peers are to the control loop."""
+
+from __future__ import annotations
+
+from typing import cast
+
+import numpy as np
+
+from ..interface.protocols import Scenario, Transition
+from ..numerics.arrays import FloatArray, IntArray
+from .seen import Seen
+
+
+class Peer:
+    """A learner that acts for all agents by what it sees; inherit it, and add what it learns.
+
+    Parameters
+    ----------
+    seed
+        Source of everything random in it.
+    """
+
+    def __init__(self, seed: np.random.SeedSequence) -> None:
+        self.rng = np.random.Generator(np.random.PCG64(seed))
+
+    def begin_episode(self) -> None:
+        """Note that an episode begins."""
+
+    def predict(self, scenario: Scenario) -> Seen:
+        """Return the present states, see `nested_agents.core.policies.seen`."""
+        return cast(Seen, scenario.predict())
+
+    def check(self, prediction: Seen) -> None:
+        """Refuse nothing."""
+
+    def adapt(self, prediction: Seen, joint_action: IntArray, transition: Transition) -> None:
+        """Revise nothing: nothing was predicted."""
+
+    def learn(self, transition: Transition) -> None:
+        """Take in what a step led to."""
+
+    def end_episode(self) -> None:
+        """Note that an episode has ended."""
+
+    def arrays(self) -> dict[str, FloatArray]:
+        """Return what has been learned, if anything."""
+        return {}

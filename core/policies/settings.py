@@ -1,0 +1,130 @@
+"""The settings of peers, as they stand in the ``[learner]`` table of a spec.
+
+Defaults are those of stable-baselines3, but for those that docs/peers.md names and accounts for.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from ..learners.learner import TeamSettings
+from ..plugins.places import located
+from ..plugins.settings import Fraction, NonNegative, Positive
+
+Count = Annotated[int, Field(ge=1)]
+Width = Annotated[int, Field(ge=1, le=4096)]
+
+
+class PeerSettings(TeamSettings):
+    """What the settings of all peers share."""
+
+    discount: Annotated[float, Field(ge=0, lt=1)] = 0.97
+    """Discount per decision."""
+
+    def build(self, scenario: Any, seed: np.random.SeedSequence) -> Any:
+        """Return the peer that acts in a scenario.
+
+        Raises
+        ------
+        ValueError
+            If it cannot act there; one line.
+        """
+        raise TypeError(f"peer {self.kind!r} says not how it is built")
+
+    def _built(self, place: str, scenario: Any, seed: np.random.SeedSequence) -> Any:
+        try:
+            peer = located(f"{__package__}{place}")
+        except ImportError as error:
+            raise ValueError(
+                f"learner.kind = {self.kind!r}: needs the extra peers, pip install "
+                "'nested-agents[peers]', in a checkout ./dev exec pip install stable-baselines3 "
+                f"({error})"
+            ) from None
+        return peer(self, scenario, seed)
+
+
+class NetworkSettings(PeerSettings):
+    """What the settings of peers of stable-baselines3 share."""
+
+    learning_rate: Positive = 3e-4
+    """Step size of Adam."""
+    batch_size: Count = 64
+    """Transitions in a minibatch."""
+    hidden: Annotated[tuple[Width, ...], Field(min_length=1)] = (64, 64)
+    """Units of the hidden layers of every network."""
+
+
+class PolicyGradientSettings(NetworkSettings):
+    """What the settings of PPO (Schulman et al. 2017) in all its forms share."""
+
+    learning_rate: Positive = 1e-3
+    """Step size of Adam."""
+    batch_size: Count = 256
+    """Transitions in a minibatch."""
+    rollout: Annotated[int, Field(ge=2)] = 256
+    """Decisions between two updates."""
+    epochs: Count = 10
+    """Passes over the rollout at every update."""
+    gae_lambda: Fraction = 0.95
+    """Trace decay of the generalised advantage estimate."""
+    clip: Positive = 0.2
+    """Clipping range of the probability ratio."""
+    entropy: NonNegative = 0.01
+    """Weight of the entropy bonus."""
+
+
+class PPOSettings(PolicyGradientSettings):
+    """PPO (Schulman et al. 2017): one centralised policy sees all states and acts for all."""
+
+    kind: Literal["ppo"] = "ppo"
+
+    def build(self, scenario: Any, seed: np.random.SeedSequence) -> Any:
+        """Return the peer."""
+        return self._built(".ppo:CentralPPO", scenario, seed)
+
+
+class IPPOSettings(PolicyGradientSettings):
+    """Independent PPO (de Witt et al. 2020): every agent acts by its state, all share weights."""
+
+    kind: Literal["ippo"] = "ippo"
+
+    def build(self, scenario: Any, seed: np.random.SeedSequence) -> Any:
+        """Return the peer."""
+        return self._built(".ppo:IndependentPPO", scenario, seed)
+
+
+class MAPPOSettings(PolicyGradientSettings):
+    """Multi-agent PPO (Yu et al. 2022): as independent PPO, but the critic sees all states."""
+
+    kind: Literal["mappo"] = "mappo"
+
+    def build(self, scenario: Any, seed: np.random.SeedSequence) -> Any:
+        """Return the peer."""
+        return self._built(".ppo:CentralCriticPPO", scenario, seed)
+
+
+class DQNSettings(NetworkSettings):
+    """DQN (Mnih et al. 2015) for one agent, such as that of ``topology = "single-agent"``."""
+
+    kind: Literal["dqn"] = "dqn"
+    memory: Count = 50_000
+    """Transitions in the replay memory."""
+    begin: Count = 500
+    """Decisions before the first update."""
+    interval: Count = 4
+    """Decisions between two updates."""
+    target_interval: Count = 250
+    """Decisions between two copies to the target network."""
+    exploration_begin: Fraction = 1.0
+    """Exploration rate at the first decision."""
+    exploration_end: Fraction = 0.05
+    """Exploration rate from `exploration_decisions` on."""
+    exploration_decisions: Count = 2000
+    """Decisions over which the exploration rate falls linearly."""
+
+    def build(self, scenario: Any, seed: np.random.SeedSequence) -> Any:
+        """Return the peer."""
+        return self._built(".dqn:DeepQ", scenario, seed)

@@ -1,0 +1,175 @@
+"""The passing down as turns: a PettingZoo AEC environment in the order of a hierarchy.
+
+In a parallel environment all agents act at once, and none knows what another does. In a hierarchy
+they decide from the top down, and each is passed the actions decided above (Section II-D). This is
+a turn-based environment of the same world, of any parallel environment with flat Box observations
+and discrete actions: agents take turns in hierarchy order, each observes its state and the actions
+it was passed, and the world goes on when the last has acted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from gymnasium.spaces import Box, Discrete, MultiDiscrete
+from pettingzoo import AECEnv, ParallelEnv
+
+from ...core.interface.hierarchy import Hierarchy
+from ...core.numerics.arrays import FloatArray
+
+
+class PassingDownEnv(AECEnv):
+    """A parallel environment whose agents take turns from the top of a hierarchy down.
+
+    An observation is what the agent observes in `env`, and after it the actions that it has been
+    passed: one entry for every choice of every agent, in the order of ``env.possible_agents``. It
+    is 1 for a choice that an agent above has made in this step, else 0, so agents of equal
+    observations can share a policy. Observations of `env` change, and rewards come, when the last
+    agent has acted. Who is done leaves before the next step, and passes nothing down.
+
+    Parameters
+    ----------
+    env
+        A PettingZoo parallel environment.
+    hierarchy
+        Over its possible agents; None: a chain in their order.
+
+    Attributes
+    ----------
+    env, hierarchy
+        As given.
+
+    Raises
+    ------
+    ValueError
+        If the hierarchy has other agents, or observations or actions are of other kinds; one line.
+
+    Examples
+    --------
+    >>> from nested_agents.scenarios.box_pushing.environments import WheelsEnv
+    >>> env = PassingDownEnv(WheelsEnv({"robots": 1}, steps=3))
+    >>> env.reset(seed=0)
+    >>> env.agent_selection, env.observe("robot1.right")[-8:].tolist()
+    ('robot1.left', [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    >>> env.step(2)
+    >>> env.agent_selection, env.observe("robot1.right")[-8:].tolist()
+    ('robot1.right', [0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    """
+
+    def __init__(self, env: ParallelEnv[str, Any, Any], hierarchy: Hierarchy | None = None) -> None:
+        names = list(env.possible_agents)
+        if hierarchy is None:
+            hierarchy = Hierarchy(names, pairwise(names))
+        if set(hierarchy.agents) != set(names):
+            raise ValueError(
+                f"hierarchy: agents {', '.join(hierarchy.agents)}, those of the environment are "
+                f"{', '.join(names)}"
+            )
+        self.env, self.hierarchy = env, hierarchy
+        self.metadata = dict(env.metadata)
+        self.render_mode = getattr(env, "render_mode", None)
+        self.possible_agents = names
+        self.agents: list[str] = []
+        self._order = [hierarchy.agents[i] for i in hierarchy.order]
+        self._above = {
+            name: {hierarchy.agents[j] for j in hierarchy.above(i)}
+            for i, name in enumerate(hierarchy.agents)
+        }
+        self._choices = {name: _choices(name, env.action_space(name)) for name in names}
+        self._spaces = {name: self._space(name) for name in names}
+
+    def _space(self, name: str) -> Box:
+        own = self.env.observation_space(name)
+        if not isinstance(own, Box) or len(own.shape) != 1:
+            raise ValueError(f"observations of {name!r}: {own}, allowed a Box of one dimension")
+        passed = sum(int(choices.sum()) for choices in self._choices.values())
+        low, high = (
+            np.append(bound, np.full(passed, end)).astype(own.dtype)
+            for bound, end in ((own.low, 0.0), (own.high, 1.0))
+        )
+        return Box(low, high, dtype=own.dtype)
+
+    def observation_space(self, agent: str) -> Box:
+        """Return the space of an agent's observations."""
+        return self._spaces[agent]
+
+    def action_space(self, agent: str) -> Any:
+        """Return the space of an agent's actions: that of the parallel environment."""
+        return self.env.action_space(agent)
+
+    def reset(self, seed: int | None = None, options: Mapping[str, Any] | None = None) -> None:
+        """Start an episode; the agent at the top of the hierarchy is the first to act."""
+        self._observations, self.infos = self.env.reset(seed=seed, options=options)
+        self.agents = list(self.env.agents)
+        self.rewards = dict.fromkeys(self.agents, 0.0)
+        self._cumulative_rewards = dict.fromkeys(self.agents, 0.0)
+        self.terminations = dict.fromkeys(self.agents, False)
+        self.truncations = dict.fromkeys(self.agents, False)
+        self._begin_step()
+
+    def _begin_step(self) -> None:
+        self._decided: dict[str, Any] = {}
+        self._waiting = [name for name in self._order if name in self.env.agents]
+        if self._waiting:
+            self.agent_selection = self._waiting.pop(0)
+
+    def observe(self, agent: str) -> FloatArray:
+        """Return what an agent observes, and the actions that it has been passed so far."""
+        own = self._observations[agent]
+        parts = [own]
+        for name, choices in self._choices.items():
+            part = np.zeros(int(choices.sum()))
+            if name in self._decided and name in self._above[agent]:
+                part[np.cumsum(choices) - choices + self._decided[name]] = 1.0
+            parts.append(part)
+        return np.concatenate(parts).astype(own.dtype)
+
+    def step(self, action: Any) -> None:
+        """Pass the action of the selected agent down; after the last one the world goes on.
+
+        An agent that is done takes the action None and leaves, as PettingZoo has it.
+
+        Raises
+        ------
+        ValueError
+            If the action is none of the agent's; one line.
+        """
+        agent = self.agent_selection
+        if self.terminations[agent] or self.truncations[agent]:
+            self._was_dead_step(action)
+            return
+        if not self.action_space(agent).contains(action):
+            raise ValueError(
+                f"step: action {action!r} of {agent}, allowed {self.action_space(agent)}"
+            )
+        self._cumulative_rewards[agent] = 0.0
+        self._clear_rewards()
+        self._decided[agent] = action
+        if self._waiting:
+            self.agent_selection = self._waiting.pop(0)
+            return
+        told = self.env.step(self._decided)
+        self._observations, self.rewards, self.terminations, self.truncations, self.infos = told
+        self._accumulate_rewards()
+        self._begin_step()
+        self._deads_step_first()
+
+    def render(self) -> Any:
+        """Return or show what the parallel environment does."""
+        return self.env.render()
+
+    def close(self) -> None:
+        """Close the parallel environment."""
+        self.env.close()
+
+
+def _choices(name: str, space: Any) -> Any:
+    """Return how many choices each of an agent's actions has ``(k,)``."""
+    if isinstance(space, Discrete) and space.start == 0:
+        return np.array([space.n])
+    if isinstance(space, MultiDiscrete) and space.nvec.ndim == 1 and not space.start.any():
+        return space.nvec
+    raise ValueError(f"actions of {name!r}: {space}, allowed Discrete or MultiDiscrete from 0")

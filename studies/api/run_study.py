@@ -1,0 +1,136 @@
+"""Runs a study: every trial that its store does not hold yet, on workers of any kind.
+
+Nothing is printed here: who wants to see how it goes passes an `Observer`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import closing, contextmanager
+from pathlib import Path
+from typing import Protocol
+
+from ...core.plugins.sources import is_reference
+from ..catalogue.study import load_study, measured
+from ..spec.spec import Spec
+from ..store.store import Store
+from ..trials.arrangement import check
+from ..trials.trial import trials_of
+from ..workers.loggers import logged, make
+from ..workers.runner import Outcome, run_trials
+from ..workers.worker import RunTrial
+from ..workers.workers import Backend, start_workers
+
+
+class Observer(Protocol):
+    """Who is told how a study goes."""
+
+    def announce(self, spec: Spec, directory: Path, processes: int) -> None:
+        """Learn what is about to be run, if anything is left to run."""
+        ...
+
+    def note(self, line: str) -> None:
+        """Learn of something out of the ordinary, in one line."""
+        ...
+
+    def follow(self, outcomes: Iterable[Outcome], total: int, done: int) -> None:
+        """Consume the outcomes, which runs the trials; `done` of `total` were run before."""
+        ...
+
+
+class Silent:
+    """An observer that tells nobody."""
+
+    def announce(self, spec: Spec, directory: Path, processes: int) -> None:
+        """See `Observer.announce`."""
+
+    def note(self, line: str) -> None:
+        """See `Observer.note`."""
+
+    def follow(self, outcomes: Iterable[Outcome], total: int, done: int) -> None:
+        """See `Observer.follow`."""
+        for _ in outcomes:
+            pass
+
+
+@contextmanager
+def run_study(
+    spec: Spec,
+    directory: Path,
+    *,
+    jobs: int | None = None,
+    backend: Backend = "loky",
+    address: str | None = None,
+    retry_failed: bool = False,
+    accept_code: bool = False,
+    observer: Observer | None = None,
+    loggers: Sequence[str] = (),
+) -> Iterator[Store]:
+    """Run what is left of a study; then its store is open for as long as the context lasts.
+
+    Parameters
+    ----------
+    spec
+        The study.
+    directory
+        Where it is kept; made if it does not exist.
+    jobs, backend, address
+        Who runs the trials, see `start_workers`.
+    retry_failed
+        Whether failed trials are run again.
+    accept_code
+        Whether to go on with a study although the installed code has changed.
+    observer
+        Who is told how it goes; None: nobody.
+    loggers
+        Who else is told of every trial, by name, see `nested_agents.studies.workers.loggers`.
+
+    Yields
+    ------
+    Store
+        With the results of every trial, or its traceback (`Store.failed`).
+
+    Raises
+    ------
+    SpecError
+        If the study cannot be run or continued; one line says why.
+    KeyboardInterrupt
+        If it is interrupted. What has finished is kept; the same call continues.
+    """
+    observer = Silent() if observer is None else observer
+    measures, trials = check(spec), trials_of(spec)
+    run_trial = _run_trial(spec)
+    with (
+        start_workers(backend, jobs, address, len(trials)) as workers,
+        Store.create(directory, spec, measures, accept_code=accept_code) as store,
+    ):
+        if retry_failed:
+            store.forget_failed()
+        pending = store.pending(trials)
+        for note in (*store.notes, *spec.doubts()):
+            observer.note(note)
+        if pending:
+            observer.announce(spec, directory, workers.processes)
+        if pending and not workers.processes:
+            observer.note("there is no worker yet: waiting for one")
+        try:
+            with closing(run_trials(pending, store, run_trial, workers)) as outcomes:
+                told = [make(name, spec, directory) for name in loggers] if pending else []
+                following = logged(outcomes, told, observer.note)
+                observer.follow(following, len(trials), len(trials) - len(pending))
+        except KeyboardInterrupt:
+            observer.note(
+                f"interrupted: {store.counts()['done']} of {len(trials)} trials are kept in "
+                f"{directory}; the same command continues"
+            )
+            raise
+        yield store
+
+
+def _run_trial(spec: Spec) -> RunTrial:
+    """Return what runs a trial of the study, after the study has checked its spec."""
+    with spec.sources.active():
+        study = load_study(spec.study)
+        getattr(study, "check", lambda spec: None)(spec)
+    # A study of a user's file is made again in every worker, which knows the file.
+    return measured if is_reference(spec.study) else study.measure

@@ -1,0 +1,252 @@
+"""Conditions compared by any measure: all with one, or level by level within equal others."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from textwrap import wrap
+
+import numpy as np
+
+from ...core.interface.protocols import Measure
+from ...core.plugins.messages import closest
+from ..spec.errors import SpecError
+from ..spec.labels import label
+from .comparison import Array, Difference, adjusted, aligned
+from .numbers import shown
+from .paired_tests import LEVEL
+from .results import Results
+from .statistics import bootstrap, rate
+from .summary import Summary
+from .verdicts import WIDTH, WORDS, power_lines, told
+
+EPISODES = (
+    Measure("steps", "steps", "1", better="lower", least=0.0),
+    Measure("return", "return", "1", better="higher"),
+)
+"""What is known of every episode besides the measures of its scenario."""
+
+
+@dataclass(frozen=True)
+class Group:
+    """Conditions that are compared with each other.
+
+    Attributes
+    ----------
+    setting
+        What they have in common, as a label; empty if nothing is told.
+    reference
+        The label of the one that the others are compared with.
+    differences
+        Of the others from it.
+    table
+        A line for each, the reference first.
+    """
+
+    setting: str
+    reference: str
+    differences: tuple[Difference, ...]
+    table: tuple[Summary, ...]
+
+
+@dataclass(frozen=True)
+class Contrasts:
+    """Conditions against references by one measure; p is adjusted over all of them.
+
+    Attributes
+    ----------
+    measure
+        By what they are compared.
+    phase
+        In which episodes; empty if it is a number of whole trials.
+    groups
+        The comparisons.
+    """
+
+    measure: Measure
+    phase: str
+    groups: tuple[Group, ...]
+
+    @property
+    def differences(self) -> tuple[Difference, ...]:
+        """All differences."""
+        return tuple(d for group in self.groups for d in group.differences)
+
+    @property
+    def significant(self) -> tuple[Difference, ...]:
+        """Those whose adjusted p is below .05."""
+        return tuple(d for d in self.differences if d.p < LEVEL)
+
+    @property
+    def title(self) -> str:
+        """What is compared."""
+        return f"{self.measure.heading}, {self.phase}" if self.phase else self.measure.heading
+
+    @property
+    def table(self) -> tuple[Summary, ...]:
+        """A line for every condition: estimate, and difference from its reference."""
+        return tuple(line for group in self.groups for line in group.table)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """The verdicts, and what the comparisons could have found."""
+        return tuple(self._notes())
+
+    def _notes(self) -> Iterator[str]:
+        found = self.differences
+        if not found:
+            yield "Nothing to compare: no two conditions share two seeds."
+            return
+        words = {"higher": WORDS, "lower": WORDS[::-1]}.get(
+            self.measure.better or "", ("lower", "higher")
+        )
+        for group in self.groups:
+            if group.differences:
+                where = f"{group.setting}: " if group.setting else ""
+                text = f"{where}{self.title}, less that of {group.reference}:"
+                yield from wrap(text, WIDTH, break_on_hyphens=False)
+                yield from told(group.differences, words)
+        counted = f"{len(found)} comparison{'s' * (len(found) > 1)}"
+        yield f"p: permutation of signs over seeds, adjusted over {counted} (Holm)."
+        yield from power_lines(found, of_rates=self.measure.is_rate)
+
+
+def contrasts(
+    results: Results,
+    measure: str = "success",
+    phase: str | None = None,
+    by: str | None = None,
+    reference: str | None = None,
+) -> Contrasts:
+    """Compare conditions by the means of their seeds.
+
+    Parameters
+    ----------
+    results
+        Of any studies.
+    measure
+        A measure of episodes, ``steps``, ``return``, or a number of whole trials, by name.
+    phase
+        Which episodes: ``evaluation`` unless said otherwise, or where there is none, ``training``.
+    by
+        A swept key, or the last part of it: conditions that agree in all others are compared, each
+        with that of the first value. None: all conditions with the first one.
+    reference
+        Label of another one to compare with, or with `by` another value.
+
+    Raises
+    ------
+    SpecError
+        If the results have no such measure, phase, key or reference.
+    """
+    if phase is None:
+        evaluated = all(c in results.evaluation for c in results.training)
+        phase = "evaluation" if evaluated and results.evaluation else "training"
+    told_by, values, phase = _values(results, measure, phase)
+    groups = _groups([c for c in results.columns if c in values], results.columns, by, reference)
+    found: list[list[Difference]] = []
+    for _, members in groups:
+        own = []
+        (_, base), *others = members
+        for name, condition in others:
+            ours, theirs = aligned(results, (condition, base), lambda _, c: values[c])
+            if len(ours) >= 2:
+                own.append(
+                    Difference.between(name, measure, ours, theirs, of_rates=told_by.is_rate)
+                )
+        found.append(own)
+    every = iter(adjusted([d for own in found for d in own]))
+    made = []
+    for (setting, members), own in zip(groups, found, strict=True):
+        differences = tuple(next(every) for _ in own)
+        lines = _lines(results, told_by, phase, setting, members, values, differences)
+        made.append(Group(setting, members[0][0], differences, lines))
+    return Contrasts(told_by, phase, tuple(made))
+
+
+Members = list[tuple[str, str]]
+"""Names of the conditions of a group, and their labels; the reference first."""
+
+
+def _values(results: Results, name: str, phase: str) -> tuple[Measure, dict[str, Array], str]:
+    """Return a measure, its means by condition ``(n_seeds,)``, and the phase that they are of."""
+    measures = {m.name: m for m in (*results.measures, *EPISODES)}
+    whole = {n for by in (results.numbers, results.usage) for named in by.values() for n in named}
+    if name in measures:
+        if phase not in results.phases:
+            raise SpecError(f"phase = {phase!r}: {closest(phase, results.phases)}")
+        arrays = results.phases[phase]
+        found = {c: a[name].mean(axis=1) for c, a in arrays.items() if name in a}
+        return measures[name], found, phase
+    if name not in whole:
+        raise SpecError(f"measure = {name!r}: {closest(name, {*measures, *whole})}")
+    both = (results.numbers, results.usage)
+    found = {c: by[c][name] for by in both for c in by if name in by[c]}
+    measure, factor = shown(name)
+    return measure, {c: factor * values for c, values in found.items()}, ""
+
+
+def _groups(
+    conditions: list[str],
+    columns: Mapping[str, Mapping[str, object]],
+    by: str | None,
+    reference: str | None,
+) -> list[tuple[str, Members]]:
+    if by is None:
+        members = [(c, c) for c in conditions]
+        return [("", _led(members, reference, "reference"))] if members else []
+    keys = dict.fromkeys(key for c in conditions for key in columns[c])
+    key = next((k for k in keys if by in (k, k.rpartition(".")[2])), None)
+    if key is None:
+        raise SpecError(f"by = {by!r}: {closest(by, keys)}")
+    found: dict[str, Members] = {}
+    for c in conditions:
+        level = _told(key, columns[c][key])
+        rest = ", ".join(_told(k, v) for k, v in columns[c].items() if k != key and v != "")
+        found.setdefault(rest, []).append((level, c))
+    return [(setting, _led(members, reference, "reference")) for setting, members in found.items()]
+
+
+def _told(key: str, value: object) -> str:
+    """Return a value of a column as a label: a name stands for itself.
+
+    >>> _told("scenario.robots", 8), _told("topology", "chain")
+    ('robots=8', 'chain')
+    """
+    return value if isinstance(value, str) else f"{key.rpartition('.')[2]}={label({key: value})}"
+
+
+def _led(members: Members, reference: str | None, what: str) -> Members:
+    """Return the members of a group, the reference first."""
+    if reference is None:
+        return members
+    names = [name for name, _ in members]
+    if reference not in names:
+        raise SpecError(f"{what} = {reference!r}: {closest(reference, names)}")
+    first = names.index(reference)
+    return [members[first], *members[:first], *members[first + 1 :]]
+
+
+def _lines(
+    results: Results,
+    measure: Measure,
+    phase: str,
+    setting: str,
+    members: Members,
+    values: Mapping[str, Array],
+    differences: tuple[Difference, ...],
+) -> tuple[Summary, ...]:
+    by_name = {d.condition: d.estimate for d in differences}
+    lines = []
+    for name, condition in members:
+        own = values[condition]
+        estimates = {
+            measure.heading: rate(results.phases[phase][condition][measure.name])
+            if phase and measure.is_rate
+            else bootstrap(np.asarray(own, dtype=float), bounds=measure.bounds)
+        }
+        if name in by_name:
+            estimates["difference"] = by_name[name]
+        whose = ", ".join(filter(None, (setting, name)))
+        lines.append(Summary(whose, len(own), estimates))
+    return tuple(lines)

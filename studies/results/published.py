@@ -1,0 +1,196 @@
+"""Results of a study as one small JSON file, with spec and seeds, fit to be committed or published.
+
+Rates are kept as one character an episode, steps and other measures in three decimals; returns are
+left out, and where there are thousands of short trials their times too. Claims are always decided
+by results in this form, so the committed files give the table that the run gave.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...core.interface.protocols import SUCCESS, Measure
+from ..spec.errors import SpecError
+from ..spec.outline import Outline
+from ..store import durable
+from ..trials.code import RESULTS_VERSION
+from ..trials.measures import measures_from, tables
+from .results import Arrays, Results
+
+SUCCESS_ALONE = ("ablation", "chain-order", "games", "hierarchies", "scaling", "wheel-failure")
+"""Studies whose analysis asks for no other measure of an episode: of them no other is kept."""
+DECIMALS = 3
+UNTIMED = ("games",)
+"""Studies of thousands of trials, too short for the time of each to say anything."""
+FEW = 100
+"""Fewer rows, or values, are always written one by one."""
+
+
+def dumps(outline: Outline, results: Results, version: int = RESULTS_VERSION) -> str:
+    """Return results, their spec and the version that they are of as JSON text."""
+    measures = _kept(outline.study, results)
+    rates = {measure.name: measure.is_rate for measure in measures} | {"steps": False}
+    content = {
+        "results_version": version,
+        "spec": outline.table,
+        "columns": results.columns,
+        "measures": tables(measures),
+        "seeds": {c: _counted(found) for c, found in results.seeds.items()},
+        "phases": {
+            phase: {
+                condition: {
+                    name: _packed(values, is_rate=rates[name])
+                    for name, values in arrays.items()
+                    if name in rates
+                }
+                for condition, arrays in by_condition.items()
+            }
+            for phase, by_condition in results.phases.items()
+        },
+        "numbers": _rounded(results.numbers),
+        "usage": {} if outline.study in UNTIMED else _rounded(results.usage),
+    }
+    lines = [f"{json.dumps(key)}: {json.dumps(value)}" for key, value in content.items()]
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+class Published(NamedTuple):
+    """Results with their spec as a table, and the version of the code that they are of."""
+
+    outline: Outline
+    results: Results
+    version: int
+
+    @property
+    def note(self) -> str | None:
+        """What must be said of results of another version than this, in one line."""
+        if self.version == RESULTS_VERSION:
+            return None
+        return f"results of version {self.version}, this is version {RESULTS_VERSION}"
+
+
+def loads(text: str) -> Published:
+    """Return what `dumps` has written."""
+    content = json.loads(text)
+    measures = measures_from(content["measures"])
+    rates = {measure.name for measure in measures if measure.is_rate}
+    phases = {
+        phase: {
+            condition: {
+                name: _unpacked(packed, is_rate=name in rates) for name, packed in arrays.items()
+            }
+            for condition, arrays in by_condition.items()
+        }
+        for phase, by_condition in content["phases"].items()
+    }
+    seeds = {
+        condition: tuple(range(found) if isinstance(found, int) else found)
+        for condition, found in content["seeds"].items()
+    }
+    numbers, usage = (
+        {
+            c: {n: _unpacked(v, is_rate=False) for n, v in named.items()}
+            for c, named in content[key].items()
+        }
+        for key in ("numbers", "usage")
+    )
+    training, evaluation = phases.get("training", {}), phases.get("evaluation", {})
+    columns = content["columns"]
+    outline = Outline.noted(content["spec"], columns)
+    results = Results(training, evaluation, phases, seeds, numbers, usage, columns, measures)
+    return Published(outline, results, int(content["results_version"]))
+
+
+def write(path: Path, outline: Outline, results: Results, version: int = RESULTS_VERSION) -> None:
+    """Write the same to a file, which is there whole or not at all."""
+    durable.write(path, dumps(outline, results, version).encode())
+
+
+def read(folder: Path, studies: Iterable[str]) -> dict[str, Published]:
+    """Read the files of studies; those that are missing are left out.
+
+    Raises
+    ------
+    SpecError
+        If a file is not what `dumps` writes.
+    """
+    paths = {study: folder / f"{study}.json" for study in studies}
+    return {study: load(path) for study, path in paths.items() if path.exists()}
+
+
+def load(path: Path) -> Published:
+    """Read one file.
+
+    Raises
+    ------
+    SpecError
+        If it is not what `dumps` writes.
+    """
+    try:
+        return loads(path.read_text(encoding="utf-8"))
+    except (KeyError, TypeError, AttributeError, ValueError) as error:
+        raise SpecError(f"{path}: holds no published results: {error}") from None
+
+
+def _kept(study: str, results: Results) -> tuple[Measure, ...]:
+    """Return the measures of which there is anything to be kept."""
+    wanted = {SUCCESS.name} if study in SUCCESS_ALONE else {m.name for m in results.measures}
+    held = {
+        name
+        for by_condition in results.phases.values()
+        for arrays in by_condition.values()
+        for name in arrays
+    }
+    return tuple(m for m in results.measures if m.name in wanted & held)
+
+
+def _counted(seeds: tuple[int, ...]) -> int | list[int]:
+    """Return many seeds from 0 on as their number."""
+    many = len(seeds) >= FEW and seeds == tuple(range(len(seeds)))
+    return len(seeds) if many else list(seeds)
+
+
+Packed = list[Any] | dict[str, Any]
+"""An array as lists; of many rows, as flags or one value for all, with its shape."""
+
+
+def _packed(values: np.ndarray, *, is_rate: bool) -> Packed:
+    if is_rate and len(values) < FEW:
+        return ["".join("1" if v else "0" for v in row) for row in values]
+    if is_rate:
+        flags = "".join("1" if v else "0" for v in values.flat)
+        return {"flags": flags, "shape": list(values.shape)}
+    rounded = np.round(values, DECIMALS)
+    return _constant(rounded) or rounded.tolist()
+
+
+def _unpacked(packed: Packed, *, is_rate: bool) -> np.ndarray:
+    if isinstance(packed, dict):
+        if is_rate:
+            return np.array(list(map(int, packed["flags"]))).reshape(packed["shape"])
+        return np.full(packed["shape"], packed["all"])
+    if is_rate:
+        return np.array([[int(character) for character in row] for row in packed])
+    return np.array(packed)
+
+
+def _constant(values: np.ndarray) -> dict[str, Any] | None:
+    """Return many equal values as one of them and their shape; None of others."""
+    if values.size < FEW or not (values == values.flat[0]).all():
+        return None
+    return {"all": values.flat[0].item(), "shape": list(values.shape)}
+
+
+def _rounded(named: Mapping[str, Arrays]) -> dict[str, dict[str, Packed]]:
+    return {
+        condition: {
+            name: _constant(values) or [float(f"{v:.5g}") for v in values]
+            for name, values in arrays.items()
+        }
+        for condition, arrays in named.items()
+    }

@@ -1,0 +1,98 @@
+"""One agent per robot: the same world, told in other words."""
+
+import numpy as np
+import pytest
+
+from nested_agents.core.adaptation.self_model import SelfModelSettings
+from nested_agents.core.agents.loop import control_loop, policy_seed
+from nested_agents.core.agents.robot_agents import RobotAgents, per_robot
+from nested_agents.core.agents.team import Team
+from nested_agents.core.decision.settings import Decision
+from nested_agents.core.interface.protocols import EmbodiedScenario, roles_of
+from nested_agents.core.learners.batch import BatchTDSettings
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
+from nested_agents.scenarios.box_pushing.scenario import BoxPushing
+from nested_agents.scenarios.checking.checker import CHECKS, check_scenario
+from nested_agents.topologies import parse
+
+
+def test_a_robot_has_the_states_and_actions_of_its_wheels(line_world) -> None:
+    world, robots = line_world(2, 2), per_robot(line_world(2, 2))
+    assert not isinstance(robots, EmbodiedScenario)
+    assert robots.agents == ("cart0", "cart1")
+    assert len(robots.action_set) == 16
+    assert robots.action_set.names[robots.action_set.neutral] == "maintain+maintain"
+    names = [v.name for v in robots.state_space.variables]
+    assert names == ["wheel0.speed", "wheel0.phase", "wheel1.speed", "wheel1.phase", "gap"]
+    before, joined = world.reset(3), robots.reset(3)
+    assert (joined[1] == [*before[2, :2], *before[3, :2], before[2, 2]]).all()
+    one, other = world.step(np.array([0, 1, 2, 3])), robots.step(np.array([1, 11]))
+    assert (other.states[0] == [*one.states[0, :2], *one.states[1]]).all()
+    assert other.reward == one.reward
+
+
+def test_predictions_by_blocks_are_those_by_states(line_world) -> None:
+    robots = per_robot(line_world(2, 2))
+    robots.reset(0)
+    robots.step(np.array([0, 5]))
+    prediction = robots.predict()
+    codes = np.arange(256)
+    joint = np.stack([codes // 16, codes % 16], axis=1)
+    for agent in range(2):
+        blocks = prediction.blocks(agent)
+        assert blocks.states(codes) == pytest.approx(prediction.states(agent, joint))
+    assert prediction.reward_table() == pytest.approx(prediction.rewards(joint))
+
+
+def test_robots_whose_wheels_have_the_same_roles_are_of_one_role(line_world) -> None:
+    world = line_world(2, 2)
+    assert roles_of(per_robot(world)) == ("cart0.wheel0+cart0.wheel1", "cart1.wheel0+cart1.wheel1")
+    world.roles = ("front", "rear") * 2
+    assert roles_of(per_robot(world)) == ("front+rear", "front+rear")
+
+
+@pytest.mark.parametrize(("topology", "agents"), [("per-robot", 2), ("single-agent", 1)])
+def test_rewards_of_wheels_are_joined(topology: str, agents: int) -> None:
+    settings = BoxPushingSettings.model_validate({"reward": {"of": "robot"}})
+    world = BoxPushing(settings)
+    scenario, _ = parse(topology).arrange(BoxPushing(settings))
+    world.reset(0)
+    scenario.reset(0)
+    of_wheels = np.asarray(world.step(np.full(4, world.action_set.neutral)).reward)
+    joined = scenario.step(np.full(agents, scenario.action_set.neutral)).reward
+    assert joined == pytest.approx(of_wheels.reshape(agents, -1).mean(axis=1))
+
+
+def test_the_scenario_keeps_its_promises() -> None:
+    def make() -> RobotAgents:
+        return per_robot(BoxPushing(BoxPushingSettings()))
+
+    assert check_scenario(make, steps=10) == tuple(CHECKS)
+
+
+def test_both_evaluators_and_a_self_model_work_on_it() -> None:
+    settings = BoxPushingSettings()
+    weights = []
+    for evaluator in ("exact", "sampling"):
+        learner = BatchTDSettings(
+            decision=Decision(evaluator=evaluator),  # type: ignore[arg-type]
+            self_model=SelfModelSettings(enabled=True),
+        )
+        scenario, hierarchy = parse("per-robot").arrange(BoxPushing(settings))
+        assert hierarchy.edges == ((0, 1),)
+        team = Team.build(learner, scenario, hierarchy, policy_seed(0))
+        nominal = team.self_model.effects[0].copy()
+        for record in control_loop(scenario, team, episodes=2, steps=8, seed=0):
+            assert record.joint_action.shape == (2,)
+        assert (team.self_model.effects[0] != nominal).any()
+        weights.append(team.learner.theta)
+    assert all(np.abs(theta).sum() > 0.0 for theta in weights)
+
+
+def test_what_cannot_be_is_refused(line_world) -> None:
+    with pytest.raises(ValueError, match=r"robots: 4 \*\* 5 actions each, allowed: 256"):
+        per_robot(line_world(1, 5))
+    world = line_world(1, 3)
+    world.groups = ((0, 1), (2,))
+    with pytest.raises(ValueError, match=r"robots: of \[1, 2\] wheels"):
+        per_robot(world)

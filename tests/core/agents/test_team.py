@@ -1,0 +1,386 @@
+"""A team passes actions down, saves and continues bit for bit, and refuses foreign files."""
+
+import copy
+import zipfile
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from nested_agents.core.agents.robot_agents import per_robot
+from nested_agents.core.agents.rows import carried_rows
+from nested_agents.core.agents.team import Team
+from nested_agents.core.evaluators.exact import ExactEnumeration
+from nested_agents.core.evaluators.sampling import Sampling
+from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.core.interface.spaces import ActionSet, StateSpace
+from nested_agents.core.learners import LEARNERS, LearnerSettings
+
+PAPER = {"kind": "paper", "decay": 0.05, "clock": "episode"}
+BURST = {"kind": "burst", "rate": 0.4}
+TEAMS = {
+    "td-lambda, paper": {"kind": "td-lambda", "step_size": 0.1, "exploration": PAPER},
+    "td-lambda, burst": {"kind": "td-lambda", "step_size": 0.1, "exploration": BURST},
+    "td-lambda, 75 rules": {
+        "kind": "td-lambda",
+        "rule_base": {"membership": "sigmoid", "memberships": 5, "order": 2},
+        "decision": {"teammates": "empirical"},
+    },
+    "td-lambda, averaged": {"kind": "td-lambda", "step_size": 0.1, "averaging": 5.0},
+    "gradient-td": {"kind": "gradient-td", "exploration": PAPER},
+    "batch-td": {"kind": "batch-td", "ridge": 0.1, "exploration": BURST},
+    "batch-td, sigmoid": {"kind": "batch-td", "rule_base": {"membership": "sigmoid"}},
+    "anova-td": {"kind": "anova-td", "rule_base": {"order": 3}, "ridge": 0.1},
+    "sampling": {
+        "kind": "batch-td",
+        "decision": {
+            "evaluator": {"kind": "sampling", "samples": 7},
+            "teammates": "empirical",
+        },
+    },
+    "frozen": {"kind": "frozen", "decision": {"rule": "reward-and-value"}},
+    "random": {"kind": "td-lambda", "decision": {"rule": "random"}},
+}
+
+
+def settings_of(table: dict) -> LearnerSettings:
+    return LEARNERS.model(table["kind"]).model_validate(table)
+
+
+def chain_of(agents: tuple[str, ...]) -> Hierarchy:
+    return Hierarchy(agents, list(pairwise(agents)))
+
+
+@pytest.fixture
+def world(line_world):
+    return line_world(carts=2, wheels=2, closed=0.05)
+
+
+def team_of(name: str, world, seed: int = 1, hierarchy: Hierarchy | None = None) -> Team:
+    hierarchy = hierarchy or chain_of(world.agents)
+    return Team.build(settings_of(TEAMS[name]), world, hierarchy, np.random.SeedSequence(seed))
+
+
+def run_steps(team: Team, world, steps: int) -> list[list[int]]:
+    actions = []
+    for _ in range(steps):
+        joint = team.act(world.predict())
+        transition = world.step(joint)
+        team.learn(transition)
+        actions.append(joint.tolist())
+    return actions
+
+
+def run_episode(team: Team, world, seed: int, steps: int = 12) -> list[list[int]]:
+    world.reset(seed)
+    team.begin_episode()
+    actions = run_steps(team, world, steps)
+    team.end_episode()
+    return actions
+
+
+def same(one: Team, two: Team) -> bool:
+    a, b = one.arrays(), two.arrays()
+    return a.keys() == b.keys() and all((a[k] == b[k]).all() for k in a)
+
+
+@pytest.mark.parametrize("name", TEAMS)
+def test_a_saved_team_continues_bit_for_bit_within_an_episode(
+    name: str, world, tmp_path: Path
+) -> None:
+    team = team_of(name, world)
+    for episode in range(2):
+        run_episode(team, world, episode)
+    world.reset(2)
+    team.begin_episode()
+    run_steps(team, world, 5)
+    team.save(tmp_path / "team.npz")
+    elsewhere, restored = copy.deepcopy(world), team_of(name, world, seed=99)
+    restored.load(tmp_path / "team.npz")
+    assert same(team, restored)
+
+    def carry_on(team: Team, world) -> list:
+        actions = run_steps(team, world, 6)
+        team.end_episode()
+        return actions + run_episode(team, world, 3)
+
+    assert carry_on(team, world) == carry_on(restored, elsewhere)
+    assert same(team, restored)
+
+
+@pytest.mark.parametrize("name", TEAMS)
+def test_a_fresh_team_can_be_saved(name: str, world, tmp_path: Path) -> None:
+    team, restored = team_of(name, world), team_of(name, world, seed=99)
+    team.save(tmp_path / "team.npz")
+    restored.load(tmp_path / "team.npz")
+    assert run_episode(team, world, 0) == run_episode(restored, world, 0)
+    assert same(team, restored)
+
+
+@pytest.mark.parametrize("name", TEAMS)
+def test_same_seed_same_bits_other_seed_other_actions(name: str, world) -> None:
+    one, two, three = team_of(name, world), team_of(name, world), team_of(name, world, seed=2)
+    actions = [[run_episode(t, world, e) for e in range(2)] for t in (one, two, three)]
+    assert actions[0] == actions[1]
+    assert same(one, two)
+    assert actions[0] != actions[2]
+
+
+def test_a_file_holds_arrays_only(world, tmp_path: Path) -> None:
+    team = team_of("batch-td", world)
+    run_episode(team, world, 0)
+    team.save(tmp_path / "team.npz")
+    with np.load(tmp_path / "team.npz", allow_pickle=False) as arrays:
+        assert {arrays[name].dtype.kind for name in arrays.files} <= set("fiu")
+    assert all(n.endswith(".npy") for n in zipfile.ZipFile(tmp_path / "team.npz").namelist())
+
+
+def test_pickles_are_refused(world, tmp_path: Path) -> None:
+    team = team_of("frozen", world)
+    arrays = {**team.arrays(), "seen": np.array([{"a": 1}], dtype=object)}
+    np.savez(tmp_path / "team.npz", **arrays)
+    with pytest.raises(ValueError, match="allow_pickle=False"):
+        team.load(tmp_path / "team.npz")
+
+
+@pytest.mark.parametrize(
+    ("saved", "loading", "complaint"),
+    [
+        ("td-lambda, paper", "td-lambda, 75 rules", r"learner.theta has shape \(4, 15\)"),
+        ("td-lambda, paper", "td-lambda, burst", r"explorer has shape \(1,\), this team's \(9,\)"),
+        ("td-lambda, paper", "batch-td", "saved arrays .* are not this team's"),
+        ("batch-td", "td-lambda, paper", "saved arrays .* are not this team's"),
+        ("frozen", "gradient-td", "saved arrays .* are not this team's"),
+    ],
+)
+def test_what_another_team_saved_is_refused(
+    saved: str, loading: str, complaint: str, world, tmp_path: Path
+) -> None:
+    team_of(saved, world).save(tmp_path / "team.npz")
+    team, untouched = team_of(loading, world, 5), team_of(loading, world, 5)
+    with pytest.raises(ValueError, match=complaint) as caught:
+        team.load(tmp_path / "team.npz")
+    assert "\n" not in str(caught.value)
+    assert same(team, untouched)
+
+
+def test_a_team_of_other_size_is_refused(world, line_world, tmp_path: Path) -> None:
+    team_of("frozen", line_world(carts=3, wheels=2)).save(tmp_path / "team.npz")
+    with pytest.raises(ValueError, match=r"learner.theta has shape \(6, 15\)"):
+        team_of("frozen", world).load(tmp_path / "team.npz")
+
+
+def test_bounds_of_traces_by_other_rows_are_refused(world) -> None:
+    team = team_of("td-lambda, paper", world)
+    arrays = team.arrays()
+    arrays["learner.reach"] = arrays["learner.reach"][:, :-1]
+    with pytest.raises(ValueError, match=r"saved learner.reach has shape"):
+        team.restore(arrays)
+
+
+class Witness:
+    """Notes what each agent is told, and values its actions by a script."""
+
+    def __init__(self, best: list[int]) -> None:
+        self.best, self.told = best, {}
+
+    def values(self, deliberation) -> np.ndarray:
+        self.told[deliberation.agent] = deliberation.joint_action.tolist()
+        return np.eye(4)[self.best[deliberation.agent]]
+
+
+@pytest.mark.parametrize(
+    ("edges", "told"),
+    [
+        # Agents choose 0, 1, 3, 0; those above are told, all others count as maintaining (2).
+        ([(0, 1), (1, 2), (2, 3)], [[2, 2, 2, 2], [0, 2, 2, 2], [0, 1, 2, 2], [0, 1, 3, 2]]),
+        ([(3, 2), (2, 1), (1, 0)], [[2, 1, 3, 0], [2, 2, 3, 0], [2, 2, 2, 0], [2, 2, 2, 2]]),
+        ([(0, 1), (0, 2), (1, 3)], [[2, 2, 2, 2], [0, 2, 2, 2], [0, 2, 2, 2], [0, 1, 2, 2]]),
+        ([(0, 1), (2, 3)], [[2, 2, 2, 2], [0, 2, 2, 2], [2, 2, 2, 2], [2, 2, 3, 2]]),
+        ([], [[2, 2, 2, 2]] * 4),
+    ],
+)
+def test_actions_are_passed_down_and_the_unseen_maintain(edges, told, world) -> None:
+    names = world.agents
+    hierarchy = Hierarchy(names, [(names[a], names[b]) for a, b in edges])
+    team = team_of("frozen", world, hierarchy=hierarchy)
+    witness = team.evaluator = Witness([0, 1, 3, 0])  # type: ignore[assignment]
+    world.reset(0)
+    assert team.act(world.predict(), explore=False).tolist() == [0, 1, 3, 0]
+    assert [witness.told[i] for i in range(4)] == told
+    assert tuple(witness.told) == hierarchy.order
+
+
+def test_frequencies_are_what_was_seen(world) -> None:
+    team = team_of("random", world)
+    team.evaluator = Witness([0, 1, 3, 0])  # type: ignore[assignment]
+    team.explorer = team._greedy
+    world.reset(0)
+    for _ in range(6):
+        team.act(world.predict())
+    # One of each to begin with, then six times the same: 7 in 10.
+    assert team.arrays()["seen"].tolist() == [
+        [7, 1, 1, 1],
+        [1, 7, 1, 1],
+        [1, 1, 1, 7],
+        [7, 1, 1, 1],
+    ]
+
+
+@pytest.mark.parametrize("name", ["td-lambda, paper", "batch-td", "sampling"])
+def test_acting_without_exploring_leaves_the_memory_alone(name: str, world) -> None:
+    team = team_of(name, world)
+    run_episode(team, world, 0)
+    before = {k: v.copy() for k, v in team.arrays().items() if k != "generator"}
+    world.reset(1)
+    for _ in range(5):
+        world.step(team.act(world.predict(), explore=False))
+    after = team.arrays()
+    assert all((after[k] == v).all() for k, v in before.items())
+
+
+def test_a_random_team_draws_all_actions_alike(world) -> None:
+    team = team_of("random", world)
+    world.reset(0)
+    drawn = np.array([team.act(world.predict()) for _ in range(4000)])
+    fractions = np.stack([(drawn == action).mean(axis=0) for action in range(4)])
+    assert fractions == pytest.approx(np.full((4, 4), 0.25), abs=0.035)
+
+
+def test_counts_of_an_episode(world) -> None:
+    team = team_of("td-lambda, paper", world)
+    run_episode(team, world, 0, steps=12)
+    # Twelve decisions; eleven updates, as the first after-state has none before it.
+    assert isinstance(team.evaluator, ExactEnumeration)
+    counts = team.evaluator.counts
+    assert counts.joint_actions == 12 * (256 + 64 + 16 + 4)
+    assert counts.rule_evaluations == counts.joint_actions * 15
+    assert counts.weight_updates == 11 * 4 * 15
+
+
+@pytest.mark.parametrize(
+    ("decision", "kind"),
+    [
+        ({}, ExactEnumeration),
+        ({"evaluator": {"kind": "auto", "exact_up_to": 3}}, Sampling),
+        ({"evaluator": "sampling"}, Sampling),
+        ({"evaluator": "exact"}, ExactEnumeration),
+        ({"evaluator": {"kind": "auto", "exact_up_to": 10}}, ExactEnumeration),
+    ],
+)
+def test_the_evaluator_follows_the_settings(decision: dict, kind: type, world) -> None:
+    settings = settings_of({"kind": "frozen", "decision": decision})
+    team = Team.build(settings, world, chain_of(world.agents), np.random.SeedSequence(1))
+    assert isinstance(team.evaluator, kind)
+
+
+def test_what_is_too_much_to_enumerate_is_sampled(line_world) -> None:
+    # 256 joint actions of four wheels each: four agents have four thousand million.
+    scenario = per_robot(line_world(carts=4, wheels=4))
+    learner = settings_of({"kind": "frozen"})
+    hierarchy = chain_of(scenario.agents)
+    team = Team.build(learner, scenario, hierarchy, np.random.SeedSequence(1))
+    assert isinstance(team.evaluator, Sampling)
+
+
+def test_a_scenario_may_list_its_agents(line_world) -> None:
+    scenario = line_world(carts=2, wheels=2)
+    scenario.agents = list(scenario.agents)
+    assert team_of("frozen", scenario).hierarchy.agents == tuple(scenario.agents)
+
+
+def test_a_hierarchy_over_other_agents_is_refused(world) -> None:
+    with pytest.raises(ValueError, match=r"topology: agents a, b are not the scenario's") as caught:
+        team_of("frozen", world, hierarchy=Hierarchy("ab", []))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["td-lambda, burst", "batch-td", "gradient-td"])
+def test_permuting_agents_permutes_what_is_learned(name: str, line_world) -> None:
+    # Every agent's cart has one wheel. Both worlds are stepped with the same actions; what agents
+    # learn from them does not depend on the order in which they are listed.
+    class Permuted(line_world):
+        order = np.array([2, 0, 1])
+
+        def step(self, joint_action):
+            inverse = np.argsort(self.order)
+            transition = super().step(np.asarray(joint_action)[inverse])
+            return replace(transition, states=transition.states[self.order])
+
+    here, there = line_world(3, 1), Permuted(3, 1)
+    one, two = team_of(name, here), team_of(name, there)
+    rng = np.random.default_rng(4)
+    for episode in range(2):
+        for team, world in ((one, here), (two, there)):
+            world.reset(episode)
+            team.begin_episode()
+        for _ in range(10):
+            joint = rng.integers(4, size=3)
+            one.learn(here.step(joint))
+            two.learn(there.step(joint[there.order]))
+        one.end_episode()
+        two.end_episode()
+    assert np.abs(one.learner.theta).max() > 0
+    assert (two.learner.theta == one.learner.theta[there.order]).all()
+
+
+@pytest.mark.parametrize("name", TEAMS)
+def test_a_team_that_takes_over_goes_on_as_the_former_one_would(name: str, world) -> None:
+    former = team_of(name, world)
+    run_episode(former, world, seed=5)
+    same = copy.deepcopy(former)
+    successor = team_of(name, world, seed=2)
+    successor.take_over(former, carried_rows(world, world, shared=False))
+    assert run_episode(successor, world, seed=6) == run_episode(same, world, seed=6)
+    assert (successor.learner.theta == same.learner.theta).all()
+
+
+def test_a_larger_team_takes_over_by_role(line_world) -> None:
+    small, large = (line_world(carts=carts, wheels=2) for carts in (1, 3))
+    for world in (small, large):
+        world.roles = ("front", "rear") * world.shape[0]
+    settings = settings_of({**TEAMS["sampling"], "weights": "role", "exploration": BURST})
+    former, successor = (
+        Team.build(settings, world, chain_of(world.agents), np.random.SeedSequence(1))
+        for world in (small, large)
+    )
+    run_episode(former, small, seed=5)
+    successor.take_over(former, carried_rows(small, large, shared=True))
+    assert (successor.learner.theta == former.learner.theta).all()
+    assert successor.explorer.memory[0] == 0.0  # one episode has been begun
+    seen, before = successor.arrays()["seen"], former.arrays()["seen"]
+    assert (seen == np.tile(before, (3, 1))).all()
+    run_episode(successor, large, seed=6)
+    assert (successor.learner.theta != former.learner.theta).any()
+
+
+@pytest.mark.parametrize(
+    ("change", "shared", "said"),
+    [
+        ({"carts": 3}, False, "4 agents over 'line' cannot act with 6 .*: learner.weights = 'own'"),
+        ({"carts": 3}, True, "cannot act with 6 agents over 'line': their roles are cart0.wheel0"),
+        ({"state_space": "short"}, True, "with 4 agents over 'short': the state spaces differ"),
+        ({"action_set": "two"}, True, "the actions differ"),
+    ],
+)
+def test_weights_are_not_carried_where_they_mean_nothing(
+    change: dict, shared: bool, said: str, world, line_world
+) -> None:
+    other = line_world(carts=change.get("carts", 2), wheels=2)
+    if "state_space" in change:
+        other.state_space = StateSpace("short", other.state_space.variables[:1])
+    if "action_set" in change:
+        other.action_set = ActionSet(("go", "stay"), (1.0, 1.0), (1.0, 0.0), 1)
+    with pytest.raises(ValueError, match=said) as caught:
+        carried_rows(world, other, shared=shared)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("part", ["learner", "explorer"])
+def test_parts_that_cannot_take_over_are_named(part: str, world) -> None:
+    former, successor = team_of("batch-td", world), team_of("batch-td", world)
+    setattr(successor, part, object())
+    with pytest.raises(ValueError, match=r"learner\..*kind: object has no take_over"):
+        successor.take_over(former, np.arange(4))

@@ -1,0 +1,114 @@
+"""Who is above, below and unseen; what is refused."""
+
+from itertools import pairwise
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nested_agents.core.interface.hierarchy import Hierarchy
+
+CHAIN = Hierarchy("abcd", [("a", "b"), ("b", "c"), ("c", "d")])
+TREE = Hierarchy("abcde", [("a", "b"), ("a", "c"), ("b", "d"), ("b", "e")])
+DIAMOND = Hierarchy("abcd", [("a", "b"), ("a", "c"), ("b", "d"), ("c", "d")])
+APART = Hierarchy("abc", [])
+
+
+@st.composite
+def hierarchies(draw: st.DrawFn) -> Hierarchy:
+    n = draw(st.integers(1, 7))
+    names = [f"agent{i}" for i in range(n)]
+    rank = draw(st.permutations(range(n)))
+    pairs = [(i, j) for i in range(n) for j in range(n) if rank[i] < rank[j]]
+    edges = [pair for pair in pairs if draw(st.booleans())]
+    return Hierarchy(names, [(names[i], names[j]) for i, j in edges])
+
+
+def test_a_chain() -> None:
+    assert CHAIN.order == (0, 1, 2, 3)
+    assert [CHAIN.below(i) for i in range(4)] == [(1, 2, 3), (2, 3), (3,), ()]
+    assert [CHAIN.above(i) for i in range(4)] == [(), (0,), (0, 1), (0, 1, 2)]
+    assert [CHAIN.unseen(i) for i in range(4)] == [(), (), (), ()]
+    assert (len(CHAIN), CHAIN.depth) == (4, 4)
+    assert repr(CHAIN) == "Hierarchy(4 agents: a -> b, b -> c, c -> d)"
+
+
+def test_a_tree() -> None:
+    assert TREE.order == (0, 1, 2, 3, 4)
+    assert (TREE.below(0), TREE.below(1), TREE.below(2)) == ((1, 2, 3, 4), (3, 4), ())
+    assert (TREE.above(3), TREE.unseen(3)) == ((0, 1), (2, 4))
+    assert (TREE.unseen(2), TREE.depth) == ((1, 3, 4), 3)
+
+
+def test_a_diamond_counts_nobody_twice() -> None:
+    assert DIAMOND.below(0) == (1, 2, 3)
+    assert DIAMOND.above(3) == (0, 1, 2)
+    assert DIAMOND.unseen(1) == (2,)
+
+
+def test_independent_agents_see_nobody() -> None:
+    assert [APART.unseen(i) for i in range(3)] == [(1, 2), (0, 2), (0, 1)]
+    assert (APART.order, APART.depth, repr(APART)) == (
+        (0, 1, 2),
+        1,
+        "Hierarchy(3 agents: no edges)",
+    )
+
+
+def test_ties_are_decided_in_agent_order() -> None:
+    # d and b are roots; b comes first, then its subordinate a before the other root d.
+    assert Hierarchy("abcd", [("b", "a"), ("d", "c")]).order == (1, 0, 3, 2)
+
+
+def test_joint_actions_of_a_chain_are_the_papers_sum() -> None:
+    # 4 ** 4 + 4 ** 3 + 4 ** 2 + 4 for four wheels; exact far beyond 64 bits.
+    assert CHAIN.joint_actions(4) == 256 + 64 + 16 + 4
+    assert APART.joint_actions(4) == 12
+    names = [str(i) for i in range(100)]
+    long = Hierarchy(names, list(pairwise(names)))
+    assert long.joint_actions(4) == (4**101 - 4) // 3
+
+
+@given(hierarchies())
+def test_everybody_else_is_above_below_or_unseen(hierarchy: Hierarchy) -> None:
+    n = len(hierarchy)
+    assert sorted(hierarchy.order) == list(range(n))
+    position = {agent: k for k, agent in enumerate(hierarchy.order)}
+    for i in range(n):
+        classes = [*hierarchy.above(i), *hierarchy.below(i), *hierarchy.unseen(i), i]
+        assert sorted(classes) == list(range(n))
+        assert all(i in hierarchy.above(j) for j in hierarchy.below(i))
+        assert all(position[j] < position[i] for j in hierarchy.above(i))
+        assert all(i in hierarchy.unseen(j) for j in hierarchy.unseen(i))
+
+
+@given(hierarchies(), st.data())
+def test_permuting_agents_permutes_the_hierarchy(hierarchy: Hierarchy, data: st.DataObject) -> None:
+    n = len(hierarchy)
+    permutation = data.draw(st.permutations(range(n)))
+    other = hierarchy.permuted(permutation)
+    for k, i in enumerate(permutation):
+        assert other.agents[k] == hierarchy.agents[i]
+        assert {permutation[j] for j in other.below(k)} == set(hierarchy.below(i))
+        assert {permutation[j] for j in other.above(k)} == set(hierarchy.above(i))
+    assert other.joint_actions(4) == hierarchy.joint_actions(4)
+    assert other.depth == hierarchy.depth
+
+
+@pytest.mark.parametrize(
+    ("agents", "edges", "complaint"),
+    [
+        ("", [], "hierarchy: no agents"),
+        ("aba", [], "agent 'a' is named more than once"),
+        ("ab", [("a", "z")], "edge a -> z names unknown agent 'z', known: a, b"),
+        ("ab", [("z", "a")], "edge z -> a names unknown agent 'z', known: a, b"),
+        ("ab", [("a", "a")], "agent 'a' cannot be its own superior"),
+        ("ab", [("a", "b"), ("a", "b")], "edge a -> b is given more than once"),
+        ("ab", [("a", "b"), ("b", "a")], "cycle a -> b -> a"),
+        ("abcd", [("a", "b"), ("b", "c"), ("c", "d"), ("d", "b")], "cycle b -> c -> d -> b"),
+    ],
+)
+def test_a_hierarchy_refuses(agents: str, edges: list, complaint: str) -> None:
+    with pytest.raises(ValueError, match=complaint) as caught:
+        Hierarchy(agents, edges)
+    assert "\n" not in str(caught.value)

@@ -1,0 +1,198 @@
+"""A learner, an evaluator and an exploration of one's own from files; scenarios of few members."""
+
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from nested_agents.core.agents.loop import control_loop, policy_seed
+from nested_agents.core.agents.robot_agents import per_robot
+from nested_agents.core.agents.single_agent import SingleAgent
+from nested_agents.core.agents.team import Team
+from nested_agents.core.decision.exploration import EXPLORATIONS
+from nested_agents.core.evaluators import EVALUATORS
+from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.core.learners import LEARNERS
+from nested_agents.core.learners.batch import BatchTDSettings
+from nested_agents.core.plugins.sources import Sources
+
+MINE = """
+import numpy as np
+from nested_agents.core.evaluators.evaluator import Counts, EvaluatorSettings
+from nested_agents.core.learners.learner import LearnerSettings
+
+class MonteCarlo:
+    '''Weights a step towards every reward.'''
+
+    class Settings(LearnerSettings):
+        step_size: float = 0.5
+
+    def __init__(self, settings, rules, rows):
+        self.settings, self.rules, self.rows = settings, rules, rows
+        self.theta = np.zeros((int(rows.max()) + 1, rules.n_rules))
+
+    def begin_episode(self):
+        pass
+
+    def observe(self, states, reward, terminated):
+        step = self.settings.step_size * np.broadcast_to(reward, len(states))
+        np.add.at(self.theta, self.rows, step[:, None] * self.rules.features(states))
+        return self.theta.size
+
+    def end_episode(self):
+        return 0
+
+    def arrays(self):
+        return {"theta": self.theta}
+
+    def restore(self, arrays):
+        self.theta = arrays["theta"].copy()
+
+class Favourite(EvaluatorSettings):
+    action: int = 1
+
+    def build(self, problem):
+        return Fixed(np.eye(problem.n_actions)[self.action])
+
+class Fixed:
+    def __init__(self, found):
+        self.found, self.counts = found, Counts()
+
+    def values(self, deliberation):
+        self.counts.joint_actions += 1
+        return self.found
+
+class Least:
+    '''Takes the action of least value.'''
+
+    def __init__(self, n_agents):
+        self.memory = np.zeros(n_agents)
+
+    def begin_episode(self):
+        pass
+
+    def choose(self, agent, values, rng):
+        self.memory[agent] += 1
+        return int(values.argmin())
+
+    def advance(self):
+        pass
+"""
+TABLE = {
+    "kind": "mine.py:MonteCarlo",
+    "step_size": 0.25,
+    "exploration": {"kind": "mine.py:Least"},
+    "decision": {"evaluator": {"kind": "mine.py:Favourite", "action": 3}},
+}
+
+
+class FewMembers:
+    """What a scenario must have, and no more: predictions give next states only."""
+
+    def __init__(self, world) -> None:
+        self.agents, self.state_space = world.agents, world.state_space
+        self.action_set, self.reset, self.step = world.action_set, world.reset, world.step
+        self._world = world
+
+    def predict(self) -> SimpleNamespace:
+        return SimpleNamespace(states=self._world.predict().states)
+
+
+def team_of(settings, scenario) -> Team:
+    hierarchy = Hierarchy(scenario.agents, [scenario.agents] if len(scenario.agents) == 2 else [])
+    return Team.build(settings, scenario, hierarchy, policy_seed(1))
+
+
+def test_a_team_of_ones_own_parts(line_world, tmp_path) -> None:
+    world = line_world(carts=2, wheels=1)
+    with Sources(texts={"mine.py": MINE}).active():
+        settings = LEARNERS.model("mine.py:MonteCarlo").model_validate(TABLE)
+        assert (
+            LEARNERS.model("mine.py:MonteCarlo").model_validate(settings.model_dump()) == settings
+        )
+        team, restored = team_of(settings, world), team_of(settings, world)
+    rewarded = np.zeros_like(team.learner.theta)
+    for record in control_loop(world, team, episodes=2, steps=4, seed=3):
+        assert record.joint_action.tolist() == [0, 0]  # the least of 0, 0, 0, 1
+        features = team.learner.rules.features(record.transition.states)  # type: ignore[attr-defined]
+        rewarded += 0.25 * record.transition.reward * features
+    assert team.learner.theta == pytest.approx(rewarded, rel=0, abs=1e-15)
+    assert team.explorer.memory.tolist() == [8, 8]
+    assert team.evaluator.counts.joint_actions == 16
+    assert team.act(world.predict(), explore=False).tolist() == [3, 3]
+    team.save(tmp_path / "team.npz")
+    restored.load(tmp_path / "team.npz")
+    assert (restored.learner.theta == team.learner.theta).all()
+
+
+@pytest.mark.parametrize("name", ["auto", "exact", "sampling"])
+@pytest.mark.parametrize("view", [None, per_robot, SingleAgent])
+def test_a_scenario_of_few_members_is_learned(name: str, view, line_world) -> None:
+    scenario = FewMembers(line_world(carts=2, wheels=1))
+    seen = view(scenario) if view else scenario
+    settings = BatchTDSettings.model_validate({"decision": {"evaluator": name}})
+    team = team_of(settings, seen)
+    records = list(control_loop(seen, team, episodes=2, steps=5, seed=0))
+    assert len(records) == 10
+    assert team.learner.theta.any()
+
+
+@pytest.mark.parametrize("view", [None, per_robot, SingleAgent])
+@pytest.mark.parametrize("rule", ["reward", "reward-and-value"])
+def test_rewards_that_are_not_predicted_cannot_decide(rule: str, view, line_world) -> None:
+    scenario = FewMembers(line_world(carts=2, wheels=1))
+    seen = view(scenario) if view else scenario
+    team = team_of(BatchTDSettings.model_validate({"decision": {"rule": rule}}), seen)
+    seen.reset(0)
+    said = rf"^learner\.decision\.rule = '{rule}': the scenario predicts no rewards, use value$"
+    with pytest.raises(ValueError, match=said):
+        team.check(seen.predict())
+    with pytest.raises(ValueError, match=said):
+        next(control_loop(seen, team, episodes=1, steps=1, seed=0))
+
+
+@pytest.mark.parametrize("rule", ["reward", "reward-and-value"])
+def test_rewards_without_tables_decide_too(rule: str, line_world) -> None:
+    world, few = line_world(carts=2, wheels=1), FewMembers(line_world(carts=2, wheels=1))
+    tables = few._world.predict
+
+    def predict() -> SimpleNamespace:
+        found = tables()
+        return SimpleNamespace(states=found.states, rewards=found.rewards, blocks=found.blocks)
+
+    few.predict = predict  # type: ignore[method-assign]
+    chosen = []
+    for scenario in (world, few):
+        team = team_of(BatchTDSettings.model_validate({"decision": {"rule": rule}}), scenario)
+        records = control_loop(scenario, team, episodes=2, steps=5, seed=0)
+        chosen.append([record.joint_action.tolist() for record in records])
+    assert chosen[0] == chosen[1]
+
+
+@pytest.mark.parametrize("name", ["moments", "extremes"])
+def test_additive_evaluators_do_not_fit_it(name: str, line_world) -> None:
+    table = {"decision": {"evaluator": name, "teammates": "uniform"}}
+    with pytest.raises(ValueError, match="the scenario predicts no sums, use exact or sampling"):
+        team_of(BatchTDSettings.model_validate(table), FewMembers(line_world(2, 1)))
+
+
+def test_settings_are_read_without_numba_and_scipy() -> None:
+    models = [(r, name) for r in (LEARNERS, EVALUATORS, EXPLORATIONS) for name in r.built_in]
+    assert len(models) >= 12
+    program = """
+import sys
+import nested_agents.core.decision.settings
+from nested_agents.core.evaluators import EVALUATORS
+from nested_agents.core.decision.exploration import EXPLORATIONS
+from nested_agents.core.learners import LEARNERS
+for registry in (LEARNERS, EVALUATORS, EXPLORATIONS):
+    for name in registry.built_in:
+        registry.parsed(name)
+print(*({"numba", "scipy"} & {name.partition(".")[0] for name in sys.modules}))
+"""
+    run = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    assert run.stdout.split() == []

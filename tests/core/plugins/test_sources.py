@@ -1,0 +1,125 @@
+"""Files of users: what they mean, what is said of bad ones, and how they travel."""
+
+import pickle
+from pathlib import Path
+
+import pytest
+
+from nested_agents.core.plugins import trust
+from nested_agents.core.plugins.sources import Sources, active
+
+TEXT = "LINKS = 3\n\n\ndef twice(x):\n    return 2 * x\n"
+
+
+def test_a_name_in_a_file_is_found_and_the_file_run_once(tmp_path: Path) -> None:
+    (tmp_path / "arm.py").write_text(TEXT + "class A:\n    class B:\n        pass\n")
+    sources = Sources(tmp_path)
+    assert sources.load("arm.py:twice")(4) == 8
+    assert sources.load("arm.py:A.B") is sources.load("arm.py:A").B
+    assert sources.texts == {"arm.py": sources.text("arm.py")}
+
+
+@pytest.mark.parametrize(
+    ("other", "same"),
+    [
+        ("# three\n" + TEXT, True),
+        (TEXT.replace("LINKS = 3", "LINKS=3  # links"), True),
+        (TEXT.replace("3", "4"), False),
+        (TEXT.replace("2 * x", "x * 2"), False),
+    ],
+)
+def test_only_what_is_run_counts(other: str, same: bool) -> None:
+    one, two = (Sources(texts={"arm.py": text}).digest("arm.py") for text in (TEXT, other))
+    assert (one == two) is same
+
+
+@pytest.mark.parametrize(
+    "content", [TEXT.replace("\n", "\r\n").encode(), b"\xef\xbb\xbf" + TEXT.encode()]
+)
+def test_other_line_ends_and_a_byte_order_mark_change_nothing(
+    content: bytes, tmp_path: Path
+) -> None:
+    (tmp_path / "arm.py").write_bytes(content)
+    sources = Sources(tmp_path)
+    assert sources.text("arm.py") == TEXT
+    assert sources.digest("arm.py") == Sources(texts={"arm.py": TEXT}).digest("arm.py")
+    assert sources.load("arm.py:LINKS") == 3
+
+
+@pytest.mark.parametrize(
+    ("text", "reference", "complaint"),
+    [
+        (TEXT, "leg.py:LINKS", r"^leg\.py: No such file or directory$"),
+        (TEXT, "arm.py:Leg", r"^arm\.py has no 'Leg', it has: twice$"),
+        (TEXT, "arm.py:", r"^'arm\.py:' must be written path/to/file\.py:name$"),
+        ("LINKS = = 3", "arm.py:LINKS", r"^arm\.py cannot be run: SyntaxError: invalid syntax"),
+        ("import sys; sys.exit(2)", "arm.py:LINKS", r"^arm\.py cannot be run: SystemExit: 2$"),
+        ("import no_such_thing", "arm.py:LINKS", r"ModuleNotFoundError: No module named"),
+        ("raise ValueError('two\\nlines')", "arm.py:A", r"ValueError: two lines$"),
+    ],
+)
+def test_a_bad_file_is_told_in_one_line(
+    text: str, reference: str, complaint: str, tmp_path: Path
+) -> None:
+    (tmp_path / "arm.py").write_text(text)
+    with pytest.raises(ValueError, match=complaint) as caught:
+        Sources(tmp_path).load(reference)
+    assert "\n" not in str(caught.value)
+
+
+def test_what_is_no_text_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "arm.py").write_bytes(b"\xff\xfe")
+    (tmp_path / "long.py").write_bytes(b"#" * 1_000_001)
+    for name, complaint in (("arm.py", "is not UTF-8 text"), ("long.py", "1000001 bytes")):
+        with pytest.raises(ValueError, match=rf"^{name}: {complaint}"):
+            Sources(tmp_path).text(name)
+    with pytest.raises(ValueError, match=r"^arm\.py cannot be run: SyntaxError: .*\(arm\.py, line"):
+        Sources(texts={"arm.py": "x ="}).digest("arm.py")
+
+
+def test_texts_travel_without_their_folder(tmp_path: Path) -> None:
+    (tmp_path / "arm.py").write_text(TEXT)
+    sources = Sources(tmp_path)
+    sources.text("arm.py")
+    (tmp_path / "leg.py").write_text(TEXT)
+    there = pickle.loads(pickle.dumps(sources))
+    assert there == sources
+    assert there.folder is None
+    (tmp_path / "arm.py").write_text("LINKS = 5")
+    assert there.load("arm.py:LINKS") == sources.load("arm.py:LINKS") == 3
+    with pytest.raises(ValueError, match=r"^leg\.py: is not among the files kept with the study$"):
+        there.load("leg.py:LINKS")
+
+
+def test_names_are_resolved_by_the_active_sources(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "arm.py").write_text("LINKS = 7")
+    monkeypatch.chdir(tmp_path)
+    with Sources(texts={"arm.py": TEXT}).active():
+        assert active().load("arm.py:LINKS") == 3
+    assert active().load("arm.py:LINKS") == 7
+
+
+def test_the_copy_of_a_study_stands_in_for_a_file_that_is_gone(tmp_path: Path) -> None:
+    copies = tmp_path / "out" / "sources"
+    copies.mkdir(parents=True)
+    (copies / "links.py").write_text("LINKS = 3")
+    with pytest.raises(ValueError, match=r"^links\.py came with .*out and was not run from a spec"):
+        Sources(tmp_path, study=tmp_path / "out").load("links.py:LINKS")
+    trust.trust("LINKS = 3")
+    assert Sources(tmp_path, study=tmp_path / "out").load("links.py:LINKS") == 3
+    (tmp_path / "links.py").write_text("LINKS = 4")
+    assert Sources(tmp_path, study=tmp_path / "out").load("links.py:LINKS") == 4
+
+
+@pytest.mark.parametrize("beside", ["shared.py", "shared/__init__.py"])
+def test_a_file_that_needs_another_one_is_refused(tmp_path: Path, beside: str) -> None:
+    (tmp_path / "links.py").write_text(
+        "def links():\n    from shared import LINKS\n    return LINKS"
+    )
+    Sources(tmp_path).load("links.py:links")  # installed, for all that can be known
+    (tmp_path / beside).parent.mkdir(exist_ok=True)
+    (tmp_path / beside).write_text("LINKS = 3")
+    with pytest.raises(ValueError, match=r"links\.py: imports shared, which stands beside it"):
+        Sources(tmp_path).load("links.py:links")

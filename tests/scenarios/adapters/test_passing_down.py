@@ -1,0 +1,161 @@
+"""Turns in hierarchy order: what PettingZoo checks, what is passed down, and the same world."""
+
+import warnings
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from pettingzoo import ParallelEnv
+from pettingzoo.test import api_test, seed_test
+
+from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.scenarios.adapters.passing_down import PassingDownEnv
+from nested_agents.scenarios.box_pushing.environments import RobotsEnv, WheelsEnv
+
+FAST: Any = {"action_repeat": 2}
+ADVICE = (
+    "We recommend agents to be named", "Action space for each agent probably should",
+    "Agent's m.* observation space value is",
+)  # fmt: skip
+"""What the check advises against: names with dots, MultiDiscrete actions, infinite bounds."""
+TREE = Hierarchy(
+    ["robot1.left", "robot1.right", "robot2.left", "robot2.right"],
+    [("robot2.right", "robot1.left"), ("robot2.right", "robot2.left")],
+)
+
+
+class Leaving(ParallelEnv):
+    """Agents are paid their number in every step, and leave after as many; the last ends it."""
+
+    metadata = {"name": "leaving_v0"}  # noqa: RUF012
+
+    def __init__(self) -> None:
+        self.possible_agents = ["a", "b", "c"]
+        self.agents: list[str] = []
+        self.render_mode = None
+
+        self.seen = gymnasium.spaces.Box(0, 9, (1,), dtype=np.float32)
+        self.chosen = {name: gymnasium.spaces.Discrete(2) for name in self.possible_agents}
+
+    def observation_space(self, agent: str) -> Any:
+        return self.seen
+
+    def action_space(self, agent: str) -> Any:
+        return self.chosen[agent]
+
+    def _told(self) -> Any:
+        return {name: np.array([1 + self.time], dtype=np.float32) for name in self.agents}
+
+    def reset(self, seed: int | None = None, options: Any = None) -> Any:
+        self.agents, self.time = list(self.possible_agents), 0
+        return self._told(), {name: {} for name in self.agents}
+
+    def step(self, actions: Any) -> Any:
+        assert set(actions) == set(self.agents)
+        self.time += 1
+        told, infos = self._told(), {name: {} for name in self.agents}
+        paid = {name: 1.0 + self.possible_agents.index(name) for name in self.agents}
+        ends = {name: paid[name] <= self.time for name in self.agents}
+        breaks = dict.fromkeys(self.agents, False)
+        self.agents = [name for name in self.agents if not ends[name]]
+        return told, paid, ends, breaks, infos
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: PassingDownEnv(WheelsEnv(FAST, steps=15)),
+        lambda: PassingDownEnv(WheelsEnv(FAST, steps=15), TREE),
+        lambda: PassingDownEnv(RobotsEnv(FAST, steps=15)),
+        lambda: PassingDownEnv(Leaving()),
+    ],
+)
+def test_pettingzoo_finds_nothing(make: Any) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for advice in ADVICE:
+            warnings.filterwarnings("ignore", message=advice)
+        api_test(make(), num_cycles=60)
+        seed_test(make, num_cycles=20)
+
+
+def test_it_is_the_world_of_the_parallel_environment() -> None:
+    turns, parallel = PassingDownEnv(WheelsEnv(FAST, steps=6), TREE), WheelsEnv(FAST, steps=6)
+    turns.reset(seed=4)
+    told = parallel.reset(seed=4)[0]
+    rng = np.random.default_rng(0)
+    while parallel.agents:
+        actions = {name: int(rng.integers(4)) for name in parallel.agents}
+        for place in TREE.order:
+            name = TREE.agents[place]
+            assert turns.agent_selection == name
+            seen, _, ended, broken, _ = turns.last()
+            own = len(told[name])
+            assert (seen[:own] == told[name]).all()
+            assert not ended
+            assert not broken
+            passed = np.zeros((4, 4))
+            for superior in TREE.above(place):
+                passed[superior, actions[TREE.agents[superior]]] = 1
+            assert (seen[own:] == passed.ravel()).all()
+            turns.step(actions[name])
+        told, rewards, _, breaks, _ = parallel.step(actions)
+        assert {name: turns._cumulative_rewards[name] for name in rewards} == rewards
+        assert turns.truncations == breaks
+    assert turns.agents
+    while turns.agents:
+        turns.step(None)
+
+
+def test_what_is_passed_is_of_this_step_alone() -> None:
+    env = PassingDownEnv(RobotsEnv(FAST, steps=3))
+    env.reset(seed=0)
+    env.step(np.array([1, 3]))
+    assert env.observe("robot1")[-16:].tolist() == [0] * 16
+    assert env.observe("robot2")[-16:].tolist() == [0, 1, 0, 0, 0, 0, 0, 1] + [0] * 8
+    env.step(np.array([0, 0]))
+    assert env.observe("robot2")[-16:].tolist() == [0] * 16
+
+
+def test_who_has_left_passes_nothing_down() -> None:
+    env = PassingDownEnv(Leaving())
+    env.reset()
+    for _ in range(3):
+        env.step(1)
+    assert env.agent_selection == "a"
+    env.step(None)
+    assert (env.agents, env.agent_selection) == (["b", "c"], "b")
+    assert env.observe("b").tolist() == [2] + [0] * 6
+    env.step(1)
+    assert env.last()[:2] == (pytest.approx([2, 0, 0, 0, 1, 0, 0]), 3.0)
+
+
+@pytest.mark.parametrize(
+    ("act", "complaint"),
+    [
+        (lambda: PassingDownEnv(Leaving(), Hierarchy(["a", "x"], [])), "agents a, x, those of the"),
+        (lambda: _of(action_space=gymnasium.spaces.Box(0, 1)), "actions of 'a': Box"),
+        (lambda: _of(action_space=gymnasium.spaces.Discrete(2, start=1)), "actions of 'a'"),
+        (lambda: _of(observation_space=gymnasium.spaces.Discrete(3)), "observations of 'a'"),
+        (lambda: _started().step(2), r"action 2 of a, allowed Discrete\(2\)"),
+        (lambda: _started().step(None), "action None of a"),
+    ],
+)
+def test_refusals(act: Any, complaint: str) -> None:
+    with pytest.raises(ValueError, match=complaint) as raised:
+        act()
+    assert "\n" not in str(raised.value)
+
+
+def _of(**spaces: Any) -> PassingDownEnv:
+    env = Leaving()
+    for name, space in spaces.items():
+        setattr(env, name, lambda agent, space=space: space)
+    return PassingDownEnv(env)
+
+
+def _started() -> PassingDownEnv:
+    env = PassingDownEnv(Leaving())
+    env.reset()
+    return env

@@ -1,0 +1,72 @@
+import pytest
+from made_up_results import hierarchies, scaling
+
+from nested_agents.studies.results.contrasts import contrasts
+from nested_agents.studies.spec.errors import SpecError
+
+CHANCES = {
+    ("chain", "team", 2): 0.9,
+    ("star", "team", 2): 0.9,
+    ("chain", "team", 8): 0.8,
+    ("star", "team", 8): 0.1,
+}
+
+
+def test_levels_are_compared_where_all_else_is_equal() -> None:
+    found = contrasts(hierarchies(CHANCES), by="topology")
+    assert [(g.setting, g.reference) for g in found.groups] == [
+        ("team, robots=2", "chain"), ("team, robots=8", "chain"),
+    ]  # fmt: skip
+    assert [d.condition for d in found.significant] == ["star"]
+    assert found.groups[1].differences[0].estimate.value == pytest.approx(-0.7, abs=0.15)
+    text = "\n".join(found.notes)
+    assert "team, robots=8: success, evaluation, less that of chain:\n  worse: star" in text
+    assert "adjusted over 2 comparisons" in text
+    assert "Power: with 20 seeds and 2 comparisons, a difference of" in text
+
+
+def test_the_reference_is_the_first_condition_or_a_named_one() -> None:
+    results = hierarchies(CHANCES)
+    first = next(iter(results.columns))
+    assert contrasts(results).groups[0].reference == first
+    assert len(contrasts(results).differences) == 3
+    last = list(results.columns)[-1]
+    found = contrasts(results, reference=last)
+    assert found.significant[0].condition == first
+    assert {d.condition for d in found.significant} == set(list(results.columns)[:3])
+
+
+def test_what_is_better_depends_on_the_measure() -> None:
+    # Failed episodes take all their steps, which is worse.
+    text = "\n".join(contrasts(hierarchies(CHANCES), "steps", by="topology").notes)
+    assert "worse: star" in text
+    assert "better" not in text
+
+
+def test_numbers_of_whole_trials_are_compared_too() -> None:
+    results = scaling({2: 0.9})
+    for condition in results.training:
+        results.columns[condition] = {"name": condition.partition(",")[0]}
+    found = contrasts(results, "decision_median")
+    assert found.phase == ""
+    assert [d.condition for d in found.significant] == ["sampling, robots=2"]
+    assert "worse: sampling" in "\n".join(found.notes)
+
+
+@pytest.mark.parametrize(
+    ("options", "complaint"),
+    [
+        ({"measure": "sucess"}, "measure = 'sucess': did you mean 'success'"),
+        ({"phase": "evaluating"}, "phase = 'evaluating': did you mean 'evaluation'"),
+        ({"by": "topolgy"}, "by = 'topolgy': did you mean 'topology'"),
+        ({"by": "topology", "reference": "ring"}, "reference = 'ring': known: chain, star"),
+    ],
+)
+def test_what_there_is_not_is_refused(options: dict, complaint: str) -> None:
+    with pytest.raises(SpecError, match=complaint):
+        contrasts(hierarchies(CHANCES), **options)
+
+
+def test_too_few_shared_seeds_leave_nothing_to_compare() -> None:
+    results = hierarchies(CHANCES, seeds=1)
+    assert contrasts(results).notes == ("Nothing to compare: no two conditions share two seeds.",)

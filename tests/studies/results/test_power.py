@@ -1,0 +1,129 @@
+import numpy as np
+import pytest
+from scipy import stats
+
+from nested_agents.studies.results.comparison import Difference, adjusted
+from nested_agents.studies.results.paired_tests import LEVEL, paired_permutation
+from nested_agents.studies.results.power import (
+    detectable,
+    deviation_of,
+    power,
+    seeds_for,
+    seeds_needed,
+)
+from nested_agents.studies.results.statistics import bootstrap
+from nested_agents.studies.results.verdicts import power_lines, power_text, told
+
+
+def found_in_simulation(
+    effect: float, seeds: int, comparisons: int, studies: int, seed: int = 1
+) -> float:
+    """The share of simulated studies whose permutation test finds the effect."""
+    differences = np.random.default_rng(seed).normal(size=(studies, seeds)) + effect
+    nothing = np.zeros(seeds)
+    ps = [paired_permutation(d, nothing, permutations=2000) for d in differences]
+    return float(np.mean(np.array(ps) * comparisons < LEVEL))
+
+
+@pytest.mark.parametrize(
+    ("effect", "seeds", "comparisons"), [(1.2, 6, 1), (1.2, 8, 2), (0.9, 10, 1), (0.6, 30, 3)]
+)
+def test_the_power_is_that_of_simulated_studies(
+    effect: float, seeds: int, comparisons: int
+) -> None:
+    share = found_in_simulation(effect, seeds, comparisons, studies=1200)
+    assert power(effect, 1.0, seeds, comparisons) == pytest.approx(share, abs=0.045)
+
+
+def test_simulated_power_is_that_of_the_noncentral_t_distribution_where_both_hold() -> None:
+    # 10 seeds: 25 patterns, simulated; a t test of the same level is nearly as powerful.
+    shift, level = 0.9 * np.sqrt(10), 25 / 2**9
+    beyond = stats.t.isf(level / 2, 9)
+    assert power(0.9, 1.0, 10) == pytest.approx(stats.nct.sf(beyond, 9, shift), abs=0.03)
+
+
+def test_too_few_seeds_have_no_power_at_all() -> None:
+    assert power(100.0, 1.0, 5) == 0.0
+    assert power(100.0, 1.0, 6) == 1.0
+    assert power(100.0, 1.0, 6, comparisons=2) == 0.0
+    assert detectable(1.0, 5) == np.inf
+
+
+@pytest.mark.parametrize("comparisons", [1, 8, 63])
+def test_planned_seeds_are_the_fewest_and_find_what_is_detectable(comparisons: int) -> None:
+    n = seeds_for(0.2, 0.25, comparisons)
+    assert n is not None
+    assert power(0.2, 0.25, n, comparisons) >= 0.8 > power(0.2, 0.25, n - 1, comparisons)
+    assert detectable(0.25, n, comparisons) <= 0.2
+    assert n >= seeds_needed(comparisons)
+
+
+def test_what_takes_too_many_seeds_is_said_to() -> None:
+    assert seeds_for(0.001, 1.0) is None
+
+
+@pytest.mark.parametrize("wrong", [(0.0, 5, 1), (1.0, 0, 1), (1.0, 5, 0)])
+def test_what_is_no_study_is_refused(wrong: tuple[float, int, int]) -> None:
+    with pytest.raises(ValueError, match="allowed: above 0"):
+        power(0.2, *wrong)
+
+
+def test_the_deviation_is_pooled_and_of_rates_never_zero() -> None:
+    rng = np.random.default_rng(0)
+    samples = [rng.normal(size=200), 5.0 + rng.normal(size=200)]
+    assert deviation_of(samples, of_rates=False) == pytest.approx(1.0, abs=0.06)
+    assert deviation_of([[0.5] * 3], of_rates=True) == pytest.approx(1.07 * 0.204, abs=0.001)
+    assert deviation_of([[0.5] * 3], of_rates=False) is None
+
+
+def compared(own: list[float], base: list[float], title: str = "other") -> Difference:
+    pair = np.array(own, dtype=float), np.array(base, dtype=float)
+    return Difference.of(title, "success", *pair, bootstrap(pair[0] - pair[1], bounds=(-1, 1)))
+
+
+def test_five_seeds_that_all_agree_are_told_what_they_lack() -> None:
+    found = adjusted([compared([1.0] * 5, [0.0] * 5), compared([1.0] * 5, [0.0] * 5, "third")])
+    assert [round(d.raw, 4) for d in found] == [0.0625, 0.0625]
+    text = " ".join(" ".join(told(found)).split())
+    assert "+1.00 [+0.13, +1.00], p = 0.12 (0.062 unadjusted)" in text
+    said = " ".join(line.strip() for line in power_lines(found))
+    assert "5 seeds and 2 comparisons cannot give an adjusted p below .05" in said
+    assert "It needs at least 7 seeds; for a difference of .20, about" in said
+
+
+def test_without_deviation_nothing_is_promised() -> None:
+    assert "cannot be told" in " ".join(power_text(8, 1, None, None))
+    assert power_lines([]) == []
+
+
+def test_a_difference_of_rounding_errors_is_none() -> None:
+    assert compared([0.3, 0.1 + 0.2], [0.1 + 0.2, 0.3]).shown.startswith("0.00 [")
+
+
+def test_interval_and_test_are_those_of_scipy() -> None:
+    rng = np.random.default_rng(3)
+    for n in (5, 7, 12):
+        one, other = rng.normal(size=n) + 0.7, rng.normal(size=n)
+        theirs = stats.permutation_test(
+            (one, other), lambda a, b: (a - b).mean(), permutation_type="samples",
+            n_resamples=np.inf,
+        )  # fmt: skip
+        assert paired_permutation(one, other) == pytest.approx(theirs.pvalue)
+        if n < 8:
+            ours = bootstrap(one - other)
+            low, high = stats.ttest_rel(one, other).confidence_interval(0.95)
+            assert (ours.low, ours.high) == (pytest.approx(low), pytest.approx(high))
+
+
+def test_the_test_is_that_of_an_independent_implementation() -> None:
+    """Sign flips counted one by one, in whole numbers: nothing is shared with ours."""
+    from itertools import product
+
+    rng = np.random.default_rng(4)
+    for n in (4, 6, 9):
+        whole = [int(v) for v in rng.integers(-5, 9, n)]
+        reached = sum(
+            abs(sum(s * v for s, v in zip(signs, whole, strict=True))) >= abs(sum(whole))
+            for signs in product((1, -1), repeat=n)
+        )
+        assert paired_permutation(whole, [0] * n) == reached / 2**n

@@ -1,0 +1,35 @@
+"""Numbers of whole trials and phases of a study's own, from the store to arrays."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from made_up import MEASURES, SPEC, TRIALS, measure
+
+from nested_agents.studies.results.results import read
+from nested_agents.studies.store.store import Store
+
+
+def test_phases_numbers_and_usage_are_read_by_condition(tmp_path: Path) -> None:
+    with Store.create(tmp_path / "study", SPEC, MEASURES) as store:
+        for trial in TRIALS[:-1]:
+            result = measure(trial)
+            further = tuple(
+                r._replace(phase="evaluation:circle") for r in result.rows if r.phase != "training"
+            )
+            result = replace(
+                result,
+                rows=(*result.rows, *further),
+                numbers={"messages": 6.0 + trial.seed},
+                usage={"peak_bytes": 10.0 * trial.seed},
+            )
+            store.save(trial, result, 2.0)
+        results = read(store)
+    assert results.seeds == {"default": (0, 1, 2), "frozen": (0, 1)}
+    assert list(results.phases) == ["training", "evaluation", "evaluation:circle"]
+    assert results.training is results.phases["training"]
+    circle = results.phases["evaluation:circle"]["default"]["success"]
+    assert (circle == results.evaluation["default"]["success"]).all()
+    assert results.numbers["default"]["messages"].tolist() == [6.0, 7.0, 8.0]
+    assert results.usage["frozen"]["peak_bytes"].tolist() == [0.0, 10.0]
+    assert results.usage["frozen"]["total"].tolist() == [2.0, 2.0]
+    assert len(results.usage["default"]["decision"]) == 3

@@ -1,0 +1,71 @@
+import numpy as np
+import pytest
+from made_up_results import hierarchies, scaling
+
+from nested_agents.studies.results.selection import Where, selected, together
+from nested_agents.studies.spec.errors import SpecError
+
+SETTINGS = {"scenario": {"robots": 8, "box": "square"}, "learner": {"kind": "batch-td"}}
+COLUMNS = {"learner.self_model.enabled": "true"}
+
+
+@pytest.mark.parametrize(
+    ("text", "is_chosen"),
+    [
+        ("robots == 8", True),
+        ("scenario.robots != 8", False),
+        ("robots in [2, 8] and seed < 5", True),
+        ("not (box == circle or seed >= 3)", False),
+        ("kind == batch-td", True),
+        ("enabled == true", True),
+        ('condition == "no replay"', True),
+        ("robots > 8 or seed == 3", True),
+    ],
+)
+def test_a_choice_is_made_by_settings_condition_and_seed(text: str, is_chosen: bool) -> None:
+    assert Where(text)("no replay", 3, SETTINGS, COLUMNS) == is_chosen
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("robots = 8", "must be such as"),
+        ("robots", "is no comparison"),
+        ("1 < robots < 5", "is no comparison"),
+        ("robts == 8", "did you mean 'robots'"),
+        ("box < 3", "cannot be compared so"),
+        ("__import__('os') == 1", "is no setting"),
+        ("", "must be such as"),
+    ],
+)
+def test_what_is_no_choice_is_refused_in_one_line(text: str, complaint: str) -> None:
+    with pytest.raises(SpecError, match=complaint):
+        Where(text)("no replay", 3, SETTINGS, COLUMNS)
+
+
+def test_a_name_of_several_settings_must_be_told_apart() -> None:
+    with pytest.raises(SpecError, match=r"kind: may be learner.kind or scenario.kind"):
+        Where("kind == x")("c", 0, {"learner": {"kind": "a"}, "scenario": {"kind": "b"}}, {})
+
+
+def test_selected_trials_keep_their_values() -> None:
+    whole = scaling({2: 0.9, 4: 0.5})
+    part = selected(whole, lambda condition, seed: "robots=2" in condition and seed % 2 == 0)
+    assert list(part.training) == ["sums, robots=2", "sampling, robots=2"]
+    assert part.seeds["sums, robots=2"] == tuple(range(0, 20, 2))
+    there = whole.evaluation["sums, robots=2"]["success"][::2]
+    np.testing.assert_array_equal(part.evaluation["sums, robots=2"]["success"], there)
+    assert len(part.usage["sums, robots=2"]["learning"]) == 10
+    assert selected(whole, lambda condition, seed: False).seeds == {}
+
+
+def test_studies_together_name_what_would_be_confused() -> None:
+    key = ("chain", "team", 2)
+    one, other = hierarchies({key: 0.9}), hierarchies({key: 0.1, ("star", "team", 2): 0.2})
+    whole, labels = together([("one", one), ("other", other)])
+    label = "topology=chain, value_of=team, robots=2"
+    assert labels[0] == {label: f"{label} (one)"}
+    assert whole.columns[f"{label} (other)"]["directory"] == "other"
+    assert list(whole.seeds)[2] == "topology=star, value_of=team, robots=2"
+    there = whole.evaluation[f"{label} (one)"]["success"]
+    np.testing.assert_array_equal(there, one.evaluation[label]["success"])

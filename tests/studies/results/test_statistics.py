@@ -1,0 +1,210 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import stats
+
+from nested_agents.studies.results.statistics import (
+    STATISTICS,
+    _drawn,
+    _tail,
+    _taken,
+    bootstrap,
+    rate,
+    rates,
+)
+
+RNG = np.random.default_rng(0)
+
+
+def interquartile_mean(values, axis):
+    return stats.trim_mean(values, 0.25, axis)
+
+
+@pytest.mark.parametrize("statistic", STATISTICS)
+def test_one_stratum_agrees_with_scipy(statistic):
+    values = RNG.normal(size=30)
+    estimate = bootstrap(values, statistic=statistic, resamples=20_000)
+    function = {
+        "mean": np.mean,
+        "median": np.median,
+        "iqm": lambda x, axis: stats.trim_mean(x, 0.25, axis),
+    }
+    reference = stats.bootstrap(
+        (values,), function[statistic], method="percentile", n_resamples=20_000, rng=RNG, axis=0,
+        confidence_level=1.0 - 2.0 * _tail(0.95, 30),
+    ).confidence_interval  # fmt: skip
+    assert estimate.low == pytest.approx(reference.low, abs=0.02)
+    assert estimate.high == pytest.approx(reference.high, abs=0.02)
+
+
+def test_strata_agree_with_an_independent_implementation():
+    a, b = RNG.normal(size=10), RNG.normal(5.0, size=25)
+    estimate = bootstrap(a, b, statistic="iqm", resamples=20_000)
+    pooled = [
+        interquartile_mean(np.concatenate([RNG.choice(a, 10), RNG.choice(b, 25)]), 0)
+        for _ in range(8_000)
+    ]
+    assert estimate.value == pytest.approx(stats.trim_mean(np.concatenate([a, b]), 0.25))
+    assert estimate.low == pytest.approx(np.quantile(pooled, _tail(0.95, 35)), abs=0.04)
+    assert estimate.high == pytest.approx(np.quantile(pooled, 1.0 - _tail(0.95, 35)), abs=0.04)
+
+
+def test_strata_keep_their_weight():
+    # Between strata nothing varies, so neither does the mean.
+    estimate = bootstrap(np.zeros(5), np.ones(5))
+    assert (estimate.low, estimate.value, estimate.high) == (0.5, 0.5, 0.5)
+
+
+def test_points_are_estimated_apart():
+    values = RNG.normal(size=(8, 3))
+    together = bootstrap(values)
+    for point in range(3):
+        alone = bootstrap(values[:, point])
+        for end in ("value", "low", "high"):
+            assert getattr(together, end)[point] == pytest.approx(getattr(alone, end), abs=1e-12)
+
+
+def test_the_same_seed_draws_the_same_and_another_does_not():
+    values = RNG.normal(size=8)
+    assert bootstrap(values).low == bootstrap(values).low
+    assert bootstrap(values).low != bootstrap(values, seed=1).low
+
+
+def test_one_run_has_no_interval():
+    for estimate in (bootstrap([3.0]), bootstrap([1.0, 2.0], [3.0]), rate([[1, 0]])):
+        assert np.isnan(estimate.low)
+        assert np.isnan(estimate.high)
+
+
+@pytest.mark.parametrize("runs", [2, 3, 4, 5, 6, 7, 8, 10, 15, 30])
+def test_the_mean_is_covered_about_as_often_as_promised(runs):
+    rng, times = np.random.default_rng(0), 600
+    values = rng.normal(3.0, 2.0, size=(runs, times))  # points are estimated apart
+    found = [bootstrap(column, resamples=1000) for column in values.T]
+    covered = np.mean([e.low <= 3.0 <= e.high for e in found])
+    assert 0.92 <= covered <= 0.975
+
+
+@pytest.mark.parametrize("statistic", ["iqm", "median"])
+@pytest.mark.parametrize("runs", [2, 3, 4, 5, 6, 7])
+def test_other_statistics_of_few_runs_are_covered_too(statistic, runs):
+    found = bootstrap(np.random.default_rng(0).normal(size=(runs, 4000)), statistic=statistic)
+    assert 0.92 <= np.mean((found.low <= 0.0) & (found.high >= 0.0)) <= 0.99
+
+
+@pytest.mark.parametrize("runs", [2, 3, 5, 7, 8, 12, 20, 30])
+@pytest.mark.parametrize("success", [0.5, 0.9, 0.98])
+def test_rates_are_covered_however_few_the_runs(runs, success):
+    rng, covered, times = np.random.default_rng(1), 0, 500
+    for _ in range(times):
+        chances = rng.beta(9.0 * success, 9.0 * (1.0 - success), size=runs)
+        estimate = rate(rng.random((runs, 10)) < chances[:, None])
+        assert 0.0 <= estimate.low < estimate.high <= 1.0
+        covered += bool(estimate.low <= success <= estimate.high)
+    assert covered / times >= 0.92
+
+
+def test_few_runs_have_students_interval_by_hand():
+    # t(.975, 2) = 4.3027; the standard error of the mean of 1, 2, 3 is 1 / sqrt(3).
+    estimate = bootstrap([1.0, 2.0, 3.0])
+    assert estimate.low == pytest.approx(2.0 - 4.302653 / np.sqrt(3.0), abs=1e-6)
+    bounded = bootstrap([0.9, 1.0, 1.0], bounds=(0.0, 1.0))
+    assert bounded.high == 1.0
+    assert bounded.low == pytest.approx(29 / 30 - 4.302653 / 30, abs=1e-6)
+
+
+@pytest.mark.parametrize("runs", [2, 5, 8, 30])
+def test_what_all_runs_have_in_full_is_not_certain(runs):
+    for value in (0.0, 1.0):
+        estimate = bootstrap(np.full(runs, value), bounds=(0.0, 1.0))
+        wilson = rate(np.full((runs, 1), value))
+        assert (estimate.low, estimate.high) == pytest.approx((wilson.low, wilson.high))
+    assert bootstrap(np.ones(runs)).low == 1.0  # a number of bytes, say
+
+
+def test_few_runs_of_two_strata_have_welchs_degrees_of_freedom():
+    one, other = np.array([1.0, 2.0, 4.0]), np.array([0.0, 5.0, 9.0])
+    estimate = bootstrap(one, other)
+    test = stats.ttest_ind(one, -other, equal_var=False).confidence_interval(0.95)
+    assert estimate.low == pytest.approx(test.low / 2.0)
+    assert estimate.high == pytest.approx(test.high / 2.0)
+
+
+@pytest.mark.parametrize(("successes", "runs"), [(0, 8), (1, 8), (5, 8), (8, 8), (31, 40)])
+def test_one_episode_a_run_is_wilsons_interval(successes, runs):
+    outcomes = np.arange(runs) < successes
+    reference = stats.binomtest(successes, runs).proportion_ci(method="wilson")
+    estimate = rate(outcomes[:, None])
+    assert estimate.low == pytest.approx(reference.low, abs=1e-12)
+    assert estimate.high == pytest.approx(reference.high, abs=1e-12)
+
+
+def test_runs_that_all_succeed_or_all_fail_count_once():
+    outcomes = np.repeat(np.arange(8)[:, None] < 4, 5, axis=1)
+    reference = stats.binomtest(4, 8).proportion_ci(method="wilson")
+    # The design effect is estimated, with 7 degrees of freedom for 8: hence not exactly the same.
+    assert rate(outcomes).low == pytest.approx(reference.low, abs=0.03)
+
+
+def test_many_failures_spread_over_all_runs_count_as_many_as_their_episodes():
+    outcomes = np.tile(np.arange(500) % 5 < 3, (8, 1))
+    reference = stats.binomtest(2400, 4000).proportion_ci(method="wilson")
+    assert rate(outcomes).low == pytest.approx(reference.low, abs=5e-3)
+
+
+def test_a_failure_more_hardly_raises_the_lower_end():
+    outcomes = np.ones((30, 10))
+    ends = [rate(outcomes).low]
+    for run in range(12):
+        outcomes[run, 0] = 0.0
+        ends.append(rate(outcomes).low)
+    assert ends[0] == pytest.approx(0.886, abs=1e-3)
+    # One failure tells that episodes of a run need not end alike, which is worth a little.
+    assert max(np.diff(ends)) < 0.03
+
+
+@pytest.mark.parametrize(("runs", "dead"), [(10, 0.05), (10, 0.0), (30, 0.05), (30, 0.0)])
+def test_intervals_cover_when_some_runs_never_learn(runs, dead):
+    covered = 0
+    for _ in range(300):
+        chances = np.where(RNG.random(runs) < dead, 0.0, 0.99)
+        estimate = rate(RNG.random((runs, 10)) < chances[:, None])
+        covered += bool(estimate.low <= (1.0 - dead) * 0.99 <= estimate.high)
+    assert covered / 300 >= 0.9
+
+
+def test_rates_are_by_column():
+    outcomes = RNG.random((8, 4)) < 0.5
+    together = rates(outcomes)
+    assert together.high[2] == rate(outcomes[:, 2:3]).high
+
+
+@settings(max_examples=100)
+@given(st.integers(2, 9), st.integers(1, 6), st.randoms(use_true_random=False))
+def test_a_rate_lies_within_its_interval(runs, episodes, random):
+    outcomes = [[random.random() < 0.5 for _ in range(episodes)] for _ in range(runs)]
+    estimate = rate(outcomes)
+    assert 0.0 <= estimate.low <= estimate.value <= estimate.high <= 1.0
+
+
+def test_what_cannot_be_estimated_is_refused():
+    with pytest.raises(ValueError, match="statistic = 'mode': known: mean, iqm, median"):
+        bootstrap([1.0], statistic="mode")
+    for strata in ([], [[]], [np.zeros((2, 2, 2))]):
+        with pytest.raises(ValueError, match="every stratum needs values"):
+            bootstrap(*strata)
+
+
+@pytest.mark.parametrize("statistic", STATISTICS)
+@pytest.mark.parametrize(
+    "shapes", [[(25,)], [(24, 1)], [(30, 7)], [(12, 3), (13, 3)], [(9,), (20,)]]
+)
+def test_how_resamples_lie_in_memory_changes_no_bit(statistic, shapes):
+    strata = [RNG.normal(size=shape) for shape in shapes]
+    drawn = _drawn(tuple(map(len, strata)), 50, 0)
+    plain = np.concatenate([s[runs] for s, runs in zip(strata, drawn, strict=True)], axis=1)
+    laid = np.concatenate([_taken(s, runs) for s, runs in zip(strata, drawn, strict=True)])
+    compute = STATISTICS[statistic]
+    expected = compute(np.moveaxis(plain, 1, -1))
+    np.testing.assert_array_equal(compute(np.moveaxis(laid, 0, -1)), expected)
