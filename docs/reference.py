@@ -64,8 +64,8 @@ MODULES = {
         "evaluators.best_response", "evaluators.coordination", "evaluators.cross_entropy",
         "coordination.elimination", "coordination.max_plus", "adaptation.self_model",
         "adaptation.calibration", "agents.cost", "plugins.registry", "plugins.plugged",
-        "plugins.settings", "interface.acting", "numerics.ties", "policies.settings", "policies.peer",
-        "policies.seen", "policies.inputs",
+        "plugins.settings", "interface.acting", "numerics.ties", "policies.settings",
+        "policies.peer", "policies.seen", "policies.inputs",
     )),
     "topologies": ("Who is above whom.", ("builders", "checks", "config", "drawing", "files")),
     "scenarios": ("Where agents act.", (
