@@ -79,6 +79,4 @@ def test_all_kernels_are_compiled_so() -> None:
         for path in (ROOT / folder).rglob("*.py"):
             if path.name != "compiling.py":
                 found = re.search(r"^\s*(from|import) numba\b.*", path.read_text(), re.MULTILINE)
-                assert found is None, (
-                    f"{path}: {found and found[0]}; see core/numerics"
-                )
+                assert found is None, f"{path}: {found and found[0]}; see core/numerics"
