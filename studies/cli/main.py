@@ -111,6 +111,11 @@ def _run(arguments: list[str]) -> int:
             return int(nested_agents.invoke(context))
     except click.exceptions.Exit as exit_:
         return exit_.exit_code
+    except SystemExit as error:
+        # No command does: it is code of a user's file, and nothing that was asked for has been done.
+        raise SpecError(
+            f"code of a file that the spec names calls sys.exit({error.code})"
+        ) from None
 
 
 def _complain(message: str) -> int:

@@ -151,6 +151,8 @@ def _built(settings: ConditionSettings, where: str) -> Arrangement:
             found.team.check(found.scenario.predict())
     except ValueError as error:
         raise SpecError(f"{error}{where}") from None
+    except SystemExit as error:
+        raise SpecError(f"the scenario or topology calls sys.exit({error.code}){where}") from None
     return found
 
 

@@ -23,6 +23,9 @@ PACKAGES = ("nested-agents", "numpy", "numba", "scipy", "Box2D")
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 """What tells linear algebra to use one thread: last bits depend on their number."""
 
+MOST_ERROR = 20_000
+"""Characters of a traceback that are kept; the middle of a longer one is left out."""
+
 RunTrial = Callable[["Trial"], "TrialResult"]
 """Runs one trial; a module-level function, since workers import it by name."""
 
@@ -74,14 +77,37 @@ def begin(parent: int) -> None:
 
 
 def attempt(run_trial: RunTrial, trial: Trial) -> Arrival:
-    """Run one trial; what goes wrong is returned as text."""
+    """Run one trial; what goes wrong is returned as text.
+
+    A scenario that calls ``sys.exit``, or raises KeyboardInterrupt, has failed like any other: a
+    worker ignores Ctrl-C, so that neither can come from anybody else.
+    """
     begin = time.perf_counter()
     try:
         with trial.sources.active():
             result = run_trial(trial)
-    except Exception:
-        return Arrival(trial, None, traceback.format_exc(), time.perf_counter() - begin)
+    except BaseException:
+        error = storable(traceback.format_exc())
+        return Arrival(trial, None, error, time.perf_counter() - begin)
     return Arrival(trial, result, None, time.perf_counter() - begin)
+
+
+def storable(error: str) -> str:
+    r"""Return a traceback as text that any file can hold, shortened if it is very long.
+
+    Examples
+    --------
+    >>> storable("ValueError: \ud800")
+    'ValueError: \\ud800'
+    >>> len(storable("x" * 3_000_000)) < MOST_ERROR + 100
+    True
+    """
+    text = error.encode("utf-8", "backslashreplace").decode("utf-8")
+    left_out = len(text) - MOST_ERROR
+    if left_out <= 0:
+        return text
+    half = MOST_ERROR // 2
+    return f"{text[:half]}\n[... {left_out} characters left out ...]\n{text[-half:]}"
 
 
 def attempt_alike(expected: dict[str, str], run_trial: RunTrial, trial: Trial) -> Arrival:

@@ -1,0 +1,92 @@
+"""A trial fails with its traceback, whatever the user's code raises."""
+
+import made_up
+import pytest
+
+from nested_agents.studies.cli.main import main
+from nested_agents.studies.store.store import Store
+from nested_agents.studies.workers.worker import MOST_ERROR, attempt
+
+
+class OddError(BaseException):
+    pass
+
+
+@pytest.mark.parametrize(
+    "raised", [SystemExit(0), SystemExit(3), KeyboardInterrupt(), OddError("odd")]
+)
+def test_what_is_no_exception_fails_a_trial_too(raised: BaseException) -> None:
+    def measure(trial):
+        raise raised
+
+    arrival = attempt(measure, made_up.TRIALS[0])
+    assert arrival.result is None
+    assert type(raised).__name__ in arrival.error.splitlines()[-1]
+
+
+@pytest.mark.parametrize("message", ["\ud800 alone", "long " * 600_000])
+def test_any_message_can_be_stored_and_is_short(tmp_path, message: str) -> None:
+    def measure(trial):
+        raise ValueError(message)
+
+    arrival = attempt(measure, made_up.TRIALS[0])
+    assert len(arrival.error.encode()) < 2 * MOST_ERROR
+    with Store.create(tmp_path, made_up.SPEC, made_up.MEASURES) as store:
+        store.fail(arrival.trial, arrival.error)
+        assert len(store.failed()) == 1
+
+
+QUITS = """
+import sys
+from nested_agents.scenarios.line_up import LineUp, LineUpSettings
+
+class Settings(LineUpSettings):
+    when: str = "step"
+
+class Quits(LineUp):
+    Settings = Settings
+
+    def __init__(self, settings):
+        super().__init__(settings)
+        self.when = settings.when
+        if self.when == "begin":
+            sys.exit(0)
+
+    def step(self, joint_action):
+        sys.exit(0)
+"""
+
+
+def spec(tmp_path, when: str) -> str:
+    (tmp_path / "quits.py").write_text(QUITS)
+    (tmp_path / "spec.toml").write_text(
+        f"""
+        seeds = 2
+        episodes = 1
+        steps = 2
+        evaluation = 1
+        [[overrides]]
+        name = "quits"
+        scenario = {{ kind = "quits.py:Quits", when = "{when}" }}
+        [[overrides]]
+        name = "works"
+        scenario = {{ kind = "line-up" }}
+        """
+    )
+    return str(tmp_path / "spec.toml")
+
+
+def test_a_scenario_that_quits_fails_its_trials_and_no_others(tmp_path, capsys) -> None:
+    study = tmp_path / "study"
+    assert main(["run", spec(tmp_path, "step"), "--out", str(study), "--jobs", "1"]) == 1
+    assert "SystemExit: 0" in capsys.readouterr().err
+    with Store.open(study) as store:
+        assert store.counts() == {"done": 2, "failed": 2}
+
+
+def test_a_scenario_that_quits_when_it_is_built_is_refused_in_one_line(tmp_path, capsys) -> None:
+    assert main(["run", spec(tmp_path, "begin"), "--out", str(tmp_path / "study")]) == 2
+    error = capsys.readouterr().err
+    assert "calls sys.exit(0)" in error
+    assert error.count("\n") == 1
+    assert not (tmp_path / "study").exists()
