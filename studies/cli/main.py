@@ -112,7 +112,7 @@ def _run(arguments: list[str]) -> int:
     except click.exceptions.Exit as exit_:
         return exit_.exit_code
     except SystemExit as error:
-        # No command does: it is code of a user's file, and nothing that was asked for has been done.
+        # No command of ours does: it is code of a file of the user.
         raise SpecError(
             f"code of a file that the spec names calls sys.exit({error.code})"
         ) from None

@@ -97,15 +97,30 @@ def paired_permutation(
     if not (np.isfinite(one).all() and np.isfinite(other).all()):
         raise ValueError("paired_permutation: values must be finite")
     difference, n = one - other, len(one)
-    # Each difference is off by half a unit in the last place, and each of n additions again.
-    rounding = 2 * (n + 1) * np.finfo(float).eps * float((abs(one) + abs(other)).sum())
-    observed = abs(difference.sum()) - rounding
+    if difference.sum() < 0.0:
+        difference = -difference
+    # Whole numbers differ exactly; others are off by rounding, some units in the last place each.
+    is_whole = (one == np.rint(one)) & (other == np.rint(other))
+    rounding = np.where(is_whole, 0.0, 2 * np.finfo(float).eps * (abs(one) + abs(other)))
     if 2**n <= permutations:
-        codes = np.arange(2**n)[:, None] >> np.arange(n) & 1
-        return float((abs((2 * codes - 1) @ difference) >= observed).mean())
-    signs = np.random.default_rng(seed).integers(0, 2, size=(permutations, n)) * 2 - 1
-    reached = int((abs(signs @ difference) >= observed).sum())
-    return (1 + reached) / (1 + permutations)
+        flipped = (np.arange(2**n)[:, None] >> np.arange(n) & 1) == 1
+        return float(_reaching(difference, rounding, flipped).mean())
+    flipped = np.random.default_rng(seed).integers(0, 2, size=(permutations, n)) == 0
+    return float((1 + _reaching(difference, rounding, flipped).sum()) / (1 + permutations))
+
+
+def _reaching(difference: Array, rounding: Array, flipped: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which patterns of flipped signs ``(m, n)`` reach the sum of the differences, S >= 0.
+
+    With the flipped ones summing up to F, the pattern's sum is S - 2 F: its size is S or more if
+    F <= 0, or if what is left, S - F, is. Either is a sum over its own differences alone, so that a
+    large value that stays in its place hides nothing.
+    """
+    n = difference.size
+    rounding = rounding + n * np.finfo(float).eps * abs(difference) * (rounding > 0.0)
+    return (flipped @ difference <= flipped @ rounding) | (
+        ~flipped @ difference <= ~flipped @ rounding
+    )
 
 
 def holm(ps: ArrayLike) -> Array:

@@ -1,5 +1,6 @@
 """Permutation tests against exact enumeration, scipy and known distributions."""
 
+from fractions import Fraction
 from itertools import permutations, product
 
 import numpy as np
@@ -61,6 +62,20 @@ def test_ties_are_ties_whatever_the_size_of_the_values(scale: float) -> None:
             paired_permutation(whole[0] / 7 * scale + 3 * scale, (whole[1] / 7 + 3) * scale)
             == exact
         )
+
+
+@pytest.mark.parametrize("size", [2.0**47, 1e14, 2.0**51])
+@pytest.mark.parametrize("large", [1, 8])
+def test_large_values_hide_no_differences(size: float, large: int) -> None:
+    rng = np.random.default_rng(4)
+    for _ in range(40):
+        n = int(rng.integers(2, 9))
+        values = rng.integers(0, 9, size=(2, n)) + np.where(np.arange(n) < large, size, 0.0)
+        difference = [Fraction(a) - Fraction(b) for a, b in values.T]
+        sums = [sum(s * d for s, d in zip(signs, difference, strict=True))
+                for signs in product((-1, 1), repeat=n)]  # fmt: skip
+        exact = np.mean([abs(found) >= abs(sum(difference)) for found in sums])
+        assert paired_permutation(*values) == exact
 
 
 def test_what_is_no_pairs_is_refused() -> None:
