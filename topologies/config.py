@@ -13,8 +13,7 @@ import numpy as np
 from pydantic import Field
 from typing_extensions import TypeAliasType
 
-from ..core.agents.robot_agents import per_robot
-from ..core.agents.single_agent import SingleAgent
+from ..core.agents.joint_agents import per_robot, single_agent
 from ..core.interface.hierarchy import Hierarchy
 from ..core.interface.protocols import Scenario, groups_of
 from ..core.plugins import sources
@@ -313,7 +312,7 @@ class SingleAgentSettings(TopologySettings):
 
     def arrange(self, scenario: Scenario) -> tuple[Scenario, Hierarchy]:
         """Return the scenario as that of one agent."""
-        one = SingleAgent(scenario)
+        one = single_agent(scenario)
         return one, Hierarchy(one.agents, [])
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from ..core.agents.cost import below_counts
-from ..core.agents.robot_agents import MOST_ACTIONS, robot_of
+from ..core.agents.joint_agents import MOST_ROBOT_ACTIONS, robot_of
 from ..core.interface.hierarchy import Hierarchy
 from . import TOPOLOGIES, TopologySettings, build, builders, parse
 from .checks import check_legible
@@ -102,10 +102,10 @@ def view(
 def _of_robots(text: str, team: Crew, actions: int) -> HierarchyView:
     """Return the view of one agent per robot, which tries the joint actions of all its wheels."""
     own = actions ** len(team.groups[0])
-    if own > MOST_ACTIONS:
+    if own > MOST_ROBOT_ACTIONS:
         raise ValueError(
             f"topology {text!r}: {actions} ** {len(team.groups[0])} actions of a robot, allowed: "
-            f"{MOST_ACTIONS} or fewer"
+            f"{MOST_ROBOT_ACTIONS} or fewer"
         )
     robots = tuple(robot_of(team.agents[wheels[0]]) for wheels in team.groups)
     hierarchy = Hierarchy(robots, builders.chain(robots).edges)

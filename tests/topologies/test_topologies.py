@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
-from nested_agents.core.agents.single_agent import SingleAgent
+from nested_agents.core.agents.joint_agents import JointAgents
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.topologies import (
     TOPOLOGIES,
@@ -212,7 +212,8 @@ def test_no_agents_are_refused(text: str) -> None:
 def test_the_single_agent_sees_a_scenario_of_its_own(line_world) -> None:
     world = line_world(2, 1)
     scenario, hierarchy = parse("single-agent").arrange(world)
-    assert isinstance(scenario, SingleAgent)
+    assert isinstance(scenario, JointAgents)
+    assert (scenario.agents, scenario.whole) == (("single",), True)
     assert hierarchy.agents == scenario.agents
     assert parse("chain").arrange(world)[0] is world
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nested_agents.core.agents.robot_agents import per_robot
+from nested_agents.core.agents.joint_agents import per_robot
 from nested_agents.core.agents.rows import carried_rows
 from nested_agents.core.agents.team import Team
 from nested_agents.core.evaluators.exact import ExactEnumeration

@@ -7,9 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from nested_agents.core.agents.joint_agents import per_robot, single_agent
 from nested_agents.core.agents.loop import control_loop, policy_seed
-from nested_agents.core.agents.robot_agents import per_robot
-from nested_agents.core.agents.single_agent import SingleAgent
 from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.exploration import EXPLORATIONS
 from nested_agents.core.evaluators import EVALUATORS
@@ -128,7 +127,7 @@ def test_a_team_of_ones_own_parts(line_world, tmp_path) -> None:
 
 
 @pytest.mark.parametrize("name", ["auto", "exact", "sampling"])
-@pytest.mark.parametrize("view", [None, per_robot, SingleAgent])
+@pytest.mark.parametrize("view", [None, per_robot, single_agent])
 def test_a_scenario_of_few_members_is_learned(name: str, view, line_world) -> None:
     scenario = FewMembers(line_world(carts=2, wheels=1))
     seen = view(scenario) if view else scenario
@@ -139,7 +138,7 @@ def test_a_scenario_of_few_members_is_learned(name: str, view, line_world) -> No
     assert team.learner.theta.any()
 
 
-@pytest.mark.parametrize("view", [None, per_robot, SingleAgent])
+@pytest.mark.parametrize("view", [None, per_robot, single_agent])
 @pytest.mark.parametrize("rule", ["reward", "reward-and-value"])
 def test_rewards_that_are_not_predicted_cannot_decide(rule: str, view, line_world) -> None:
     scenario = FewMembers(line_world(carts=2, wheels=1))

@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 from nested_agents import View, state_variable
-from nested_agents.core.agents.robot_agents import per_robot
-from nested_agents.core.agents.single_agent import SingleAgent
+from nested_agents.core.agents.joint_agents import per_robot, single_agent
 from nested_agents.core.interface.protocols import SUCCESS, Blocks, Measure, Scenario, Transition
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.scenarios import BoxPushing, BoxPushingSettings
@@ -46,7 +45,7 @@ def line(**changes: Callable[..., Any]) -> Callable[[], Scenario]:
     "factory",
     [
         lambda: LineUp(LineUpSettings(carts=3)),
-        lambda: SingleAgent(LineUp(LineUpSettings())),
+        lambda: single_agent(LineUp(LineUpSettings())),
         lambda: BoxPushing(BoxPushingSettings()),
         lambda: BoxPushing(BoxPushingSettings(state_space="paper", start="hard", box="bar")),
         lambda: BoxPushing(BoxPushingSettings(failures=FAILURES)),

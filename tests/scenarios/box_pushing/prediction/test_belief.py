@@ -5,8 +5,8 @@ import pytest
 from pydantic import ValidationError
 
 from nested_agents.core.adaptation.calibration import CalibrationSettings
+from nested_agents.core.agents.joint_agents import per_robot
 from nested_agents.core.agents.loop import control_loop, policy_seed
-from nested_agents.core.agents.robot_agents import per_robot
 from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.settings import Decision
 from nested_agents.core.interface.protocols import CalibratedScenario

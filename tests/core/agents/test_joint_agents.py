@@ -1,19 +1,105 @@
-"""One agent per robot: the same world, told in other words."""
+"""One agent per robot, one agent for the team: the same world, told in other words."""
+
+from itertools import product
 
 import numpy as np
 import pytest
 
 from nested_agents.core.adaptation.self_model import SelfModelSettings
+from nested_agents.core.agents.joint_agents import JointAgents, per_robot, single_agent
 from nested_agents.core.agents.loop import control_loop, policy_seed
-from nested_agents.core.agents.robot_agents import RobotAgents, per_robot
 from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.settings import Decision
+from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.interface.protocols import EmbodiedScenario, roles_of
 from nested_agents.core.learners.batch import BatchTDSettings
+from nested_agents.core.learners.td import TDLambdaSettings
+from nested_agents.core.rules.settings import RuleBaseSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.checking.checker import CHECKS, check_scenario
 from nested_agents.topologies import parse
+
+
+@pytest.fixture
+def pair(line_world):
+    """A world of two agents and the same one seen as one agent's, in the same state."""
+    world, single = line_world(2, 1), single_agent(line_world(2, 1))
+    assert (single.reset(1) == world.reset(1).reshape(1, -1)).all()
+    return world, single
+
+
+def test_one_agent_with_all_joint_actions_and_variables(pair) -> None:
+    _, single = pair
+    assert (single.agents, single.groups) == (("single",), ((0,),))
+    assert len(single.action_set) == 16
+    assert single.action_set.names[:3] == (
+        "increase+increase", "increase+decrease", "increase+maintain",
+    )  # fmt: skip
+    assert single.action_set.names[single.action_set.neutral] == "maintain+maintain"
+    names = [v.name for v in single.state_space.variables]
+    assert names[:4] == ["cart0.wheel0.speed", "cart0.wheel0.phase", "cart0.wheel0.gap",
+                         "cart1.wheel0.speed"]  # fmt: skip
+    assert single.state_space.n_variables == 6
+
+
+def test_steps_are_those_of_the_world(pair) -> None:
+    world, single = pair
+    for code, joint in enumerate(product(range(4), repeat=2)):
+        expected, found = world.step(np.array(joint)), single.step(np.array([code]))
+        assert (found.states == expected.states.reshape(1, -1)).all()
+        assert (found.reward, found.info) == (expected.reward, expected.info)
+    assert single.scenario.measure() == world.measure()
+
+
+def test_predictions_are_those_of_the_world(pair) -> None:
+    world, single = pair
+    prediction, expected = single.predict(), world.predict()
+    joint = np.array(list(product(range(4), repeat=2)))
+    codes = np.arange(16)[:, None]
+    both = np.concatenate([expected.states(i, joint) for i in range(2)], axis=1)
+    assert (prediction.states(0, codes) == both).all()
+    assert (prediction.rewards(codes) == expected.rewards(joint)).all()
+    assert (prediction.reward_table() == expected.reward_table()).all()
+    blocks = prediction.blocks(0)
+    assert (blocks.states(np.arange(16)) == both).all()
+
+
+def test_a_team_of_one_acts_and_learns(pair) -> None:
+    _, single = pair
+    settings = TDLambdaSettings(rule_base=RuleBaseSettings(memberships=2, order=6), step_size=0.1)
+    team = Team.build(settings, single, Hierarchy(["single"], []), np.random.SeedSequence(1))
+    records = list(control_loop(single, team, episodes=2, steps=5, seed=1))
+    assert len(records) == 10
+    assert team.learner.theta.shape == (1, 2**6)
+    assert np.abs(team.learner.theta).max() > 0
+    assert team.evaluator.counts.joint_actions == 10 * 16
+
+
+class Bare:
+    """A prediction that has what it is told to have of a line world's, and the next states."""
+
+    def __init__(self, prediction, *names: str) -> None:
+        for name in ("states", *names):
+            setattr(self, name, getattr(prediction, name))
+
+
+@pytest.mark.parametrize(
+    ("names", "of_robots", "of_one"),
+    [
+        ((), set(), {"blocks"}),
+        (("rewards",), {"rewards"}, {"rewards", "blocks", "reward_table"}),
+        (("rewards", "blocks", "reward_table"),) + ({"rewards", "blocks", "reward_table"},) * 2,
+    ],
+)
+def test_predictions_can_do_what_the_scenarios_can(
+    names, of_robots: set[str], of_one: set[str], line_world
+) -> None:
+    for view, expected in ((per_robot, of_robots), (single_agent, of_one)):
+        scenario = view(line_world(2, 1))
+        scenario.reset(0)
+        found = scenario.prediction_of(Bare(scenario.scenario.predict(), *names))
+        assert {n for n in ("rewards", "blocks", "reward_table") if hasattr(found, n)} == expected
 
 
 def test_a_robot_has_the_states_and_actions_of_its_wheels(line_world) -> None:
@@ -64,7 +150,7 @@ def test_rewards_of_wheels_are_joined(topology: str, agents: int) -> None:
 
 
 def test_the_scenario_keeps_its_promises() -> None:
-    def make() -> RobotAgents:
+    def make() -> JointAgents:
         return per_robot(BoxPushing(BoxPushingSettings()))
 
     assert check_scenario(make, steps=10) == tuple(CHECKS)
@@ -96,3 +182,5 @@ def test_what_cannot_be_is_refused(line_world) -> None:
     world.groups = ((0, 1), (2,))
     with pytest.raises(ValueError, match=r"robots: of \[1, 2\] wheels"):
         per_robot(world)
+    with pytest.raises(ValueError, match=r"single agent: 4 \*\* 7 actions, allowed: 4096 or fewer"):
+        single_agent(line_world(7, 1))
