@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -24,7 +24,6 @@ from ..interface.protocols import (
     Prediction,
     RewardPrediction,
     Scenario,
-    TabulatedPrediction,
     Transition,
     groups_of,
     joint_reward,
@@ -210,7 +209,7 @@ class TabulatedRobotPrediction(RewardedRobotPrediction):
 
     def blocks(self, agent: int) -> Blocks:
         """Return the next states of a robot for all joint actions."""
-        tables = cast(TabulatedPrediction, self._prediction)
+        tables = cast(Any, self._prediction)
         blocks = [tables.blocks(wheel) for wheel in self._groups[agent]]
         own = [b.own[b.own_rows] if len(b.own_rows) else b.own for b in blocks]
         return replace(
@@ -219,7 +218,7 @@ class TabulatedRobotPrediction(RewardedRobotPrediction):
 
     def reward_table(self) -> FloatArray:
         """Return the predicted rewards of all joint actions by index."""
-        return cast(TabulatedPrediction, self._prediction).reward_table()
+        return cast(Any, self._prediction).reward_table()
 
 
 def robot_of(agent: str) -> str:
