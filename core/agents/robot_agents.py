@@ -17,7 +17,6 @@ import numpy as np
 
 from ..interface.protocols import (
     Blocks,
-    CalibratedPrediction,
     CalibratedScenario,
     EmbodiedPrediction,
     EmbodiedScenario,
@@ -193,7 +192,7 @@ class RobotPrediction:
     def outcomes(self, joint_action: IntArray, constants: FloatArray) -> FloatArray:
         """Return what robot-action indices ``(M,)`` would lead to under constants ``(k, n)``."""
         wheels = self._robots.wheels(joint_action[None])[0]
-        return cast(CalibratedPrediction, self._prediction).outcomes(wheels, constants)
+        return cast(Any, self._prediction).outcomes(wheels, constants)
 
 
 class RewardedRobotPrediction(RobotPrediction):

@@ -236,7 +236,9 @@ class Scenario(Protocol):
     """A world with a task. Everything a learner may know of it.
 
     What else it may have is asked for by `groups_of`, `roles_of` and `measures_of`, which know what
-    holds without; and by the protocols below, its *capabilities*.
+    holds without; and by the protocols below, its *capabilities*. Two more are asked for by name:
+    ``measure()``, see `RecordedScenario`, and ``superposes``, whether its predictions can be had to
+    first order with the present settings, see `Prediction`.
     """
 
     @property
@@ -310,17 +312,15 @@ def measures_of(scenario: Scenario) -> tuple[Measure, ...]:
 
 
 @runtime_checkable
-class MeasuredScenario(Scenario, Protocol):
-    """A scenario that can be measured between steps, as before the first one."""
+class RecordedScenario(Scenario, Protocol):
+    """A scenario whose episodes are worth keeping step by step."""
 
     def measure(self) -> Mapping[str, Any]:
-        """Return the measurements of the present state, as in `Transition.info`."""
+        """Return the measurements of the present state, as in `Transition.info`.
+
+        It is asked for between steps, and before the first one.
+        """
         ...
-
-
-@runtime_checkable
-class RecordedScenario(MeasuredScenario, Protocol):
-    """A scenario whose episodes are worth keeping step by step."""
 
     @property
     def recorded(self) -> tuple[str, ...]:
@@ -343,20 +343,10 @@ class DrawnScenario(RecordedScenario, Protocol):
 
 @runtime_checkable
 class ExactlyPredictedScenario(Scenario, Protocol):
-    """A scenario of which there is a like whose predictions come true to rounding."""
+    """A scenario that can be had with a predictor that makes no errors but those of rounding."""
 
     def with_exact_prediction(self) -> Scenario:
-        """Return a scenario alike that predicts exactly; perhaps this one."""
-        ...
-
-
-@runtime_checkable
-class SummedScenario(Scenario, Protocol):
-    """A scenario whose predictions can be had to first order."""
-
-    @property
-    def superposes(self) -> bool:
-        """Whether they can, with the present settings."""
+        """Return the same scenario with such a predictor; this one, if it has it already."""
         ...
 
 
@@ -406,17 +396,6 @@ class EmbodiedScenario(Scenario, Protocol):
         ...
 
 
-class CalibratedPrediction(EmbodiedPrediction, Protocol):
-    """A prediction that rests on constants of which other values could be believed."""
-
-    def outcomes(self, joint_action: IntArray, constants: FloatArray) -> FloatArray:
-        """Return what a joint action would lead to under each of the constants ``(k, n)``.
-
-        Mean twists ``(k, M + 1, 3)`` of what is pushed, and then of the bodies.
-        """
-        ...
-
-
 @runtime_checkable
 class CalibratedScenario(EmbodiedScenario, Protocol):
     """A scenario whose predictions rest on positive constants that can be calibrated."""
@@ -433,9 +412,12 @@ class CalibratedScenario(EmbodiedScenario, Protocol):
 
     def predict_with(
         self, effects: Sequence[FloatArray], constants: FloatArray | None = None
-    ) -> CalibratedPrediction:
+    ) -> EmbodiedPrediction:
         """Predict, believing in these effects and in these constants.
 
-        The constants are logarithms, in units of what is believed without them.
+        The constants are logarithms, in units of what is believed without them. The prediction also
+        has ``outcomes(joint_action, constants)``: what a joint action ``(n,)`` would lead to under
+        each of ``k`` choices of the constants ``(k, c)``, as mean twists ``(k, M + 1, 3)`` of what
+        is pushed, and then of the bodies.
         """
         ...
