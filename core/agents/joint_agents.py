@@ -17,20 +17,18 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import product
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 
 from ..interface.protocols import (
     Blocks,
-    CalibratedPrediction,
     CalibratedScenario,
     EmbodiedPrediction,
     EmbodiedScenario,
     Prediction,
     RewardPrediction,
     Scenario,
-    TabulatedPrediction,
     Transition,
     groups_of,
     joint_reward,
@@ -198,7 +196,7 @@ class JointPrediction:
     def outcomes(self, joint_action: IntArray, constants: FloatArray) -> FloatArray:
         """Return what a joint action ``(M,)`` would lead to under constants ``(k, n)``."""
         actions = self._joint.actions(joint_action)
-        return cast(CalibratedPrediction, self._prediction).outcomes(actions, constants)
+        return cast(Any, self._prediction).outcomes(actions, constants)
 
 
 class RewardedJointPrediction(JointPrediction):
@@ -217,7 +215,7 @@ class BlocksJointPrediction(JointPrediction):
         """Return the next states of who acts for a block, for all joint actions."""
         if self._joint.whole:  # no variable is its own alone
             return Blocks(np.zeros((1, 0)), self.states(0, self._joint.every()), 1)
-        tables = cast(TabulatedPrediction, self._prediction)
+        tables = cast(Any, self._prediction)
         blocks = [tables.blocks(i) for i in self._joint.blocks[agent]]
         own = [b.own[b.own_rows] if len(b.own_rows) else b.own for b in blocks]
         return replace(
@@ -232,7 +230,7 @@ class TabulatedJointPrediction(BlocksJointPrediction, RewardedJointPrediction):
         """Return the predicted rewards of all joint actions by index."""
         if self._joint.whole:
             return self.rewards(self._joint.every())
-        return cast(TabulatedPrediction, self._prediction).reward_table()
+        return cast(Any, self._prediction).reward_table()
 
 
 def per_robot(scenario: Scenario) -> JointAgents:

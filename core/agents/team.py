@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from ..evaluators.evaluator import NOTHING_GIVEN, DecisionProblem, Deliberation,
 from ..interface.acting import Actors
 from ..interface.hierarchy import Hierarchy
 from ..interface.protocols import (
-    CalibratedPrediction,
     CalibratedScenario,
     ContinuedPrediction,
     EmbodiedPrediction,
@@ -24,7 +23,6 @@ from ..interface.protocols import (
     Prediction,
     RewardPrediction,
     Scenario,
-    SummedScenario,
     Transition,
     groups_of,
 )
@@ -147,7 +145,7 @@ class Team:
                 hierarchy,
                 len(scenario.action_set),
                 groups_of(scenario),
-                isinstance(scenario, SummedScenario) and scenario.superposes,
+                getattr(scenario, "superposes", False),
                 decision.rule,
                 decision.teammates,
                 settings.discount,
@@ -252,7 +250,7 @@ class Team:
         that pushes a box is slow, not broken. The constants are held against what was pushed.
         """
         if self.calibration is not None:
-            self._calibrate(cast(CalibratedPrediction, prediction), joint_action, transition)
+            self._calibrate(prediction, joint_action, transition)
         if self.self_model is None or transition.motions is None:
             return
         embodied = cast(EmbodiedPrediction, prediction)
@@ -261,9 +259,7 @@ class Team:
         for body, group in enumerate(embodied.groups):
             self.self_model.observe(body, speeds[list(group)], free[body])
 
-    def _calibrate(
-        self, prediction: CalibratedPrediction, joint_action: IntArray, transition: Transition
-    ) -> None:
+    def _calibrate(self, prediction: Any, joint_action: IntArray, transition: Transition) -> None:
         moved, motions = transition.pushed, transition.motions
         if self.calibration is None or moved is None or motions is None or not moved.any():
             return

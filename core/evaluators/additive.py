@@ -1,14 +1,23 @@
 """Evaluators for many agents: the agents below enter through the sum of what their groups do.
 
-Both need a prediction that can be had to first order (`Superposition`)
-and value by f alone. Their cost per agent is linear in the number of groups. The own group is
-enumerated; for the other groups
+Both need a prediction that can be had to first order, its ``superposition``, and value by f alone.
+Their cost per agent is linear in the number of groups. The own group is enumerated; for the other
+groups
 
 - `Moments` (teammates uniform or empirical) takes the sum as a random variable, of which mean and
   covariance suffice: f is averaged over sigma points (Julier and Uhlmann 2004) that have the same.
 - `Extremes` (teammates best response) takes the greatest f over the mean sum and the sums that lie
   farthest out in one of 26 directions (k = 3): in a given direction every group's best is
   independent of the others, so that these joint actions are found without search.
+
+A superposition of ``G`` groups, of ``L`` robot-action indices at most, that share ``k`` components
+has
+
+- ``contributions`` ``(G, L, k)``: what each index of each group adds to the sum;
+- ``alike`` ``(G, L)``: the first index of the group that comes to the same;
+- ``states(agent, local, sums, shares)``: the next states ``(m, d)`` of an agent, given the indices
+  ``(m,)`` of its own group, the contributions ``(m, k)`` of all groups added up, and the
+  probabilities ``(G, L)`` of the indices of the other groups.
 """
 
 from __future__ import annotations
@@ -16,11 +25,10 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from functools import cache
 from itertools import product
-from typing import Literal, cast
+from typing import Any, Literal
 
 import numpy as np
 
-from ..interface.protocols import SummedPrediction
 from ..numerics.arrays import FloatArray
 from .evaluator import Aggregation, DecisionProblem, Deliberation, EvaluatorSettings, Teammates
 from .grouping import Grouping
@@ -87,7 +95,8 @@ class _Additive(Aggregation, ABC):
     def values(self, deliberation: Deliberation) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent."""
         agent = deliberation.agent
-        superposition = cast(SummedPrediction, deliberation.prediction).superposition
+        prediction: Any = deliberation.prediction
+        superposition = prediction.superposition
         expected = self._grouping.expected(
             agent, deliberation.joint_action, deliberation.frequencies
         )

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal, cast
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ..interface.protocols import TabulatedPrediction
 from ..numerics.arrays import FloatArray, IntArray
 from .evaluator import (
     Aggregation,
@@ -79,7 +78,8 @@ class ExactEnumeration(Aggregation):
     def values(self, deliberation: Deliberation) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent."""
         agent, problem = deliberation.agent, self.problem
-        tabulated = bool(self._tried) and hasattr(deliberation.prediction, "blocks")
+        prediction: Any = deliberation.prediction
+        tabulated = bool(self._tried) and hasattr(prediction, "blocks")
         own = len(self.concerned[agent]) == 1
         conditional = problem.teammates == "conditional"
         if tabulated and own and problem.rule == "value" and not conditional:
@@ -88,7 +88,7 @@ class ExactEnumeration(Aggregation):
             empirical = problem.teammates == "empirical"
             return self.rules.enumerate(
                 deliberation.own_weights,
-                cast(TabulatedPrediction, deliberation.prediction).blocks(agent),
+                prediction.blocks(agent),
                 tried,
                 deliberation.joint_action,
                 deliberation.frequencies if empirical else self._expected,
@@ -102,7 +102,7 @@ class ExactEnumeration(Aggregation):
             probabilities = probabilities_of(deliberation.frequencies, below)
         elif conditional:
             probabilities = np.stack([probabilities_of(rows, below) for rows in deliberation.given])
-        if tabulated and hasattr(deliberation.prediction, "reward_table"):
+        if tabulated and hasattr(prediction, "reward_table"):
             table = self._by_tables(deliberation)
         else:
             table = self.by_states(deliberation, combined)
@@ -110,7 +110,7 @@ class ExactEnumeration(Aggregation):
 
     def _by_tables(self, deliberation: Deliberation) -> FloatArray:
         """Value ``(A, m)`` each own action with each joint action below, by anything."""
-        prediction = cast(TabulatedPrediction, deliberation.prediction)
+        prediction: Any = deliberation.prediction
         tried, concerned = self._tried[deliberation.agent], self.concerned[deliberation.agent]
         indices = (tried.indices + int(deliberation.joint_action @ tried.places)).ravel()
         self.count(deliberation.agent, len(indices))
@@ -126,7 +126,7 @@ class ExactEnumeration(Aggregation):
         prediction, weights = deliberation.prediction, deliberation.weights
         of = prediction, weights, concerned
         if self._means is None or any(a is not b for a, b in zip(self._means[0], of, strict=True)):
-            tables = cast(TabulatedPrediction, prediction)
+            tables: Any = prediction
             indices = np.arange(self.n_actions ** len(weights))
             values = [
                 self.rules.block_values(weights[i], tables.blocks(i), indices) for i in concerned

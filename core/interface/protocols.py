@@ -69,7 +69,29 @@ class Blocks:
 
 @runtime_checkable
 class Prediction(Protocol):
-    """What joint actions taken now would lead to. Valid until the scenario's next step."""
+    """What joint actions taken now would lead to. Valid until the scenario's next step.
+
+    Only `states` is required. What a prediction may have besides is asked for by name, and where it
+    is missing, what needs it does without or says so. `nested_agents.scenarios.checking` compares
+    it with `states`.
+
+    ``states_of_all(joint_actions)``
+        Next states ``(n, m, d)`` of all agents at once. `states_of_all` asks for it.
+    ``states_by_group(joint_actions)``
+        Own variables ``(n, m, n_own)`` of all agents and shared ones ``(G, m, d - n_own)`` of all
+        groups. `states_by_group` asks for it, where the values of many agents are pooled.
+    ``rewards(joint_actions)``, ``after(joint_action)``
+        See `RewardPrediction` and `ContinuedPrediction`.
+    ``blocks(agent)``
+        `Blocks` of an agent's next states for all ``A ** n`` joint actions. The evaluator ``exact``
+        reads them where few agents are free.
+    ``reward_table()``
+        Rewards ``(A ** n,)`` of all joint actions by index, as `rewards` gives them. The evaluator
+        ``exact`` needs it besides ``blocks``, except to decide by the deciding agent's value alone.
+    ``superposition``
+        The prediction to first order, for scenarios that say ``superposes``: groups move what they
+        share by contributions that add up. `nested_agents.core.evaluators.additive` describes it.
+    """
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
@@ -94,30 +116,13 @@ class ContinuedPrediction(RewardPrediction, Protocol):
         ...
 
 
-@runtime_checkable
-class TeamPrediction(Prediction, Protocol):
-    """A prediction that gives the next states of all agents for the same joint actions at once."""
-
-    def states_of_all(self, joint_actions: IntArray) -> FloatArray:
-        """Return the next states ``(n, m, d)`` of all agents for joint actions ``(m, n)``."""
-        ...
-
-
 def states_of_all(prediction: Prediction, joint_actions: IntArray) -> FloatArray:
     """Return the next states ``(n, m, d)`` of all agents for joint actions ``(m, n)``."""
-    if hasattr(prediction, "states_of_all"):  # of a `TeamPrediction`; the test is quicker
-        found: FloatArray = prediction.states_of_all(joint_actions)
+    own_way = getattr(prediction, "states_of_all", None)
+    if own_way is not None:
+        found: FloatArray = own_way(joint_actions)
         return found
     return np.stack([prediction.states(i, joint_actions) for i in range(joint_actions.shape[1])])
-
-
-@runtime_checkable
-class GroupPrediction(TeamPrediction, Protocol):
-    """A prediction that tells what is an agent's own and what the agents of a group share."""
-
-    def states_by_group(self, joint_actions: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Return the own variables ``(n, m, n_own)`` and the shared ones ``(G, m, d - n_own)``."""
-        ...
 
 
 def states_by_group(
@@ -126,25 +131,13 @@ def states_by_group(
     groups: tuple[tuple[int, ...], ...],
     n_own: int,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return what `GroupPrediction.states_by_group` does, of any prediction."""
-    if hasattr(prediction, "states_by_group"):
-        found: tuple[FloatArray, FloatArray] = prediction.states_by_group(joint_actions)
+    """Return the own variables ``(n, m, n_own)`` and the shared ones ``(G, m, d - n_own)``."""
+    own_way = getattr(prediction, "states_by_group", None)
+    if own_way is not None:
+        found: tuple[FloatArray, FloatArray] = own_way(joint_actions)
         return found
     states = states_of_all(prediction, joint_actions)
     return states[:, :, :n_own], states[[group[0] for group in groups], :, n_own:]
-
-
-@runtime_checkable
-class TabulatedPrediction(Prediction, Protocol):
-    """A prediction that has tables of all joint actions: quick where few agents are free."""
-
-    def blocks(self, agent: int) -> Blocks:
-        """Return the next states of `agent` for all ``A ** n`` joint actions: as `states` does."""
-        ...
-
-    def reward_table(self) -> FloatArray:
-        """Return the rewards ``(A ** n,)`` of all joint actions by index: as `rewards` does."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -243,7 +236,9 @@ class Scenario(Protocol):
     """A world with a task. Everything a learner may know of it.
 
     What else it may have is asked for by `groups_of`, `roles_of` and `measures_of`, which know what
-    holds without; and by the protocols below, its *capabilities*.
+    holds without; and by the protocols below, its *capabilities*. Two more are asked for by name:
+    ``measure()``, see `RecordedScenario`, and ``superposes``, whether its predictions can be had to
+    first order with the present settings, see `Prediction`.
     """
 
     @property
@@ -317,17 +312,15 @@ def measures_of(scenario: Scenario) -> tuple[Measure, ...]:
 
 
 @runtime_checkable
-class MeasuredScenario(Scenario, Protocol):
-    """A scenario that can be measured between steps, as before the first one."""
+class RecordedScenario(Scenario, Protocol):
+    """A scenario whose episodes are worth keeping step by step."""
 
     def measure(self) -> Mapping[str, Any]:
-        """Return the measurements of the present state, as in `Transition.info`."""
+        """Return the measurements of the present state, as in `Transition.info`.
+
+        It is asked for between steps, and before the first one.
+        """
         ...
-
-
-@runtime_checkable
-class RecordedScenario(MeasuredScenario, Protocol):
-    """A scenario whose episodes are worth keeping step by step."""
 
     @property
     def recorded(self) -> tuple[str, ...]:
@@ -350,64 +343,10 @@ class DrawnScenario(RecordedScenario, Protocol):
 
 @runtime_checkable
 class ExactlyPredictedScenario(Scenario, Protocol):
-    """A scenario of which there is a like whose predictions come true to rounding."""
+    """A scenario that can be had with a predictor that makes no errors but those of rounding."""
 
     def with_exact_prediction(self) -> Scenario:
-        """Return a scenario alike that predicts exactly; perhaps this one."""
-        ...
-
-
-class Superposition(Protocol):
-    """A prediction to first order: groups move what they share by contributions that add up.
-
-    ``G`` groups, ``L`` robot-action indices of the largest, ``k`` components of what is shared.
-    """
-
-    @property
-    def contributions(self) -> FloatArray:
-        """``(G, L, k)`` what each robot-action index of each group contributes to the sum."""
-        ...
-
-    @property
-    def alike(self) -> IntArray:
-        """``(G, L)`` the first robot-action index of the group that comes to the same."""
-        ...
-
-    def states(
-        self, agent: int, local: IntArray, sums: FloatArray, shares: FloatArray
-    ) -> FloatArray:
-        """Return the next states ``(m, d)`` of `agent`.
-
-        Parameters
-        ----------
-        agent
-            Whose states.
-        local
-            ``(m,)`` robot-action index of its own group.
-        sums
-            ``(m, k)`` contributions of all groups, added up.
-        shares
-            ``(G, L)`` probabilities of the robot-action indices of the other groups.
-        """
-        ...
-
-
-class SummedPrediction(Prediction, Protocol):
-    """A prediction that can also be had to first order, for any number of groups."""
-
-    @property
-    def superposition(self) -> Superposition:
-        """The prediction to first order."""
-        ...
-
-
-@runtime_checkable
-class SummedScenario(Scenario, Protocol):
-    """A scenario whose predictions can be had to first order."""
-
-    @property
-    def superposes(self) -> bool:
-        """Whether they can, with the present settings."""
+        """Return the same scenario with such a predictor; this one, if it has it already."""
         ...
 
 
@@ -457,17 +396,6 @@ class EmbodiedScenario(Scenario, Protocol):
         ...
 
 
-class CalibratedPrediction(EmbodiedPrediction, Protocol):
-    """A prediction that rests on constants of which other values could be believed."""
-
-    def outcomes(self, joint_action: IntArray, constants: FloatArray) -> FloatArray:
-        """Return what a joint action would lead to under each of the constants ``(k, n)``.
-
-        Mean twists ``(k, M + 1, 3)`` of what is pushed, and then of the bodies.
-        """
-        ...
-
-
 @runtime_checkable
 class CalibratedScenario(EmbodiedScenario, Protocol):
     """A scenario whose predictions rest on positive constants that can be calibrated."""
@@ -484,9 +412,12 @@ class CalibratedScenario(EmbodiedScenario, Protocol):
 
     def predict_with(
         self, effects: Sequence[FloatArray], constants: FloatArray | None = None
-    ) -> CalibratedPrediction:
+    ) -> EmbodiedPrediction:
         """Predict, believing in these effects and in these constants.
 
-        The constants are logarithms, in units of what is believed without them.
+        The constants are logarithms, in units of what is believed without them. The prediction also
+        has ``outcomes(joint_action, constants)``: what a joint action ``(n,)`` would lead to under
+        each of ``k`` choices of the constants ``(k, c)``, as mean twists ``(k, M + 1, 3)`` of what
+        is pushed, and then of the bodies.
         """
         ...

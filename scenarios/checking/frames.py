@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...core.agents.loop import world_seed
-from ...core.interface.protocols import MeasuredScenario, RewardPrediction, Scenario, Transition
+from ...core.interface.protocols import RewardPrediction, Scenario, Transition
 from ...core.numerics.arrays import IntArray
 
 Frame = dict[str, Any]
@@ -63,7 +63,8 @@ def opening(scenario: Scenario, seed: int, episode: int) -> Frame:
 
 def measured(scenario: Scenario) -> Mapping[str, Any]:
     """Return the measurements of the present state, of a scenario that has them between steps."""
-    return scenario.measure() if isinstance(scenario, MeasuredScenario) else {}
+    measure = getattr(scenario, "measure", None)
+    return {} if measure is None else measure()
 
 
 def stepped(scenario: Scenario, action: IntArray) -> Frame:

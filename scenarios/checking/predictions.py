@@ -13,11 +13,8 @@ import numpy as np
 
 from ...core.interface.protocols import (
     Blocks,
-    GroupPrediction,
     RewardPrediction,
     Scenario,
-    TabulatedPrediction,
-    TeamPrediction,
     groups_of,
     states_by_group,
 )
@@ -45,7 +42,7 @@ def fault_of_prediction(
     rng
         Draws the joint actions for which tables are compared, where there are many.
     """
-    prediction = scenario.predict()
+    prediction: Any = scenario.predict()
     m, d = len(joint_actions), scenario.state_space.n_variables
     wanted: dict[str, tuple[Any, tuple[int, ...]]] = {
         f"states of agent {i}": (prediction.states(i, joint_actions), (m, d))
@@ -53,7 +50,7 @@ def fault_of_prediction(
     }
     if isinstance(prediction, RewardPrediction):
         wanted["rewards"] = prediction.rewards(joint_actions), (m,)
-    if isinstance(prediction, TeamPrediction):
+    if hasattr(prediction, "states_of_all"):
         together = prediction.states_of_all(joint_actions)
         wanted["states of all agents"] = together, (len(scenario.agents), m, d)
     groups, n_own = groups_of(scenario), scenario.state_space.n_own
@@ -68,9 +65,9 @@ def fault_of_prediction(
     alone = np.array([prediction.states(i, joint_actions) for i in range(len(scenario.agents))])
     body = np.repeat(np.arange(len(groups)), [len(group) for group in groups])
     by_group = np.concatenate([np.asarray(own), np.asarray(shared)[body]], axis=2)
-    grouped = isinstance(prediction, GroupPrediction)
+    grouped = hasattr(prediction, "states_by_group")
     found = [("states_by_group" if grouped else "shared variables of a group", by_group)]
-    if isinstance(prediction, TeamPrediction):
+    if hasattr(prediction, "states_of_all"):
         found.insert(0, ("states_of_all", np.asarray(together)))
     for source, states in found:
         wrong = ~_close(apart(scenario, states, alone), alone)
@@ -78,7 +75,7 @@ def fault_of_prediction(
             agent, _, j = np.argwhere(wrong)[0]
             name = scenario.state_space.variables[j].name
             return f"{source} and states differ in {name} of agent {agent}"
-    if isinstance(prediction, TabulatedPrediction):
+    if hasattr(prediction, "blocks") and hasattr(prediction, "reward_table"):
         return _wrong_tables(scenario, prediction, rng)
     return None
 
@@ -93,9 +90,7 @@ def apart(scenario: Scenario, states: FloatArray, others: FloatArray) -> FloatAr
     return found
 
 
-def _wrong_tables(
-    scenario: Scenario, prediction: TabulatedPrediction, rng: np.random.Generator
-) -> str | None:
+def _wrong_tables(scenario: Scenario, prediction: Any, rng: np.random.Generator) -> str | None:
     """Return where the tables differ from the prediction, whose states are taken to be right."""
     n, n_actions = len(scenario.agents), len(scenario.action_set)
     count = n_actions**n

@@ -43,7 +43,7 @@ class Premises:
 
 
 class ChainPrediction:
-    """Prediction of one decision; a `TeamPrediction` and more.
+    """Prediction of one decision, of all agents at once.
 
     It knows rewards, can be had as sums, and serves self-models, every joint being a body.
 
@@ -132,7 +132,7 @@ class ChainPrediction:
 
 
 class ChainSuperposition:
-    """A `Superposition` of the kinematic chain.
+    """The prediction of the kinematic chain to first order.
 
     The sum is how far the tip moves away from the mean posture. Of those joints whose actions are
     known, and of the deciding one, kinematics are exact: only what may yet be decided adds up.

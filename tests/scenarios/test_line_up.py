@@ -6,7 +6,6 @@ import pytest
 from nested_agents.core.interface.protocols import (
     ExactlyPredictedScenario,
     RecordedScenario,
-    TeamPrediction,
     measures_of,
     roles_of,
 )
@@ -38,6 +37,5 @@ def test_the_states_of_all_agents_are_those_of_each() -> None:
     scenario = LineUpSettings(carts=3).build()
     scenario.reset(0)
     prediction, joint = scenario.predict(), np.random.default_rng(0).integers(4, size=(9, 3))
-    assert isinstance(prediction, TeamPrediction)
     expected = np.stack([prediction.states(agent, joint) for agent in range(3)])
     np.testing.assert_array_equal(prediction.states_of_all(joint), expected)

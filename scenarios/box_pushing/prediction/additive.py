@@ -54,7 +54,7 @@ class Predicted(Protocol):
 
 
 class PushSuperposition:
-    """A `Superposition` of box pushing.
+    """The prediction of box pushing to first order.
 
     The sum is the pose of the box relative to the reference; the robot of the deciding agent
     stands where its wheel command takes it, the others where theirs do in the mean.
