@@ -90,7 +90,6 @@ MODULES = {
         "trials.arrangement", "trials.session",
         "store.store", "results.results", "results.statistics", "results.comparison",
         "results.power", "results.summary", "catalogue.study", "cost.cost", "claims.claims",
-        "course.grading",
     )),
 }  # fmt: skip
 """The public modules of each package, by what the package is for."""

@@ -69,7 +69,6 @@ _PLACES = {
     "cost_table": ("studies.api.costs", "cost_table"),
     "control_loop": ("core.agents.loop", "control_loop"),
     "detectable": ("studies.results.power", "detectable"),
-    "grade": ("studies.course.grading", "grade"),
     "greatest": ("core.numerics.ties", "greatest"),
     "make_vec": ("scenarios.box_pushing.batched.environments", "make_vec"),
     "load": ("studies.api.study", "load"),

@@ -22,7 +22,7 @@ ALLOWED = {
 }
 STUDIES = (
     "spec", "trials", "store", "workers", "results", "presentation", "catalogue", "claims", "cost",
-    "explain", "report", "api", "course", "cli",
+    "explain", "report", "api", "cli",
 )  # fmt: skip
 """The rooms of studies/, each of which may import those before it."""
 MAX_BYTES = 1_000_000

@@ -21,6 +21,8 @@ import numpy as np
 import nested_agents as na
 from nested_agents.studies.presentation.figures import COLOURS
 
+from grade import grade
+
 payments = np.array([[11, -30, 0], [-30, 7, 6], [0, 0, 5]])
 print(payments)
 
@@ -99,7 +101,7 @@ figure.savefig("out/course/climbing-game.png", dpi=80)
 # %%
 # Questions
 # ---------
-# Put your answers in place of ``None`` and run the cell again. ``nested-agents course sheet
+# Put your answers in place of ``None`` and run the cell again. ``python grade.py sheet
 # climbing-game`` prints the same questions in full.
 
 answers = {
@@ -111,4 +113,4 @@ answers = {
     "reason": None,  # why? a: it explores too little; b: it expects what was so far; c: payments
     "values": None,  # how many joint actions does each of five agents have to value?
 }
-print(na.grade("climbing-game", answers))
+print(grade("climbing-game", answers))

@@ -21,6 +21,8 @@ import nested_agents as na
 from nested_agents.core.agents.cost import Problem, below_counts
 from nested_agents.studies.presentation.figures import COLOURS, STYLES
 
+from grade import grade
+
 TOPOLOGIES = {"chain": "chain", "binary tree": "tree:2", "line of neighbours": "coordination-graph"}
 problem = Problem(actions=4)
 
@@ -75,4 +77,4 @@ answers = {
     "step": None,  # how many joint actions does one more agent add to a long line?
     "width": None,  # elimination can be afforded by a: agents, b: edges, c: width of the graph
 }
-print(na.grade("costs", answers))
+print(grade("costs", answers))

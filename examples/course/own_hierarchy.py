@@ -20,6 +20,8 @@ import nested_agents as na
 from nested_agents.core.agents.cost import Problem, below_counts
 from nested_agents.studies.presentation.figures import COLOURS
 
+from grade import grade
+
 agents = na.BoxPushingSettings(robots=2).build().agents
 left1, right1, left2, right2 = agents
 mine = na.Hierarchy(agents, [(left1, left2), (left1, right1), (left2, right2)])
@@ -81,4 +83,4 @@ answers = {
     "absent": None,  # "no difference found": a: equal, b: one may remain, c: the study was faulty
     "edges": None,  # your hierarchy of eight wheels
 }
-print(na.grade("own-hierarchy", answers))
+print(grade("own-hierarchy", answers))

@@ -22,6 +22,8 @@ import numpy as np
 import nested_agents as na
 from nested_agents.studies.presentation.figures import COLOURS, STYLES
 
+from grade import grade
+
 SEEDS, EPISODES, FAILS = 4, 20, 10
 failure = {"kind": "reversed", "wheels": "robot1.front-left", "episode": FAILS}
 spec = na.Spec(
@@ -83,4 +85,4 @@ answers = {
     "better": None,  # who keeps more success? a: weights alone, b: with self-model, c: nothing
     "fair": None,  # why the copy? a: costs if nothing adapts, b: shorter intervals, c: time
 }
-print(na.grade("wheel-failure", answers))
+print(grade("wheel-failure", answers))

@@ -40,7 +40,6 @@ COMMANDS: dict[str, str] = {
     "check": "Check that scenarios keep their promises.",
     "cost": "Print what hierarchies cost, by formula and measured.",
     "claims": "Print the claims of the paper and what was found of each.",
-    "course": "List the labs of the course, print their questions, grade answers.",
 }
 """The commands and what the help says of each; their modules are imported when asked for."""
 

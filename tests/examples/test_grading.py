@@ -1,17 +1,24 @@
 """Sheets of answers: what is right, wrong, left out, and refused."""
 
+import doctest
+import subprocess
+import sys
 from itertools import pairwise
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
 import nested_agents as na
 from nested_agents.core.agents.cost import Problem, below_counts
-from nested_agents.studies.cli.main import main
-from nested_agents.studies.course.grading import blank_sheet, grade, grade_sheet
-from nested_agents.studies.course.labs import LABS, WHEELS
-from nested_agents.studies.course.questions import Choice, Edges, Number
 from nested_agents.studies.spec.errors import SpecError
+
+import grade as program
+import labs
+import questions
+from grade import blank_sheet, grade, grade_sheet, main
+from labs import LABS, WHEELS
+from questions import Choice, Edges, Number
 
 FRUGAL = [
     [f"robot{n}.left", f"robot{m}.right"] for n in range(1, 5) for m in (n, n + 1) if m < 5
@@ -115,14 +122,14 @@ def test_what_is_no_answer_is_refused_in_one_line(
         grade_sheet(path)
     assert str(refused.value).startswith(f"{path}: ")
     assert said in str(refused.value)
-    assert main(["course", "check", str(path)]) == 2
+    assert main(["check", str(path)]) == 2
     assert capsys.readouterr().err.count("\n") == 1
 
 
 def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["course", "list"]) == 0
+    assert main(["list"]) == 0
     assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == list(LABS)
-    assert main(["course", "sheet", "costs"]) == 0
+    assert main(["sheet", "costs"]) == 0
     sheet = capsys.readouterr().out
     blank, full = tmp_path / "blank.toml", tmp_path / "full.toml"
     blank.write_text(sheet)
@@ -130,17 +137,36 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
         shown = f'"{answer}"' if isinstance(answer, str) else answer
         sheet = sheet.replace(f'\n{key} = ""\n', f"\n{key} = {shown}\n")
     full.write_text(sheet)
-    assert main(["course", "check", str(full)]) == 0
+    assert main(["check", str(full)]) == 0
     assert "right" in capsys.readouterr().out
-    assert main(["course", "check", str(full), str(blank), "--format", "csv"]) == 1
+    assert main(["check", str(full), str(blank), "--format", "csv"]) == 1
     assert capsys.readouterr().out == "lab,name,right,questions\ncosts,,6,6\ncosts,,0,6\n"
 
 
 @pytest.mark.parametrize(
-    "arguments", [["list", "costs"], ["sheet"], ["sheet", "a", "b"], ["sheet", "cost"], ["check"]]
-)
+    "arguments",
+    [
+        ["list", "costs"], ["sheet"], ["sheet", "a", "b"], ["sheet", "cost"], ["check"], [],
+        ["grade"], ["check", "no-such-file.toml"], ["check", "a.toml", "--format", "xml"],
+        ["list", "--lab"],
+    ],
+)  # fmt: skip
 def test_the_command_refuses_in_one_line(
     arguments: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["course", *arguments]) == 2
+    assert main(arguments) == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_the_program_runs_from_any_folder(tmp_path: Path) -> None:
+    path = tmp_path / "sheet.toml"
+    path.write_text(blank_sheet("climbing-game"))
+    command = [sys.executable, program.__file__, "check", "--format", "csv", path.name]
+    run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert run.stdout == "lab,name,right,questions\nclimbing-game,,0,7\n"
+    assert (run.returncode, run.stderr) == (1, "")
+
+
+@pytest.mark.parametrize("module", [program, labs, questions])
+def test_the_examples_of_the_docstrings_hold(module: ModuleType) -> None:
+    assert doctest.testmod(module).failed == 0

@@ -1,6 +1,6 @@
 """The four labs and their questions.
 
-Their programs are in ``examples/course``, one file each. What is right is computed here where a
+Their programs stand beside this file, one for each. What is right is computed here where a
 formula says it; what a program measures is right within bounds that any two machines keep.
 """
 
@@ -9,9 +9,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ...core.agents.cost import Problem, below_counts
-from ...topologies import build
-from .questions import Choice, Edges, Number, Question
+from nested_agents.core.agents.cost import Problem, below_counts
+from nested_agents.topologies import build
+
+from questions import Choice, Edges, Number, Question
 
 WHEELS = tuple(f"robot{robot}.{side}" for robot in (1, 2, 3, 4) for side in ("left", "right"))
 

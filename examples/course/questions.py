@@ -12,8 +12,8 @@ from typing import Any, Protocol
 
 import networkx as nx
 
-from ...core.agents.cost import PAPER_ACTIONS, Problem, below_counts
-from ...core.interface.hierarchy import Hierarchy
+from nested_agents.core.agents.cost import PAPER_ACTIONS, Problem, below_counts
+from nested_agents.core.interface.hierarchy import Hierarchy
 
 
 class Question(Protocol):

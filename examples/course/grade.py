@@ -1,17 +1,32 @@
-"""Sheets of answers: empty ones to hand out, filled ones to grade."""
+"""The questions of the course: hand out sheets, grade what comes back.
+
+Usage::
+
+    python examples/course/grade.py list
+    python examples/course/grade.py sheet LAB
+    python examples/course/grade.py check SHEET.toml ... [--format csv]
+
+Exit statuses: 0 done and all answers right, 1 an answer is wrong or left out, 2 something that one
+line on standard error names, 130 interrupted, 141 the reader of the output has gone.
+"""
 
 from __future__ import annotations
 
+import argparse
+import os
+import sys
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from textwrap import fill
-from typing import Any, Literal
+from typing import Any, Literal, NoReturn
 
-from ...core.plugins.messages import closest
-from ..spec.errors import SpecError, show
-from .labs import LABS, Lab
+from nested_agents.core.plugins.messages import closest
+from nested_agents.studies.presentation.csv_text import write_csv
+from nested_agents.studies.spec.errors import SpecError, show
+
+from labs import LABS, Lab
 
 WIDTH = 80
 """Of a line [characters]."""
@@ -150,3 +165,74 @@ def _lab(name: Any) -> Lab:
     if name not in tuple(LABS):
         raise SpecError(f"lab = {show(name)}: unknown lab; {closest(name, LABS)}")
     return LABS[name]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """List the labs, print the questions of one, or grade sheets; return the exit status."""
+    try:
+        status = _run(_Parser().parse_intermixed_args(arguments))
+        sys.stdout.flush()
+        return status
+    except SpecError as error:
+        return _complain(str(error))
+    except BrokenPipeError:
+        # The reader went away, as `head` does; Python would complain again at exit.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 141
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        return _complain(f"{where}{error.strerror or error}")
+    except KeyboardInterrupt:
+        return 130
+
+
+class _Parser(argparse.ArgumentParser):
+    """What the program takes; a line that refuses it is one."""
+
+    def __init__(self) -> None:
+        super().__init__(
+            "grade.py", description="List the labs, print the questions of one, or grade answers."
+        )
+        self.add_argument("action", choices=["list", "sheet", "check"])
+        self.add_argument("arguments", nargs="*", metavar="LAB|SHEET.toml")
+        self.add_argument(
+            "--format", choices=["text", "csv"], default="text", dest="form",
+            help="of marks: every answer, or a row for each sheet (default: text)",
+        )  # fmt: skip
+
+    def error(self, message: str) -> NoReturn:
+        """Refuse arguments as all else is refused."""
+        raise SpecError(f"{message}; see {self.prog} --help")
+
+
+def _run(given: argparse.Namespace) -> int:
+    arguments = given.arguments
+    if given.action == "list":
+        if arguments:
+            raise SpecError(f"list {arguments[0]}: takes no argument; see sheet")
+        for name, lab in LABS.items():
+            print(f"{name:<{max(map(len, LABS)) + 2}}{lab.title}")
+        return 0
+    if given.action == "sheet":
+        if len(arguments) != 1:
+            raise SpecError(f"sheet: takes one LAB, got {len(arguments)}; see list")
+        print(blank_sheet(arguments[0]))
+        return 0
+    if not arguments:
+        raise SpecError("check: SHEET.toml is missing; sheet LAB prints an empty one")
+    graded = [grade_sheet(Path(path)) for path in arguments]
+    if given.form == "csv":
+        rows = [(m.lab, m.name, m.right, len(m.marks)) for m in graded]
+        write_csv(sys.stdout, ("lab", "name", "right", "questions"), rows)
+    else:
+        print("\n\n".join(map(str, graded)))
+    return 0 if all(m.right == len(m.marks) for m in graded) else 1
+
+
+def _complain(message: str) -> int:
+    print(f"grade.py: error: {' '.join(message.split())}", file=sys.stderr)
+    return 2
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

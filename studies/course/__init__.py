@@ -1,1 +1,0 @@
-"""A course of four labs: their questions, and how answers to them are graded."""
