@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyBboxPatch, Polygon, Wedge
 
-from nested_agents.core.rules.fuzzy import Partition
+from nested_agents.core.rules.kernels.fuzzy import Partition
 from nested_agents.studies.presentation.figures import COLOURS, SETTINGS, write
 
 BLUE, ORANGE, GREEN = COLOURS[:3]

@@ -56,7 +56,7 @@ MODULES = {
     "core": ("How agents perceive, predict, decide and learn, and what that costs.", (
         "interface.hierarchy", "interface.spaces", "interface.protocols", "agents.team",
         "agents.rows", "adaptation.mirror", "agents.loop", "decision.settings",
-        "decision.exploration", "rules.fuzzy", "rules.rule_base", "rules.settings",
+        "decision.exploration", "rules.kernels.fuzzy", "rules.rule_base", "rules.settings",
         "learners.learner", "learners.td", "learners.batch", "learners.anova",
         "learners.gradient", "learners.optimistic", "learners.fmq", "learners.sparse_cooperative",
         "learners.vdn", "learners.q_learning", "learners.frozen", "evaluators.evaluator",
@@ -71,7 +71,7 @@ MODULES = {
     "scenarios": ("Where agents act.", (
         "box_pushing.config", "box_pushing.scenario", "box_pushing.environments",
         "box_pushing.batched.environments", "adapters.passing_down",
-        "box_pushing.reward", "box_pushing.starts", "box_pushing.states.view",
+        "box_pushing.world.reward", "box_pushing.world.starts", "box_pushing.states.view",
         "box_pushing.states.variables", "box_pushing.states.state_spaces",
         "box_pushing.prediction.predictors", "box_pushing.world.boxes",
         "box_pushing.world.robots", "box_pushing.world.failures",

@@ -41,7 +41,7 @@ _PLACES = {
     "LearnerSettings": ("core.learners", "LearnerSettings"),
     "LineUpSettings": ("scenarios.line_up", "LineUpSettings"),
     "Measure": ("core.interface.protocols", "Measure"),
-    "Partition": ("core.rules.fuzzy", "Partition"),
+    "Partition": ("core.rules.kernels.fuzzy", "Partition"),
     "RuleBase": ("core.rules.rule_base", "RuleBase"),
     "SUCCESS": ("core.interface.protocols", "SUCCESS"),
     "Peer": ("core.policies.peer", "Peer"),

@@ -34,7 +34,7 @@ class Variable:
         Whether `low` and `high` are the same point (an angle).
     centres
         Default centres of the membership functions, increasing, within the range. Empty: spread
-        evenly, see `core.rules.fuzzy.Partition.of`.
+        evenly, see `core.rules.kernels.fuzzy.Partition.of`.
     labels
         Words for the membership functions, in the order of `centres`; empty: numbered.
     mirrored

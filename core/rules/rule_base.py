@@ -24,7 +24,7 @@ from ..interface.protocols import Blocks
 from ..interface.spaces import StateSpace
 from ..numerics.arrays import FloatArray, IntArray
 from . import kernels
-from .fuzzy import Partition
+from .kernels.fuzzy import Partition
 from .settings import RuleBaseSettings
 
 MOST_RULES = 2**63 - 1

@@ -26,7 +26,7 @@ from ..faults.settings import (
     Weak,
 )
 from ..state_variables import referred
-from . import units
+from .world import units
 
 CONTROL_PERIOD = 0.064
 """Time between commands to the wheels [s]; the basic time step of the e-puck in Webots."""

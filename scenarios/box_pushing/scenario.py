@@ -22,14 +22,14 @@ from .prediction.belief import APART, CONSTANTS, PushBelief, least_gap
 from .prediction.prediction import BoxPrediction, mean_twists
 from .prediction.predictors import ExactPrediction, Future, push_model
 from .prediction.situation import Premises, Situation
-from .reward import Task, reward
-from .starts import place
 from .states.state_spaces import state_space_for
 from .states.view import View
 from .world.boxes import box_for, growth
 from .world.failures import WheelFailures
 from .world.infrared import InfraredSpec, strongest_reading
+from .world.reward import Task, reward
 from .world.robots import nominal_effect, robot_for
+from .world.starts import place
 from .world.world import World, WorldState
 
 SENSING = 2**32 - 1

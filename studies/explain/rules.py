@@ -23,7 +23,7 @@ import numpy as np
 
 from ...core.interface.spaces import Variable
 from ...core.numerics.arrays import FloatArray
-from ...core.rules.fuzzy import Partition
+from ...core.rules.kernels.fuzzy import Partition
 from ...core.rules.rule_base import RuleBase
 from .body import headed
 

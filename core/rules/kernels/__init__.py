@@ -1,6 +1,7 @@
 """Compiled kernels of the rule base: the same numbers as the NumPy definitions, fast.
 
-Every kernel has a plain-NumPy reference implementation: firing strengths in `core.rules.fuzzy`,
+Every kernel has a plain-NumPy reference implementation: firing strengths in
+`core.rules.kernels.fuzzy`,
 features in `RuleBase.features`, values and temporal differences in `core.rules.reference`. Nothing
 is compiled on import; each kernel is compiled at its first call and cached on disk.
 

@@ -16,7 +16,7 @@ from ...numerics.arrays import FloatArray, IntArray
 from ...numerics.compiling import njit
 
 if TYPE_CHECKING:
-    from ..fuzzy import Partition
+    from .fuzzy import Partition
 
 
 class Layout(NamedTuple):

@@ -16,9 +16,9 @@ import numpy as np
 
 from ....core.interface.protocols import Blocks
 from ....core.numerics.arrays import FloatArray, IntArray
-from ..reward import reward
 from ..states.view import View
 from ..world.infrared import expected_reading
+from ..world.reward import reward
 from .additive import PushSuperposition
 from .belief import outcomes
 from .push import PushModel, push

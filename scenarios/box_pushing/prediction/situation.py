@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 from ....core.interface.spaces import ActionSet
 from ....core.numerics.arrays import FloatArray
-from ..reward import Task
 from ..states.state_spaces import BoxStateSpace
 from ..world.geometry import Outline
 from ..world.infrared import InfraredSpec
+from ..world.reward import Task
 from .belief import PushBelief
 
 

@@ -8,7 +8,7 @@ import pytest
 from nested_agents.core.learners.anova import MOST_RULES, AnovaTD, AnovaTDSettings, spread
 from nested_agents.core.learners.batch import REWARD_SCALE, BatchTD, BatchTDSettings
 from nested_agents.core.learners.dictionary import Dictionary, kernel
-from nested_agents.core.rules.fuzzy import Partition
+from nested_agents.core.rules.kernels.fuzzy import Partition
 from nested_agents.core.rules.rule_base import RuleBase
 
 EXACT = 1e-9

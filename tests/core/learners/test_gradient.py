@@ -5,7 +5,7 @@ import pytest
 
 from nested_agents.core.learners.gradient import GradientTD, GradientTDSettings
 from nested_agents.core.learners.td import TDLambda, TDLambdaSettings
-from nested_agents.core.rules.fuzzy import Partition
+from nested_agents.core.rules.kernels.fuzzy import Partition
 from nested_agents.core.rules.rule_base import RuleBase
 
 CORRECTIONS = ("tdc", "gtd2")

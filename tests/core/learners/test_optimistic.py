@@ -6,7 +6,7 @@ import pytest
 from nested_agents.core.learners.fmq import FMQ, FMQSettings
 from nested_agents.core.learners.optimistic import OptimisticTD, OptimisticTDSettings
 from nested_agents.core.learners.td import TDLambda, TDLambdaSettings
-from nested_agents.core.rules.fuzzy import Partition
+from nested_agents.core.rules.kernels.fuzzy import Partition
 from nested_agents.core.rules.rule_base import RuleBase
 
 TABLE = RuleBase([Partition((0.0, 1.0, 2.0), "triangular")], [(0,)])

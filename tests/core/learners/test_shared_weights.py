@@ -12,7 +12,7 @@ from nested_agents.core.learners.batch import REWARD_SCALE, BatchTD, BatchTDSett
 from nested_agents.core.learners.learner import Learner
 from nested_agents.core.learners.td import TDLambda, TDLambdaSettings
 from nested_agents.core.rules import reference
-from nested_agents.core.rules.fuzzy import Partition
+from nested_agents.core.rules.kernels.fuzzy import Partition
 from nested_agents.core.rules.rule_base import RuleBase
 
 LEARNING: dict[str, dict[str, Any]] = {

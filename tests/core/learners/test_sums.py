@@ -8,7 +8,7 @@ from nested_agents.core.learners.sparse_cooperative import (
     SparseCooperativeSettings,
 )
 from nested_agents.core.learners.vdn import ValueDecomposition, ValueDecompositionSettings
-from nested_agents.core.rules.fuzzy import Partition
+from nested_agents.core.rules.kernels.fuzzy import Partition
 from nested_agents.core.rules.rule_base import RuleBase
 
 FUZZY = RuleBase([Partition((-1.0, 0.0, 1.0), "triangular")], [(0,)])

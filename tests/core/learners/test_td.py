@@ -7,7 +7,7 @@ import pytest
 
 from nested_agents.core.learners.td import TDLambda, TDLambdaSettings
 from nested_agents.core.rules import reference
-from nested_agents.core.rules.fuzzy import Partition
+from nested_agents.core.rules.kernels.fuzzy import Partition
 from nested_agents.core.rules.rule_base import RuleBase
 
 LOW_HIGH = Partition((0.0, 1.0), "triangular")

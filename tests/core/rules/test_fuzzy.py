@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from nested_agents.core.interface.spaces import Variable
 from nested_agents.core.rules import kernels
-from nested_agents.core.rules.fuzzy import Partition
+from nested_agents.core.rules.kernels.fuzzy import Partition
 
 SHAPES = ("triangular", "sigmoid")
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from nested_agents.core.interface.protocols import Blocks
 from nested_agents.core.rules import kernels, reference
-from nested_agents.core.rules.fuzzy import Partition
+from nested_agents.core.rules.kernels.fuzzy import Partition
 from nested_agents.core.rules.rule_base import RuleBase
 
 N_ACTIONS, N_AGENTS, GROUP = 4, 4, 2

@@ -9,7 +9,7 @@ import pytest
 
 from nested_agents.core.interface.protocols import Blocks
 from nested_agents.core.interface.spaces import StateSpace, Variable
-from nested_agents.core.rules.fuzzy import Partition
+from nested_agents.core.rules.kernels.fuzzy import Partition
 from nested_agents.core.rules.rule_base import RuleBase
 from nested_agents.core.rules.settings import RuleBaseSettings
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from nested_agents.core.interface.spaces import Variable
-from nested_agents.core.rules.fuzzy import Partition
+from nested_agents.core.rules.kernels.fuzzy import Partition
 from nested_agents.core.rules.rule_base import RuleBase
 from nested_agents.studies.explain import rules as explain_rules
 from nested_agents.studies.explain.rules import labels, strongest_pairs, take_apart

@@ -7,13 +7,13 @@ import pytest
 
 from nested_agents.core.numerics.arrays import FloatArray
 from nested_agents.scenarios.box_pushing.config import CONTROL_PERIOD
-from nested_agents.scenarios.box_pushing.starts import place
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES, box_for
 from nested_agents.scenarios.box_pushing.world.robots import (
     ROBOTS,
     compliance,
     nominal_effect,
 )
+from nested_agents.scenarios.box_pushing.world.starts import place
 from nested_agents.scenarios.box_pushing.world.world import World
 
 E_PUCK = ROBOTS["e-puck"]

@@ -20,8 +20,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.numerics.arrays import BoolArray, FloatArray
-from .config import RewardSettings
+from ....core.numerics.arrays import BoolArray, FloatArray
+from ..config import RewardSettings
 
 
 class Task(NamedTuple):

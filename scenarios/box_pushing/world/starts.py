@@ -14,10 +14,10 @@ from math import cos, pi, radians, sin
 
 import numpy as np
 
-from ...core.numerics.arrays import FloatArray
-from .world.boxes import BoxSpec
-from .world.geometry import surface
-from .world.robots import RobotSpec
+from ....core.numerics.arrays import FloatArray
+from .boxes import BoxSpec
+from .geometry import surface
+from .robots import RobotSpec
 
 GOAL = (1.0, 0.0, 0.0)
 """Goal pose of the box [m, m, rad]."""

@@ -22,8 +22,8 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from ..interface.spaces import Variable
-from ..numerics.arrays import FloatArray
+from ...interface.spaces import Variable
+from ...numerics.arrays import FloatArray
 
 Membership = Literal["triangular", "sigmoid"]
 
