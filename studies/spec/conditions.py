@@ -29,7 +29,6 @@ from .labels import label, scalar
 from .overlay import TomlTable, nested, overlay
 from .presets import PRESETS
 from .refused import explain
-from .renamed import now_called
 
 SECTIONS = ("scenario", "topology", "learner")
 
@@ -185,8 +184,7 @@ def resolve(
     own = override.preset if override else None
     name = point.get("preset", preset if own is None else own)
     if not isinstance(name, str) or name not in PRESETS:
-        said = now_called("preset", name) or closest(name, PRESETS)
-        raise SpecError(f"preset = {show(name)}: {said}{where}")
+        raise SpecError(f"preset = {show(name)}: {closest(name, PRESETS)}{where}")
     own_layers = [tables, override.tables if override else {}]
     own_layers += [nested(key, value) for key, value in point.items() if key != "preset"]
     table = _laid([PRESETS[name].table, *own_layers])

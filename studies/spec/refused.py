@@ -14,7 +14,6 @@ from pydantic import BaseModel, ValidationError
 from ...core.plugins.messages import closest, dotted, mistaken, near, place, rule
 from .errors import show
 from .overlay import Slot, field_of, kind_of, model_at, models_of, registry_of
-from .renamed import now_called
 
 
 def explain(
@@ -45,9 +44,6 @@ def explain(
     if first["type"] == "extra_forbidden":
         owner = _owner(keys[:-1], model, data)
         kind = f" for kind {kind_of(owner)!r}" if owner is not None and kind_of(owner) else ""
-        renamed = now_called(path)
-        if renamed is not None:
-            return f"{path} = {show(first['input'])}: {renamed}"
         known = set() if owner is None else set(owner.model_fields)
         misspelt = near(keys[-1], known, cutoff=0.85)
         hint = misspelt or misplaced(path, below or model) or closest(keys[-1], known)
@@ -59,8 +55,7 @@ def explain(
     if first["type"] == "plugged_kind":
         if isinstance(value, Mapping):
             path, value = f"{path}.kind", value.get("kind")
-        renamed = now_called(path, value)
-        return f"{path} = {show(value)}: {renamed or first['msg']}"
+        return f"{path} = {show(value)}: {first['msg']}"
     if first["type"].startswith("union_tag"):
         path, value = f"{path}.kind", value.get("kind") if isinstance(value, Mapping) else value
         slot = _slot(keys, model, data)
@@ -68,10 +63,9 @@ def explain(
         return f"{path} = {show(value)}: {closest(value, [k for k in kinds if k])}"
     # The members of a union complain one by one about the same place: say what any would take.
     rules = dict.fromkeys(rule(e["msg"]) for there, e in found if there == keys)
-    renamed = now_called(path, value)
     owner = _owner(keys[:-1], model, data) if keys else None
     other = mistaken(keys[-1], owner.model_fields) if owner is not None else ""
-    return f"{path} = {show(value)}: {renamed or ', or '.join(rules) + other}"
+    return f"{path} = {show(value)}: {', or '.join(rules)}{other}"
 
 
 def misplaced(path: str, model: type[BaseModel]) -> str:
