@@ -168,7 +168,7 @@ def _choose(values, exploring, clock, rng) -> int:  # type: ignore[no-untyped-de
 
 @njit(cache=True)
 def _greatest(values, rng) -> int:  # type: ignore[no-untyped-def]
-    """Return the greatest value's place, see `nested_agents.core.decision.exploration.greatest`."""
+    """Return the greatest value's place, see `nested_agents.core.numerics.ties.greatest`."""
     top = values.max()
     best = np.flatnonzero(values >= top - 1e-12 * max(1.0, abs(top)))
     return best[0] if len(best) == 1 else best[rng.integers(0, len(best))]
