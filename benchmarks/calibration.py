@@ -16,7 +16,8 @@ from nested_agents.core.adaptation.self_model import SelfModelSettings
 from nested_agents.core.agents.loop import policy_seed, world_seed
 from nested_agents.core.agents.team import Team
 from nested_agents.core.learners.batch import BatchTDSettings
-from nested_agents.scenarios import BoxPushing, BoxPushingSettings
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
+from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.topologies import build, parse
 
 BELIEFS = {

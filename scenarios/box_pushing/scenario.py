@@ -17,10 +17,11 @@ import numpy as np
 from ...core.interface.protocols import SUCCESS, Measure, Transition
 from ...core.interface.spaces import ActionSet, StateSpace
 from ...core.numerics.arrays import BoolArray, FloatArray, IntArray
-from .config import CONTROL_PERIOD, BeliefSettings, BoxPushingSettings
+from .config import BoxPushingSettings
 from .prediction.belief import APART, CONSTANTS, PushBelief, least_gap
 from .prediction.prediction import BoxPrediction, mean_twists
 from .prediction.predictors import ExactPrediction, Future, push_model
+from .prediction.settings import BeliefSettings
 from .prediction.situation import Premises, Situation
 from .states.state_spaces import state_space_for
 from .states.view import View
@@ -29,6 +30,7 @@ from .world.failures import WheelFailures
 from .world.infrared import InfraredSpec, strongest_reading
 from .world.reward import Task, reward
 from .world.robots import nominal_effect, robot_for
+from .world.settings import CONTROL_PERIOD
 from .world.starts import place
 from .world.world import World, WorldState
 

@@ -11,7 +11,7 @@ from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.settings import Decision
 from nested_agents.core.interface.protocols import CalibratedScenario
 from nested_agents.core.learners.batch import BatchTDSettings
-from nested_agents.scenarios import BoxPushing, BoxPushingSettings
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.prediction.belief import (
     CONSTANTS,
     believing,
@@ -20,6 +20,7 @@ from nested_agents.scenarios.box_pushing.prediction.belief import (
 )
 from nested_agents.scenarios.box_pushing.prediction.prediction import mean_twists
 from nested_agents.scenarios.box_pushing.prediction.push import push
+from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.scripted.controller import ScriptedController
 from nested_agents.topologies import parse
 
