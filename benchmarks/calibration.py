@@ -56,8 +56,9 @@ def calibrated(robot: str, believed: str, episodes: int) -> tuple[Any, Any]:
             predicted = prediction.outcomes(joint, tried)  # type: ignore[attr-defined]
             transition = scenario.step(joint)
             team.adapt(prediction, joint, transition)
-            if transition.pushed is not None and np.hypot(*transition.pushed[:2]) > 0.002:
-                off = np.hypot(*(predicted[:, 0] - transition.pushed)[:, :2].T)
+            box, *bodies = transition.twists
+            if len(bodies) == len(scenario.groups) and np.hypot(*box[:2]) > 0.002:
+                off = np.hypot(*(predicted[:, 0] - box)[:, :2].T)
                 errors.append(1000 * off * scenario.settings.action_repeat * 0.064)
                 found.append(np.exp(team.calibration.constants - right))
             prediction = team.predict(scenario)

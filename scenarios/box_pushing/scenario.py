@@ -209,10 +209,10 @@ class BoxPushing:
         moved = perf_counter()
         states = self._observe(box)
         period = self.settings.period
-        motions = mean_twists(poses, self.world.robot_poses, period)
-        pushed = None
+        twists = mean_twists(poses, self.world.robot_poses, period)
         if min(least_gap(poses, radius), least_gap(self.world.robot_poses, radius)) > APART:
-            pushed = mean_twists(box[None], self.world.box_pose[None], period)[0]
+            of_box = mean_twists(box[None], self.world.box_pose[None], period)
+            twists = np.concatenate([of_box, twists])
         measured = self.measure()
         readings = strongest_reading(self.world, self._sensing)
         terminated = self._reached()
@@ -235,7 +235,7 @@ class BoxPushing:
         measured["seconds"] = {"physics": moved - begin, "sensors": sensed - moved}
         farthest = self._unit * self.settings.termination_radius
         truncated = not terminated and measured["distance_m"] > farthest
-        return Transition(states, paid, terminated, truncated, measured, motions, pushed)
+        return Transition(states, paid, terminated, truncated, measured, twists)
 
     @property
     def nominal_effects(self) -> tuple[FloatArray, ...]:
