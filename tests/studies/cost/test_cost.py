@@ -113,7 +113,7 @@ def test_numbers() -> None:
         (("--topology", "ring"), "topology 'ring': known: chain,"),
         (("--topology",), "'--topology' requires an argument"),
         (("--topology", "--format", "csv"), "--topology --format: is an option"),
-        (("--topology", "per-robot"), "what whole robots try is in: nested-agents topology show"),
+        (("--topology", "per-robot"), "agents = 'body', topology = 'chain'"),
         (("--format", "xml"), "--format xml: known: csv, json, latex, table"),
         (("--plot", "cost.txt"), "cost.txt: suffix must be"),
     ],
