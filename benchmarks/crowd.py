@@ -15,7 +15,7 @@ from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.settings import Decision
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.learners.td import TDLambdaSettings
-from nested_agents.scenarios import BoxPushingSettings
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.pictures.rendering import snapshot
 from nested_agents.studies.trials.episodes import EpisodeRecorder, Stopwatch
 

@@ -37,7 +37,7 @@ from nested_agents.core.evaluators.sampling import Sampling, SamplingSettings
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.numerics.arrays import FloatArray
-from nested_agents.scenarios import BoxPushingSettings
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 
 from .situations import ADDITIVE, situation
 from .timing import paired
