@@ -122,6 +122,16 @@ def imports_between(sources: dict[str, tuple[str, bool]]) -> nx.DiGraph:
     return graph
 
 
+def folders_of(graph: nx.DiGraph, packages: set[str]) -> nx.DiGraph:
+    """Which folder imports which; a package's own module counts as its folder."""
+    folders = nx.DiGraph()
+    for edge in graph.edges:
+        place, target = (m if m in packages else m.rpartition(".")[0] for m in edge)
+        if place != target:
+            folders.add_edge(place, target)
+    return folders
+
+
 def circles(graph: nx.DiGraph) -> list[str]:
     """The circles of imports, each as one line."""
     return [
@@ -158,6 +168,35 @@ def graph() -> nx.DiGraph:
 def test_no_files_import_each_other_in_a_circle(graph: nx.DiGraph) -> None:
     assert graph.number_of_edges() > 100
     assert circles(graph) == []
+
+
+def test_no_folders_import_each_other_in_a_circle(graph: nx.DiGraph) -> None:
+    folders = folders_of(
+        graph,
+        {
+            module
+            for package in ALLOWED
+            for path, module in modules_of(package)
+            if path.name == "__init__.py"
+        },
+    )
+    assert folders.number_of_edges() > 50
+    assert circles(folders) == []
+
+
+def test_a_circle_of_folders_is_named() -> None:
+    roof_and_ground = {
+        "nested_agents.core": ("from .rules import base", True),
+        "nested_agents.core.rules": ("", True),
+        "nested_agents.core.rules.base": ("def f():\n    from ..spaces import S", False),
+        "nested_agents.core.spaces": ("", False),
+    }
+    graph = imports_between(roof_and_ground)
+    packages = {module for module, (_, is_package) in roof_and_ground.items() if is_package}
+    assert circles(graph) == []
+    assert circles(folders_of(graph, packages)) == [
+        "nested_agents.core <-> nested_agents.core.rules"
+    ]
 
 
 def test_imports_inside_studies_point_one_way(graph: nx.DiGraph) -> None:

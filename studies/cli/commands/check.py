@@ -8,18 +8,17 @@ from typing import Any
 
 import click
 
-from ..arguments import Command, Text, Whole
-from . import options
+from .. import options
 
 Case = tuple[str, Callable[[], Any], list[int]]
 """What a scenario is called, a function that makes it, and the episodes to play."""
 
 
-@click.command(cls=Command)
-@click.argument("source", type=Text(), metavar="SPEC.toml|FILE.py:NAME")
+@click.command()
+@click.argument("source", type=options.text, metavar="SPEC.toml|FILE.py:NAME")
 @click.option(
     "--steps",
-    type=Whole(),
+    type=int,
     metavar="N",
     default=40,
     help="Most steps of the episodes that are played for it.",

@@ -7,18 +7,17 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..arguments import Choice, Command, File
-from . import options
+from .. import options
 
 if TYPE_CHECKING:
     from ...claims.table import Format
     from ...results.published import Published
 
 
-@click.command(cls=Command)
+@click.command()
 @click.option(
     "--out",
-    type=File(),
+    type=options.path,
     metavar="DIR",
     help="Run the studies that the claims rest on, each in a directory of its own below this one; "
     "what has been run before is read.",
@@ -32,13 +31,13 @@ if TYPE_CHECKING:
 @click.option(
     "--format",
     "form",
-    type=Choice(["table", "json", "markdown", "latex"]),
+    type=click.Choice(["table", "json", "markdown", "latex"]),
     default="table",
     help="How to print the table.",
 )
 @click.option(
     "--publish",
-    type=File(),
+    type=options.path,
     metavar="DIR",
     help="Also write the results that it rests on, as one small JSON file a study.",
 )

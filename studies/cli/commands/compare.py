@@ -6,32 +6,34 @@ from pathlib import Path
 
 import click
 
-from ..arguments import Command, File, Text
-from . import options
+from .. import options
 
 
-@click.command(cls=Command)
-@click.argument("sources", type=File(), metavar="DIR...|FILE.json", nargs=-1, required=True)
+@click.command()
+@click.argument("sources", type=options.path, metavar="DIR...|FILE.json", nargs=-1, required=True)
 @click.option(
     "--by",
-    type=Text(),
+    type=options.text,
     metavar="KEY",
     help="Compare conditions that differ in this swept key alone, as robots or topology; "
     "directory compares studies. All conditions with the first unless said otherwise.",
 )
 @click.option(
     "--measure",
-    type=Text(),
+    type=options.text,
     metavar="NAME",
     default="success",
     help="A measure of episodes, steps, return, or a number of whole trials.",
 )
 @click.option(
-    "--phase", type=Text(), metavar="PHASE", help="Of the episodes; evaluation, if there is one."
+    "--phase",
+    type=options.text,
+    metavar="PHASE",
+    help="Of the episodes; evaluation, if there is one.",
 )
 @click.option(
     "--reference",
-    type=Text(),
+    type=options.text,
     metavar="LABEL",
     help="What the others are compared with; the first unless said otherwise.",
 )

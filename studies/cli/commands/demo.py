@@ -6,14 +6,13 @@ from pathlib import Path
 
 import click
 
-from ..arguments import Command, File
-from . import options
+from .. import options
 
 
-@click.command(cls=Command)
+@click.command()
 @click.option(
     "--out",
-    type=File(),
+    type=options.path,
     metavar="DIR",
     default="nested-agents-demo",
     help="Where to keep the study; made if it does not exist. The same command again continues it.",

@@ -6,20 +6,19 @@ from pathlib import Path
 
 import click
 
-from ..arguments import Command, Text, Whole
-from . import options
+from .. import options
 
 
-@click.command(cls=Command)
+@click.command()
 @options.directory
 @click.option(
     "--condition",
-    type=Text(),
+    type=options.text,
     metavar="LABEL",
     help="Label of the condition; the first one unless said otherwise.",
 )
 @click.option(
-    "--seed", type=Whole(), metavar="SEED", help="The seed; the first one unless said otherwise."
+    "--seed", type=int, metavar="SEED", help="The seed; the first one unless said otherwise."
 )
 @options.trust
 def command(directory: Path, condition: str | None, seed: int | None, trust: bool) -> int:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import click
 
-from ..arguments import Command, Text
+from .. import options
 
 
-@click.command(cls=Command)
-@click.argument("prefix", type=Text(), metavar="[PREFIX]", required=False)
+@click.command()
+@click.argument("prefix", type=options.text, metavar="[PREFIX]", required=False)
 def command(prefix: str | None) -> int:
     """List the keys of a spec: default, type, what is allowed, meaning.
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import click
 
-from ..arguments import Command, Text
+from .. import options
 
 
-@click.command(cls=Command)
-@click.argument("name", type=Text(), metavar="[NAME]", required=False)
+@click.command()
+@click.argument("name", type=options.text, metavar="[NAME]", required=False)
 def command(name: str | None) -> int:
     """List the presets, or print one in full.
 

@@ -6,15 +6,14 @@ from pathlib import Path
 
 import click
 
-from ..arguments import Command, File
-from . import options
+from .. import options
 
 
-@click.command(cls=Command)
+@click.command()
 @options.directory
 @click.option(
     "--out",
-    type=File(),
+    type=options.path,
     metavar="FILE.html",
     help="Where to write; report.html in the study's directory unless said otherwise.",
 )

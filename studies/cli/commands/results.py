@@ -7,25 +7,24 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..arguments import Choice, Command, Text
-from . import options
+from .. import options
 
 if TYPE_CHECKING:
     from ...presentation.row_formats import Format
 
 
-@click.command(cls=Command)
+@click.command()
 @options.directory
 @click.option(
     "--format",
     "form",
-    type=Choice(["table", "csv", "json"]),
+    type=click.Choice(["table", "csv", "json"]),
     default="table",
     help="How to print the rows; CSV and JSON hold every digit, and a column for every swept key.",
 )
 @click.option(
     "--phase",
-    type=Text(),
+    type=options.text,
     metavar="PHASE",
     default="training",
     help="The episodes of training, those of the greedy evaluation after it (evaluation), of a "

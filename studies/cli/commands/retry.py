@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..arguments import Command
-from . import options
+from .. import options
 
 if TYPE_CHECKING:
     from ...workers.workers import Backend
 
 
-@click.command(cls=Command)
+@click.command()
 @options.directory
 @options.jobs
 @options.backend

@@ -7,18 +7,17 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..arguments import Command, File, Several, Text
-from . import options
+from .. import options
 
 if TYPE_CHECKING:
     from ...workers.workers import Backend
 
 
-@click.command(cls=Command)
-@click.argument("spec", type=File(), metavar="SPEC.toml")
+@click.command()
+@click.argument("spec", type=options.path, metavar="SPEC.toml")
 @click.option(
     "--out",
-    type=File(),
+    type=options.path,
     metavar="DIR",
     required=True,
     help="Where to keep the study; made if it does not exist. Every trial is kept the moment it "
@@ -33,8 +32,8 @@ if TYPE_CHECKING:
 @click.option(
     "--log",
     "loggers",
-    cls=Several,
-    type=Text(),
+    multiple=True,
+    type=options.text,
     metavar="file.py:NAME...",
     help="Tell this logger of every finished trial, as for TensorBoard or MLflow.",
 )

@@ -6,11 +6,10 @@ from pathlib import Path
 
 import click
 
-from ..arguments import Command
-from . import options
+from .. import options
 
 
-@click.command(cls=Command)
+@click.command()
 @options.directory
 def command(directory: Path) -> int:
     """Tell how many trials are done, running, failed (with the reason) and left, and for how long.

@@ -6,18 +6,17 @@ from pathlib import Path
 
 import click
 
-from ..arguments import Command, File, Several, Text
-from . import options
+from .. import options
 
 
-@click.command(cls=Command)
-@click.argument("sources", type=File(), metavar="DIR...|FILE.json", nargs=-1, required=True)
+@click.command()
+@click.argument("sources", type=options.path, metavar="DIR...|FILE.json", nargs=-1, required=True)
 @options.as_study
 @options.where
 @click.option(
     "--columns",
-    cls=Several,
-    type=Text(),
+    multiple=True,
+    type=options.text,
     metavar="TITLE...",
     help="Headings of the columns to print, in this order; all unless said otherwise.",
 )

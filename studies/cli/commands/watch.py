@@ -6,16 +6,15 @@ from pathlib import Path
 
 import click
 
-from ..arguments import Command, Number
-from . import options
+from .. import options
 
 LEAST_SECONDS = 0.2
 
 
-@click.command(cls=Command)
+@click.command()
 @options.directory
 @click.option(
-    "--every", type=Number(), metavar="SECONDS", default=2.0, help="How often to look again."
+    "--every", type=float, metavar="SECONDS", default=2.0, help="How often to look again."
 )
 @click.option("--once", is_flag=True, help="Show what there is now, and stop.")
 def command(directory: Path, every: float, once: bool) -> int:

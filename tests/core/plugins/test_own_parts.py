@@ -170,13 +170,6 @@ def test_rewards_without_tables_decide_too(rule: str, line_world) -> None:
     assert chosen[0] == chosen[1]
 
 
-@pytest.mark.parametrize("name", ["moments", "extremes"])
-def test_additive_evaluators_do_not_fit_it(name: str, line_world) -> None:
-    table = {"decision": {"evaluator": name, "teammates": "uniform"}}
-    with pytest.raises(ValueError, match="the scenario predicts no sums, use exact or sampling"):
-        team_of(BatchTDSettings.model_validate(table), FewMembers(line_world(2, 1)))
-
-
 def test_settings_are_read_without_numba_and_scipy() -> None:
     models = [(r, name) for r in (LEARNERS, EVALUATORS, EXPLORATIONS) for name in r.built_in]
     assert len(models) >= 12

@@ -15,8 +15,9 @@ from nested_agents import View, state_variable
 from nested_agents.core.agents.joint_agents import join_agents
 from nested_agents.core.interface.protocols import SUCCESS, Blocks, Measure, Scenario, Transition
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
-from nested_agents.scenarios import BoxPushing, BoxPushingSettings
-from nested_agents.scenarios.box_pushing.config import (
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
+from nested_agents.scenarios.box_pushing.scenario import BoxPushing
+from nested_agents.scenarios.box_pushing.world.settings import (
     DelayedSettings,
     NoisySettings,
     SeizedSettings,

@@ -7,7 +7,7 @@ import made_up
 import numpy as np
 import pytest
 
-from nested_agents.scenarios.box_pushing.config import BoxSettings, label
+from nested_agents.scenarios.box_pushing.world.settings import BoxSettings, label
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.trial import trials_of

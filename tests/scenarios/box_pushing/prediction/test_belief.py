@@ -11,7 +11,7 @@ from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.settings import Decision
 from nested_agents.core.interface.protocols import CalibratedScenario
 from nested_agents.core.learners.batch import BatchTDSettings
-from nested_agents.scenarios import BoxPushing, BoxPushingSettings
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.prediction.belief import (
     CONSTANTS,
     believing,
@@ -20,6 +20,7 @@ from nested_agents.scenarios.box_pushing.prediction.belief import (
 )
 from nested_agents.scenarios.box_pushing.prediction.prediction import mean_twists
 from nested_agents.scenarios.box_pushing.prediction.push import push
+from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.scripted.controller import ScriptedController
 from nested_agents.topologies import build
 
@@ -121,14 +122,14 @@ def test_wrong_constants_are_found_out_by_pushing(believed):
     assert box[:2].max() < 0.005
 
 
-def test_what_was_pushed_is_not_told_when_robots_touch():
+def test_the_twist_of_the_box_is_not_measured_when_robots_touch():
     world = scenario(start="easy")
     world.reset(0)
-    assert world.step(np.zeros(4, dtype=int)).pushed.shape == (3,)
+    assert world.step(np.zeros(4, dtype=int)).twists.shape == (3, 3)
     robots = world.world.robot_poses.copy()
     robots[1, :2] = robots[0, :2] + [0.0, 0.075]
     world.world.place(robots, world.world.box_pose.copy())
-    assert world.step(np.zeros(4, dtype=int)).pushed is None
+    assert world.step(np.zeros(4, dtype=int)).twists.shape == (2, 3)
 
 
 def test_a_team_of_robots_calibrates_too_and_is_saved_whole(tmp_path):

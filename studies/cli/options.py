@@ -1,17 +1,69 @@
-"""Arguments and options that several commands share."""
+"""Arguments and options that several commands share, and how texts and paths are read.
+
+An option that may be given several times takes several values at once, too: `with_every_name`.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
 import click
 
-from ..arguments import Assignments, Choice, File, Several, Text, Whole
 
-directory = click.argument("directory", type=File(), metavar="DIR")
+def text(value: str) -> str:
+    """Return an argument as it is, unless it is empty or an option whose own value is missing.
+
+    An unset shell variable gives an empty one.
+    """
+    if not value:
+        raise click.BadParameter("must not be empty")
+    if value.startswith("--"):
+        raise click.BadParameter(f"{value!r} is an option; a value must come first")
+    return value
+
+
+def path(value: str) -> Path:
+    """Return the path that an argument names, which need not exist."""
+    return Path(text(value))
+
+
+def with_every_name(command: click.Command, arguments: Iterable[str]) -> Iterator[str]:
+    """Yield arguments in which each further value of an option has the option's name before it.
+
+    Values go on up to the next option; those of ``KEY=VALUE`` up to an argument without ``=``.
+
+    Examples
+    --------
+    >>> command = click.Command("run", params=[click.Option(["--log"], multiple=True)])
+    >>> list(with_every_name(command, ["--log", "a", "b", "--jobs", "3"]))
+    ['--log', 'a', '--log', 'b', '--jobs', '3']
+    """
+    is_assignment = {
+        name: "=" in str(option.metavar)
+        for option in command.params
+        if isinstance(option, click.Option) and option.multiple
+        for name in option.opts
+    }
+    name, is_first = "", False
+    for argument in arguments:
+        if argument in is_assignment:
+            name, is_first = argument, True
+        elif is_first:
+            is_first = False
+        elif name and argument[:1] != "-" and ("=" in argument or not is_assignment[name]):
+            yield name
+        else:
+            name = ""
+        yield argument
+
+
+directory = click.argument("directory", type=path, metavar="DIR")
 """An existing study."""
 
 jobs = click.option(
     "--jobs",
-    type=Whole(),
+    type=int,
     metavar="N",
     help="Trials at a time; one for every core unless said otherwise.",
 )
@@ -19,7 +71,7 @@ jobs = click.option(
 
 backend = click.option(
     "--backend",
-    type=Choice(["loky", "dask"]),
+    type=click.Choice(["loky", "dask"]),
     default="loky",
     help="Who runs the trials: loky, processes of this machine, or dask, workers of a Dask cluster "
     "(extra nested-agents[dask]). The results are the same.",
@@ -28,7 +80,7 @@ backend = click.option(
 
 address = click.option(
     "--address",
-    type=Text(),
+    type=text,
     metavar="tcp://HOST:PORT",
     help="Of the scheduler of a running Dask cluster, all of whose workers are used unless --jobs "
     "says otherwise. If missing, a cluster is started here.",
@@ -53,8 +105,8 @@ trust = click.option(
 changes = click.option(
     "--set",
     "changes",
-    cls=Assignments,
-    type=Text(),
+    multiple=True,
+    type=text,
     metavar="KEY=VALUE...",
     help='Lay values over the spec: --set learner.ridge=1 "seeds=[3, 5]". May be repeated.',
 )
@@ -62,8 +114,8 @@ changes = click.option(
 
 figures = click.option(
     "--figures",
-    cls=Several,
-    type=Choice(["png", "svg", "pdf"]),
+    multiple=True,
+    type=click.Choice(["png", "svg", "pdf"]),
     metavar="png|svg|pdf...",
     default=("png", "svg"),
     help="Formats of the figures.",
@@ -71,14 +123,14 @@ figures = click.option(
 """What figures of a study are written as."""
 
 plot = click.option(
-    "--plot", type=File(), metavar="PATH", help="A figure to write: SVG, PNG or PDF by suffix."
+    "--plot", type=path, metavar="PATH", help="A figure to write: SVG, PNG or PDF by suffix."
 )
 """A picture to write."""
 
 as_study = click.option(
     "--as",
     "study",
-    type=Text(),
+    type=text,
     metavar="STUDY",
     help="Analyse the trials as this study does, by its name or file.py:NAME; nothing is run.",
 )
@@ -86,7 +138,7 @@ as_study = click.option(
 
 where = click.option(
     "--where",
-    type=Text(),
+    type=text,
     metavar="CHOICE",
     help='Only the trials of a choice: "robots == 8 and seed < 5", "box in [square, circle]".',
 )
@@ -95,7 +147,7 @@ where = click.option(
 form = click.option(
     "--format",
     "form",
-    type=Choice(["table", "markdown", "latex", "csv"]),
+    type=click.Choice(["table", "markdown", "latex", "csv"]),
     default="table",
     help="How to print the table; CSV holds every digit, LaTeX needs the package booktabs.",
 )
