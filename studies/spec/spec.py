@@ -23,9 +23,9 @@ from ...core.agents.joint_agents import Agents
 from ...core.plugins.messages import closest
 from ...core.plugins.settings import Settings, tuples
 from ...core.plugins.sources import Sources, is_reference, named
+from ..errors import SpecError, show
 from .conditions import SECTIONS, Condition, ConditionSettings, Override, grid, layer_of, section
 from .curriculum import Curriculum, Length, Name
-from .errors import SpecError, show
 from .objects import plain
 from .overlay import TomlTable, assignment, flat, overlay
 from .presets import PRESETS

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from nested_agents.studies.spec.errors import SpecError
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.presets import PRESETS
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.spec.toml import dumps
