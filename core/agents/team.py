@@ -145,7 +145,6 @@ class Team:
                 hierarchy,
                 len(scenario.action_set),
                 groups_of(scenario),
-                getattr(scenario, "superposes", False),
                 decision.rule,
                 decision.teammates,
                 settings.discount,

@@ -88,9 +88,6 @@ class Prediction(Protocol):
     ``reward_table()``
         Rewards ``(A ** n,)`` of all joint actions by index, as `rewards` gives them. The evaluator
         ``exact`` needs it besides ``blocks``, except to decide by the deciding agent's value alone.
-    ``superposition``
-        The prediction to first order, for scenarios that say ``superposes``: groups move what they
-        share by contributions that add up. `nested_agents.core.evaluators.additive` describes it.
     """
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
@@ -234,9 +231,8 @@ class Scenario(Protocol):
     """A world with a task. Everything a learner may know of it.
 
     What else it may have is asked for by `groups_of`, `roles_of` and `measures_of`, which know what
-    holds without; and by the protocols below, its *capabilities*. Two more are asked for by name:
-    ``measure()``, see `RecordedScenario`, and ``superposes``, whether its predictions can be had to
-    first order with the present settings, see `Prediction`.
+    holds without; and by the protocols below, its *capabilities*. One more is asked for by
+    name: ``measure()``, see `RecordedScenario`.
     """
 
     @property

@@ -136,11 +136,6 @@ class BoxPushing:
         self._saved: WorldState | None = None
 
     @property
-    def superposes(self) -> bool:
-        """Whether predictions can be had to first order: all but exact ones."""
-        return self.settings.predictor != "exact"
-
-    @property
     def state_space(self) -> StateSpace:
         """The state variables of every agent."""
         return self._space.space

@@ -86,11 +86,6 @@ class KinematicChain:
         self._step = 0
 
     @property
-    def superposes(self) -> bool:
-        """Whether predictions can be had to first order: always."""
-        return True
-
-    @property
     def state_space(self) -> StateSpace:
         """The state variables of every agent."""
         return self._states.space

@@ -17,9 +17,8 @@ from typing import Any
 from ...core.plugins.places import located
 from ...scenarios import SCENARIOS
 from ..spec.errors import SpecError
-from ..store.durable import NotRecordedError
+from ..store.durable import NotRecordedError, Recording
 from ..store.store import Planned, Store
-from ..trials.episodes import Recording
 from .films import Film, films
 from .words import runs
 
@@ -88,7 +87,7 @@ def replays(store: Store, trials: Iterable[Planned], most_bytes: int = MOST_BYTE
             miss(trial, "Left out to keep the page small")
             continue
         try:
-            kept = {k: store.recording(trial, name) for k, name in trial.recorded.items()}
+            kept = {k: store.recording(trial.identity, name) for k, name in trial.recorded.items()}
         except NotRecordedError:
             miss(trial, "Not shown, as the scenario records no episodes")
             continue

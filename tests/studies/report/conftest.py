@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.trial import trials_of
+from nested_agents.studies.workers.runner import save
 
 STEPS = 30
 SPEC = Spec.of({"seeds": 3, "episodes": 4, "steps": 5, "evaluation": 2,
@@ -28,13 +28,13 @@ def keep(
     failed: int = 0,
 ) -> Path:
     """Keep a study of which some trials are done, and some of the next ones failed."""
-    with Store.create(directory, spec, made_up.MEASURES) as store:
+    with made_up.opened(directory, spec) as store:
         for i, trial in enumerate(trials_of(spec)):
             if i < done:
                 result = made_up.measure(trial)
                 kept = dict.fromkeys(trial.recorded.values(), recording(STEPS + i))
                 result = replace(result, recordings=kept)
-                store.save(trial, result, 1.0)
+                save(store, trial, result, 1.0)
             elif i < done + failed:
                 store.fail(trial, ERROR)
     return directory
