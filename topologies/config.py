@@ -15,7 +15,7 @@ from typing_extensions import TypeAliasType
 
 from ..core.agents.joint_agents import per_robot, single_agent
 from ..core.interface.hierarchy import Hierarchy
-from ..core.interface.protocols import Scenario, groups_of
+from ..core.interface.scenario import Scenario, groups_of
 from ..core.plugins import sources
 from ..core.plugins.deferred import Deferred
 from ..core.plugins.messages import closest

@@ -21,18 +21,14 @@ from typing import Any, cast
 
 import numpy as np
 
-from ..interface.protocols import (
-    Blocks,
-    CalibratedScenario,
-    EmbodiedPrediction,
+from ..interface.measures import measures_of
+from ..interface.prediction import Blocks, Prediction
+from ..interface.scenario import (
     EmbodiedScenario,
-    Prediction,
-    RewardPrediction,
     Scenario,
     Transition,
     groups_of,
     joint_reward,
-    measures_of,
     roles_of,
 )
 from ..interface.spaces import ActionSet, StateSpace, Variable
@@ -140,22 +136,19 @@ class EmbodiedJointAgents(JointAgents):
     @property
     def constants(self) -> tuple[str, ...]:
         """Names of the constants that can be calibrated, if any."""
-        return self.scenario.constants if isinstance(self.scenario, CalibratedScenario) else ()
+        return getattr(self.scenario, "constants", ())
 
     @property
     def levers(self) -> FloatArray:
         """Speed per turning rate of what is pushed and of the bodies."""
-        return cast(CalibratedScenario, self.scenario).levers
+        return cast(Any, self.scenario).levers
 
     def predict_with(
         self, effects: Sequence[FloatArray], constants: FloatArray | None = None
     ) -> JointPrediction:
         """Predict from the present state, believing in these effects and constants."""
-        if constants is None:
-            prediction = cast(EmbodiedScenario, self.scenario).predict_with(effects)
-        else:
-            prediction = cast(CalibratedScenario, self.scenario).predict_with(effects, constants)
-        return self.prediction_of(prediction)
+        given = () if constants is None else (constants,)
+        return self.prediction_of(cast(Any, self.scenario).predict_with(effects, *given))
 
 
 class JointPrediction:
@@ -181,17 +174,17 @@ class JointPrediction:
     @property
     def groups(self) -> tuple[tuple[int, ...], ...]:
         """Wheels by body."""
-        return cast(EmbodiedPrediction, self._prediction).groups
+        return cast(Any, self._prediction).groups
 
     def commands(self, joint_action: IntArray) -> FloatArray:
         """Return the wheel speeds that a joint action ``(M,)`` would command."""
         actions = self._joint.actions(joint_action)
-        return cast(EmbodiedPrediction, self._prediction).commands(actions)
+        return cast(Any, self._prediction).commands(actions)
 
     def slips(self, joint_action: IntArray) -> FloatArray:
         """Return by how much contact is predicted to change the bodies' twists, ``(M, 3)``."""
         actions = self._joint.actions(joint_action)
-        return cast(EmbodiedPrediction, self._prediction).slips(actions)
+        return cast(Any, self._prediction).slips(actions)
 
     def outcomes(self, joint_action: IntArray, constants: FloatArray) -> FloatArray:
         """Return what a joint action ``(M,)`` would lead to under constants ``(k, n)``."""
@@ -205,7 +198,7 @@ class RewardedJointPrediction(JointPrediction):
     def rewards(self, joint_actions: IntArray) -> FloatArray:
         """Return the predicted rewards ``(m,)`` of joint actions ``(m, M)``."""
         actions = self._joint.actions(joint_actions)
-        return cast(RewardPrediction, self._prediction).rewards(actions)
+        return cast(Any, self._prediction).rewards(actions)
 
 
 class BlocksJointPrediction(JointPrediction):

@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self, TypeVar
 
-from ...core.interface.protocols import Measure
+from ...core.interface.measures import Measure
 from ...core.plugins.sources import Sources
 from ..spec.errors import SpecError
 from ..spec.outline import Outline

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...core.interface.protocols import Measure
+from ...core.interface.measures import Measure
 from ...core.plugins.sources import Sources, named
 from ..spec.difference import difference
 from ..spec.errors import SpecError

@@ -15,7 +15,7 @@ from itertools import groupby
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
-from ...core.interface.protocols import Measure
+from ...core.interface.measures import Measure
 from ..trials.code import RESULTS_VERSION, Code
 from ..trials.episodes import STAGE
 from ..trials.measures import columns, tables

@@ -21,7 +21,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
-from ...core.interface.protocols import Measure
+from ...core.interface.measures import Measure
 from ...core.plugins.sources import FOLDER, kept_name
 from ..spec.errors import SpecError
 from ..spec.toml import dumps

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from ...core.interface.protocols import Measure
+from ...core.interface.measures import Measure
 from ..spec.errors import SpecError
 
 BEFORE = ("phase", "episode", "steps")
