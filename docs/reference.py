@@ -88,7 +88,7 @@ MODULES = {
     "studies": ("What is measured, compared and drawn.", (
         "api.study", "api.planning", "api.costs", "api.comparison", "api.recovery", "api.frames",
         "api.run_study",
-        "spec.spec", "spec.errors", "spec.keys", "spec.presets", "trials.trial",
+        "errors", "spec.spec", "spec.keys", "spec.presets", "trials.trial",
         "trials.arrangement", "trials.session",
         "store.store", "results.results", "results.statistics", "results.comparison",
         "results.power", "results.summary", "catalogue.study", "cost.cost", "claims.claims",

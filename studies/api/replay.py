@@ -9,7 +9,7 @@ from typing import Any
 
 from ...core.interface.scenario import can_draw
 from ...core.plugins.messages import closest
-from ..spec.errors import SpecError
+from ..errors import SpecError
 from ..store.store import Store
 
 MOST_BYTES = 20_000_000
@@ -60,10 +60,11 @@ def draw(
     SpecError
         If there is no such trial or recording, or its scenario does not draw.
     """
+    from ..trials.keeping import spec_of
     from ..trials.trial import trials_of
 
     with Store.open(directory) as store:
-        spec = store.spec()
+        spec = spec_of(store)
         trials = [t for t in trials_of(spec) if condition in (None, t.condition)]
         if not trials:
             known = closest(condition, [c.label for c in spec.conditions()])
@@ -87,5 +88,5 @@ def draw(
             path.parent.mkdir(exist_ok=True)
             is_drawn = path.exists()
         if not is_drawn:
-            scenario.animate(store.recording(chosen, episode), path)
+            scenario.animate(store.recording(chosen.identity, episode), path)
     return Replay(path, f"{chosen.condition}, seed {chosen.seed}, {episode} episode")

@@ -12,7 +12,7 @@ from ..store.store import Store
 def trust_files(directory: Path) -> None:
     """Allow the files that are kept with a study to be run, and say which."""
     with Store.open(directory) as store:
-        texts = store.sources().texts
+        texts = store.sources()
     for name, text in texts.items():
         if name.endswith(".py") and not trust.is_trusted(text):
             say(f"{name}, which came with {directory}, is trusted from now on")

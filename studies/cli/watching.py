@@ -14,6 +14,7 @@ from rich.text import Text
 
 from ..presentation.words import count, duration
 from ..results.results import Results, read
+from ..spec.outline import Outline
 from ..store.store import Store
 from ..workers.progress import Progress, progress
 
@@ -42,7 +43,7 @@ def curve(rates: Sequence[float], width: int = CURVE) -> str:
 def frame(directory: Path) -> tuple[Group, bool]:
     """Return what there is to see of a study now, and whether anything is still to come."""
     with Store.open(directory) as store:
-        outline, now, failed = store.outline(), progress(store), store.failed()
+        outline, now, failed = Outline.kept(store), progress(store), store.failed()
         results = read(store) if store.other_version() is None else Results({}, {})
         planned = store.planned()
     planned_of: dict[str, int] = {}

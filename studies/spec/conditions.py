@@ -23,8 +23,8 @@ from ...core.plugins.settings import ScenarioSettings, Settings, tuples
 from ...scenarios import SCENARIOS
 from ...scenarios.box_pushing.config import BoxPushingSettings
 from ...topologies.config import ChainSettings, Topology, parse
+from ..errors import SpecError, show
 from .curriculum import Curriculum, Name, Stage, StageSettings
-from .errors import SpecError, show
 from .labels import label, scalar
 from .overlay import TomlTable, nested, overlay
 from .presets import PRESETS

@@ -22,9 +22,9 @@ from pydantic import Field, PrivateAttr, ValidationError, field_validator
 from ...core.plugins.messages import closest
 from ...core.plugins.settings import Settings, tuples
 from ...core.plugins.sources import Sources, is_reference, named
+from ..errors import SpecError, show
 from .conditions import SECTIONS, Condition, ConditionSettings, Override, grid, section
 from .curriculum import Curriculum, Length, Name
-from .errors import SpecError, show
 from .objects import plain
 from .overlay import TomlTable, assignment, flat, overlay
 from .presets import PRESETS

@@ -20,8 +20,8 @@ from ...core.learners import LearnerSettings, TeamSettings
 from ...core.numerics.arrays import IntArray
 from ...core.plugins.settings import ScenarioSettings
 from ...core.policies.seen import SeenScenario
+from ..errors import SpecError
 from ..spec.conditions import Condition, ConditionSettings
-from ..spec.errors import SpecError
 from ..spec.spec import Spec
 from .measures import joined
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from ...core.agents.cost import below_counts
 from ...core.interface.scenario import groups_of
 from ...topologies.view import HierarchyView
+from ..errors import SpecError
 from ..spec.conditions import Condition
-from ..spec.errors import SpecError
 from ..spec.spec import Spec
 
 

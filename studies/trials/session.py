@@ -12,16 +12,10 @@ from ...core.interface.acting import Actors
 from ...core.interface.measures import Measure, measures_of
 from ...core.interface.scenario import RecordedScenario
 from ...core.plugins.settings import ScenarioSettings
+from ..store.durable import Recording
+from ..store.schema import ELSEWHERE, STAGE
 from .arrangement import Arrangement, arrange
-from .episodes import (
-    ELSEWHERE,
-    STAGE,
-    EpisodeMeter,
-    EpisodeRecorder,
-    EpisodeRow,
-    Recording,
-    Stopwatch,
-)
+from .episodes import EpisodeMeter, EpisodeRecorder, EpisodeRow, Stopwatch
 from .measures import joined
 from .trial import Trial, TrialResult
 

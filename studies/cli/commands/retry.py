@@ -33,13 +33,14 @@ def command(
     DIR is where the study is kept.
     """
     from ...store.store import Store
+    from ...trials.keeping import spec_of
     from ..running import run_and_show
     from ..trusting import trust_files
 
     if trust:
         trust_files(directory)
     with Store.open(directory) as store:
-        spec = store.spec()
+        spec = spec_of(store)
     return run_and_show(
         spec,
         directory,

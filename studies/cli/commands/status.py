@@ -22,11 +22,12 @@ def command(directory: Path) -> int:
     from ...presentation.words import count, duration
     from ...results.power import SMALLEST, USUAL_DEVIATION
     from ...results.verdicts import power_told
+    from ...spec.outline import Outline
     from ...store.store import Store
     from ...workers.progress import progress
 
     with Store.open(directory) as store:
-        outline, now, failed = store.outline(), progress(store), store.failed()
+        outline, now, failed = Outline.kept(store), progress(store), store.failed()
         versions = store.versions_of_code()
     extent = f"{count(len(outline.columns), 'condition')} x {count(len(outline.seeds), 'seed')}"
     print(f"study    {outline.study}: {extent}")
