@@ -77,7 +77,7 @@ def arrange(settings: ConditionSettings, seed: int) -> Arrangement:
         If the settings do not fit together; one line.
     """
     world = settings.scenario.build()
-    scenario, hierarchy = settings.topology.arrange(world)
+    scenario, hierarchy = settings.arrange(world)
     learner, source = settings.learner, policy_seed(seed)
     if isinstance(learner, LearnerSettings):
         team: Actors = Team.build(learner, scenario, hierarchy, source)

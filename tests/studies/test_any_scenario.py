@@ -233,7 +233,7 @@ def test_results_of_an_older_version_are_not_read(study, monkeypatch):
 
 
 def test_the_world_is_asked_and_not_what_agents_see_of_it(carts):
-    spec = Spec.of(SPEC.table() | {"topology": {"kind": "single-agent"}})
+    spec = Spec.of(SPEC.table() | {"agents": "team"})
     session = Session(trials_of(spec)[1])
     assert session.scenario is not session.world
     assert len(groups_of(session.world)) == 2

@@ -152,7 +152,7 @@ def test_a_topology_file_that_has_changed_since(tmp_path, capsys):
 
 @pytest.mark.slow
 def test_an_agent_for_each_robot(tmp_path, capsys):
-    one = {"overrides": (), "topology": {"kind": "per-robot"}, "evaluation": 0, "episodes": 2}
+    one = {"overrides": (), "agents": "body", "evaluation": 0, "episodes": 2}
     spec = Spec.of({**SPEC.table(), **one})
     (trial,) = trials_of(spec)
     with made_up.opened(tmp_path, spec, MEASURES) as store:
