@@ -46,7 +46,7 @@ def command(
 ) -> int:
     """Print one table: each claim of the paper, its measure, the result, the verdict.
 
-    Without --out the table is made from the results that come with the program.
+    Without --out the table is made from the results that are committed in the repository.
     """
     from ...claims import claims
     from ...claims.table import print_claims
@@ -58,6 +58,11 @@ def command(
         for option, given in (("--quick", quick), ("--publish", publish), ("--jobs", jobs)):
             if given is not None and given is not False:
                 raise SpecError(f"{option}: needs --out, the directory of the studies")
+        if not claims.PUBLISHED.is_dir():
+            raise SpecError(
+                "claims: the committed results are in the repository, in studies/claims/published, "
+                "not in the installed package; with --out DIR the studies are run"
+            )
         found = published.read(claims.PUBLISHED, claims.STUDIES_OF_CLAIMS)
     else:
         found = _run(out, quick=quick, jobs=jobs)

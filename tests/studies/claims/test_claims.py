@@ -203,6 +203,14 @@ def test_options_that_run_need_a_directory(capsys) -> None:
     assert "--quick: needs --out" in capsys.readouterr().err
 
 
+def test_an_installed_package_says_where_the_results_are(tmp_path, capsys, monkeypatch) -> None:
+    monkeypatch.setattr(claims, "PUBLISHED", tmp_path / "published")
+    assert main(["claims"]) == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+    assert "in the repository, in studies/claims/published" in err
+
+
 def test_the_committed_results_make_the_page(capsys) -> None:
     files = list(claims.PUBLISHED.glob("*.json"))
     assert {path.stem for path in files} == {
