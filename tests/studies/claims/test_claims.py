@@ -10,7 +10,7 @@ from made_up_results import ablation, arrays, games, related, scaling, shapes, w
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
 from nested_agents.studies.catalogue.study import load_study
 from nested_agents.studies.claims import claims
-from nested_agents.studies.claims.claims import CLAIMS, AtLeast, AtMost, Within, judge
+from nested_agents.studies.claims.claims import CLAIMS, at_least, at_most, judge, within
 from nested_agents.studies.claims.measures import Measured
 from nested_agents.studies.claims.table import markdown, print_claims
 from nested_agents.studies.cli.main import main
@@ -34,17 +34,17 @@ def found(value: float, low: float, high: float, p: float | None = None) -> Meas
 @pytest.mark.parametrize(
     ("criterion", "measured", "verdict"),
     [
-        (AtLeast(0.8), found(0.9, 0.8, 1.0), "holds"),
-        (AtLeast(0.8), found(0.9, 0.79, 1.0), "not decided"),
-        (AtLeast(0.8), found(0.5, 0.4, 0.79), "does not hold"),
-        (AtLeast(0.8), found(0.9, np.nan, np.nan), "not decided"),
-        (AtMost(1.0), found(0.9, 0.8, 1.0), "holds"),
-        (AtMost(1.0), found(1.0, 0.8, 1.1), "not decided"),
-        (AtMost(1.0), found(1.2, 1.1, 1.3), "does not hold"),
-        (Within(0.1), found(0.0, -0.1, 0.1), "holds"),
-        (Within(0.1), found(0.0, -0.2, 0.1, p=0.5), "not decided"),
-        (Within(0.1), found(0.0, -0.1, 0.1, p=0.04), "does not hold"),
-        (Within(0.1), found(-0.3, -0.4, -0.2), "does not hold"),
+        (at_least(0.8), found(0.9, 0.8, 1.0), "holds"),
+        (at_least(0.8), found(0.9, 0.79, 1.0), "not decided"),
+        (at_least(0.8), found(0.5, 0.4, 0.79), "does not hold"),
+        (at_least(0.8), found(0.9, np.nan, np.nan), "not decided"),
+        (at_most(1.0), found(0.9, 0.8, 1.0), "holds"),
+        (at_most(1.0), found(1.0, 0.8, 1.1), "not decided"),
+        (at_most(1.0), found(1.2, 1.1, 1.3), "does not hold"),
+        (within(0.1), found(0.0, -0.1, 0.1), "holds"),
+        (within(0.1), found(0.0, -0.2, 0.1, p=0.5), "not decided"),
+        (within(0.1), found(0.0, -0.1, 0.1, p=0.04), "does not hold"),
+        (within(0.1), found(-0.3, -0.4, -0.2), "does not hold"),
     ],
 )
 def test_criteria_decide_by_the_whole_interval(criterion, measured, verdict) -> None:
