@@ -315,7 +315,7 @@ def test_studies_are_run_read_again_and_published(tmp_path, capsys, monkeypatch)
     monkeypatch.setattr(claims, "QUICK", tmp_path / "quick")
     monkeypatch.setattr(claims, "PUBLISHED", tmp_path / "published")
     arguments = ["claims", "--quick", "--out", str(tmp_path / "out"), "--jobs", "1"]
-    arguments += ["--publish", str(tmp_path / "published"), "--format", "markdown"]
+    arguments += ["--format", "markdown"]
     assert main(arguments) == 0
     first = capsys.readouterr()
     assert first.out.count("**not decided**") + first.out.count("**does not hold**") >= 5
@@ -324,5 +324,11 @@ def test_studies_are_run_read_again_and_published(tmp_path, capsys, monkeypatch)
     again = capsys.readouterr()
     assert again.out == first.out
     assert "4 of 4 trials were run before" in again.err
+    for study in REST:
+        folder = tmp_path / "out" / study
+        assert main(["export", str(folder), "--format", "json"]) == 0
+        (tmp_path / "published").mkdir(exist_ok=True)
+        (folder / "export" / "results.json").rename(tmp_path / "published" / f"{study}.json")
+    capsys.readouterr()
     assert main(["claims", "--format", "markdown"]) == 0
     assert capsys.readouterr().out == first.out
