@@ -52,7 +52,7 @@ _PLACES = {
     "Settings": ("core.plugins.settings", "Settings"),
     "Spec": ("studies.spec.spec", "Spec"),
     "StateSpace": ("core.interface.spaces", "StateSpace"),
-    "SpecError": ("studies.spec.errors", "SpecError"),
+    "SpecError": ("studies.errors", "SpecError"),
     "StudyResults": ("studies.api.study", "StudyResults"),
     "Summary": ("studies.results.summary", "Summary"),
     "TDLambdaSettings": ("core.learners.td", "TDLambdaSettings"),

@@ -145,7 +145,6 @@ class Team:
                 hierarchy,
                 len(scenario.action_set),
                 groups_of(scenario),
-                getattr(scenario, "superposes", False),
                 decision.rule,
                 decision.teammates,
                 settings.discount,
@@ -247,24 +246,25 @@ class Team:
         """Revise self-model and constants by what `joint_action` did, against what was predicted.
 
         What contact is predicted to take from the motion is given back to the self-model: a robot
-        that pushes a box is slow, not broken. The constants are held against what was pushed.
+        that moves a load is slow, not broken. The constants are held against how the load moved.
         """
         if self.calibration is not None:
             self._calibrate(prediction, joint_action, transition)
-        if self.self_model is None or transition.motions is None:
+        if self.self_model is None or transition.twists is None:
             return
         embodied = cast(EmbodiedPrediction, prediction)
         speeds = embodied.commands(joint_action)
-        free = transition.motions - embodied.slips(joint_action)
+        slips = embodied.slips(joint_action)
+        free = transition.twists[-len(slips) :] - slips
         for body, group in enumerate(embodied.groups):
             self.self_model.observe(body, speeds[list(group)], free[body])
 
     def _calibrate(self, prediction: Any, joint_action: IntArray, transition: Transition) -> None:
-        moved, motions = transition.pushed, transition.motions
-        if self.calibration is None or moved is None or motions is None or not moved.any():
+        twists, n_bodies = transition.twists, len(prediction.groups)
+        if self.calibration is None or twists is None or not twists[:-n_bodies].any():
             return
         predicted = prediction.outcomes(joint_action, self.calibration.points)
-        self.calibration.observe(np.vstack([moved, motions]), predicted)
+        self.calibration.observe(twists, predicted)
 
     def learn(self, transition: Transition) -> None:
         """Take in what a step led to."""

@@ -103,8 +103,6 @@ class DecisionProblem:
         Actions A of every agent.
     groups
         Agents by body.
-    additive
-        Whether predictions can be had to first order, as sums over groups.
     rule, teammates
         By what a joint action is valued, and what the agents below are expected to do.
     discount
@@ -117,7 +115,6 @@ class DecisionProblem:
     hierarchy: Hierarchy
     n_actions: int
     groups: tuple[tuple[int, ...], ...]
-    additive: bool
     rule: Rule
     teammates: Teammates
     discount: float

@@ -88,9 +88,6 @@ class Prediction(Protocol):
     ``reward_table()``
         Rewards ``(A ** n,)`` of all joint actions by index, as `rewards` gives them. The evaluator
         ``exact`` needs it besides ``blocks``, except to decide by the deciding agent's value alone.
-    ``superposition``
-        The prediction to first order, for scenarios that say ``superposes``: groups move what they
-        share by contributions that add up. `nested_agents.core.evaluators.additive` describes it.
     """
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
@@ -156,11 +153,10 @@ class Transition:
         Whether the episode ends for lack of time.
     info
         Measurements of the step by name, scalars or small arrays; for records, not for learners.
-    motions
-        ``(M, 3)`` mean twist of every group's body in its own frame [m/s, m/s, rad/s], if bodies
-        measure it.
-    pushed
-        ``(3,)`` the same of what the bodies push together, if they see it and push nothing else.
+    twists
+        ``(M, 3)`` mean twist of every group's body in its own frame [m/s, m/s, rad/s], where bodies
+        measure it; ``(K + M, 3)`` where they also measure what they move, its twists standing
+        first, and nothing else than these bodies moved it.
     """
 
     states: FloatArray
@@ -168,8 +164,7 @@ class Transition:
     terminated: bool
     truncated: bool
     info: Mapping[str, Any]
-    motions: FloatArray | None = None
-    pushed: FloatArray | None = None
+    twists: FloatArray | None = None
 
 
 @dataclass(frozen=True)
@@ -236,9 +231,8 @@ class Scenario(Protocol):
     """A world with a task. Everything a learner may know of it.
 
     What else it may have is asked for by `groups_of`, `roles_of` and `measures_of`, which know what
-    holds without; and by the protocols below, its *capabilities*. Two more are asked for by name:
-    ``measure()``, see `RecordedScenario`, and ``superposes``, whether its predictions can be had to
-    first order with the present settings, see `Prediction`.
+    holds without; and by the protocols below, its *capabilities*. One more is asked for by
+    name: ``measure()``, see `RecordedScenario`.
     """
 
     @property
@@ -407,7 +401,7 @@ class CalibratedScenario(EmbodiedScenario, Protocol):
 
     @property
     def levers(self) -> FloatArray:
-        """``(M + 1,)`` speed per turning rate of what is pushed and of the bodies [m]."""
+        """``(K + M,)`` speed per turning rate of what is moved and of the bodies [m]."""
         ...
 
     def predict_with(
@@ -417,7 +411,7 @@ class CalibratedScenario(EmbodiedScenario, Protocol):
 
         The constants are logarithms, in units of what is believed without them. The prediction also
         has ``outcomes(joint_action, constants)``: what a joint action ``(n,)`` would lead to under
-        each of ``k`` choices of the constants ``(k, c)``, as mean twists ``(k, M + 1, 3)`` of what
-        is pushed, and then of the bodies.
+        each of ``k`` choices of the constants ``(k, c)``, as mean twists ``(k, K + M, 3)`` of what
+        is moved, and then of the bodies, see `Transition.twists`.
         """
         ...

@@ -39,7 +39,7 @@ class DeepQ(Peer):
         if len(scenario.agents) > 1:
             raise ValueError(
                 f"learner.kind = 'dqn': acts for one agent, there are {len(scenario.agents)}; "
-                "use topology = 'single-agent'"
+                "use agents = 'team'"
             )
         super().__init__(seed)
         self._settings, self._inputs = settings, Inputs(scenario)

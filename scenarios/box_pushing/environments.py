@@ -113,7 +113,7 @@ class Game:
         settings = meant(settings)
         self.scenario = BoxPushing(settings)
         self.steps = steps
-        self.screen = Screen(settings, render_mode, sensors=sensors) if render_mode else None
+        self.screen = Screen(settings.drawn, render_mode, sensors=sensors) if render_mode else None
         self._seeds = np.random.default_rng()
         self._episode, self._step = -1, 0
 

@@ -15,7 +15,7 @@ from ...core.numerics.arrays import IntArray
 Frame = dict[str, Any]
 """What one step gave, by dotted name; without the measured times."""
 
-FIELDS = ("states", "reward", "terminated", "truncated", "motions", "pushed", "info")
+FIELDS = ("states", "reward", "terminated", "truncated", "twists", "info")
 
 
 def random_actions(scenario: Scenario, steps: int, seed: int) -> IntArray:

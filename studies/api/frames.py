@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ...core.interface.protocols import Measure
+from ..errors import SpecError
 from ..results.numbers import NUMBERS
-from ..spec.errors import SpecError
 from ..store.reading import NamesAndRows
 from ..store.store import Store
 

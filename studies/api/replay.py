@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ...core.interface.protocols import DrawnScenario
 from ...core.plugins.messages import closest
-from ..spec.errors import SpecError
+from ..errors import SpecError
 from ..store.store import Store
 
 MOST_BYTES = 20_000_000
@@ -59,10 +59,11 @@ def draw(
     SpecError
         If there is no such trial or recording, or its scenario does not draw.
     """
+    from ..trials.keeping import spec_of
     from ..trials.trial import trials_of
 
     with Store.open(directory) as store:
-        spec = store.spec()
+        spec = spec_of(store)
         trials = [t for t in trials_of(spec) if condition in (None, t.condition)]
         if not trials:
             known = closest(condition, [c.label for c in spec.conditions()])
@@ -86,5 +87,5 @@ def draw(
             path.parent.mkdir(exist_ok=True)
             is_drawn = path.exists()
         if not is_drawn:
-            scenario.animate(store.recording(chosen, episode), path)
+            scenario.animate(store.recording(chosen.identity, episode), path)
     return Replay(path, f"{chosen.condition}, seed {chosen.seed}, {episode} episode")

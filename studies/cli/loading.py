@@ -29,7 +29,7 @@ def load_results(
 def trust_files(directory: Path) -> None:
     """Allow the Python files that are kept with a study to be run, and say which."""
     with Store.open(directory) as store:
-        texts = store.sources().texts
+        texts = store.sources()
     for name, text in texts.items():
         if name.endswith(".py") and not trust.is_trusted(text):
             say(f"{name}, which came with {directory}, is trusted from now on")

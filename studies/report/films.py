@@ -15,6 +15,7 @@ from pathlib import Path
 from ...core.interface.protocols import DrawnScenario
 from ..spec.errors import SpecError
 from ..store.store import Planned, Store
+from ..trials.keeping import spec_of
 from ..trials.trial import Trial, trials_of
 
 LAST = "last"
@@ -61,7 +62,7 @@ def films(store: Store, planned: Iterable[Planned], most_bytes: int) -> list[Fil
 def _trials(store: Store) -> Mapping[str, Trial]:
     """Return the trials of a study by identity; none if this version cannot read its spec."""
     try:
-        return {trial.identity: trial for trial in trials_of(store.spec())}
+        return {trial.identity: trial for trial in trials_of(spec_of(store))}
     except SpecError:
         return {}
 
@@ -74,7 +75,7 @@ def _drawn(store: Store, trial: Trial) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "episode.gif"
         try:
-            scenario.animate(store.recording(trial, LAST), path)
+            scenario.animate(store.recording(trial.identity, LAST), path)
         except Exception:  # a drawing may be anybody's, and the page is worth more than it
             return b""
         return path.read_bytes()

@@ -19,8 +19,8 @@ from ...core.learners import LearnerSettings, TeamSettings
 from ...core.numerics.arrays import IntArray
 from ...core.plugins.settings import ScenarioSettings
 from ...core.policies.seen import SeenScenario
+from ..errors import SpecError
 from ..spec.conditions import Condition, ConditionSettings
-from ..spec.errors import SpecError
 from ..spec.spec import Spec
 from .measures import joined
 
@@ -76,7 +76,7 @@ def arrange(settings: ConditionSettings, seed: int) -> Arrangement:
         If the settings do not fit together; one line.
     """
     world = settings.scenario.build()
-    scenario, hierarchy = settings.topology.arrange(world)
+    scenario, hierarchy = settings.arrange(world)
     learner, source = settings.learner, policy_seed(seed)
     if isinstance(learner, LearnerSettings):
         team: Actors = Team.build(learner, scenario, hierarchy, source)

@@ -11,16 +11,10 @@ from ...core.agents.team import Team
 from ...core.interface.acting import Actors
 from ...core.interface.protocols import Measure, RecordedScenario, measures_of
 from ...core.plugins.settings import ScenarioSettings
+from ..store.durable import Recording
+from ..store.schema import ELSEWHERE, STAGE
 from .arrangement import Arrangement, arrange
-from .episodes import (
-    ELSEWHERE,
-    STAGE,
-    EpisodeMeter,
-    EpisodeRecorder,
-    EpisodeRow,
-    Recording,
-    Stopwatch,
-)
+from .episodes import EpisodeMeter, EpisodeRecorder, EpisodeRow, Stopwatch
 from .measures import joined
 from .trial import Trial, TrialResult
 

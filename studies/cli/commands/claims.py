@@ -74,6 +74,7 @@ def _run(out: Path, *, quick: bool, jobs: int | None) -> dict[str, Published]:
     from ...results import published
     from ...results.results import read
     from ...spec.errors import SpecError
+    from ...spec.outline import Outline
     from ...spec.spec import Spec
 
     results = {}
@@ -87,5 +88,5 @@ def _run(out: Path, *, quick: bool, jobs: int | None) -> dict[str, Published]:
                     f"{out / study}: {len(failed)} trials failed: nested-agents status "
                     f"{out / study}"
                 )
-            results[study] = published.loads(published.dumps(store.outline(), read(store)))
+            results[study] = published.loads(published.dumps(Outline.kept(store), read(store)))
     return results

@@ -28,7 +28,7 @@ MOST_AGENTS = 10_000
     multiple=True,
     metavar="SPEC...",
     default=("chain",),
-    help="One or more topologies as in a spec: chain teams tree:2 ...",
+    help="One or more topologies as in a spec: chain teams tree:2 ...; single-agent: Eq. 23.",
 )
 @click.option("--rules", type=int, metavar="N", default=5**7, help="|S|, rules of one agent.")
 @click.option("--actions", type=int, metavar="N", default=4, help="|A|, actions of one agent.")

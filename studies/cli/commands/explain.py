@@ -39,7 +39,7 @@ def command(directory: Path, condition: str | None, seed: int | None, trust: boo
         trust_files(directory)
     with Store.open(directory) as store:
         trial = explain.choose(store, condition, seed)
-        conditions = [c.label for c in store.spec().conditions()]
+        conditions = list(store.columns())
         say(f"training {trial.condition}, seed {trial.seed} again: {trial.lengths}")
         found = explain.explained(store, trial)
     folder = explain.folder(directory, trial, conditions)

@@ -35,13 +35,14 @@ def command(
     from ...api.study import run
     from ...presentation.progress import Terminal
     from ...store.store import Store
+    from ...trials.keeping import spec_of
     from ..display import show_results
     from ..loading import trust_files
 
     if trust:
         trust_files(directory)
     with Store.open(directory) as store:
-        spec = store.spec()
+        spec = spec_of(store)
     study = run(
         spec, directory, jobs=jobs, backend=backend, address=address, retry_failed=True,
         accept_code=accept_code, observer=Terminal(),

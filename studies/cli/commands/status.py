@@ -18,6 +18,7 @@ def command(directory: Path) -> int:
     """
     from ...results.power import SMALLEST, USUAL_DEVIATION
     from ...results.verdicts import power_told
+    from ...spec.outline import Outline
     from ...store.store import Store
     from ...workers.progress import progress
     from ..display import print_wrapped
@@ -26,7 +27,7 @@ def command(directory: Path) -> int:
     with Store.open(directory) as store:
         now = progress(store)
         print(*describe(store, now), sep="\n")
-        outline, failed = store.outline(), store.failed()
+        outline, failed = Outline.kept(store), store.failed()
     if len(outline.columns) > 1:
         power = power_told(len(outline.seeds), len(outline.columns) - 1, USUAL_DEVIATION, SMALLEST)
         print_wrapped(power, "power    ", 9)

@@ -47,7 +47,7 @@ def problem_of(
     rules: RuleBase, hierarchy: Hierarchy, rule: Rule, teammates: Teammates
 ) -> DecisionProblem:
     alone = tuple((i,) for i in range(len(hierarchy)))
-    return DecisionProblem(rules, hierarchy, A, alone, False, rule, teammates, DISCOUNT)
+    return DecisionProblem(rules, hierarchy, A, alone, rule, teammates, DISCOUNT)
 
 
 class Tabled:

@@ -30,7 +30,7 @@ SHORT = {
 
 
 def spec_of(kind: str, **changes: Any) -> Spec:
-    single = {"topology": "single-agent"} if kind == "dqn" else {}
+    single = {"agents": "team"} if kind == "dqn" else {}
     return Spec.of({**TABLE, **single, "learner": SHORT[kind], **changes})
 
 

@@ -17,7 +17,9 @@ from nested_agents.core.interface.protocols import (
     measures_of,
 )
 from nested_agents.core.learners.batch import BatchTDSettings
-from nested_agents.scenarios import SCENARIOS, BoxPushing, BoxPushingSettings
+from nested_agents.scenarios import SCENARIOS
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
+from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.topologies import build, parse
 
 

@@ -113,7 +113,7 @@ def test_numbers() -> None:
         (("--topology", "ring"), "topology 'ring': known: chain,"),
         (("--topology",), "'--topology' requires an argument; see nested-agents cost --help"),
         (("--topology", "--format", "csv"), "--topology --format: is an option"),
-        (("--topology", "per-robot"), "what whole robots try is in: nested-agents topology show"),
+        (("--topology", "per-robot"), "agents = 'body', topology = 'chain'"),
         (("--format", "xml"), "'xml' is not one of 'table', 'json', 'csv', 'latex'"),
         (("--plot", "cost.txt"), "cost.txt: suffix must be"),
     ],
