@@ -32,7 +32,7 @@ from ...core.decision.settings import Decision
 from ...core.evaluators.coordination import VariableEliminationSettings
 from ...core.evaluators.exact import ExactSettings
 from ...core.interface.hierarchy import Hierarchy
-from ...core.interface.protocols import Scenario
+from ...core.interface.scenario import Scenario
 from ...core.learners.td import TDLambdaSettings
 from ...core.plugins.deferred import Deferred
 from ...core.rules.settings import RuleBaseSettings

@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.progress import track
 
 from ...core.agents.team import Team, of_fuzzy_agents
-from ...core.interface.protocols import Scenario
+from ...core.interface.scenario import Scenario
 from ...core.interface.spaces import Variable
 from ...core.learners import LearnerSettings
 from ...core.plugins.messages import closest

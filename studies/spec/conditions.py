@@ -17,7 +17,7 @@ from pydantic import Field, SerializerFunctionWrapHandler, ValidationError, mode
 
 from ...core.agents.joint_agents import Agents, join_agents
 from ...core.interface.hierarchy import Hierarchy
-from ...core.interface.protocols import Scenario, groups_of
+from ...core.interface.scenario import Scenario, groups_of
 from ...core.learners import LEARNERS, TeamSettings
 from ...core.learners.batch import BatchTDSettings
 from ...core.plugins.messages import closest

@@ -9,7 +9,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-from ...core.interface.protocols import Measure, Scenario
+from ...core.interface.measures import Measure
+from ...core.interface.scenario import Scenario
 from ...core.plugins.settings import ScenarioSettings
 from ...core.plugins.sources import Sources, named
 from ..spec.conditions import ConditionSettings

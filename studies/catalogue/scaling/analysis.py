@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from ....core.agents.team import of_fuzzy_agents
-from ....core.interface.protocols import groups_of
+from ....core.interface.scenario import groups_of
 from ...presentation.words import count
 from ...results.results import Results
 from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
