@@ -13,7 +13,6 @@ from .. import options
 @options.directory
 @click.option(
     "--condition",
-    type=options.text,
     metavar="LABEL",
     help="Label of the condition; the first one unless said otherwise.",
 )
@@ -34,7 +33,7 @@ def command(directory: Path, condition: str | None, seed: int | None, trust: boo
     from ...presentation.progress import say
     from ...store import durable
     from ...store.store import Store
-    from ..trusting import trust_files
+    from ..loading import trust_files
 
     if trust:
         trust_files(directory)

@@ -112,7 +112,7 @@ def test_numbers() -> None:
         (("--rules", "0"), "rules = 0, allowed: 1 or more"),
         (("--topology", "ring"), "topology 'ring': known: chain,"),
         (("--topology",), "'--topology' requires an argument; see nested-agents cost --help"),
-        (("--topology", "--format", "csv"), "'--topology': '--format' is an option"),
+        (("--topology", "--format", "csv"), "--topology --format: is an option"),
         (("--topology", "per-robot"), "agents = 'body', topology = 'chain'"),
         (("--format", "xml"), "'xml' is not one of 'table', 'json', 'csv', 'latex'"),
         (("--plot", "cost.txt"), "cost.txt: suffix must be"),
