@@ -17,7 +17,7 @@ import numpy as np
 
 from ....core.interface.spaces import StateSpace, Variable
 from ....core.numerics.arrays import FloatArray
-from ...state_variables import found, sensed
+from ...state_variables import find_variable, sensed
 from .kernels import COMPILED, Columns
 from .variables import STATE_VARIABLES
 from .view import View, wrap
@@ -87,7 +87,7 @@ class Listed:
     """
 
     def __init__(self, names: Sequence[str]) -> None:
-        things = [found(STATE_VARIABLES, name) for name in names]
+        things = [find_variable(STATE_VARIABLES, name) for name in names]
         is_compiled = np.array([name in COMPILED for name in names], dtype=bool)
         self.variables = tuple(thing.variable for thing in things)
         self.common = tuple(thing.variable.name for thing in things if thing.common)
