@@ -20,8 +20,7 @@ from ...core.numerics.arrays import FloatArray
 from ...scenarios.box_pushing.prediction.prediction import BoxPrediction
 from ...scenarios.box_pushing.prediction.situation import Situation
 from ...scenarios.box_pushing.scenario import BoxPushing
-from ...scenarios.box_pushing.states.view import wrap
-from ...scenarios.box_pushing.world.geometry import surface
+from ...scenarios.box_pushing.world.geometry import surface, wrap
 from ...scenarios.box_pushing.world.starts import place
 
 AHEAD = 0.6

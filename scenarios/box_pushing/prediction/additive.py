@@ -14,9 +14,8 @@ from typing import Protocol
 import numpy as np
 
 from ....core.numerics.arrays import BoolArray, FloatArray, IntArray
-from ....core.numerics.compiling import njit
 from ..states.view import View
-from ..world.geometry import surface
+from ..world.geometry import gaps as gaps_of
 from .push import PushModel, push
 from .push_lanes import MARGIN
 from .situation import Premises, Situation
@@ -109,7 +108,7 @@ class PushSuperposition:
     def _present_gaps(self) -> FloatArray:
         situation, model = self._prediction.situation, self._prediction.model
         box = situation.box[None]
-        return _gaps(situation.robots, box, model.edges, model.rounding, model.radii)
+        return gaps_of(situation.robots, box, model.edges, model.rounding, model.radii)
 
     def _push(
         self, robots: IntArray, twists: FloatArray, choices: IntArray
@@ -135,21 +134,8 @@ class PushSuperposition:
         robots[r] = self._poses[r, local].T
         gaps[:] = np.einsum("gl,gl->g", shares, self._gaps)[:, None]
         model = prediction.model
-        gaps[r] = _gaps(robots[r].T, box, model.edges, model.rounding, np.full(m, model.radii[r]))
+        gaps[r] = gaps_of(robots[r].T, box, model.edges, model.rounding, np.full(m, model.radii[r]))
         own, which = prediction.own_block(agent)
         view = prediction.seen(robots.transpose(2, 0, 1), box, gaps.T, prediction.premises.seconds)
         shared = prediction.premises.space.shared_of(view, [r])[0]
         return np.concatenate([own[which[local]], shared], axis=1)
-
-
-@njit(cache=True)
-def _gaps(robots, boxes, edges, rounding, radii):  # type: ignore[no-untyped-def]
-    """Return the gaps ``(m,)`` between poses of robots and of the box."""
-    gaps = np.empty(len(robots))
-    for c in range(len(robots)):
-        box = boxes[c % len(boxes)]
-        cos, sin = np.cos(box[2]), np.sin(box[2])
-        dx, dy = robots[c, 0] - box[0], robots[c, 1] - box[1]
-        near = surface(edges, rounding, cos * dx + sin * dy, cos * dy - sin * dx)
-        gaps[c] = near[0] - radii[c]
-    return gaps

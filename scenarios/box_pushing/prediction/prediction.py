@@ -17,7 +17,6 @@ import numpy as np
 from ....core.interface.protocols import Blocks
 from ....core.numerics.arrays import FloatArray, IntArray
 from ..states.view import View
-from ..world.infrared import expected_reading
 from ..world.reward import reward
 from .additive import PushSuperposition
 from .belief import outcomes
@@ -267,7 +266,7 @@ class BoxPrediction:
             -view.approach,
             view.turn,
             view.gaps < CONTACT_GAP,
-            expected_reading(view.gaps, self.premises.infrared),
+            self.premises.infrared.reading(view.gaps),
         )
         mean: FloatArray = of_parties.mean(axis=1)
         return mean

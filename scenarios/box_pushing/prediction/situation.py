@@ -8,8 +8,8 @@ from ....core.interface.spaces import ActionSet
 from ....core.numerics.arrays import FloatArray
 from ..states.state_spaces import BoxStateSpace
 from ..world.geometry import Outline
-from ..world.infrared import InfraredSpec
 from ..world.reward import Task
+from ..world.settings import InfraredSettings
 from .belief import PushBelief
 
 
@@ -63,7 +63,7 @@ class Premises:
     increment: float
     limits: FloatArray
     task: Task
-    infrared: InfraredSpec
+    infrared: InfraredSettings
     outline: Outline
     hold: float
     seconds: float

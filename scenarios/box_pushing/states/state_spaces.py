@@ -18,9 +18,10 @@ import numpy as np
 from ....core.interface.spaces import StateSpace, Variable
 from ....core.numerics.arrays import FloatArray
 from ...state_variables import found, sensed
+from ..world.geometry import wrap
 from .kernels import COMPILED, Columns
 from .variables import STATE_VARIABLES
-from .view import View, wrap
+from .view import View
 
 
 @dataclass(frozen=True)
