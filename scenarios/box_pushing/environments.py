@@ -51,9 +51,13 @@ class Seat:
         What is played.
     wheels
         Indices of the wheels.
+    by_wheel
+        Whether it observes the state of every wheel in a row of its own.
     """
 
-    def __init__(self, scenario: BoxPushing, wheels: Sequence[int]) -> None:
+    def __init__(
+        self, scenario: BoxPushing, wheels: Sequence[int], *, by_wheel: bool = False
+    ) -> None:
         self.wheels = list(wheels)
         space, bounds = scenario.state_space, scenario.bounds
         d, own = space.n_variables, space.n_own
@@ -62,11 +66,13 @@ class Seat:
             mine = [wheel for wheel in group if wheel in self.wheels]
             places += [wheel * d + i for wheel in mine for i in range(own)]
             places += [wheel * d + i for wheel in mine[:1] for i in range(own, d)]
-        self.places: IntArray = np.array(places)
+        if by_wheel:
+            places = [wheel * d + i for wheel in self.wheels for i in range(d)]
+        self.places: IntArray = np.reshape(places, (len(self.wheels), d) if by_wheel else -1)
         self.names = tuple(
             f"{scenario.agents[place // d]}.{space.variables[place % d].name}" for place in places
         )
-        low, high = bounds[self.places % d].T.astype(np.float32)
+        low, high = np.moveaxis(bounds[self.places % d].astype(np.float32), -1, 0)
         self.observation_space = Box(low, high, dtype=np.float32)
         actions = len(scenario.action_set)
         self.action_space = (

@@ -17,7 +17,7 @@ from ...core.interface.protocols import SUCCESS, Measure, Transition
 from ...core.interface.spaces import ActionSet, StateSpace
 from ...core.numerics.arrays import BoolArray, FloatArray, IntArray
 from .config import BoxPushingSettings
-from .prediction.belief import APART, CONSTANTS, PushBelief, least_gap
+from .prediction.belief import APART, CONSTANTS, PushBelief, believing, least_gap
 from .prediction.prediction import BoxPrediction, mean_twists
 from .prediction.predictors import ExactPrediction, Future, push_model
 from .prediction.settings import BeliefSettings
@@ -263,7 +263,7 @@ class BoxPushing:
             self.world.robot_poses.copy(), self.world.box_pose.copy(), self._goal,
             self._speeds, tuple(effects), self.groups,
         )  # fmt: skip
-        model = self._model if constants is None else self._belief.believing(constants)
+        model = self._model if constants is None else believing(self._belief, constants)
         if self._playground is None or self._saved is None:
             return BoxPrediction(situation, model, self._premises)
         future = Future(
@@ -357,7 +357,7 @@ class BoxPushing:
             poses[None], world.box_pose[None], world.gaps[None], self._goal, origin, 1.0,
             self.box.outline, self.box.friction_radius,
         )  # fmt: skip
-        n_own, shared = self._space.space.n_own, self._space.sensed(view)
+        n_own, shared = self._space.space.n_own, self._space.sensed(view, range(len(poses)))
         states = np.empty((len(self.agents), self._space.space.n_variables))
         for r, group in enumerate(self.groups):
             for agent in group:

@@ -13,39 +13,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from gymnasium.spaces import Box, MultiDiscrete
 from gymnasium.vector import AutoresetMode
 
 from ....core.numerics.arrays import FloatArray
 from ..config import BoxPushingSettings
 from ..environments import Game, Seat
 from ..scenario import BoxPushing
-
-
-class WheelRows:
-    """What an outside agent sees that is told the state of every wheel in a row of its own.
-
-    Parameters
-    ----------
-    scenario
-        What is played.
-    """
-
-    def __init__(self, scenario: BoxPushing) -> None:
-        n = len(scenario.agents)
-        self.wheels = list(range(n))
-        low, high = (np.tile(bound, (n, 1)) for bound in scenario.bounds.T.astype(np.float32))
-        self.observation_space = Box(low, high, dtype=np.float32)
-        self.action_space = MultiDiscrete([len(scenario.action_set)] * n)
-
-    def observe(self, states: FloatArray) -> FloatArray:
-        """Return the observation ``(n, d)``."""
-        seen: FloatArray = states.astype(np.float32)
-        return seen
-
-    def paid(self, reward: float | FloatArray) -> float:
-        """Return the mean reward of all wheels."""
-        return float(np.mean(reward))
 
 
 @dataclass(frozen=True)
@@ -73,14 +46,12 @@ class Recipe:
         """Return a world."""
         return Game(self.settings, self.steps, self.render_mode, sensors=self.sensors)
 
-    def seat(self, scenario: BoxPushing) -> Seat | WheelRows:
+    def seat(self, scenario: BoxPushing) -> Seat:
         """Return how the worlds are seen."""
-        if self.by_wheel:
-            return WheelRows(scenario)
-        return Seat(scenario, range(len(scenario.agents)))
+        return Seat(scenario, range(len(scenario.agents)), by_wheel=self.by_wheel)
 
 
-def row_type(game: Game, seat: Seat | WheelRows) -> np.dtype[Any]:
+def row_type(game: Game, seat: Seat) -> np.dtype[Any]:
     """Return the fields of a world's row.
 
     ``told`` says whether the last call wrote into the row, ``final`` whether an episode ended in it

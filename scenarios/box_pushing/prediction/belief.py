@@ -53,15 +53,10 @@ class PushBelief(NamedTuple):
         ]
         return cls(model, *parts)
 
-    def believing(self, constants: FloatArray) -> PushModel:
-        """Return the model of constants ``(3,)``."""
-        model: PushModel = believing(self, constants)
-        return model
-
 
 @njit(cache=True)
 def believing(belief, constants):  # type: ignore[no-untyped-def]
-    """Return the push model of constants ``(3,)``: as `PushBelief.believing`."""
+    """Return the `PushModel` of constants ``(3,)``."""
     model, factors = belief.model, np.exp(constants)
     compliance = np.empty_like(belief.ahead)
     for r in range(len(compliance)):

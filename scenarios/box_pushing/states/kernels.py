@@ -18,15 +18,12 @@ from ....core.numerics.compiling import njit
 from ..world import geometry as rows
 from ..world.geometry import LANES, ON_SURFACE, nearest_points
 from .relational import AWAY
+from .variables import STATE_VARIABLES
 from .view import ARRIVED, CLOSE, KEPT, LEAST, STILL, View
 
 _EXACT = {"contract", "nsz"}
 
-COMPILED = (
-    "gap", "box_bearing", "side", "others_gap", "push_bearing", "cross_track_error",
-    "box_distance", "approach", "box_turn", "bend", "face_bearing", "others_away",
-    "contact_push_bearing", "contact_cross_track_error", "path_bearing", "path_cross_track_error",
-)  # fmt: skip
+COMPILED = tuple(STATE_VARIABLES.built_in)
 """The built-in variables that are computed here, each in a row of scratch of its own."""
 # Where these rows begin.
 (

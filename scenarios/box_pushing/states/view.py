@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -60,11 +60,8 @@ class View:
 
     def guarded(self) -> View:
         """Return the same situations, not to be written to."""
-        robots, box, gaps = (_fixed(a.view()) for a in (self.robots, self.box, self.gaps))
-        goal, origin = _fixed(self.goal.view()), _fixed(self.origin.view())
-        return View(
-            robots, box, gaps, goal, origin, self.periods, self.outline, self.friction_radius
-        )
+        arrays = ("robots", "box", "gaps", "goal", "origin")
+        return replace(self, **{name: _fixed(getattr(self, name).view()) for name in arrays})
 
     @property
     def n_situations(self) -> int:

@@ -280,7 +280,9 @@ def test_all_robots_sense_what_each_does_alone(space: BoxStateSpace) -> None:
     rng = np.random.default_rng(0)
     poses, gaps = rng.normal(size=(1, 4, 3)), np.abs(rng.normal(size=(1, 4)))
     seen = View(poses, poses[:, 0] + 0.3, gaps, GOAL, ORIGIN, 1.0, SQUARE, 0.08)
-    np.testing.assert_array_equal(space.sensed(seen), [space.shared(seen, r) for r in range(4)])
+    np.testing.assert_array_equal(
+        space.sensed(seen, range(4)), [space.shared(seen, r) for r in range(4)]
+    )
 
 
 def test_what_is_common_is_sensed_once() -> None:
@@ -309,7 +311,7 @@ def gap(view, robot):
     with Sources(texts={"mine.py": text}).active():
         space = listed("own", "mine.py:gap")
     with pytest.raises(ValueError, match="state variable 'gap': shape"):
-        space.sensed(view([[-0.2, 0, 0]], [0, 0, 0], [0.06]))
+        space.sensed(view([[-0.2, 0, 0]], [0, 0, 0], [0.06]), [0])
 
 
 @pytest.mark.parametrize(
