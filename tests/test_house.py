@@ -21,8 +21,8 @@ ALLOWED = {
     "studies": {"studies", "core", "topologies", "scenarios"},
 }
 STUDIES = (
-    "spec", "trials", "store", "workers", "results", "presentation", "catalogue", "claims", "cost",
-    "explain", "report", "api", "cli",
+    "errors", "store", "spec", "trials", "workers", "results", "presentation", "catalogue",
+    "claims", "cost", "explain", "report", "api", "cli",
 )  # fmt: skip
 """The rooms of studies/, each of which may import those before it."""
 MAX_BYTES = 1_000_000
@@ -203,6 +203,17 @@ def test_imports_inside_studies_point_one_way(graph: nx.DiGraph) -> None:
     assert wrong_arrows(graph) == []
 
 
+def test_the_store_knows_neither_specs_nor_trials_nor_the_files_of_users(graph: nx.DiGraph) -> None:
+    others = ("nested_agents.studies.", "nested_agents.core.plugins.")
+    own = ("nested_agents.studies.store.", "nested_agents.studies.errors")
+    found = {
+        imported
+        for module, imported in graph.edges()
+        if module.startswith("nested_agents.studies.store.") and imported.startswith(others)
+    }
+    assert [name for name in found if not name.startswith(own)] == []
+
+
 def test_a_circle_and_a_wrong_arrow_are_named() -> None:
     at_type_checking = "if TYPE_CHECKING:\n    from ..report.page import Page"
     graph = imports_between(
@@ -329,3 +340,5 @@ def test_the_wheel_holds_the_four_packages(tmp_path: Path, tracked: list[Path]) 
     assert sources <= names
     assert {"nested_agents/__main__.py", "nested_agents/py.typed"} <= names
     assert {name.split("/")[0] for name in names if ".dist-info" not in name} == {"nested_agents"}
+    assert [name for name in names if "/published/" in name] == []
+    assert "nested_agents/studies/claims/quick/shapes.toml" in names

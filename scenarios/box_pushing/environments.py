@@ -23,7 +23,7 @@ import numpy as np
 from gymnasium.spaces import Box, Discrete, MultiDiscrete
 from pettingzoo import ParallelEnv
 
-from ...core.interface.protocols import Transition
+from ...core.interface.scenario import Transition
 from ...core.numerics.arrays import FloatArray, IntArray
 from .config import BoxPushingSettings
 from .pictures.screen import Screen
@@ -78,6 +78,11 @@ class Seat:
         self.action_space = (
             Discrete(actions) if len(self.wheels) == 1 else MultiDiscrete([actions] * len(wheels))
         )
+
+    @classmethod
+    def of_all(cls, scenario: BoxPushing, *, by_wheel: bool = False) -> Seat:
+        """Return the seat of an agent that drives all wheels."""
+        return cls(scenario, range(len(scenario.agents)), by_wheel=by_wheel)
 
     def observe(self, states: FloatArray) -> FloatArray:
         """Return the observation in the states ``(n, d)`` of all wheels."""
@@ -310,7 +315,7 @@ class BoxPushingEnv(gymnasium.Env):
     ) -> None:
         self.game = Game(settings, steps, render_mode, sensors=sensors)
         self.render_mode = render_mode
-        self.seat = Seat(self.game.scenario, range(len(self.game.scenario.agents)))
+        self.seat = Seat.of_all(self.game.scenario)
         self.observation_space = self.seat.observation_space
         self.action_space = self.seat.action_space
 

@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, Any
 from ...core.plugins.messages import closest
 from ...core.plugins.sources import Sources
 from ..catalogue.study import analysed, load_study
+from ..errors import SpecError
 from ..presentation.progress import Terminal
 from ..presentation.tables import SummaryTable, tabulate
 from ..presentation.words import count
@@ -34,8 +35,7 @@ from ..results.power import SMALLEST, USUAL_DEVIATION
 from ..results.results import Results, read
 from ..results.selection import Where, selected, together
 from ..results.verdicts import power_text
-from ..spec.errors import SpecError
-from ..spec.outline import Outline
+from ..spec.outline import Outline, sources_of
 from ..store import durable
 from ..store.store import Store
 from ..workers.workers import Backend
@@ -222,7 +222,7 @@ class StudyResults:
         condition, seed
             Which trial; the first unless said otherwise.
         episode
-            ``first`` or ``last``; ``before`` or ``after`` where a wheel fails.
+            ``first`` or ``last``; ``before`` or ``after`` where something fails.
         path
             Where to write, GIF or MP4; the study's folder ``replay`` unless said otherwise.
         """
@@ -403,8 +403,14 @@ def _loaded(path: Path) -> StudyResults:
 
 
 def _of(store: Store) -> StudyResults:
-    outline = store.outline()
+    outline = Outline.kept(store)
     part = Part(store.directory, {label: label for label in outline.columns})
     return StudyResults(
-        outline, read(store), tuple(store.failed()), (), store.sources(), store.settings(), (part,)
+        outline,
+        read(store),
+        tuple(store.failed()),
+        (),
+        sources_of(store),
+        store.settings(),
+        (part,),
     )

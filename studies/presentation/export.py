@@ -10,6 +10,7 @@ from typing import Any, Literal
 from ..results import published
 from ..results.results import read
 from ..spec.errors import SpecError
+from ..spec.outline import Outline
 from ..store.durable import replacing
 from ..store.reading import NamesAndRows
 from ..store.store import Store
@@ -64,7 +65,7 @@ def _writers(store: Store, form: Form) -> dict[str, Callable[[Path], None]]:
     if form == "json":
         version = int(store.meta("results_version"))
         return {
-            "results": lambda path: published.write(path, store.outline(), read(store), version)
+            "results": lambda path: published.write(path, Outline.kept(store), read(store), version)
         }
     rates = {measure.name for measure in store.measures() if measure.is_rate}
     write_table = _write_csv if form == "csv" else _parquet_writer(rates)

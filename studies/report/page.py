@@ -13,9 +13,10 @@ from ..claims.claims import judge
 from ..claims.table import result
 from ..presentation.tables import tabulate
 from ..results.results import read
+from ..spec.outline import Outline, sources_of
 from ..spec.toml import dumps
+from ..store.schema import RESULTS_VERSION
 from ..store.store import Store
-from ..trials.code import RESULTS_VERSION
 from . import words
 from .pictures import pictures
 from .replays import replays
@@ -33,7 +34,7 @@ def page(directory: Path) -> str:
     """
     with Store.open(directory) as store:
         store.verify()
-        outline, results, counts = store.outline(), read(store), store.counts()
+        outline, results, counts = Outline.kept(store), read(store), store.counts()
         failed = [
             (condition, seed, words.without_places(error.rstrip()))
             for condition, seed, error in store.failed()
@@ -41,7 +42,7 @@ def page(directory: Path) -> str:
         trials = store.planned()
         packed = replays(store, trials)
         version = store.meta("results_version")
-        sources = store.sources()
+        sources = sources_of(store)
     with sources.active():
         analysis = analysed(outline.study, results)
         drawn = load_study(outline.study).draw(analysis) if analysis.table else {}
@@ -69,7 +70,7 @@ def page(directory: Path) -> str:
         outdated=version != str(RESULTS_VERSION),
         css=_own("page.css"),
         js=_own("page.js"),
-        replay_js=_own("replay.js"),
+        replay_js=Markup(packed.script),
     )
 
 

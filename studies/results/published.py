@@ -14,12 +14,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.interface.protocols import SUCCESS, Measure
+from ...core.interface.measures import SUCCESS, Measure
 from ..spec.errors import SpecError
 from ..spec.outline import Outline
 from ..store import durable
-from ..trials.code import RESULTS_VERSION
-from ..trials.measures import measures_from, tables
+from ..store.schema import RESULTS_VERSION, measures_from, tables
 from .results import Arrays, Results
 
 SUCCESS_ALONE = ("ablation", "chain-order", "games", "hierarchies", "scaling", "wheel-failure")

@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.interface.protocols import SUCCESS, Measure
+from ...core.interface.measures import SUCCESS, Measure
+from ..store.schema import AFTER, ELSEWHERE
 from ..store.store import Store
-from ..trials.episodes import ELSEWHERE
-from ..trials.measures import AFTER
 
 Arrays = dict[str, NDArray[Any]]
 

@@ -9,15 +9,17 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-from ...core.interface.protocols import Measure, Scenario
+from ...core.interface.measures import Measure
+from ...core.interface.scenario import Scenario
 from ...core.plugins.settings import ScenarioSettings
 from ...core.plugins.sources import Sources, named
 from ..spec.conditions import ConditionSettings
 from ..spec.curriculum import Stage
 from ..spec.outline import lengths
 from ..spec.spec import Spec
-from .code import RESULTS_VERSION
-from .episodes import EpisodeRow, Recording
+from ..store.durable import Recording
+from ..store.schema import RESULTS_VERSION, Planned
+from .episodes import EpisodeRow
 
 PLAIN = ("study", "condition", "seed", "episodes", "steps", "evaluation", "evaluation_steps")
 """What of a trial any process can read as it is."""
@@ -117,6 +119,11 @@ class Trial:
         return built
 
     @property
+    def planned(self) -> Planned:
+        """What a store notes of it."""
+        return Planned(self.identity, self.condition, self.seed, self.recorded)
+
+    @property
     def lengths(self) -> str:
         """Its episodes of training, stage by stage, in words."""
         return lengths([[stage.episodes for stage in self.curriculum]], self.episodes)
@@ -125,7 +132,7 @@ class Trial:
     def recorded(self) -> dict[int, str]:
         """Names of the training episodes that are recorded, by number.
 
-        The first and the last; if a wheel fails, also the one before, and the one in which it does.
+        The first and the last; if something is scheduled to fail, also that one and the one before.
         """
         named = {}
         onset = self.settings.scenario.onset

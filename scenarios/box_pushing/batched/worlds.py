@@ -9,7 +9,6 @@ other worlds there are.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,37 +17,6 @@ from gymnasium.vector import AutoresetMode
 from ....core.numerics.arrays import FloatArray
 from ..config import BoxPushingSettings
 from ..environments import Game, Seat
-from ..scenario import BoxPushing
-
-
-@dataclass(frozen=True)
-class Recipe:
-    """What all worlds of a vector environment are made by.
-
-    Attributes
-    ----------
-    settings, steps, render_mode, sensors
-        As in `nested_agents.scenarios.box_pushing.environments.Game`.
-    by_wheel
-        Whether observations have a row for every wheel.
-    autoreset
-        When a world that is over starts anew.
-    """
-
-    settings: BoxPushingSettings
-    steps: int
-    render_mode: str | None
-    sensors: bool
-    by_wheel: bool
-    autoreset: AutoresetMode
-
-    def game(self) -> Game:
-        """Return a world."""
-        return Game(self.settings, self.steps, self.render_mode, sensors=self.sensors)
-
-    def seat(self, scenario: BoxPushing) -> Seat:
-        """Return how the worlds are seen."""
-        return Seat(scenario, range(len(scenario.agents)), by_wheel=self.by_wheel)
 
 
 def row_type(game: Game, seat: Seat) -> np.dtype[Any]:
@@ -82,16 +50,29 @@ class Worlds:
 
     Parameters
     ----------
-    recipe
-        What they are made by.
+    settings, steps, render_mode, sensors
+        As in `nested_agents.scenarios.box_pushing.environments.Game`.
+    by_wheel
+        Whether observations have a row for every wheel.
+    autoreset
+        When a world that is over starts anew.
     rows
         A row for each of them, see `row_type`; written to.
     """
 
-    def __init__(self, recipe: Recipe, rows: Any) -> None:
-        self._recipe, self._rows = recipe, rows
-        self._games = [recipe.game() for _ in rows]
-        self._seats = [recipe.seat(game.scenario) for game in self._games]
+    def __init__(
+        self,
+        settings: BoxPushingSettings,
+        steps: int,
+        render_mode: str | None,
+        sensors: bool,
+        by_wheel: bool,
+        autoreset: AutoresetMode,
+        rows: Any,
+    ) -> None:
+        self._autoreset, self._rows = autoreset, rows
+        self._games = [Game(settings, steps, render_mode, sensors=sensors) for _ in rows]
+        self._seats = [Seat.of_all(game.scenario, by_wheel=by_wheel) for game in self._games]
 
     def reset(
         self,
@@ -111,7 +92,7 @@ class Worlds:
             row = self._rows[i]
             over = row["terminated"] or row["truncated"]
             row["told"], row["final"] = True, False
-            if over and self._recipe.autoreset is AutoresetMode.NEXT_STEP:
+            if over and self._autoreset is AutoresetMode.NEXT_STEP:
                 self._begin(i, None, None)
                 continue
             transition, truncated = game.step(row["action"])
@@ -119,7 +100,7 @@ class Worlds:
             row["terminated"], row["truncated"] = transition.terminated, truncated
             self._tell(i, transition.states, transition.info)
             ended = transition.terminated or truncated
-            if ended and self._recipe.autoreset is AutoresetMode.SAME_STEP:
+            if ended and self._autoreset is AutoresetMode.SAME_STEP:
                 row["final"], row["final_observation"] = True, row["observation"]
                 row["final_info"] = row["info"]
                 self._tell(i, game.reset(None, None), game.scenario.measure())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -60,8 +61,9 @@ class View:
 
     def guarded(self) -> View:
         """Return the same situations, not to be written to."""
-        arrays = ("robots", "box", "gaps", "goal", "origin")
-        return replace(self, **{name: _fixed(getattr(self, name).view()) for name in arrays})
+        names = ("robots", "box", "gaps", "goal", "origin")
+        arrays: dict[str, Any] = {name: _fixed(getattr(self, name).view()) for name in names}
+        return replace(self, **arrays)
 
     @property
     def n_situations(self) -> int:

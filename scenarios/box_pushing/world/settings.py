@@ -159,7 +159,7 @@ class BoxSettings(Described):
 
 
 class WheelSettings(Settings):
-    """A wheel of a robot of one's own."""
+    """A wheel of a robot: its name, unique in its robot, and where it stands in the body frame."""
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")]
     """Name of the wheel; its agent is called ``robot1.NAME``."""

@@ -20,7 +20,7 @@ from ...results.statistics import Estimate, rate
 from ...results.summary import Summary, two_figures
 from ...spec.errors import SpecError
 from ...spec.spec import Spec
-from ...trials.episodes import ELSEWHERE
+from ...store.schema import ELSEWHERE
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 

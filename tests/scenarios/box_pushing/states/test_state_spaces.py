@@ -20,8 +20,9 @@ from nested_agents.scenarios.box_pushing.states.state_spaces import (
     state_space_for,
 )
 from nested_agents.scenarios.box_pushing.states.variables import STATE_VARIABLES
-from nested_agents.scenarios.box_pushing.states.view import View, wrap
+from nested_agents.scenarios.box_pushing.states.view import View
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
+from nested_agents.scenarios.box_pushing.world.geometry import wrap
 from nested_agents.scenarios.state_variables import StateVariable, found, sensed
 
 GOAL = np.array([1.0, 0.0, 0.0])
