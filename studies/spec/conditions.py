@@ -26,7 +26,7 @@ from ...core.plugins.settings import ScenarioSettings, Settings, tuples
 from ...scenarios import SCENARIOS
 from ...scenarios.box_pushing.config import BoxPushingSettings
 from ...topologies import build
-from ...topologies.config import ChainSettings, Topology, parse
+from ...topologies.config import Topology, parse
 from ..errors import SpecError, show
 from .curriculum import Curriculum, Name, Stage, StageSettings
 from .labels import label, scalar
@@ -42,7 +42,7 @@ class ConditionSettings(Settings):
 
     scenario: Annotated[ScenarioSettings, Plugged(SCENARIOS)] = BoxPushingSettings()
     agents: Agents = "actuator"
-    topology: Topology = ChainSettings()
+    topology: Topology = parse("chain")
     learner: Annotated[TeamSettings, Plugged(LEARNERS)] = BatchTDSettings()
 
     @model_serializer(mode="wrap")
