@@ -6,7 +6,7 @@ import numpy as np
 from gymnasium.spaces import Discrete
 from stable_baselines3 import DQN
 
-from ..interface.protocols import Scenario, Transition
+from ..interface.scenario import Scenario, Transition
 from ..numerics.arrays import FloatArray, IntArray
 from .inputs import Inputs, RewardScale
 from .networks import Layers, drawing_from, prepare, weights_of

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...core.agents.cost import below_counts
-from ...core.interface.protocols import groups_of
+from ...core.interface.scenario import groups_of
 from ...topologies.view import HierarchyView
 from ..errors import SpecError
 from ..spec.conditions import Condition

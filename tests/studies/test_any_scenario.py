@@ -9,7 +9,8 @@ import made_up
 import numpy as np
 import pytest
 
-from nested_agents.core.interface.protocols import SUCCESS, Measure, groups_of
+from nested_agents.core.interface.measures import SUCCESS, Measure
+from nested_agents.core.interface.scenario import groups_of
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.line_up import LineUp, LineUpSettings
 from nested_agents.studies.api.study import load

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("action", type=click.Choice(["list", "show"]), metavar="list|show")
-@click.argument("topology", type=options.text, metavar="[SPEC]", required=False)
+@click.argument("topology", metavar="[SPEC]", required=False)
 @click.option(
     "--agents",
     type=int,

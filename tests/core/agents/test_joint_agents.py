@@ -11,7 +11,7 @@ from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.settings import Decision
 from nested_agents.core.interface.hierarchy import Hierarchy
-from nested_agents.core.interface.protocols import EmbodiedScenario, Scenario, roles_of
+from nested_agents.core.interface.scenario import EmbodiedScenario, Scenario, roles_of
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.learners.td import TDLambdaSettings
 from nested_agents.core.rules.settings import RuleBaseSettings

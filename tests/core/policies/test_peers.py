@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nested_agents.core.interface.protocols import Transition
+from nested_agents.core.interface.scenario import Transition
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.core.learners import LEARNERS
 from nested_agents.core.policies.inputs import FARTHEST, Inputs, RewardScale

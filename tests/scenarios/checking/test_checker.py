@@ -13,7 +13,9 @@ import pytest
 
 from nested_agents import View, state_variable
 from nested_agents.core.agents.joint_agents import join_agents
-from nested_agents.core.interface.protocols import SUCCESS, Blocks, Measure, Scenario, Transition
+from nested_agents.core.interface.measures import SUCCESS, Measure
+from nested_agents.core.interface.prediction import Blocks
+from nested_agents.core.interface.scenario import Scenario, Transition
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing

@@ -9,7 +9,6 @@ from nested_agents.core.agents.joint_agents import join_agents
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.settings import Decision
-from nested_agents.core.interface.protocols import CalibratedScenario
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.prediction.belief import (
@@ -134,7 +133,6 @@ def test_the_twist_of_the_box_is_not_measured_when_robots_touch():
 
 def test_a_team_of_robots_calibrates_too_and_is_saved_whole(tmp_path):
     (world, team), (_, other) = (calibrating(scenario(start="easy"), "body") for _ in "ab")
-    assert isinstance(world, CalibratedScenario)
     assert world.constants == CONSTANTS
     for _ in control_loop(world, team, episodes=1, steps=30, seed=0):
         pass
