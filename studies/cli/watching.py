@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from ..presentation.words import count, duration
-from ..results.results import Results, read
+from ..results.results import Results, from_arrays, read
 from ..store.store import Store
 from ..workers.progress import Progress, progress
 
@@ -43,7 +43,7 @@ def frame(directory: Path) -> tuple[Group, bool]:
     """Return what there is to see of a study now, and whether anything is still to come."""
     with Store.open(directory) as store:
         outline, now, failed = store.outline(), progress(store), store.failed()
-        results = read(store) if store.other_version() is None else Results({}, {})
+        results = read(store) if store.other_version() is None else from_arrays({})
         planned = store.planned()
     planned_of: dict[str, int] = {}
     for trial in planned:
@@ -83,11 +83,11 @@ def _conditions(results: Results, planned: dict[str, int], now: Progress) -> Tab
         table.add_column(heading, justify="right")
     table.add_column("success, episode by episode", no_wrap=True)
     for condition, total in list(planned.items())[:MOST_CONDITIONS]:
-        done = len(results.seeds.get(condition, ()))
+        done = len(results.seeds(condition))
         running = sum(c == condition for c, _, _ in now.running)
         shown, last = "", ""
-        if condition in results.training:
-            rates = results.training[condition]["success"].mean(axis=0)
+        if results.has(condition, "training"):
+            rates = results.success(condition).mean(axis=0)
             shown, last = curve(rates), f"{rates[-5:].mean():.2f}"
         table.add_row(escape(condition), f"{done} of {total}", str(running or ""), last, shown)
     if len(planned) > MOST_CONDITIONS:

@@ -44,7 +44,6 @@ from ...topologies.config import (
     SingleAgentSettings,
 )
 from ...topologies.view import team_of
-from ..results.distributions import t_quantile
 from ..results.statistics import Estimate
 
 if TYPE_CHECKING:
@@ -270,7 +269,7 @@ def exponent(
         return None
     x, y = zip(*points, strict=True)
     fit = stats.linregress(x, y)
-    half = float(t_quantile(len(points) - 2, 0.5 + level / 2)) * fit.stderr
+    half = float(stats.t.ppf(0.5 + level / 2, len(points) - 2)) * fit.stderr
     value, low, high = (np.asarray(v) for v in (fit.slope, fit.slope - half, fit.slope + half))
     return Estimate(value, low, high)
 

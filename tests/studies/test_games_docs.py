@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from nested_agents.studies.catalogue.games.analysis import analyse
+from nested_agents.studies.catalogue.games import analyse
 from nested_agents.studies.claims import claims
 from nested_agents.studies.results import published
 from nested_agents.studies.spec.errors import SpecError

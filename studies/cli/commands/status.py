@@ -17,12 +17,7 @@ def command(directory: Path) -> int:
 
     DIR is where the study is kept.
     """
-    from shutil import get_terminal_size
-    from textwrap import fill
-
     from ...presentation.words import count, duration
-    from ...results.power import SMALLEST, USUAL_DEVIATION
-    from ...results.verdicts import power_told
     from ...store.store import Store
     from ...workers.progress import progress
 
@@ -42,10 +37,6 @@ def command(directory: Path) -> int:
         print(f"time     about {duration(now.seconds)} with {processes}")
     if versions > 1:
         print(f"code     finished trials are of {versions} versions of the installed code")
-    if len(outline.columns) > 1:
-        told = power_told(len(outline.seeds), len(outline.columns) - 1, USUAL_DEVIATION, SMALLEST)
-        width = get_terminal_size().columns
-        print(fill(told, width, initial_indent="power    ", subsequent_indent=9 * " "))
     if now.refusal:
         print(f"\nnothing can be added: {now.refusal}")
     for line in now.damaged:
