@@ -48,8 +48,10 @@ from nested_agents.studies.store import durable
 from nested_agents.studies.store.running import LOCK
 from nested_agents.studies.store.store import DATABASE, Store
 from nested_agents.studies.trials.arrangement import check
+from nested_agents.studies.trials.keeping import open_to_run, pending, spec_of
 from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import Trial, TrialResult, trials_of
+from nested_agents.studies.workers.runner import save
 from nested_agents.studies.workers.worker import Arrival, RunTrial
 
 SPEC = Spec.of(
@@ -106,9 +108,9 @@ class Adversary:
 
     def finish(self, directory: Path) -> list[str]:
         """Run what is left of a study; return what had to be said."""
-        with Store.create(directory, SPEC, self.measures) as store:
-            for trial in store.pending(self.trials):
-                store.save(trial, self.result(trial), 1.0)
+        with open_to_run(directory, SPEC, self.trials, self.measures) as store:
+            for trial in pending(store, self.trials):
+                save(store, trial, self.result(trial), 1.0)
             return store.notes
 
     def result(self, trial: Trial) -> TrialResult:
@@ -121,7 +123,7 @@ class Adversary:
             store.verify()
             names, episodes = store.episodes()
             kept = names, list(episodes)
-            rows = kept, store.planned(), store.columns(), store.spec() == SPEC
+            rows = kept, store.planned(), store.columns(), spec_of(store) == SPEC
         paths = sorted((directory / "recordings").glob("[!.]*.npz"))
         return rows, [(path.name, path.read_bytes()) for path in paths]
 

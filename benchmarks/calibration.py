@@ -16,7 +16,8 @@ from nested_agents.core.adaptation.self_model import SelfModelSettings
 from nested_agents.core.agents.loop import policy_seed, world_seed
 from nested_agents.core.agents.team import Team
 from nested_agents.core.learners.batch import BatchTDSettings
-from nested_agents.scenarios import BoxPushing, BoxPushingSettings
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
+from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.topologies import build, parse
 
 BELIEFS = {
@@ -55,8 +56,9 @@ def calibrated(robot: str, believed: str, episodes: int) -> tuple[Any, Any]:
             predicted = prediction.outcomes(joint, tried)  # type: ignore[attr-defined]
             transition = scenario.step(joint)
             team.adapt(prediction, joint, transition)
-            if transition.pushed is not None and np.hypot(*transition.pushed[:2]) > 0.002:
-                off = np.hypot(*(predicted[:, 0] - transition.pushed)[:, :2].T)
+            box, *bodies = transition.twists
+            if len(bodies) == len(scenario.groups) and np.hypot(*box[:2]) > 0.002:
+                off = np.hypot(*(predicted[:, 0] - box)[:, :2].T)
                 errors.append(1000 * off * scenario.settings.action_repeat * 0.064)
                 found.append(np.exp(team.calibration.constants - right))
             prediction = team.predict(scenario)

@@ -1,7 +1,7 @@
 """Render an episode of 64 robots, 128 agents in a chain: ``python -m benchmarks.crowd FILE.png``.
 
-The team learns online while it acts, deciding by moments every 0.5 s; drawn is the last moment with
-the trails of all robots. Prints what a control step took.
+The team learns online while it acts, deciding by best responses every 0.5 s; drawn is the last
+moment with the trails of all robots. Prints what a control step took.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.settings import Decision
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.learners.td import TDLambdaSettings
-from nested_agents.scenarios import BoxPushingSettings
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.pictures.rendering import snapshot
 from nested_agents.studies.trials.episodes import EpisodeRecorder, Stopwatch
 
@@ -31,7 +31,7 @@ def main() -> None:
     settings = BoxPushingSettings(robots=options.robots)
     scenario = settings.build()
     hierarchy = Hierarchy(scenario.agents, list(pairwise(scenario.agents)))
-    learner = TDLambdaSettings(step_size=0.05, decision=Decision(teammates="uniform"))
+    learner = TDLambdaSettings(step_size=0.05, decision=Decision())
     team = Team.build(learner, scenario, hierarchy, policy_seed(options.seed))
     watch, steps = Stopwatch(), 0
     scenario.reset(world_seed(options.seed, 0), 0)

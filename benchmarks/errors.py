@@ -26,7 +26,6 @@ from rich.table import Table
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.settings import Decision
-from nested_agents.core.evaluators.additive import Extremes, Moments
 from nested_agents.core.evaluators.evaluator import (
     DecisionProblem,
     Deliberation,
@@ -38,7 +37,7 @@ from nested_agents.core.evaluators.sampling import Sampling, SamplingSettings
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.numerics.arrays import FloatArray
-from nested_agents.scenarios import BoxPushingSettings
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 
 from .situations import ADDITIVE, situation
 from .timing import paired
@@ -73,10 +72,9 @@ def errors(
         )
         rules = team.learner.rules  # type: ignore[attr-defined]
         problem = DecisionProblem(
-            rules, hierarchy, len(scenario.action_set), scenario.groups, scenario.superposes,
-            "value", teammates, 0.95,
+            rules, hierarchy, len(scenario.action_set), scenario.groups, "value", teammates, 0.95,
         )  # fmt: skip
-        references, evaluators = _evaluators(problem)
+        references, evaluator = _references(problem), Sampling(64, problem)
         rng = np.random.default_rng(seed)
         frequencies = rng.dirichlet(np.full(4, 3.0), size=n)
         for record in control_loop(scenario, team, episodes=TRAINING + 1, steps=steps, seed=seed):
@@ -96,38 +94,29 @@ def errors(
                     drawn -= drawn.mean(axis=1, keepdims=True)
                     off = drawn.std(axis=0, ddof=1).max() / np.sqrt(len(drawn))
                     found.setdefault("reference", []).append((off / spread, 0.0))
-                for name, evaluator in evaluators.items():
-                    approximate = evaluator.values(asked)
-                    off = approximate - exact
-                    error = np.abs(off - off.mean()).max()
-                    regret = exact.max() - exact[approximate.argmax()]
-                    found.setdefault(name, []).append((error / spread, regret / spread))
+                approximate = evaluator.values(asked)
+                off = approximate - exact
+                error = np.abs(off - off.mean()).max()
+                regret = exact.max() - exact[approximate.argmax()]
+                found.setdefault("sampling", []).append((error / spread, regret / spread))
     return {name: np.array(rows) for name, rows in found.items()}
 
 
-def _evaluators(
-    problem: DecisionProblem,
-) -> tuple[list[Evaluator], dict[str, Evaluator]]:
-    """Return what is taken for exact, and what is measured."""
-    references: list[Evaluator]
+def _references(problem: DecisionProblem) -> list[Evaluator]:
+    """Return what is taken for exact."""
     if len(problem.hierarchy) <= LARGEST_EXACT:
-        references = [ExactEnumeration(problem)]
-    else:
-        references = [Sampling(SAMPLES, problem) for _ in range(REPLICATES)]
-    additive = Extremes if problem.teammates == "best-response" else Moments
-    return references, {"sampling": Sampling(64, problem), additive.name: additive(problem)}
+        return [ExactEnumeration(problem)]
+    return [Sampling(SAMPLES, problem) for _ in range(REPLICATES)]
 
 
 def times(n_agents: int, budget: float = 3.0) -> dict[str, float]:
     """Return what a decision takes with each evaluator [ms], prediction included; order 1."""
-    kinds = {name: {"evaluator": name} for name in ("sampling", "moments")}
-    if n_agents <= LARGEST_EXACT:
-        kinds["exact"] = {"evaluator": "exact"}
-    moments = {
-        name: situation(n_agents, ADDITIVE, kind).predict_and_act for name, kind in kinds.items()
+    names = ["sampling", "exact"] if n_agents <= LARGEST_EXACT else ["sampling"]
+    deciding = {
+        name: situation(n_agents, ADDITIVE, {"evaluator": name}).predict_and_act for name in names
     }
-    taken = paired(moments, budget=budget, clock=time.thread_time)
-    return {name: 1e3 * taken.median(name) for name in moments}
+    taken = paired(deciding, budget=budget, clock=time.thread_time)
+    return {name: 1e3 * taken.median(name) for name in deciding}
 
 
 def main() -> None:

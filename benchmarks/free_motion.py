@@ -13,7 +13,6 @@ import numpy as np
 from pydantic import TypeAdapter
 from scipy.linalg import expm
 
-from nested_agents.scenarios.box_pushing.config import CONTROL_PERIOD, Failure
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.failures import WheelFailures
 from nested_agents.scenarios.box_pushing.world.robots import (
@@ -21,6 +20,7 @@ from nested_agents.scenarios.box_pushing.world.robots import (
     RobotSpec,
     nominal_effect,
 )
+from nested_agents.scenarios.box_pushing.world.settings import CONTROL_PERIOD, Failure
 from nested_agents.scenarios.box_pushing.world.world import World
 
 PERIODS, SPEED = 40, 0.04

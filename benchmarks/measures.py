@@ -107,7 +107,7 @@ def _check(moment: Situation, baselines: Baselines) -> None:
 
 def large(kind: str, n_agents: int, budget: float) -> Row:
     """Time a control step of a team beyond enumeration: simulate, predict, decide, learn."""
-    moment = situation(n_agents, RULE_BASES[kind])
+    moment = situation(n_agents, RULE_BASES[kind], {"teammates": "best-response"})
     neutral = np.full(n_agents, moment.scenario.action_set.neutral)
     times = paired(
         {

@@ -21,7 +21,9 @@ from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.arrangement import check
 from nested_agents.studies.trials.episodes import EpisodeRow
+from nested_agents.studies.trials.keeping import open_to_run
 from nested_agents.studies.trials.trial import Trial, TrialResult, trials_of
+from nested_agents.studies.workers.runner import save
 
 from .startup import used_by
 from .tables import Row, show
@@ -83,10 +85,11 @@ def fill(directory: Path, trials: int, episodes: int) -> None:
             "scenario": {"kind": "line-up"}, "sweep": {"preset": ["default", "frozen"]},
         }
     )  # fmt: skip
-    with Store.create(directory, spec, check(spec)) as store:
+    trials = trials_of(spec)
+    with open_to_run(directory, spec, trials, check(spec)) as store:
         store._db.execute("PRAGMA synchronous = OFF")
-        for trial in trials_of(spec):
-            store.save(trial, _made_up(trial, store), total=1.0)
+        for trial in trials:
+            save(store, trial, _made_up(trial, store), total=1.0)
 
 
 def _made_up(trial: Trial, store: Store) -> TrialResult:

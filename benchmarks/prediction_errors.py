@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from nested_agents.scenarios import BoxPushing, BoxPushingSettings
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.prediction.prediction import BoxPrediction
 from nested_agents.scenarios.box_pushing.prediction.predictors import push_model
+from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.scripted.controller import ScriptedController
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 

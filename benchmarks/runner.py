@@ -27,6 +27,7 @@ from joblib.externals.loky import get_reusable_executor
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.arrangement import check
+from nested_agents.studies.trials.keeping import open_to_run
 from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import Trial, TrialResult, trials_of
 from nested_agents.studies.workers.loky import LokyWorkers
@@ -67,12 +68,12 @@ def measure(spec: Spec, jobs: int) -> Round:
     measures = check(spec)
     with tempfile.TemporaryDirectory() as folder:
         workers = LokyWorkers(jobs)
-        with Store.create(Path(folder) / "warm", spec, measures) as store:
+        with open_to_run(Path(folder) / "warm", spec, trials, measures) as store:
             for _ in run_trials(warm, store, timed, workers):
                 pass
             pids = _pids(store)
         before, own = sum(map(_cpu, pids)), time.process_time()
-        with Store.create(Path(folder) / "study", spec, measures) as store:
+        with open_to_run(Path(folder) / "study", spec, trials, measures) as store:
             for outcome in run_trials(trials, store, timed, workers):
                 assert outcome.error is None, outcome.error
             own = time.process_time() - own

@@ -13,7 +13,7 @@ from statistics import median
 from rich.console import Console
 from rich.table import Table
 
-from nested_agents.scenarios import BoxPushingSettings
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scripted.controller import decisions_to_goal
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 

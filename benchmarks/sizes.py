@@ -16,9 +16,9 @@ from statistics import median
 from rich.console import Console
 from rich.table import Table
 
-from nested_agents.scenarios import BoxPushingSettings
-from nested_agents.scenarios.box_pushing.config import BoxSettings
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scripted.controller import decisions_to_goal
+from nested_agents.scenarios.box_pushing.world.settings import BoxSettings
 from nested_agents.studies.results.statistics import rate
 
 STARTS = ("easy", "medium")

@@ -11,7 +11,7 @@ from pathlib import Path
 import click
 
 import nested_agents
-from nested_agents.core.interface.protocols import Measure
+from nested_agents.core.interface.measures import Measure
 from nested_agents.scenarios import SCENARIOS
 from nested_agents.scenarios.box_pushing.states.variables import STATE_VARIABLES
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
@@ -54,14 +54,15 @@ VARIABLES = {"box-pushing": STATE_VARIABLES, "kinematic-chain": CHAIN_VARIABLES}
 """State variables by the scenario that has them."""
 MODULES = {
     "core": ("How agents perceive, predict, decide and learn, and what that costs.", (
-        "interface.hierarchy", "interface.spaces", "interface.protocols", "agents.team",
+        "interface.hierarchy", "interface.spaces", "interface.prediction",
+        "interface.scenario", "interface.measures", "agents.team",
         "agents.rows", "adaptation.mirror", "agents.loop", "decision.settings",
         "decision.exploration", "rules.kernels.fuzzy", "rules.rule_base", "rules.settings",
         "learners.learner", "learners.td", "learners.batch", "learners.anova",
         "learners.gradient", "learners.optimistic", "learners.fmq", "learners.sparse_cooperative",
         "learners.vdn", "learners.q_learning", "learners.frozen", "evaluators.evaluator",
-        "evaluators.auto", "evaluators.exact", "evaluators.sampling", "evaluators.additive",
-        "evaluators.best_response", "evaluators.coordination", "evaluators.cross_entropy",
+        "evaluators.auto", "evaluators.exact", "evaluators.sampling", "evaluators.best_response",
+        "evaluators.coordination", "evaluators.cross_entropy",
         "coordination.elimination", "coordination.max_plus", "adaptation.self_model",
         "adaptation.calibration", "agents.cost", "plugins.registry", "plugins.plugged",
         "plugins.settings", "interface.acting", "numerics.ties", "policies.settings",
@@ -69,7 +70,8 @@ MODULES = {
     )),
     "topologies": ("Who is above whom.", ("builders", "checks", "config", "drawing", "files")),
     "scenarios": ("Where agents act.", (
-        "box_pushing.config", "box_pushing.scenario", "box_pushing.environments",
+        "box_pushing.config", "box_pushing.world.settings", "box_pushing.prediction.settings",
+        "box_pushing.scenario", "box_pushing.environments",
         "box_pushing.batched.environments", "adapters.passing_down",
         "box_pushing.world.reward", "box_pushing.world.starts", "box_pushing.states.view",
         "box_pushing.states.variables", "box_pushing.states.state_spaces",
@@ -86,7 +88,7 @@ MODULES = {
     "studies": ("What is measured, compared and drawn.", (
         "api.study", "api.planning", "api.costs", "api.comparison", "api.recovery", "api.frames",
         "api.run_study",
-        "spec.spec", "spec.errors", "spec.keys", "spec.presets", "trials.trial",
+        "errors", "spec.spec", "spec.keys", "spec.presets", "trials.trial",
         "trials.arrangement", "trials.session",
         "store.store", "results.results", "results.statistics", "results.comparison",
         "results.power", "results.summary", "catalogue.study", "cost.cost", "claims.claims",

@@ -15,9 +15,10 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
-from nested_agents.scenarios import BoxPushing, BoxPushingSettings
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.pictures.rendering import AXES, SIDES
 from nested_agents.scenarios.box_pushing.pictures.screen import Screen
+from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 
 ROBOTS = (2, 4, 8)
@@ -38,7 +39,7 @@ figure, grid = plt.subplots(len(BOXES), len(ROBOTS), figsize=(9, 1.8 * len(BOXES
 for row, name in zip(grid, BOXES, strict=True):
     for axes, robots in zip(row, ROBOTS, strict=True):
         settings = BoxPushingSettings(box=name, robots=robots, start="hard")
-        scenario, screen = BoxPushing(settings), Screen(settings, "rgb_array")
+        scenario, screen = BoxPushing(settings), Screen(settings.drawn, "rgb_array")
         scenario.reset(1)
         screen.begin(scenario.measure())
         axes.imshow(screen.render()[rows, columns])

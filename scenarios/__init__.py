@@ -11,16 +11,10 @@ Examples
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
 from ..core.plugins.plugged import SettingsRegistry
 from ..core.plugins.settings import ScenarioSettings
-from .box_pushing.config import BoxPushingSettings
 
-if TYPE_CHECKING:
-    from .box_pushing.scenario import BoxPushing
-
-__all__ = ["SCENARIOS", "BoxPushing", "BoxPushingSettings"]
+__all__ = ["SCENARIOS"]
 
 SCENARIOS = SettingsRegistry(
     "scenario",
@@ -36,11 +30,3 @@ SCENARIOS = SettingsRegistry(
     ScenarioSettings,
 )
 """Scenarios by the name that specs use."""
-
-
-def __getattr__(name: str) -> Any:
-    if name == "BoxPushing":
-        from .box_pushing.scenario import BoxPushing
-
-        return BoxPushing
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

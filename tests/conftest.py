@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
-from nested_agents.core.interface.protocols import Blocks, Transition
+from nested_agents.core.interface.prediction import Blocks
+from nested_agents.core.interface.scenario import Transition
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 
 # The first example of a test may compile a kernel.

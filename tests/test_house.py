@@ -21,8 +21,8 @@ ALLOWED = {
     "studies": {"studies", "core", "topologies", "scenarios"},
 }
 STUDIES = (
-    "spec", "trials", "store", "workers", "results", "presentation", "catalogue", "claims", "cost",
-    "explain", "report", "api", "cli",
+    "errors", "store", "spec", "trials", "workers", "results", "presentation", "catalogue",
+    "claims", "cost", "explain", "report", "api", "cli",
 )  # fmt: skip
 """The rooms of studies/, each of which may import those before it."""
 MAX_BYTES = 1_000_000
@@ -122,6 +122,16 @@ def imports_between(sources: dict[str, tuple[str, bool]]) -> nx.DiGraph:
     return graph
 
 
+def folders_of(graph: nx.DiGraph, packages: set[str]) -> nx.DiGraph:
+    """Which folder imports which; a package's own module counts as its folder."""
+    folders = nx.DiGraph()
+    for edge in graph.edges:
+        place, target = (m if m in packages else m.rpartition(".")[0] for m in edge)
+        if place != target:
+            folders.add_edge(place, target)
+    return folders
+
+
 def circles(graph: nx.DiGraph) -> list[str]:
     """The circles of imports, each as one line."""
     return [
@@ -160,8 +170,48 @@ def test_no_files_import_each_other_in_a_circle(graph: nx.DiGraph) -> None:
     assert circles(graph) == []
 
 
+def test_no_folders_import_each_other_in_a_circle(graph: nx.DiGraph) -> None:
+    folders = folders_of(
+        graph,
+        {
+            module
+            for package in ALLOWED
+            for path, module in modules_of(package)
+            if path.name == "__init__.py"
+        },
+    )
+    assert folders.number_of_edges() > 50
+    assert circles(folders) == []
+
+
+def test_a_circle_of_folders_is_named() -> None:
+    roof_and_ground = {
+        "nested_agents.core": ("from .rules import base", True),
+        "nested_agents.core.rules": ("", True),
+        "nested_agents.core.rules.base": ("def f():\n    from ..spaces import S", False),
+        "nested_agents.core.spaces": ("", False),
+    }
+    graph = imports_between(roof_and_ground)
+    packages = {module for module, (_, is_package) in roof_and_ground.items() if is_package}
+    assert circles(graph) == []
+    assert circles(folders_of(graph, packages)) == [
+        "nested_agents.core <-> nested_agents.core.rules"
+    ]
+
+
 def test_imports_inside_studies_point_one_way(graph: nx.DiGraph) -> None:
     assert wrong_arrows(graph) == []
+
+
+def test_the_store_knows_neither_specs_nor_trials_nor_the_files_of_users(graph: nx.DiGraph) -> None:
+    others = ("nested_agents.studies.", "nested_agents.core.plugins.")
+    own = ("nested_agents.studies.store.", "nested_agents.studies.errors")
+    found = {
+        imported
+        for module, imported in graph.edges()
+        if module.startswith("nested_agents.studies.store.") and imported.startswith(others)
+    }
+    assert [name for name in found if not name.startswith(own)] == []
 
 
 def test_a_circle_and_a_wrong_arrow_are_named() -> None:
@@ -290,3 +340,5 @@ def test_the_wheel_holds_the_four_packages(tmp_path: Path, tracked: list[Path]) 
     assert sources <= names
     assert {"nested_agents/__main__.py", "nested_agents/py.typed"} <= names
     assert {name.split("/")[0] for name in names if ".dist-info" not in name} == {"nested_agents"}
+    assert [name for name in names if "/published/" in name] == []
+    assert "nested_agents/studies/claims/quick/shapes.toml" in names

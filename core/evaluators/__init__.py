@@ -16,8 +16,6 @@ EVALUATORS = SettingsRegistry(
         "auto": f"{__name__}.auto:AutoSettings",
         "exact": f"{__name__}.exact:ExactSettings",
         "sampling": f"{__name__}.sampling:SamplingSettings",
-        "moments": f"{__name__}.additive:MomentsSettings",
-        "extremes": f"{__name__}.additive:ExtremesSettings",
         "variable-elimination": f"{__name__}.coordination:VariableEliminationSettings",
         "max-plus": f"{__name__}.coordination:MaxPlusSettings",
         "best-response": f"{__name__}.best_response:BestResponseSettings",

@@ -23,7 +23,7 @@ import numpy as np
 from gymnasium.spaces import Box, Discrete, MultiDiscrete
 from pettingzoo import ParallelEnv
 
-from ...core.interface.protocols import Transition
+from ...core.interface.scenario import Transition
 from ...core.numerics.arrays import FloatArray, IntArray
 from .config import BoxPushingSettings
 from .pictures.screen import Screen
@@ -113,7 +113,7 @@ class Game:
         settings = meant(settings)
         self.scenario = BoxPushing(settings)
         self.steps = steps
-        self.screen = Screen(settings, render_mode, sensors=sensors) if render_mode else None
+        self.screen = Screen(settings.drawn, render_mode, sensors=sensors) if render_mode else None
         self._seeds = np.random.default_rng()
         self._episode, self._step = -1, 0
 

@@ -14,13 +14,15 @@ from typing import Any
 
 import numpy as np
 
-from ...core.interface.protocols import SUCCESS, Measure, Transition
+from ...core.interface.measures import SUCCESS, Measure
+from ...core.interface.scenario import Transition
 from ...core.interface.spaces import ActionSet, StateSpace
 from ...core.numerics.arrays import BoolArray, FloatArray, IntArray
-from .config import CONTROL_PERIOD, BeliefSettings, BoxPushingSettings
+from .config import BoxPushingSettings
 from .prediction.belief import APART, CONSTANTS, PushBelief, least_gap
 from .prediction.prediction import BoxPrediction, mean_twists
 from .prediction.predictors import ExactPrediction, Future, push_model
+from .prediction.settings import BeliefSettings
 from .prediction.situation import Premises, Situation
 from .states.state_spaces import state_space_for
 from .states.view import View
@@ -29,6 +31,7 @@ from .world.failures import WheelFailures
 from .world.infrared import InfraredSpec, strongest_reading
 from .world.reward import Task, reward
 from .world.robots import nominal_effect, robot_for
+from .world.settings import CONTROL_PERIOD
 from .world.starts import place
 from .world.world import World, WorldState
 
@@ -130,11 +133,6 @@ class BoxPushing:
         self._saved: WorldState | None = None
 
     @property
-    def superposes(self) -> bool:
-        """Whether predictions can be had to first order: all but exact ones."""
-        return self.settings.predictor != "exact"
-
-    @property
     def state_space(self) -> StateSpace:
         """The state variables of every agent."""
         return self._space.space
@@ -207,10 +205,10 @@ class BoxPushing:
         moved = perf_counter()
         states = self._observe(box)
         period = self.settings.period
-        motions = mean_twists(poses, self.world.robot_poses, period)
-        pushed = None
+        twists = mean_twists(poses, self.world.robot_poses, period)
         if min(least_gap(poses, radius), least_gap(self.world.robot_poses, radius)) > APART:
-            pushed = mean_twists(box[None], self.world.box_pose[None], period)[0]
+            of_box = mean_twists(box[None], self.world.box_pose[None], period)
+            twists = np.concatenate([of_box, twists])
         measured = self.measure()
         readings = strongest_reading(self.world, self._sensing)
         terminated = self._reached()
@@ -233,7 +231,7 @@ class BoxPushing:
         measured["seconds"] = {"physics": moved - begin, "sensors": sensed - moved}
         farthest = self._unit * self.settings.termination_radius
         truncated = not terminated and measured["distance_m"] > farthest
-        return Transition(states, paid, terminated, truncated, measured, motions, pushed)
+        return Transition(states, paid, terminated, truncated, measured, twists)
 
     @property
     def nominal_effects(self) -> tuple[FloatArray, ...]:

@@ -1,7 +1,7 @@
 """A check that a scenario keeps the promises on which learning and its measurement rest.
 
 Whole episodes of random actions are played and compared to the last bit: states, reward, end of the
-episode, motions and measurements of every step. Not compared are the measured times, ``seconds``.
+episode, twists and measurements of every step. Not compared are the measured times, ``seconds``.
 Predictions are held against each other (see `predictions`), and, of scenarios that can be predicted
 exactly, against what is then sensed (see `sensing`); how good others are is not checked. What a
 scenario need not have, such as measures or tables, is checked where it is there. A further check is
@@ -21,13 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.interface.protocols import (
-    ExactlyPredictedScenario,
-    RecordedScenario,
-    Scenario,
-    groups_of,
-    roles_of,
-)
+from ...core.interface.scenario import RecordedScenario, Scenario, groups_of, roles_of
 from ...core.numerics.arrays import IntArray
 from .frames import (
     FIELDS,
@@ -168,12 +162,11 @@ def _form(of: Examination) -> str | None:
             return f"reward of shape {np.shape(frame['reward'])} {at(step)}, must be () or {(n,)}"
         if step and not all(isinstance(frame[e], bool) for e in ("terminated", "truncated")):
             return f"terminated and truncated must be bool, {at(step)} they are not"
-        motions = frame.get("motions")
-        if motions is not None and np.shape(motions) != (len(groups), 3):
-            return f"motions of shape {np.shape(motions)}, must be {(len(groups), 3)}"
-        pushed = frame.get("pushed")
-        if pushed is not None and np.shape(pushed) != (3,):
-            return f"pushed of shape {np.shape(pushed)}, must be (3,)"
+        twists = frame.get("twists")
+        if twists is not None and (np.ndim(twists) != 2 or np.shape(twists)[1] != 3):
+            return f"twists of shape {np.shape(twists)} {at(step)}, must be (bodies, 3)"
+        if twists is not None and len(twists) < len(groups):
+            return f"twists of {len(twists)} bodies {at(step)}, must be at least {len(groups)}"
     return None
 
 
@@ -299,7 +292,7 @@ def _senses(of: Examination) -> str | None:
     """Check that variables mean the same in sensing and prediction, where that can be told."""
     for seed, episode in _all(of):
         scenario: Any = of.factory()
-        if not isinstance(scenario, ExactlyPredictedScenario):
+        if not hasattr(scenario, "with_exact_prediction"):
             return None
         exact = scenario.with_exact_prediction()
         fault = fault_of_exact(exact, seed, episode, of.actions(exact, seed)) or fault_at_rest(

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from ...core.agents.loop import world_seed
-from ...core.interface.protocols import RewardPrediction, Scenario, Transition
+from ...core.interface.scenario import Scenario, Transition
 from ...core.numerics.arrays import IntArray
 
 Frame = dict[str, Any]
 """What one step gave, by dotted name; without the measured times."""
 
-FIELDS = ("states", "reward", "terminated", "truncated", "motions", "pushed", "info")
+FIELDS = ("states", "reward", "terminated", "truncated", "twists", "info")
 
 
 def random_actions(scenario: Scenario, steps: int, seed: int) -> IntArray:
@@ -131,7 +131,7 @@ def _look_ahead(scenario: Scenario) -> None:
     some[1] = len(scenario.action_set) - 1
     for agent in range(len(scenario.agents)):
         prediction.states(agent, some)
-    if isinstance(prediction, RewardPrediction):
+    if hasattr(prediction, "rewards"):
         prediction.rewards(some)
     measured(scenario)
 

@@ -153,7 +153,7 @@ class ChainSuperposition:
     def states(
         self, agent: int, local: IntArray, sums: FloatArray, shares: FloatArray
     ) -> FloatArray:
-        """Return the next states ``(m, d)`` of `agent`, see the protocol."""
+        """Return the next states ``(m, d)`` of `agent`, see `box_pushing.prediction.additive`."""
         prediction = self._prediction
         turns, speeds = (
             np.tile((shares * each).sum(axis=1), (each.shape[1], 1))

@@ -16,7 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from ...core.interface.protocols import SUCCESS, Measure, Transition
+from ...core.interface.measures import SUCCESS, Measure
+from ...core.interface.scenario import Transition
 from ...core.interface.spaces import ActionSet, StateSpace
 from ...core.numerics.arrays import BoolArray, FloatArray, IntArray
 from ..faults.schedule import Failures
@@ -86,11 +87,6 @@ class KinematicChain:
         self._step = 0
 
     @property
-    def superposes(self) -> bool:
-        """Whether predictions can be had to first order: always."""
-        return True
-
-    @property
     def state_space(self) -> StateSpace:
         """The state variables of every agent."""
         return self._states.space
@@ -135,11 +131,11 @@ class KinematicChain:
         away = np.array([measured["distance_m"]])
         terminated = bool(away[0] < self.settings.tolerance)
         truncated = not terminated and self._step >= self.settings.most_decisions
-        motions = np.zeros((len(angles), 3))
-        motions[:, 2] = (self._angles - angles) / PERIOD
+        twists = np.zeros((len(angles), 3))
+        twists[:, 2] = (self._angles - angles) / PERIOD
         paid = float(self._reward(away, before - away)[0])
         measured["seconds"] = {"physics": moved - begin, "sensors": perf_counter() - moved}
-        return Transition(states, paid, terminated, truncated, measured, motions)
+        return Transition(states, paid, terminated, truncated, measured, twists)
 
     @property
     def nominal_effects(self) -> tuple[FloatArray, ...]:

@@ -18,17 +18,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...core.plugins.deferred import Deferred
-from ..catalogue.study import load_study
+from ..errors import SpecError
 from ..presentation.words import count, duration
 from ..results.power import SMALLEST, USUAL_DEVIATION, detectable, seeds_for
 from ..results.verdicts import WIDTH, power_text
-from ..spec.errors import SpecError
 from ..spec.outline import Outline
 from ..spec.spec import Spec
-from ..trials.arrangement import check
 from ..trials.session import Session
 from ..trials.trial import Trial, trials_of
 from ..workers.worker import cores
+from .run_study import examine
 
 if TYPE_CHECKING:
     from scipy import optimize
@@ -195,9 +194,7 @@ def plan(
             raise SpecError(f"--{name} {value:g}: must be above 0 and at most 1")
     if jobs is not None and jobs < 1:
         raise SpecError(f"--jobs {jobs}: must be at least 1")
-    check(made)
-    with made.sources.active():
-        getattr(load_study(made.study), "check", lambda spec: None)(made)
+    examine(made)
     trials = trials_of(made)
     processes = max(1, min(jobs or cores(), len(trials)))
     seconds = memory = None

@@ -5,10 +5,11 @@ from __future__ import annotations
 import base64
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from ...core.interface.protocols import DrawnScenario
+from ...core.interface.scenario import can_draw
 from ...core.plugins.messages import closest
-from ..spec.errors import SpecError
+from ..errors import SpecError
 from ..store.store import Store
 
 MOST_BYTES = 20_000_000
@@ -59,10 +60,11 @@ def draw(
     SpecError
         If there is no such trial or recording, or its scenario does not draw.
     """
+    from ..trials.keeping import spec_of
     from ..trials.trial import trials_of
 
     with Store.open(directory) as store:
-        spec = store.spec()
+        spec = spec_of(store)
         trials = [t for t in trials_of(spec) if condition in (None, t.condition)]
         if not trials:
             known = closest(condition, [c.label for c in spec.conditions()])
@@ -75,8 +77,8 @@ def draw(
             episode = "last"  # of one episode
         if episode not in recorded:
             raise SpecError(f"episode = {episode!r}: {closest(episode, recorded)}")
-        scenario = chosen.world()
-        if not isinstance(scenario, DrawnScenario):
+        scenario: Any = chosen.world()
+        if not can_draw(scenario):
             raise SpecError(f"no replay: {type(scenario).__name__} does not draw its episodes")
         if store.states().get(chosen.identity) != "done":
             raise SpecError(f"{chosen.condition}, seed {chosen.seed}: has not finished")
@@ -86,5 +88,5 @@ def draw(
             path.parent.mkdir(exist_ok=True)
             is_drawn = path.exists()
         if not is_drawn:
-            scenario.animate(store.recording(chosen, episode), path)
+            scenario.animate(store.recording(chosen.identity, episode), path)
     return Replay(path, f"{chosen.condition}, seed {chosen.seed}, {episode} episode")

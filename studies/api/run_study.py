@@ -10,11 +10,13 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Protocol
 
+from ...core.interface.measures import Measure
 from ...core.plugins.sources import is_reference
 from ..catalogue.study import load_study, measured
 from ..spec.spec import Spec
 from ..store.store import Store
 from ..trials.arrangement import check
+from ..trials.keeping import open_to_run, pending
 from ..trials.trial import trials_of
 from ..workers.loggers import logged, make
 from ..workers.runner import Outcome, run_trials
@@ -98,26 +100,25 @@ def run_study(
         If it is interrupted. What has finished is kept; the same call continues.
     """
     observer = Silent() if observer is None else observer
-    measures, trials = check(spec), trials_of(spec)
-    run_trial = _run_trial(spec)
+    measures, trials = examine(spec), trials_of(spec)
     with (
         start_workers(backend, jobs, address, len(trials)) as workers,
-        Store.create(directory, spec, measures, accept_code=accept_code) as store,
+        open_to_run(directory, spec, trials, measures, accept_code=accept_code) as store,
     ):
         if retry_failed:
             store.forget_failed()
-        pending = store.pending(trials)
+        left = pending(store, trials)
         for note in (*store.notes, *spec.doubts()):
             observer.note(note)
-        if pending:
+        if left:
             observer.announce(spec, directory, workers.processes)
-        if pending and not workers.processes:
+        if left and not workers.processes:
             observer.note("there is no worker yet: waiting for one")
         try:
-            with closing(run_trials(pending, store, run_trial, workers)) as outcomes:
-                told = [make(name, spec, directory) for name in loggers] if pending else []
+            with closing(run_trials(left, store, _run_trial(spec), workers)) as outcomes:
+                told = [make(name, spec, directory) for name in loggers] if left else []
                 following = logged(outcomes, told, observer.note)
-                observer.follow(following, len(trials), len(trials) - len(pending))
+                observer.follow(following, len(trials), len(trials) - len(left))
         except KeyboardInterrupt:
             observer.note(
                 f"interrupted: {store.counts()['done']} of {len(trials)} trials are kept in "
@@ -127,10 +128,23 @@ def run_study(
         yield store
 
 
-def _run_trial(spec: Spec) -> RunTrial:
-    """Return what runs a trial of the study, after the study has checked its spec."""
+def examine(spec: Spec) -> tuple[Measure, ...]:
+    """Return what a study measures of its episodes, if it can be run.
+
+    Raises
+    ------
+    SpecError
+        If a condition cannot be built, or the study has not what it needs; before anything is run
+        or written.
+    """
+    measures = check(spec)
     with spec.sources.active():
-        study = load_study(spec.study)
-        getattr(study, "check", lambda spec: None)(spec)
-    # A study of a user's file is made again in every worker, which knows the file.
-    return measured if is_reference(spec.study) else study.measure
+        getattr(load_study(spec.study), "check", lambda spec: None)(spec)
+    return measures
+
+
+def _run_trial(spec: Spec) -> RunTrial:
+    """Return what runs a trial of the study."""
+    if is_reference(spec.study):  # made again in every worker, which knows the file
+        return measured
+    return load_study(spec.study).measure

@@ -25,6 +25,7 @@ from typing import TYPE_CHECKING, Any
 from ...core.plugins.messages import closest
 from ...core.plugins.sources import Sources
 from ..catalogue.study import analysed, drawn, load_study
+from ..errors import SpecError
 from ..presentation.progress import Terminal
 from ..presentation.tables import SummaryTable, tabulate
 from ..presentation.words import count
@@ -34,8 +35,7 @@ from ..results.power import SMALLEST, USUAL_DEVIATION
 from ..results.results import Results, read
 from ..results.selection import Where, chosen, together
 from ..results.verdicts import power_text
-from ..spec.errors import SpecError
-from ..spec.outline import Outline
+from ..spec.outline import Outline, sources_of
 from ..store import durable
 from ..store.store import Store
 from ..workers.workers import Backend
@@ -383,8 +383,8 @@ def _loaded(path: Path) -> StudyResults:
 
 
 def _of(store: Store) -> StudyResults:
-    outline = store.outline()
+    outline = Outline.kept(store)
     return StudyResults(
-        outline, read(store), tuple(store.failed()), (), store.sources(), store.settings(),
+        outline, read(store), tuple(store.failed()), (), sources_of(store), store.settings(),
         (store.directory,),
     )  # fmt: skip

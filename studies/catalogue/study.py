@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
+from ..errors import SpecError
 from ..results.results import Results
-from ..spec.errors import SpecError
 from ..spec.studies import STUDIES
 
 if TYPE_CHECKING:

@@ -16,8 +16,8 @@ from importlib import import_module
 import click
 
 from ...core.plugins.messages import closest
-from ..spec.errors import SpecError
-from .arguments import complaint
+from ..errors import SpecError
+from .options import complete
 
 PROGRAM = "nested-agents"
 
@@ -62,7 +62,7 @@ class _Commands(click.Group):
         command = self.get_command(ctx, args[0])
         if command is None:
             raise SpecError(f"{args[0]}: unknown command; {closest(args[0], COMMANDS)}")
-        return args[0], command, args[1:]
+        return args[0], command, list(complete(command, args[1:]))
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
@@ -89,7 +89,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
         return status
     except click.UsageError as error:
-        return _complain(complaint(error))
+        command = error.ctx.command_path if error.ctx else f"{PROGRAM} {arguments[0]}"
+        return _complain(f"{error.format_message().rstrip('.')}; see {command} --help")
     except SpecError as error:
         return _complain(str(error))
     except BrokenPipeError:

@@ -17,16 +17,16 @@ from rich.console import Console
 from rich.progress import track
 
 from ...core.agents.team import Team, of_fuzzy_agents
-from ...core.interface.protocols import Scenario
+from ...core.interface.scenario import Scenario
 from ...core.interface.spaces import Variable
 from ...core.learners import LearnerSettings
 from ...core.plugins.messages import closest
 from ...core.rules.rule_base import RuleBase
 from ...scenarios.box_pushing.scenario import BoxPushing
-from ..spec.errors import SpecError
+from ..errors import SpecError
+from ..store.schema import STAGE, columns
 from ..store.store import Store
-from ..trials.episodes import STAGE
-from ..trials.measures import columns
+from ..trials.keeping import spec_of
 from ..trials.session import Session
 from ..trials.trial import Trial, trials_of
 from . import policy as explain_policy
@@ -76,7 +76,7 @@ def choose(store: Store, condition: str | None, seed: int | None) -> Trial:
     """
     if (other := store.other_version()) is not None:
         raise SpecError(f"{other}: it would train another team")
-    spec = store.spec()
+    spec = spec_of(store)
     conditions = [c.label for c in spec.conditions()]
     condition = conditions[0] if condition is None else condition
     if condition not in conditions:

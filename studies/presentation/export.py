@@ -7,9 +7,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from ..errors import SpecError
 from ..results import published
 from ..results.results import read
-from ..spec.errors import SpecError
+from ..spec.outline import Outline
 from ..store.durable import replacing
 from ..store.store import Store
 from .csv_text import write_frame
@@ -66,7 +67,9 @@ def _writers(store: Store, form: Form) -> dict[str, Callable[[Path], None]]:
     results = read(store)
     if form == "json":
         version = int(store.meta("results_version"))
-        return {"results": lambda path: published.write(path, store.outline(), results, version)}
+        return {
+            "results": lambda path: published.write(path, Outline.kept(store), results, version)
+        }
     if form == "parquet" and not find_spec("pyarrow"):
         raise SpecError(
             "--format parquet: pyarrow is not installed; pip install 'nested-agents[parquet]'"

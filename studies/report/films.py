@@ -1,7 +1,7 @@
 """Recorded episodes as animations, where the canvas of a report cannot play them.
 
 The canvas knows robots that push a box. Any other scenario that draws its episodes, one's own
-included, has them drawn as it does itself (`DrawnScenario`).
+included, has them drawn as it does itself (`can_draw`).
 """
 
 from __future__ import annotations
@@ -11,10 +11,12 @@ import tempfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from ...core.interface.protocols import DrawnScenario
-from ..spec.errors import SpecError
+from ...core.interface.scenario import can_draw
+from ..errors import SpecError
 from ..store.store import Planned, Store
+from ..trials.keeping import spec_of
 from ..trials.trial import Trial, trials_of
 
 LAST = "last"
@@ -61,20 +63,20 @@ def films(store: Store, planned: Iterable[Planned], most_bytes: int) -> list[Fil
 def _trials(store: Store) -> Mapping[str, Trial]:
     """Return the trials of a study by identity; none if this version cannot read its spec."""
     try:
-        return {trial.identity: trial for trial in trials_of(store.spec())}
+        return {trial.identity: trial for trial in trials_of(spec_of(store))}
     except SpecError:
         return {}
 
 
 def _drawn(store: Store, trial: Trial) -> bytes:
     """Return the GIF of a trial's last episode; nothing if its scenario cannot."""
-    scenario = trial.world()
-    if not isinstance(scenario, DrawnScenario) or LAST not in trial.recorded.values():
+    scenario: Any = trial.world()
+    if not can_draw(scenario) or LAST not in trial.recorded.values():
         return b""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "episode.gif"
         try:
-            scenario.animate(store.recording(trial, LAST), path)
+            scenario.animate(store.recording(trial.identity, LAST), path)
         except Exception:  # a drawing may be anybody's, and the page is worth more than it
             return b""
         return path.read_bytes()

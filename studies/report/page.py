@@ -13,9 +13,10 @@ from ..claims.claims import judge
 from ..claims.table import result
 from ..presentation.tables import tabulate
 from ..results.results import read
+from ..spec.outline import Outline, sources_of
 from ..spec.toml import dumps
+from ..store.schema import RESULTS_VERSION
 from ..store.store import Store
-from ..trials.code import RESULTS_VERSION
 from . import words
 from .pictures import pictures
 from .replays import replays
@@ -33,7 +34,7 @@ def page(directory: Path) -> str:
     """
     with Store.open(directory) as store:
         store.verify()
-        outline, results, counts = store.outline(), read(store), store.counts()
+        outline, results, counts = Outline.kept(store), read(store), store.counts()
         failed = [
             (condition, seed, words.without_places(error.rstrip()))
             for condition, seed, error in store.failed()
@@ -41,7 +42,7 @@ def page(directory: Path) -> str:
         trials = store.planned()
         packed = replays(store, trials)
         version = store.meta("results_version")
-        sources = store.sources()
+        sources = sources_of(store)
     with sources.active():
         analysis = analysed(outline.study, results)
         figures = drawn(load_study(outline.study), analysis)

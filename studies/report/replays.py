@@ -21,10 +21,9 @@ import numpy as np
 from ...core.numerics.arrays import FloatArray
 from ...scenarios.box_pushing.world.boxes import box_for
 from ...scenarios.box_pushing.world.robots import robot_for
-from ..spec.errors import SpecError
-from ..store.durable import NotRecordedError
+from ..errors import SpecError
+from ..store.durable import NotRecordedError, Recording
 from ..store.store import Planned, Store
-from ..trials.episodes import Recording
 from .films import Film, films
 from .words import runs
 
@@ -96,7 +95,7 @@ def replays(store: Store, trials: Iterable[Planned], most_bytes: int = MOST_BYTE
             miss(trial, "Left out to keep the page small")
             continue
         try:
-            kept = {k: store.recording(trial, name) for k, name in trial.recorded.items()}
+            kept = {k: store.recording(trial.identity, name) for k, name in trial.recorded.items()}
             for number, recording in kept.items():
                 body = _body_of(recording, bodies, found.bodies)
                 episode = {

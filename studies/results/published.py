@@ -14,13 +14,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.interface.protocols import SUCCESS, Measure
-from ..spec.errors import SpecError
+from ...core.interface.measures import SUCCESS, Measure
+from ..errors import SpecError
 from ..spec.outline import Outline
 from ..store import durable
+from ..store.schema import RESULTS_VERSION, measures_from, tables
 from ..store.schema import SECONDS as PARTS
-from ..trials.code import RESULTS_VERSION
-from ..trials.measures import measures_from, tables
 from .results import SECONDS, Results, from_arrays
 
 SUCCESS_ALONE = ("ablation", "chain-order", "games", "hierarchies", "scaling", "wheel-failure")

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.interface.protocols import SUCCESS, Measure
+from ...core.interface.measures import SUCCESS, Measure
 from ...core.plugins.deferred import Deferred
 from ..store.reading import NamesAndRows
+from ..store.schema import ELSEWHERE
 from ..store.store import Store
-from ..trials.episodes import ELSEWHERE
 from .numbers import NUMBERS
 
 if TYPE_CHECKING:

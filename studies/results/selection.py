@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...core.plugins.messages import near
-from ..spec.errors import SpecError
+from ..errors import SpecError
 from ..spec.overlay import flat
 from ..trials.measures import joined as joined_measures
 from .results import Results, join, select

@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Collection, Mapping
 from typing import Any
 
-from .errors import show
+from ..errors import show
 
 LONGEST_TABLE = 40
 """A longer table is not spelled out in labels [characters]."""

@@ -16,7 +16,7 @@ from ...core.plugins.settings import Settings
 from ...scenarios import SCENARIOS
 from ...topologies import TOPOLOGIES
 from ...topologies.config import EdgesSettings
-from .errors import SpecError
+from ..errors import SpecError
 from .studies import STUDIES
 
 if TYPE_CHECKING:

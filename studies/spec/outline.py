@@ -6,7 +6,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from ...core.plugins.sources import Sources
+from ..errors import SpecError
+from ..store.database import DATABASE
+
 if TYPE_CHECKING:
+    from ..store.reading import Reading
     from .spec import Spec
 
 
@@ -47,6 +52,22 @@ class Outline:
         return cls.noted(spec.table(), {c.label: c.columns for c in spec.conditions()})
 
     @classmethod
+    def kept(cls, store: Reading) -> Outline:
+        """Return the outline of a kept study, as it was noted; nothing is run for it.
+
+        Raises
+        ------
+        SpecError
+            If it cannot be read.
+        """
+        try:
+            return cls.noted(store.spec(), store.columns())
+        except (KeyError, TypeError, ValueError):
+            raise SpecError(
+                f"{store.directory / DATABASE}: is damaged: spec cannot be read"
+            ) from None
+
+    @classmethod
     def noted(cls, table: Mapping[str, Any], columns: Mapping[str, Mapping[str, Any]]) -> Outline:
         """Return the outline that `Spec.table` and the columns of its conditions tell.
 
@@ -66,6 +87,11 @@ class Outline:
             columns=columns,
             table=table,
         )
+
+
+def sources_of(store: Reading) -> Sources:
+    """Return the files of users that a kept study names, as they were when it began."""
+    return Sources(None, store.sources(), brought_by=str(store.directory))
 
 
 def lengths(curricula: Iterable[Sequence[int]], episodes: int) -> str:

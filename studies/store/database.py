@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
-from ..spec.errors import SpecError
+from ..errors import SpecError
 
 DATABASE = "results.sqlite"
 """Name of the file, in the directory of a study."""

@@ -10,12 +10,17 @@ import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..spec.errors import SpecError
-from ..trials.episodes import Recording
+from ..errors import SpecError
+
+Recording = dict[str, NDArray[Any]]
+"""Arrays of one episode of T steps by name: what the scenario's ``recorded`` names, each
+``(T + 1, ...)``; ``reward`` ``(T,)``, or ``(T, n)`` if agents are rewarded one by one; and what
+its ``constants_of_episode`` returns."""
 
 
 class NotRecordedError(SpecError):

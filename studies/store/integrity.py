@@ -8,10 +8,9 @@ from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
-from ..spec.errors import SpecError
-from ..trials.code import RESULTS_VERSION
+from ..errors import SpecError
 from . import database
-from .schema import OF_A_TRIAL, study_checksum, trial_checksums
+from .schema import OF_A_TRIAL, RESULTS_VERSION, study_checksum, trial_checksums
 
 
 def damage(path: Path) -> str | None:

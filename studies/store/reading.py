@@ -4,52 +4,30 @@ from __future__ import annotations
 
 import json
 import sqlite3
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self, TypeVar
+from typing import Any, Self
 
-from ...core.interface.protocols import Measure
-from ...core.plugins.sources import Sources
-from ..spec.errors import SpecError
-from ..spec.outline import Outline
-from ..trials import code
-from ..trials.code import RESULTS_VERSION
-from ..trials.episodes import ELSEWHERE, STAGE
-from ..trials.measures import measures_from
+from ...core.interface.measures import Measure
+from ..errors import SpecError
 from . import database, integrity
 from .database import DATABASE
-from .schema import PLANNED, SECONDS, trial_checksums
-
-if TYPE_CHECKING:
-    from ..spec.spec import Spec
-
-
-class Identified(Protocol):
-    """A trial as far as the ledger needs it."""
-
-    @property
-    def identity(self) -> str: ...  # noqa: D102
-    @property
-    def condition(self) -> str: ...  # noqa: D102
-    @property
-    def seed(self) -> int: ...  # noqa: D102
-
-
-T = TypeVar("T", bound=Identified)
+from .schema import (
+    ELSEWHERE,
+    PLANNED,
+    RESULTS_VERSION,
+    SECONDS,
+    STAGE,
+    Noted,
+    Planned,
+    measures_from,
+    trial_checksums,
+)
 
 NamesAndRows = tuple[list[str], Iterable[tuple[Any, ...]]]
 """The names of columns, and rows of values, which may be read one by one."""
-
-
-class Planned(NamedTuple):
-    """A trial as it was noted before it was run: its members are those of a `Trial`."""
-
-    identity: str
-    condition: str
-    seed: int
-    recorded: dict[int, str]
 
 
 class Reading:
@@ -91,34 +69,17 @@ class Reading:
                 raise SpecError(f"{path}: is empty, it holds no study yet")
             yield cls(directory, connection)
 
-    def spec(self, sources: Sources | None = None) -> Spec:
-        """Return the spec that the study runs; what it names of users' files is run.
+    def spec(self) -> Mapping[str, Any]:
+        """Return the table of the spec that the study runs."""
+        return self._table("spec")
 
-        Parameters
-        ----------
-        sources
-            The files; those that are kept with the study unless others are given.
-        """
-        from ..spec.spec import Spec
-
-        return Spec.of(self._table("spec"), self.sources() if sources is None else sources)
-
-    def sources(self) -> Sources:
-        """Return the files of users that the study names, as they were when it began."""
-        return Sources(None, self._table("sources"), brought_by=str(self.directory))
+    def sources(self) -> dict[str, str]:
+        """Return by name the texts of the users' files that the study names, when it began."""
+        return self._table("sources")
 
     def settings(self) -> dict[str, Any]:
         """Return the settings of each condition by label, as they were when it began."""
         return self._table("conditions")
-
-    def outline(self) -> Outline:
-        """Return what the study consists of, as it was noted; nothing is run for it."""
-        try:
-            return Outline.noted(self._table("spec"), self.columns())
-        except (KeyError, TypeError, ValueError):
-            raise SpecError(
-                f"{self.directory / DATABASE}: is damaged: spec cannot be read"
-            ) from None
 
     def planned(self) -> tuple[Planned, ...]:
         """Return all trials of the study, as they were noted."""
@@ -133,22 +94,13 @@ class Reading:
         query = "SELECT count(DISTINCT code) FROM trials WHERE state = 'done'"
         return int(self._db.execute(query).fetchone()[0])
 
-    def outdated(self) -> str | None:
-        """Return why this code would not go on with the study, in one line; None if it would."""
-        if (other := self.other_version()) is not None:
-            return f"{other}; use another directory"
-        modules = code.changed(self.known_code())
-        if not modules:
-            return None
-        more = f" and {len(modules) - 1} more have" if len(modules) > 1 else " has"
-        return (
-            f"{self.directory}: its results are of other code: {modules[0]}{more} changed "
-            "since; --accept-code goes on with it"
-        )
-
-    def known_code(self) -> code.Code:
-        """Return the digests of the code that computed what was added last."""
+    def code(self) -> dict[str, tuple[str, str]]:
+        """Return by module two digests of the code that computed what was added last."""
         return {name: (text, tree) for name, (text, tree) in self._table("code").items()}
+
+    def noted(self) -> Noted:
+        """Return what the study is, but for its measures and trials."""
+        return Noted(self.spec(), self.settings(), self.columns(), self.sources())
 
     def other_version(self) -> str | None:
         """Return of which version the results are, in one line, if they are not of this one."""

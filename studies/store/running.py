@@ -16,10 +16,6 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from ..trials.trial import Trial
 
 LOCK = ".lock"
 MARK = "running.json"
@@ -54,16 +50,16 @@ class Running:
         with contextlib.suppress(OSError):
             self._path.unlink(missing_ok=True)
 
-    def begin(self, trial: Trial) -> None:
+    def begin(self, identity: str) -> None:
         """Note that a trial has been handed to a worker."""
         with self._changing:
-            self._begun[trial.identity] = time.time()
+            self._begun[identity] = time.time()
             self._write()
 
-    def end(self, trial: Trial) -> None:
+    def end(self, identity: str) -> None:
         """Note that a trial has come back."""
         with self._changing:
-            self._begun.pop(trial.identity, None)
+            self._begun.pop(identity, None)
             self._write()
 
     def _write(self) -> None:

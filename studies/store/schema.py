@@ -10,19 +10,27 @@ from __future__ import annotations
 import hashlib
 import json
 import sqlite3
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from itertools import groupby
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple
 
-from ...core.interface.protocols import Measure
-from ..trials.code import RESULTS_VERSION, Code
-from ..trials.episodes import STAGE
-from ..trials.measures import columns, tables
+from ...core.interface.measures import Measure
 from .database import insert, quoted
 
-if TYPE_CHECKING:
-    from ..spec.spec import Spec
+RESULTS_VERSION = 4
+"""Raise it when the code changes so that the same trial gives other results."""
+
+STAGE = "training:"
+"""With what the phase of a stage of a curriculum begins; the stage's name follows."""
+ELSEWHERE = "evaluation:"
+"""With what the phase of an evaluation beside a trial's own begins; its name follows."""
+
+BEFORE = ("phase", "episode", "steps")
+"""The columns of an episode before its measures."""
+AFTER = ("return",)
+"""Those after them."""
 
 SECONDS = ("decision", "physics", "sensors", "learning", "total")
 
@@ -56,41 +64,104 @@ SCHEMA = (
 differ."""
 
 
-def prepare(
-    db: sqlite3.Connection, spec: Spec, measures: Sequence[Measure], computed_by: Code
-) -> None:
-    """Make the tables, and note what the study is and what computes it; within a transaction."""
-    from ..trials.trial import trials_of
+class Planned(NamedTuple):
+    """A trial as it is noted before it is run."""
 
-    conditions = spec.conditions()
-    settings = {c.label: c.settings.model_dump(mode="json") for c in conditions}
-    swept = [quoted(key) for key in conditions[0].columns]
+    identity: str
+    condition: str
+    seed: int
+    recorded: dict[int, str]
+    """Names of the training episodes that are recorded, by number."""
+
+
+@dataclass(frozen=True)
+class Noted:
+    """What a study is, in plain tables, texts and rows, as it is noted before anything is run.
+
+    Attributes
+    ----------
+    spec
+        The spec as a table.
+    conditions
+        The settings of each condition, by label.
+    columns
+        What tells each condition from the others, by label; all have the same keys.
+    sources
+        The texts of the files of users that it names, by name.
+    measures
+        What it measures of its episodes.
+    planned
+        All its trials.
+    code
+        By module, two digests of the code that computes what is added.
+    """
+
+    spec: Mapping[str, Any]
+    conditions: Mapping[str, Any]
+    columns: Mapping[str, Mapping[str, Any]]
+    sources: Mapping[str, str]
+    measures: Sequence[Measure] = ()
+    planned: Sequence[Planned] = ()
+    code: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+
+    @property
+    def code_digest(self) -> str:
+        """One short digest of what all modules mean."""
+        text = "".join(f"{name} {tree} " for name, (_, tree) in sorted(self.code.items()))
+        return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def columns(measures: Iterable[Measure]) -> tuple[str, ...]:
+    """Return the columns of an episode: where it stands, its measures, its return."""
+    return (*BEFORE, *(measure.name for measure in measures), *AFTER)
+
+
+def tables(measures: Iterable[Measure]) -> list[dict[str, Any]]:
+    """Return measures as tables, fit for JSON."""
+    return [asdict(measure) for measure in measures]
+
+
+def measures_from(tables: Iterable[Mapping[str, Any]]) -> tuple[Measure, ...]:
+    """Return what `tables` was given.
+
+    Raises
+    ------
+    TypeError
+        If the tables are of something else.
+    """
+    return tuple(Measure(**table) for table in tables)
+
+
+def prepare(db: sqlite3.Connection, noted: Noted) -> None:
+    """Make the tables, and note what the study is and what computes it; within a transaction."""
+    swept = [quoted(key) for key in next(iter(noted.columns.values()))]
     told = ", ".join(["position INTEGER", "condition TEXT PRIMARY KEY", *swept])
     for statement in SCHEMA:
         db.execute(statement)
-    db.execute(_episodes(measures))
+    db.execute(_episodes(noted.measures))
     db.execute(f"CREATE TABLE IF NOT EXISTS conditions ({told})")
     db.execute("DELETE FROM conditions")
-    insert(db, "conditions", [(i, c.label, *c.columns.values()) for i, c in enumerate(conditions)])
+    by_condition = enumerate(noted.columns.items())
+    insert(db, "conditions", [(i, label, *row.values()) for i, (label, row) in by_condition])
     stage = f"e.phase GLOB '{STAGE}*'"  # stages come first, in the order in which they are trained
     db.execute(
         f"""CREATE VIEW IF NOT EXISTS results AS
         SELECT c.condition, {"".join(f"c.{key}, " for key in swept)}t.seed,
-            {", ".join(f"e.{quoted(name)}" for name in columns(measures))}
+            {", ".join(f"e.{quoted(name)}" for name in columns(noted.measures))}
         FROM episodes e JOIN trials t USING (identity) JOIN conditions c USING (condition)
         WHERE t.state = 'done' ORDER BY c.position, t.seed, {stage} DESC,
             CASE WHEN {stage} THEN e.episode END, e.phase DESC, e.episode"""
     )
     db.execute("DELETE FROM planned")
     planned: list[tuple[object, ...]] = [
-        (i, t.identity, t.condition, t.seed, json.dumps(t.recorded))
-        for i, t in enumerate(trials_of(spec))
+        (i, *trial[:-1], json.dumps(trial.recorded)) for i, trial in enumerate(noted.planned)
     ]
     insert(db, "planned", planned)
     db.execute("DELETE FROM meta")
-    meta = {"results_version": str(RESULTS_VERSION), "spec": json.dumps(spec.table())}
-    meta |= {"conditions": json.dumps(settings), "measures": json.dumps(tables(measures))}
-    meta |= {"sources": json.dumps(spec.sources.texts), "code": json.dumps(computed_by)}
+    meta = {"results_version": str(RESULTS_VERSION), "spec": json.dumps(noted.spec)}
+    meta |= {"conditions": json.dumps(noted.conditions)}
+    meta |= {"measures": json.dumps(tables(noted.measures))}
+    meta |= {"sources": json.dumps(noted.sources), "code": json.dumps(noted.code)}
     insert(db, "meta", list(meta.items()))
     insert(db, "meta", [("sha256", study_checksum(db))])
     if db.execute("SELECT 1 FROM ledger").fetchone() is None:

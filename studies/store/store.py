@@ -16,28 +16,40 @@ from __future__ import annotations
 import fcntl
 import sqlite3
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import Any, TextIO
 
-from ...core.interface.protocols import Measure
-from ...core.plugins.sources import FOLDER, kept_name
-from ..spec.errors import SpecError
-from ..spec.toml import dumps
-from ..trials import code
-from ..trials.episodes import Recording
+from ..errors import SpecError
 from . import database, durable, integrity
 from .database import DATABASE, SPEC_FILE
-from .reading import Identified, Planned, Reading, T
+from .durable import Recording
+from .reading import Reading
 from .running import LOCK
-from .schema import SECONDS, prepare, trial_checksums
+from .schema import SECONDS, Noted, Planned, prepare, trial_checksums
 
-if TYPE_CHECKING:
-    from ..spec.spec import Spec
-    from ..trials.trial import Trial, TrialResult
+__all__ = ["DATABASE", "SPEC_FILE", "Noted", "Planned", "Store", "locked"]
 
-__all__ = ["DATABASE", "SPEC_FILE", "Identified", "Planned", "Store"]
+
+@contextmanager
+def locked(directory: Path) -> Iterator[None]:
+    """Keep others from writing to a directory, which is made if it does not exist.
+
+    Raises
+    ------
+    SpecError
+        If it cannot be made or written, or another process is writing to it.
+    """
+    try:
+        for folder in (directory, directory / "recordings"):
+            folder.mkdir(parents=True, exist_ok=True)
+        lock = open(directory / LOCK, "w")  # noqa: SIM115 - held until the context ends
+    except OSError as error:
+        raise SpecError(f"{error.filename}: {error.strerror or error}") from None
+    with lock:
+        _take(lock, directory)
+        yield
 
 
 class Store(Reading):
@@ -59,78 +71,47 @@ class Store(Reading):
     @classmethod
     @contextmanager
     def create(
-        cls,
-        directory: Path,
-        spec: Spec,
-        measures: Sequence[Measure],
-        *,
-        accept_code: bool = False,
+        cls, directory: Path, noted: Noted, files: Mapping[str, bytes], damage: str | None
     ) -> Iterator[Store]:
-        """Open a directory to run `spec` in; make it if it does not exist.
+        """Open a directory to write, within the context of `locked`.
 
         A damaged database is set aside under another name, and what can be trusted of it copied.
 
         Parameters
         ----------
         directory
-            The directory.
-        spec
-            The study.
-        measures
-            What it measures of its episodes, see `nested_agents.studies.trials.arrangement.check`.
-        accept_code
-            Whether to go on although the installed code has changed since.
+            The directory; what it holds must be the same study.
+        noted
+            What the study is.
+        files
+            Contents of files that are kept beside the database, by name.
+        damage
+            What is wrong with its database, see `integrity.damage`.
 
         Raises
         ------
         SpecError
-            If it cannot be written, holds a study that differs by more than additional seeds, or
-            another process is writing to it. Nothing has been changed then.
+            If it cannot be written.
         """
-        from .refusal import Given, examine
-
-        given = Given(spec, measures, accept_code)
-        examine(directory, given)  # what is refused leaves nothing behind
         path = directory / DATABASE
-        try:
-            for folder in (directory, directory / "recordings"):
-                folder.mkdir(parents=True, exist_ok=True)
-            lock = open(directory / LOCK, "w")  # noqa: SIM115 - held until the store is closed
-        except OSError as error:
-            raise SpecError(f"{error.filename}: {error.strerror or error}") from None
-        with lock:
-            _take(lock, directory)
-            damage = examine(directory, given)  # again: nobody else writes from here on
-            aside = integrity.set_aside(path) if damage is not None else None
-            goes_on = integrity.holds_tables(path)
-            with database.writing(path) as connection:
-                store = cls(directory, connection)
-                computed_by = code.present(store.known_code() if goes_on else None)
-                with database.transaction(connection):
-                    prepare(connection, spec, measures, computed_by)
-                    recovered = 0 if aside is None else integrity.recover(aside, connection)
-                if aside is not None:
-                    store.notes.append(
-                        f"{path}: is damaged: {damage}; kept as {aside.name}, "
-                        f"{recovered} trials taken over, the others run again"
-                    )
-                store._keep_spec(spec)
-                store._code = code.digest(computed_by)
-                yield store
-
-    def _keep_spec(self, spec: Spec) -> None:
-        """Keep copies of the spec and of users' files, to read and to run them again."""
-        from .refusal import is_copy
-
-        path = self.directory / SPEC_FILE
-        if not is_copy(path, spec):
-            durable.write(path, dumps(spec.table()).encode())
-        folder = self.directory / FOLDER
-        for name, text in spec.sources.texts.items():
-            folder.mkdir(exist_ok=True)
-            kept = folder / kept_name(name)
-            if not kept.exists() or kept.read_bytes() != text.encode():
-                durable.write(kept, text.encode())
+        aside = integrity.set_aside(path) if damage is not None else None
+        with database.writing(path) as connection:
+            store = cls(directory, connection)
+            with database.transaction(connection):
+                prepare(connection, noted)
+                recovered = 0 if aside is None else integrity.recover(aside, connection)
+            if aside is not None:
+                store.notes.append(
+                    f"{path}: is damaged: {damage}; kept as {aside.name}, "
+                    f"{recovered} trials taken over, the others run again"
+                )
+            for name, content in files.items():
+                kept = directory / name
+                kept.parent.mkdir(exist_ok=True)
+                if not kept.exists() or kept.read_bytes() != content:
+                    durable.write(kept, content)
+            store._code = noted.code_digest
+            yield store
 
     def states(self) -> dict[str, str]:
         """Return by identity whether trials are ``done`` or ``failed``; those that are damaged not.
@@ -142,14 +123,6 @@ class Store(Reading):
             states.pop(identity, None)
             self.notes.append(f"{line}; must run again")
         return states
-
-    def pending(self, trials: Iterable[T]) -> list[T]:
-        """Return the trials that have neither failed nor finished with undamaged results.
-
-        What is damaged is added to the `notes`.
-        """
-        states = self.states()
-        return [trial for trial in trials if trial.identity not in states]
 
     def damage(self) -> dict[str, str]:
         """Return by identity which trials are not as they were written, one line each."""
@@ -164,28 +137,38 @@ class Store(Reading):
                 found[identity] = f"{path}: {what} ({condition}, seed {seed})"
         return found
 
-    def save(self, trial: Trial, result: TrialResult, total: float) -> None:
-        """Keep the result of a trial that took `total` seconds; durable on return.
+    def save(
+        self,
+        trial: Planned,
+        episodes: Sequence[tuple[Any, ...]],
+        seconds: Mapping[str, float],
+        numbers: Sequence[tuple[str, float, bool]],
+        recordings: Mapping[str, Recording],
+    ) -> None:
+        """Keep the result of a trial; durable on return.
 
-        Raises
-        ------
-        ValueError
-            If it has a measure that the study has not.
+        Parameters
+        ----------
+        trial
+            The trial.
+        episodes
+            A row for each, in the order of `columns`.
+        seconds
+            What its parts took, see `SECONDS`.
+        numbers
+            Name, value, and whether it is a function of the trial.
+        recordings
+            Recorded episodes by name.
         """
-        identity, names = trial.identity, [m.name for m in self.measures()]
-        if unknown := {m.name for m in result.measures} - set(names):
-            raise ValueError(f"measures {sorted(unknown)}: the study has {names}")
-        digest = durable.write_recordings(self._recordings(identity), result.recordings)
-        seconds = {**result.seconds, "total": total}
-        numbers = [(n, v, 1) for n, v in result.numbers.items()]
-        numbers += [(n, v, 0) for n, v in result.usage.items()]
+        identity = trial.identity
+        digest = durable.write_recordings(self._recordings(identity), recordings)
         with self._changing(identity):
             self._note(trial, "done", None, digest)
-            self._insert("episodes", [(identity, *row.flat(names)) for row in result.rows])
+            self._insert("episodes", [(identity, *row) for row in episodes])
             self._insert("seconds", [(identity, *(seconds[part] for part in SECONDS))])
-            self._insert("numbers", [(identity, *number) for number in numbers])
+            self._insert("numbers", [(identity, n, v, int(exact)) for n, v, exact in numbers])
 
-    def fail(self, trial: Trial, error: str) -> None:
+    def fail(self, trial: Planned, error: str) -> None:
         """Keep the traceback of a trial that failed."""
         with self._changing(trial.identity):
             self._note(trial, "failed", error, None)
@@ -195,11 +178,11 @@ class Store(Reading):
         with self._changing():
             return self._db.execute("DELETE FROM trials WHERE state = 'failed'").rowcount
 
-    def recording(self, trial: Identified, name: str) -> Recording:
-        """Return a recorded episode of a trial, by its name in `Trial.recorded`."""
+    def recording(self, identity: str, name: str) -> Recording:
+        """Return a recorded episode of a trial, by its name in `Planned.recorded`."""
         query = "SELECT recording_sha256 FROM trials WHERE identity = ?"
-        noted = self._db.execute(query, (trial.identity,)).fetchone()
-        return durable.read_recording(self._recordings(trial.identity), name, *(noted or ()))
+        noted = self._db.execute(query, (identity,)).fetchone()
+        return durable.read_recording(self._recordings(identity), name, *(noted or ()))
 
     def _recordings(self, identity: str) -> Path:
         return self.directory / "recordings" / f"{identity}.npz"
@@ -219,7 +202,7 @@ class Store(Reading):
     def _insert(self, table: str, rows: list[tuple[Any, ...]]) -> None:
         database.insert(self._db, table, rows)
 
-    def _note(self, trial: Trial, state: str, error: str | None, digest: str | None) -> None:
+    def _note(self, trial: Planned, state: str, error: str | None, digest: str | None) -> None:
         self._db.execute("DELETE FROM trials WHERE identity = ?", (trial.identity,))
         row = (trial.identity, trial.condition, trial.seed, state, error, digest, self._code)
         self._insert("trials", [row])

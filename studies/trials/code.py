@@ -13,9 +13,8 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from ...core.plugins.sources import meaning
+from ..store.reading import Reading
 
-RESULTS_VERSION = 4
-"""Raise it when the code changes so that the same trial gives other results."""
 PACKAGE = Path(__file__).parents[2]
 """Where the package is installed."""
 COMPUTING = ("core", "topologies", "scenarios", "studies/trials", "studies/catalogue")
@@ -77,9 +76,18 @@ def changed(known: Mapping[str, tuple[str, str]]) -> list[str]:
     return sorted(known.keys() ^ here.keys()) + edited
 
 
-def digest(code: Mapping[str, tuple[str, str]]) -> str:
-    """Return one short digest of what all modules mean."""
-    return _digest("".join(f"{name} {tree} " for name, (_, tree) in sorted(code.items())))
+def outdated(store: Reading) -> str | None:
+    """Return why this code would not go on with a study, in one line; None if it would."""
+    if (other := store.other_version()) is not None:
+        return f"{other}; use another directory"
+    modules = changed(store.code())
+    if not modules:
+        return None
+    more = f" and {len(modules) - 1} more have" if len(modules) > 1 else " has"
+    return (
+        f"{store.directory}: its results are of other code: {modules[0]}{more} changed "
+        "since; --accept-code goes on with it"
+    )
 
 
 def _digest(text: str) -> str:

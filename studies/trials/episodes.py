@@ -9,20 +9,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.interface.protocols import Measure, RecordedScenario, Transition
+from ...core.interface.measures import Measure
+from ...core.interface.scenario import RecordedScenario, Transition
+from ..store.durable import Recording
 
 if TYPE_CHECKING:
     from ...core.agents.loop import StepRecord
-
-STAGE = "training:"
-"""With what the phase of a stage of a curriculum begins; the stage's name follows."""
-ELSEWHERE = "evaluation:"
-"""With what the phase of an evaluation beside a trial's own begins; its name follows."""
-
-Recording = dict[str, NDArray[Any]]
-"""Arrays of one episode of T steps by name: what the scenario's ``recorded`` names, each
-``(T + 1, ...)``; ``reward`` ``(T,)``, or ``(T, n)`` if agents are rewarded one by one; and what
-its ``constants_of_episode`` returns."""
 
 
 class EpisodeRow(NamedTuple):

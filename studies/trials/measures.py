@@ -1,18 +1,13 @@
-"""The measures of a study: those of its scenarios, joined, and as they are written down."""
+"""The measures of a study: those of its scenarios, joined."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict
-from typing import Any
+from collections.abc import Iterable, Sequence
 
-from ...core.interface.protocols import Measure
-from ..spec.errors import SpecError
+from ...core.interface.measures import Measure
+from ..errors import SpecError
+from ..store.schema import AFTER, BEFORE
 
-BEFORE = ("phase", "episode", "steps")
-"""The columns of an episode before its measures."""
-AFTER = ("return",)
-"""Those after them."""
 RESERVED = ("identity", "condition", "seed", "position", *BEFORE, *AFTER)
 """What no measure may be called, as columns of results are called so."""
 
@@ -63,24 +58,3 @@ def column_of(measure: Measure) -> tuple[str, str, str, bool]:
 def _told(measure: Measure) -> str:
     kind = "rate" if measure.is_rate else "number"
     return f"{measure.name!r}, {measure.gathering} {kind} in {measure.unit!r}"
-
-
-def columns(measures: Iterable[Measure]) -> tuple[str, ...]:
-    """Return the columns of an episode: where it stands, its measures, its return."""
-    return (*BEFORE, *(measure.name for measure in measures), *AFTER)
-
-
-def tables(measures: Iterable[Measure]) -> list[dict[str, Any]]:
-    """Return measures as tables, fit for JSON."""
-    return [asdict(measure) for measure in measures]
-
-
-def measures_from(tables: Iterable[Mapping[str, Any]]) -> tuple[Measure, ...]:
-    """Return what `tables` was given.
-
-    Raises
-    ------
-    TypeError
-        If the tables are of something else.
-    """
-    return tuple(Measure(**table) for table in tables)

@@ -9,15 +9,17 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-from ...core.interface.protocols import Measure, Scenario
+from ...core.interface.measures import Measure
+from ...core.interface.scenario import Scenario
 from ...core.plugins.settings import ScenarioSettings
 from ...core.plugins.sources import Sources, named
 from ..spec.conditions import ConditionSettings
 from ..spec.curriculum import Stage
 from ..spec.outline import lengths
 from ..spec.spec import Spec
-from .code import RESULTS_VERSION
-from .episodes import EpisodeRow, Recording
+from ..store.durable import Recording
+from ..store.schema import RESULTS_VERSION, Planned
+from .episodes import EpisodeRow
 
 PLAIN = ("study", "condition", "seed", "episodes", "steps", "evaluation", "evaluation_steps")
 """What of a trial any process can read as it is."""
@@ -115,6 +117,11 @@ class Trial:
         with self.sources.active():
             built: Scenario = self.settings.scenario.build()
         return built
+
+    @property
+    def planned(self) -> Planned:
+        """What a store notes of it."""
+        return Planned(self.identity, self.condition, self.seed, self.recorded)
 
     @property
     def lengths(self) -> str:

@@ -18,7 +18,7 @@ from queue import Empty, SimpleQueue
 from distributed import CancelledError, Client, Future, KilledWorker, LocalCluster
 from distributed.comm.core import CommClosedError
 
-from ..spec.errors import SpecError
+from ..errors import SpecError
 from ..trials.trial import Trial
 from .interrupts import deaf
 from .worker import ONE_THREAD, Arrival, RunTrial, UnlikeWorkerError, attempt_alike, versions
@@ -96,7 +96,7 @@ class DaskWorkers:
         return found if self._most is None else min(found, self._most)
 
     def arrivals(
-        self, trials: Sequence[Trial], run_trial: RunTrial, started: Callable[[Trial], None]
+        self, trials: Sequence[Trial], run_trial: RunTrial, started: Callable[[str], None]
     ) -> Generator[Arrival]:
         """See `Workers.arrivals`."""
         waiting, expected = iter(trials), versions()
@@ -112,7 +112,7 @@ class DaskWorkers:
                         attempt_alike, expected, run_trial, trial, pure=False
                     )
                     running[future] = trial
-                    started(trial)
+                    started(trial.identity)
                     future.add_done_callback(finished.put)
                 if processes:
                     seen = time.monotonic()

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Protocol
 
 from ...core.plugins.registry import Registry
-from ..spec.errors import SpecError
+from ..errors import SpecError
 from ..spec.spec import Spec
 from ..trials.trial import Trial, TrialResult
 from .runner import Outcome

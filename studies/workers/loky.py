@@ -48,7 +48,7 @@ class LokyWorkers:
             os.environ["PYTHONWARNINGS"] = f"{filters},{QUIET}".lstrip(",")
 
     def arrivals(
-        self, trials: Sequence[Trial], run_trial: RunTrial, started: Callable[[Trial], None]
+        self, trials: Sequence[Trial], run_trial: RunTrial, started: Callable[[str], None]
     ) -> Generator[Arrival]:
         """See `Workers.arrivals`."""
         queue = list(trials)
@@ -98,7 +98,7 @@ class LokyWorkers:
 class _Handed:
     """Tells what is running: joblib takes some trials from us before a worker is free."""
 
-    def __init__(self, processes: int, started: Callable[[Trial], None]) -> None:
+    def __init__(self, processes: int, started: Callable[[str], None]) -> None:
         self.settled: set[str] = set()
         self._processes, self._started = processes, started
         self._left: list[Trial] = []
@@ -124,4 +124,4 @@ class _Handed:
         for trial in self.running():
             if trial.identity not in self._told:
                 self._told.add(trial.identity)
-                self._started(trial)
+                self._started(trial.identity)

@@ -8,6 +8,7 @@ from statistics import fmean
 
 from ..store.running import look
 from ..store.store import Store
+from ..trials.code import outdated
 from .worker import cores
 
 
@@ -45,7 +46,7 @@ class Progress:
 
 def progress(store: Store) -> Progress:
     """Return how far the study of an open store is."""
-    trials, refusal, states = store.planned(), store.outdated(), store.states()
+    trials, refusal, states = store.planned(), outdated(store), store.states()
     failed = [*states.values()].count("failed")
     if refusal is not None:
         # Trials of another version have other identities: what is there counts.

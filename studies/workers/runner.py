@@ -55,7 +55,7 @@ def run_trials(
     Parameters
     ----------
     trials
-        The trials to run, for instance `Store.pending`.
+        The trials to run, for instance those that are `pending`.
     store
         Where results and tracebacks are kept.
     run_trial
@@ -67,14 +67,14 @@ def run_trials(
     with Running(store.directory, workers.processes) as running:
         with closing(workers.arrivals(trials, run_trial, running.begin)) as arriving:
             for arrival in arriving:
-                running.end(arrival.trial)
+                running.end(arrival.trial.identity)
                 if arrival.lost:
                     lost.append(arrival.trial)
                 else:
                     yield _keep(store, arrival)
         for trial in lost:
             arrival = _alone(trial, run_trial, workers, running)
-            running.end(trial)
+            running.end(trial.identity)
             yield _keep(store, arrival)
 
 
@@ -90,7 +90,26 @@ def _alone(trial: Trial, run_trial: RunTrial, workers: Workers, running: Running
 def _keep(store: Store, arrival: Arrival) -> Outcome:
     with undisturbed():
         if arrival.result is None:
-            store.fail(arrival.trial, arrival.error or "")
+            store.fail(arrival.trial.planned, arrival.error or "")
         else:
-            store.save(arrival.trial, arrival.result, arrival.seconds)
+            save(store, arrival.trial, arrival.result, arrival.seconds)
     return Outcome(arrival.trial, arrival.error, arrival.seconds, arrival.result)
+
+
+def save(store: Store, trial: Trial, result: TrialResult, total: float) -> None:
+    """Keep the result of a trial that took `total` seconds; durable on return.
+
+    Raises
+    ------
+    ValueError
+        If it has a measure that the study has not.
+    """
+    names = [measure.name for measure in store.measures()]
+    if unknown := {measure.name for measure in result.measures} - set(names):
+        raise ValueError(f"measures {sorted(unknown)}: the study has {names}")
+    numbers = [(name, value, True) for name, value in result.numbers.items()]
+    numbers += [(name, value, False) for name, value in result.usage.items()]
+    store.save(
+        trial.planned, [row.flat(names) for row in result.rows],
+        {**result.seconds, "total": total}, numbers, result.recordings,
+    )  # fmt: skip

@@ -137,7 +137,7 @@ def attempt_alike(expected: dict[str, str], run_trial: RunTrial, trial: Trial) -
 
 def versions() -> dict[str, str]:
     """Return the versions of what a trial's bits may depend on, by name."""
-    from ..trials.code import RESULTS_VERSION
+    from ..store.schema import RESULTS_VERSION
 
     packages = {name: installed(name) for name in PACKAGES}
     return {"results version": str(RESULTS_VERSION), "Python": python_version(), **packages}

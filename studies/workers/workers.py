@@ -10,7 +10,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Literal, Protocol
 
-from ..spec.errors import SpecError
+from ..errors import SpecError
 from .worker import Arrival, RunTrial, cores
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ class Workers(Protocol):
         ...
 
     def arrivals(
-        self, trials: Sequence[Trial], run_trial: RunTrial, started: Callable[[Trial], None]
+        self, trials: Sequence[Trial], run_trial: RunTrial, started: Callable[[str], None]
     ) -> Generator[Arrival]:
         """Run trials and yield what becomes of each, in whatever order; closing stops them.
 
@@ -40,7 +40,7 @@ class Workers(Protocol):
         run_trial
             Runs one of them; a module-level function, since workers import it by name.
         started
-            Called with each trial when it is handed to a worker, by any thread.
+            Called with the identity of each trial when it is handed to a worker, by any thread.
         """
         ...
 

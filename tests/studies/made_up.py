@@ -10,11 +10,17 @@ import numpy as np
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.episodes import EpisodeRow
+from nested_agents.studies.trials.keeping import open_to_run
 from nested_agents.studies.trials.trial import TrialResult, trials_of
 
 SPEC = Spec.of({"seeds": 3, "episodes": 4, "steps": 5, "evaluation": 2,
                 "sweep": {"preset": ["default", "frozen"]}})  # fmt: skip
 TRIALS = trials_of(SPEC)
+
+
+def opened(directory, spec=SPEC, measures=MEASURES, **options):
+    """Open the store of a study to run it."""
+    return open_to_run(directory, spec, trials_of(spec), measures, **options)
 
 
 def measure(trial):

@@ -5,10 +5,12 @@ import io
 import json
 from contextlib import redirect_stdout
 
+import made_up
 import numpy as np
 import pytest
 
-from nested_agents.core.interface.protocols import SUCCESS, Measure, groups_of
+from nested_agents.core.interface.measures import SUCCESS, Measure
+from nested_agents.core.interface.scenario import groups_of
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.line_up import LineUp, LineUpSettings
 from nested_agents.studies.api.study import load
@@ -16,17 +18,20 @@ from nested_agents.studies.catalogue import scaling
 from nested_agents.studies.catalogue.study import load_study
 from nested_agents.studies.cli import running
 from nested_agents.studies.cli.main import main
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.tables import tabulate
 from nested_agents.studies.report.replays import replays
 from nested_agents.studies.results import published
 from nested_agents.studies.results.results import read
-from nested_agents.studies.spec.errors import SpecError
+from nested_agents.studies.spec.outline import Outline
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store import reading
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.arrangement import check
+from nested_agents.studies.trials.keeping import pending
 from nested_agents.studies.trials.session import Session, run_trial
 from nested_agents.studies.trials.trial import trials_of
+from nested_agents.studies.workers.runner import save
 
 SPREAD = Measure("spread_m", "greatest spread of the carts", "m", "spread_m", "max", "lower")
 LEVEL = Measure("level", "ever level", source="level", gathering="max", is_rate=True)
@@ -60,9 +65,9 @@ def carts(monkeypatch):
 def study(carts, tmp_path):
     """A study of two scenarios whose measures differ, run and kept."""
     directory = tmp_path / "study"
-    with Store.create(directory, SPEC, check(SPEC)) as store:
+    with made_up.opened(directory, SPEC, check(SPEC)) as store:
         for trial in trials_of(SPEC):
-            store.save(trial, run_trial(trial), 1.0)
+            save(store, trial, run_trial(trial), 1.0)
     return directory
 
 
@@ -136,7 +141,7 @@ def test_files_hold_what_is_missing_as_missing(study, tmp_path):
 def test_the_learning_curve_and_its_publication(study):
     with Store.open(study) as store:
         results = read(store)
-        again = published.loads(published.dumps(store.outline(), results)).results
+        again = published.loads(published.dumps(Outline.kept(store), results)).results
     learning = load_study("learning-curve")
     analysis = learning.analyse(results)
     assert tabulate(analysis.table).titles == (
@@ -164,12 +169,12 @@ def test_studies_of_success_need_no_more(study, name):
 
 def test_scaling_leaves_out_contact(carts, tmp_path):
     spec = Spec.of(SPEC.table() | {"study": "scaling"})
-    with Store.create(tmp_path, spec, check(spec)) as store:
+    with made_up.opened(tmp_path, spec, check(spec)) as store:
         for trial in trials_of(spec):
             result = scaling.measure(trial)
             assert result.numbers["robots"] == trial.settings.scenario.robots
             assert "all_touching" not in result.numbers
-            store.save(trial, result, 1.0)
+            save(store, trial, result, 1.0)
         analysis = scaling.analyse(read(store))
     assert "all touch" not in analysis.table[0].estimates
     assert list(scaling.draw(analysis)) == ["scaling"]
@@ -195,18 +200,18 @@ def test_what_is_not_recorded_is_not_replayed(study, capsys):
 def test_a_study_whose_scenarios_now_tell_something_else_is_not_continued(study):
     changed = (SUCCESS, SPREAD)
     with pytest.raises(SpecError, match="use another directory"):
-        Store.create(study, SPEC, changed).__enter__()
-    with Store.create(study, SPEC, check(SPEC)) as store:
-        assert store.pending(trials_of(SPEC)) == []
+        made_up.opened(study, SPEC, changed).__enter__()
+    with made_up.opened(study, SPEC, check(SPEC)) as store:
+        assert pending(store, trials_of(SPEC)) == []
 
 
 def test_a_result_with_another_measure_is_no_result_of_the_study(carts, tmp_path):
     result = run_trial(trials_of(SPEC)[1])
     with (
-        Store.create(tmp_path, SPEC, (SUCCESS,)) as store,
+        made_up.opened(tmp_path, SPEC, (SUCCESS,)) as store,
         pytest.raises(ValueError, match="spread_m"),
     ):
-        store.save(trials_of(SPEC)[1], result, 1.0)
+        save(store, trials_of(SPEC)[1], result, 1.0)
 
 
 def test_a_measure_that_two_scenarios_mean_otherwise_is_refused(carts, monkeypatch):
@@ -227,7 +232,7 @@ def test_results_of_an_older_version_are_not_read(study, monkeypatch):
 
 
 def test_the_world_is_asked_and_not_what_agents_see_of_it(carts):
-    spec = Spec.of(SPEC.table() | {"topology": {"kind": "single-agent"}})
+    spec = Spec.of(SPEC.table() | {"agents": "team"})
     session = Session(trials_of(spec)[1])
     assert session.scenario is not session.world
     assert len(groups_of(session.world)) == 2

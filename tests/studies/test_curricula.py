@@ -3,6 +3,7 @@
 import csv
 import io
 
+import made_up
 import pytest
 
 from nested_agents.studies.catalogue.study import load_study
@@ -16,6 +17,7 @@ from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.arrangement import check
 from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import trials_of
+from nested_agents.studies.workers.runner import save
 
 SPEC = Spec.of(
     {
@@ -37,9 +39,9 @@ SPEC = Spec.of(
 @pytest.fixture(scope="module")
 def study(tmp_path_factory):
     directory = tmp_path_factory.mktemp("study")
-    with Store.create(directory, SPEC, check(SPEC)) as store:
+    with made_up.opened(directory, SPEC, check(SPEC)) as store:
         for trial in trials_of(SPEC):
-            store.save(trial, run_trial(trial), 1.0)
+            save(store, trial, run_trial(trial), 1.0)
     return directory
 
 
@@ -98,7 +100,7 @@ def test_the_lengths_of_several_curricula_are_told():
 
 def test_extent(study):
     with Store.open(study) as store:
-        assert words.extent(store.outline()) == (
+        assert words.extent(Outline.kept(store)) == (
             "1 condition × 2 seeds, each 2 + 1 + 3 training episodes of up to 4 steps, "
             "2 evaluation episodes after them and as many in each of 2 other scenarios"
         )

@@ -30,10 +30,10 @@ from matplotlib.transforms import Affine2D
 
 from ....core.numerics.arrays import FloatArray
 from ...movies import Pixels, film
-from ..config import InfraredSettings
 from ..world.boxes import BoxSpec, box_for
 from ..world.infrared import InfraredSpec, infrared_readings, sensor_directions
 from ..world.robots import RobotSpec, robot_for
+from ..world.settings import InfraredSettings
 
 Recording = Mapping[str, FloatArray]
 

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ....core.interface.protocols import Transition
-from ..config import BoxPushingSettings
+from ....core.interface.scenario import Transition
 
 SHOWN = ("robot_poses", "box_pose", "wheel_speeds", "contact", "failed")
 
@@ -18,17 +17,17 @@ class Screen:
 
     Parameters
     ----------
-    settings
-        Of the scenario.
+    drawn
+        What does not change, `BoxPushingSettings.drawn`.
     mode
         ``"rgb_array"``: `render` returns a picture. ``"human"``: a window is kept up to date.
     sensors
         Whether rays of infrared sensors are drawn.
     """
 
-    def __init__(self, settings: BoxPushingSettings, mode: str, *, sensors: bool = False) -> None:
+    def __init__(self, drawn: Mapping[str, Any], mode: str, *, sensors: bool = False) -> None:
         self.mode, self.sensors = mode, sensors
-        self._constants = {name: np.array(value) for name, value in settings.drawn.items()}
+        self._constants = {name: np.array(value) for name, value in drawn.items()}
         self._frames: dict[str, list[Any]] = {}
         self._rewards: list[float] = []
         self._window: Any = None

@@ -5,6 +5,15 @@ hardly faster than one. So contributions are counted from a *reference* in which
 at the mean of its possible twists: a robot's contribution is by how much the box goes further when
 it alone departs from the reference. Departures of several robots at once are taken to add up. That
 needs one push per robot and wheel command, in place of one for every combination of them.
+
+A superposition of ``G`` groups, of ``L`` robot-action indices at most, that share ``k`` components
+has
+
+- ``contributions`` ``(G, L, k)``: what each index of each group adds to the sum;
+- ``alike`` ``(G, L)``: the first index of the group that comes to the same;
+- ``states(agent, local, sums, shares)``: the next states ``(m, d)`` of an agent, given the indices
+  ``(m,)`` of its own group, the contributions ``(m, k)`` of all groups added up, and the
+  probabilities ``(G, L)`` of the indices of the other groups.
 """
 
 from __future__ import annotations
@@ -125,7 +134,7 @@ class PushSuperposition:
     def states(
         self, agent: int, local: IntArray, sums: FloatArray, shares: FloatArray
     ) -> FloatArray:
-        """Return the next states ``(m, d)`` of `agent`, see the protocol."""
+        """Return the next states ``(m, d)`` of `agent`, see above."""
         prediction, m = self._prediction, len(local)
         r = prediction.robot_of(agent)
         box = self._box + sums

@@ -21,14 +21,15 @@ from typing import ClassVar
 import numpy as np
 
 from ....core.numerics.arrays import FloatArray, IntArray
-from ..config import CONTROL_PERIOD, BeliefSettings
 from ..states.view import View
 from ..world.boxes import BoxSpec
 from ..world.failures import WheelFailures
 from ..world.robots import RobotSpec, compliance
+from ..world.settings import CONTROL_PERIOD
 from ..world.world import World, WorldState
 from .prediction import BoxPrediction
 from .push import PushModel
+from .settings import BeliefSettings
 from .situation import Premises, Situation
 
 IMMOBILE = 1e6

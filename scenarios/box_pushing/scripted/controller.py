@@ -49,7 +49,7 @@ class ScriptedController:
 
     Examples
     --------
-    >>> from nested_agents.scenarios import BoxPushingSettings
+    >>> from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
     >>> scenario = BoxPushingSettings(start="easy").build()
     >>> _ = scenario.reset(1)
     >>> controller = ScriptedController(scenario.world.robots, scenario.box)

@@ -19,10 +19,10 @@ from shapely.geometry.polygon import orient
 
 from ....core.numerics.arrays import FloatArray
 from ....core.plugins.messages import closest
-from ..config import BoxSettings
 from .geometry import Outline
 from .polygons import LARGEST, Moments, Vertices, centred, convex_pieces, moments, polygon_edges
 from .robots import GRAVITY
+from .settings import BoxSettings
 
 AREA = 0.04
 """Of every box in the table [m2]: that of a square of 20 cm."""

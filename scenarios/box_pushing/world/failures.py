@@ -10,7 +10,7 @@ import numpy as np
 
 from ....core.numerics.arrays import FloatArray
 from ...faults.schedule import Failures
-from ..config import FreeSettings
+from .settings import FreeSettings
 from .world import World
 
 

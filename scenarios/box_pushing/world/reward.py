@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ....core.numerics.arrays import BoolArray, FloatArray
-from ..config import RewardSettings
+from .settings import RewardSettings
 
 
 class Task(NamedTuple):

@@ -17,7 +17,7 @@ import numpy as np
 
 from ....core.numerics.arrays import FloatArray
 from ....core.plugins.messages import closest
-from ..config import RobotSettings
+from .settings import RobotSettings
 
 GRAVITY = 9.81
 """Standard acceleration of free fall [m/s2], rounded."""

@@ -28,11 +28,11 @@ from Box2D import _Box2D
 
 from ....core.numerics.arrays import FloatArray
 from ....core.numerics.compiling import njit
-from ..config import CONTROL_PERIOD
 from .boxes import BoxSpec
 from .geometry import surface
 from .infrared import InfraredSpec, infrared_readings, sensor_directions
 from .robots import RobotSpec
+from .settings import CONTROL_PERIOD
 from .wheels import wheel_model, wheel_wrenches
 
 UNIT = 10.0

@@ -21,7 +21,7 @@ from ...results.results import Results
 from ...results.statistics import Estimate, rate
 from ...results.summary import Summary, two_figures
 from ...results.verdicts import WIDTH
-from ...trials.episodes import ELSEWHERE
+from ...store.schema import ELSEWHERE
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..study import check_evaluated as check

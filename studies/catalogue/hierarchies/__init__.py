@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...errors import SpecError
 from ...results.analysis import Analysis
 from ...results.comparison import Array, Difference, adjusted, aligned, difference
 from ...results.paired_tests import LEVEL
@@ -29,7 +30,6 @@ from ...results.results import Results
 from ...results.statistics import Estimate, bootstrap, rate
 from ...results.summary import EVALUATED, Summary, two_figures
 from ...results.verdicts import WIDTH, power_lines
-from ...spec.errors import SpecError
 from ...spec.labels import label_but
 from ...spec.spec import Spec
 from ..scaling import NUMBERS, measure
@@ -50,11 +50,11 @@ UNBROKEN = "\N{NO-BREAK SPACE}"
 def check(spec: Spec) -> None:
     """Raise `SpecError` unless there are hierarchies to compare and episodes to compare them by."""
     check_evaluated(spec)
-    first, *others = (condition.settings.topology for condition in spec.conditions())
-    if all(other == first for other in others):
+    settings = [condition.settings for condition in spec.conditions()]
+    if len({(one.agents, one.topology.model_dump_json()) for one in settings}) < 2:
         raise SpecError(
-            f"topology = {first.title!r} in every condition: hierarchies needs two or more, sweep "
-            "topology"
+            f"topology = {settings[0].topology.title!r} in every condition: hierarchies needs two "
+            "or more, sweep topology"
         )
 
 

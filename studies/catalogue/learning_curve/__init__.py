@@ -10,12 +10,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
-from ....core.interface.protocols import SUCCESS, Measure
+from ....core.interface.measures import SUCCESS, Measure
+from ...errors import SpecError
 from ...results.analysis import Analysis
 from ...results.results import Array, Results
 from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, rates
 from ...results.summary import EVALUATED, Summary, evaluated
-from ...spec.errors import SpecError
 from ..study import run_training as measure
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ....core.agents.team import of_fuzzy_agents
-from ....core.interface.protocols import groups_of
+from ....core.interface.scenario import groups_of
 from ...presentation.words import count
 from ...results.analysis import Analysis
 from ...results.comparison import Array, of_shared_seeds

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...errors import SpecError
 from ...results.analysis import Analysis
 from ...results.comparison import Difference, adjusted, ratio
 from ...results.results import Results
 from ...results.statistics import Estimate, bootstrap, rate
 from ...results.summary import Summary
 from ...results.verdicts import power_lines
-from ...spec.errors import SpecError
 from ...spec.spec import Spec
 from ...trials.contact import ContactShares
 from ...trials.session import Session

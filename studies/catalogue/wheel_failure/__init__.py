@@ -24,13 +24,13 @@ import numpy as np
 from ....core.agents.team import Team
 from ....core.learners.frozen import FrozenSettings
 from ....core.learners.learner import LearnerSettings
+from ...errors import SpecError
 from ...results.analysis import Analysis
 from ...results.comparison import Array, Difference, adjusted, of_shared_seeds
 from ...results.results import Results
 from ...results.statistics import NOT_NEGATIVE, bootstrap, rate
 from ...results.summary import Summary
 from ...results.verdicts import power_lines
-from ...spec.errors import SpecError
 from ...spec.labels import label_but
 from ...spec.spec import Spec
 from ...trials.arrangement import build

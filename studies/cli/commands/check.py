@@ -8,18 +8,17 @@ from typing import Any
 
 import click
 
-from ..arguments import Command, Text, Whole
-from . import options
+from .. import options
 
 Case = tuple[str, Callable[[], Any], list[int]]
 """What a scenario is called, a function that makes it, and the episodes to play."""
 
 
-@click.command(cls=Command)
-@click.argument("source", type=Text(), metavar="SPEC.toml|FILE.py:NAME")
+@click.command()
+@click.argument("source", metavar="SPEC.toml|FILE.py:NAME")
 @click.option(
     "--steps",
-    type=Whole(),
+    type=int,
     metavar="N",
     default=40,
     help="Most steps of the episodes that are played for it.",
@@ -31,14 +30,10 @@ def command(source: str, steps: int, changes: tuple[str, ...]) -> int:
     SPEC.toml is a spec, whose conditions are checked; FILE.py:NAME a function or class in a Python
     file that makes a scenario of one's own.
     """
-    from shutil import get_terminal_size
-    from textwrap import fill
+    from ....scenarios.checking.checker import ScenarioError, check_scenario
+    from ...errors import SpecError
+    from ..display import print_wrapped
 
-    from ....scenarios.checking.checker import LEAST_STEPS, ScenarioError, check_scenario
-    from ...spec.errors import SpecError
-
-    if steps < LEAST_STEPS:
-        raise SpecError(f"--steps {steps}: must be at least {LEAST_STEPS}")
     faults = 0
     for label, factory, episodes in _cases(source, changes):
         try:
@@ -49,15 +44,14 @@ def command(source: str, steps: int, changes: tuple[str, ...]) -> int:
         except ValueError as error:
             raise SpecError(str(error)) from None
         else:
-            told = f"passed  {label}: {', '.join(passed)}"
-            print(fill(told, get_terminal_size().columns, subsequent_indent=8 * " "))
+            print_wrapped(f"{label}: {', '.join(passed)}", "passed  ", 8)
     return 1 if faults else 0
 
 
 def _cases(source: str, changes: tuple[str, ...]) -> Iterator[Case]:
     """Yield what is to be checked, each scenario of a spec once."""
     from ....core.plugins.sources import active
-    from ...spec.errors import SpecError
+    from ...errors import SpecError
     from ...spec.spec import Spec
 
     if ".py:" in source or source.endswith(".py"):
@@ -70,10 +64,8 @@ def _cases(source: str, changes: tuple[str, ...]) -> Iterator[Case]:
         try:
             factory()
         except Exception as error:
-            said = " ".join(str(error).split())
-            raise SpecError(
-                f"{source}, called without arguments, raised {type(error).__name__}: {said}"
-            ) from None
+            message = f"raised {type(error).__name__}: {' '.join(str(error).split())}"
+            raise SpecError(f"{source}, called without arguments, {message}") from None
         yield source.rpartition(":")[2], factory, [0, 1]
         return
     seen: set[Any] = set()

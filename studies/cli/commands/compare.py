@@ -6,32 +6,30 @@ from pathlib import Path
 
 import click
 
-from ..arguments import Command, File, Text
-from . import options
+from .. import options
 
 
-@click.command(cls=Command)
-@click.argument("sources", type=File(), metavar="DIR...|FILE.json", nargs=-1, required=True)
+@click.command()
+@click.argument("sources", type=options.PATH, metavar="DIR...|FILE.json", nargs=-1, required=True)
 @click.option(
     "--by",
-    type=Text(),
     metavar="KEY",
     help="Compare conditions that differ in this swept key alone, as robots or topology; "
     "directory compares studies. All conditions with the first unless said otherwise.",
 )
 @click.option(
     "--measure",
-    type=Text(),
     metavar="NAME",
     default="success",
     help="A measure of episodes, steps, return, or a number of whole trials.",
 )
 @click.option(
-    "--phase", type=Text(), metavar="PHASE", help="Of the episodes; evaluation, if there is one."
+    "--phase",
+    metavar="PHASE",
+    help="Of the episodes; evaluation, if there is one.",
 )
 @click.option(
     "--reference",
-    type=Text(),
     metavar="LABEL",
     help="What the others are compared with; the first unless said otherwise.",
 )
@@ -53,17 +51,14 @@ def command(
     DIR is where a study is kept, FILE.json a file of results. Conditions are compared on the seeds
     that both have, on equal worlds.
     """
-    from ..asking import asked
     from ..display import print_table
+    from ..loading import load_results
 
-    found = asked(sources, None, where, trust=trust).compare(
-        by, measure, phase=phase, reference=reference
-    )
+    results = load_results(sources, None, where, is_trusted=trust)
+    comparison = results.compare(by, measure, phase=phase, reference=reference)
     if form == "table":
-        print_table(found.table)
-        print()
-        for line in found.verdicts:
-            print(line)
+        print_table(comparison.table)
+        print("", *comparison.verdicts, sep="\n")
     else:
-        print(getattr(found.table, form), end="")
+        print(getattr(comparison.table, form), end="")
     return 0

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..arguments import Choice, Command, Several, Text, Whole
-from . import options
+from .. import options
 
 if TYPE_CHECKING:
     from ...cost.table import Form
@@ -17,27 +16,25 @@ MOST_AGENTS = 10_000
 """Of one row: its integers have some fifty thousand digits."""
 
 
-@click.command(cls=Command)
+@click.command()
 @click.option(
     "--agents",
-    type=Text(),
     metavar="N|RANGE",
     default="4",
     help="Number of agents, or a range: 4, 1:16, 2:64:2.",
 )
 @click.option(
     "--topology",
-    cls=Several,
-    type=Text(),
+    multiple=True,
     metavar="SPEC...",
     default=("chain",),
-    help="One or more topologies as in a spec: chain teams tree:2 ...",
+    help="One or more topologies as in a spec: chain teams tree:2 ...; single-agent: Eq. 23.",
 )
-@click.option("--rules", type=Whole(), metavar="N", default=5**7, help="|S|, rules of one agent.")
-@click.option("--actions", type=Whole(), metavar="N", default=4, help="|A|, actions of one agent.")
+@click.option("--rules", type=int, metavar="N", default=5**7, help="|S|, rules of one agent.")
+@click.option("--actions", type=int, metavar="N", default=4, help="|A|, actions of one agent.")
 @click.option(
     "--iterations",
-    type=Whole(),
+    type=int,
     metavar="N",
     default=450,
     help="L, iterations (steps) of an epoch.",
@@ -46,7 +43,7 @@ MOST_AGENTS = 10_000
 @click.option(
     "--format",
     "form",
-    type=Choice(["table", "json", "csv", "latex"]),
+    type=click.Choice(["table", "json", "csv", "latex"]),
     default="table",
     help="How to print it.",
 )
@@ -66,8 +63,8 @@ def command(
     from ...api.costs import cost_table
     from ...cost.cost import MOST_OPERATIONS
     from ...cost.table import written
+    from ...errors import SpecError
     from ...presentation.progress import say
-    from ...spec.errors import SpecError
 
     try:
         problem = Problem(rules, actions, iterations)

@@ -6,14 +6,13 @@ from pathlib import Path
 
 import click
 
-from ..arguments import Command, File
-from . import options
+from .. import options
 
 
-@click.command(cls=Command)
+@click.command()
 @click.option(
     "--out",
-    type=File(),
+    type=options.PATH,
     metavar="DIR",
     default="nested-agents-demo",
     help="Where to keep the study; made if it does not exist. The same command again continues it.",
@@ -28,7 +27,10 @@ def command(out: Path, jobs: int | None, print_spec: bool) -> int:
     if print_spec:
         print(text, end="")
         return 0
+    from ...api.study import run
+    from ...presentation.progress import Terminal
     from ...spec.spec import Spec
-    from ..running import run_and_show
+    from ..display import show_results
 
-    return run_and_show(Spec.parse(text), out, jobs=jobs, replay=True)
+    study = run(Spec.parse(text), out, jobs=jobs, observer=Terminal())
+    return show_results(study, with_replays=True)

@@ -6,20 +6,18 @@ from pathlib import Path
 
 import click
 
-from ..arguments import Command, Text, Whole
-from . import options
+from .. import options
 
 
-@click.command(cls=Command)
+@click.command()
 @options.directory
 @click.option(
     "--condition",
-    type=Text(),
     metavar="LABEL",
     help="Label of the condition; the first one unless said otherwise.",
 )
 @click.option(
-    "--seed", type=Whole(), metavar="SEED", help="The seed; the first one unless said otherwise."
+    "--seed", type=int, metavar="SEED", help="The seed; the first one unless said otherwise."
 )
 @options.trust
 def command(directory: Path, condition: str | None, seed: int | None, trust: bool) -> int:
@@ -35,13 +33,13 @@ def command(directory: Path, condition: str | None, seed: int | None, trust: boo
     from ...presentation.progress import say
     from ...store import durable
     from ...store.store import Store
-    from ..trusting import trust_files
+    from ..loading import trust_files
 
     if trust:
         trust_files(directory)
     with Store.open(directory) as store:
         trial = explain.choose(store, condition, seed)
-        conditions = [c.label for c in store.spec().conditions()]
+        conditions = list(store.columns())
         say(f"training {trial.condition}, seed {trial.seed} again: {trial.lengths}")
         found = explain.explained(store, trial)
     folder = explain.folder(directory, trial, conditions)

@@ -7,26 +7,25 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..arguments import Choice, Command, File
-from . import options
+from .. import options
 
 if TYPE_CHECKING:
     from ...presentation.export import Form
 
 
-@click.command(cls=Command)
+@click.command()
 @options.directory
 @click.option(
     "--format",
     "form",
-    type=Choice(["csv", "parquet", "json"]),
+    type=click.Choice(["csv", "parquet", "json"]),
     default="csv",
     help="Of the files; parquet needs the extra nested-agents[parquet]. Distances and returns are "
     "left out of json.",
 )
 @click.option(
     "--out",
-    type=File(),
+    type=options.PATH,
     metavar="PATH",
     help="Folder of the files; export in the study's own unless said otherwise.",
 )

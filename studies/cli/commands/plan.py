@@ -6,23 +6,22 @@ from pathlib import Path
 
 import click
 
-from ..arguments import Command, File, Number
-from . import options
+from .. import options
 
 
-@click.command(cls=Command)
-@click.argument("spec", type=File(), metavar="SPEC.toml")
+@click.command()
+@click.argument("spec", type=options.PATH, metavar="SPEC.toml")
 @options.jobs
 @click.option(
     "--deviation",
-    type=Number(),
+    type=float,
     metavar="SD",
     default=0.25,
     help="Standard deviation that is supposed of the differences of single seeds.",
 )
 @click.option(
     "--smallest",
-    type=Number(),
+    type=float,
     metavar="D",
     default=0.2,
     help="The smallest difference of success rates that is of interest.",

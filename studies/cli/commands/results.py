@@ -7,25 +7,23 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..arguments import Choice, Command, Text
-from . import options
+from .. import options
 
 if TYPE_CHECKING:
     from ...presentation.row_formats import Format
 
 
-@click.command(cls=Command)
+@click.command()
 @options.directory
 @click.option(
     "--format",
     "form",
-    type=Choice(["table", "csv", "json"]),
+    type=click.Choice(["table", "csv", "json"]),
     default="table",
     help="How to print the rows; CSV and JSON hold every digit, and a column for every swept key.",
 )
 @click.option(
     "--phase",
-    type=Text(),
     metavar="PHASE",
     default="training",
     help="The episodes of training, those of the greedy evaluation after it (evaluation), of a "
@@ -39,8 +37,8 @@ def command(directory: Path, form: Format, phase: str) -> int:
     import sys
 
     from ....core.plugins.messages import closest
+    from ...errors import SpecError
     from ...presentation.row_formats import write_rows
-    from ...spec.errors import SpecError
     from ...store.store import Store
 
     with Store.open(directory) as store:

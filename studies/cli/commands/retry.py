@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..arguments import Command
-from . import options
+from .. import options
 
 if TYPE_CHECKING:
     from ...workers.workers import Backend
 
 
-@click.command(cls=Command)
+@click.command()
 @options.directory
 @options.jobs
 @options.backend
@@ -33,20 +32,19 @@ def command(
 
     DIR is where the study is kept.
     """
+    from ...api.study import run
+    from ...presentation.progress import Terminal
     from ...store.store import Store
-    from ..running import run_and_show
-    from ..trusting import trust_files
+    from ...trials.keeping import spec_of
+    from ..display import show_results
+    from ..loading import trust_files
 
     if trust:
         trust_files(directory)
     with Store.open(directory) as store:
-        spec = store.spec()
-    return run_and_show(
-        spec,
-        directory,
-        jobs=jobs,
-        backend=backend,
-        address=address,
-        retry_failed=True,
-        accept_code=accept_code,
-    )
+        spec = spec_of(store)
+    study = run(
+        spec, directory, jobs=jobs, backend=backend, address=address, retry_failed=True,
+        accept_code=accept_code, observer=Terminal(),
+    )  # fmt: skip
+    return show_results(study)

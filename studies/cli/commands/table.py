@@ -1,4 +1,4 @@
-"""``nested-agents table``: what a study found, as one table."""
+"""``nested-agents table``: the results of a study, as one table."""
 
 from __future__ import annotations
 
@@ -6,18 +6,16 @@ from pathlib import Path
 
 import click
 
-from ..arguments import Command, File, Several, Text
-from . import options
+from .. import options
 
 
-@click.command(cls=Command)
-@click.argument("sources", type=File(), metavar="DIR...|FILE.json", nargs=-1, required=True)
+@click.command()
+@click.argument("sources", type=options.PATH, metavar="DIR...|FILE.json", nargs=-1, required=True)
 @options.as_study
 @options.where
 @click.option(
     "--columns",
-    cls=Several,
-    type=Text(),
+    multiple=True,
     metavar="TITLE...",
     help="Headings of the columns to print, in this order; all unless said otherwise.",
 )
@@ -36,12 +34,12 @@ def command(
     DIR is where a study is kept; several are analysed together, as the first one says. FILE.json is
     a file of results that `export --format json` has written.
     """
-    from ..asking import asked
     from ..display import print_study
+    from ..loading import load_results
 
-    found = asked(sources, study, where, trust=trust)
+    results = load_results(sources, study, where, is_trusted=trust)
     if form == "table":
-        print_study(found, columns)
+        print_study(results, columns)
     else:
-        print(getattr(found.table(columns), form), end="")
+        print(getattr(results.table(columns), form), end="")
     return 0

@@ -7,40 +7,46 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..arguments import Choice, Command, Text, Whole
-from . import options
+from .. import options
 
 if TYPE_CHECKING:
+    from ....core.agents.joint_agents import Agents
     from ....topologies.view import Form
 
 
-@click.command(cls=Command)
-@click.argument("action", type=Choice(["list", "show"]), metavar="list|show")
-@click.argument("topology", type=Text(), metavar="[SPEC]", required=False)
+@click.command()
+@click.argument("action", type=click.Choice(["list", "show"]), metavar="list|show")
+@click.argument("topology", metavar="[SPEC]", required=False)
 @click.option(
     "--agents",
-    type=Whole(),
+    type=int,
     metavar="N",
     help="Number of agents; default: those that the topology names, else robots times wheels, "
     "else 4.",
 )
 @click.option(
     "--robots",
-    type=Whole(),
+    type=int,
     metavar="N",
     help="Number of robots, whose agents are consecutive.",
 )
 @click.option(
     "--wheels",
-    type=Whole(),
+    type=int,
     metavar="N",
     help="Wheels (agents) of a robot; default: 2 if the number of agents is even, else 1.",
 )
-@click.option("--actions", type=Whole(), metavar="N", default=4, help="Actions of each agent.")
+@click.option(
+    "--per",
+    type=click.Choice(["actuator", "body", "team"]),
+    default="actuator",
+    help="What there is one agent for, as the key agents of a spec says.",
+)
+@click.option("--actions", type=int, metavar="N", default=4, help="Actions of each actuator.")
 @click.option(
     "--format",
     "form",
-    type=Choice(["table", "json"]),
+    type=click.Choice(["table", "json"]),
     default="table",
     help="How to print it.",
 )
@@ -51,6 +57,7 @@ def command(
     agents: int | None,
     robots: int | None,
     wheels: int | None,
+    per: Agents,
     actions: int,
     form: Form,
     plot: Path | None,
@@ -61,7 +68,7 @@ def command(
     teams.json, ...; or the spec of a study, whose hierarchies are shown over its own agents.
     """
     from ....topologies.view import kinds, printed, view
-    from ...spec.errors import SpecError
+    from ...errors import SpecError
     from ..hierarchies import of_spec
 
     try:
@@ -79,8 +86,8 @@ def command(
         else:
             found = of_spec(topology)
             if found is None:
-                found = [view(topology, agents, robots, wheels, actions)]
-            elif agents or robots or wheels:
+                found = [view(topology, agents, robots, wheels, actions, per)]
+            elif agents or robots or wheels or per != "actuator":
                 raise SpecError(f"{topology}: is the spec of a study, which says its own agents")
             for number, shown in enumerate(found, 1):
                 if plot is not None:

@@ -6,16 +6,15 @@ from pathlib import Path
 
 import click
 
-from ..arguments import Command, Number
-from . import options
+from .. import options
 
 LEAST_SECONDS = 0.2
 
 
-@click.command(cls=Command)
+@click.command()
 @options.directory
 @click.option(
-    "--every", type=Number(), metavar="SECONDS", default=2.0, help="How often to look again."
+    "--every", type=float, metavar="SECONDS", default=2.0, help="How often to look again."
 )
 @click.option("--once", is_flag=True, help="Show what there is now, and stop.")
 def command(directory: Path, every: float, once: bool) -> int:
@@ -25,14 +24,15 @@ def command(directory: Path, every: float, once: bool) -> int:
     Ctrl-C stops the watching only.
     """
     import time
+    from math import inf
 
     from rich.console import Console
     from rich.live import Live
 
-    from ...spec.errors import SpecError
+    from ...errors import SpecError
     from ..watching import frame
 
-    if not every >= LEAST_SECONDS:
+    if not LEAST_SECONDS <= every < inf:
         raise SpecError(f"--every {every:g}: must be at least {LEAST_SECONDS}")
     console = Console()
     shown, is_going_on = frame(directory)

@@ -10,11 +10,8 @@ from nested_agents.core.agents.team import Team
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.rules.settings import RuleBaseSettings
-from nested_agents.scenarios.box_pushing.config import (
-    BoxPushingSettings,
-    RobotSettings,
-    WheelSettings,
-)
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
+from nested_agents.scenarios.box_pushing.world.settings import RobotSettings, WheelSettings
 from nested_agents.scenarios.kinematic_chain.config import KinematicChainSettings
 
 ACROSS = np.array([1.0, -1.0, -1.0])

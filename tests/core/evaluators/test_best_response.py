@@ -32,9 +32,7 @@ EDGES = {"chain": ["ab", "bc", "cd"], "tree": ["ab", "ac", "bd"], "apart": []}
 def problem_of(world, rules, name, value_of: ValueOf, rule: Rule = "value") -> DecisionProblem:
     rename = dict(zip("abcd", world.agents, strict=True))
     hierarchy = Hierarchy(world.agents, [(rename[x], rename[y]) for x, y in EDGES[name]])
-    return DecisionProblem(
-        rules, hierarchy, A, world.groups, False, rule, "best-response", 0.9, value_of
-    )
+    return DecisionProblem(rules, hierarchy, A, world.groups, rule, "best-response", 0.9, value_of)
 
 
 @pytest.fixture
@@ -111,7 +109,7 @@ def test_what_half_a_team_must_do_together_is_found(line_world) -> None:
     edges = list(zip(world.agents, world.agents[1:], strict=False))
     hierarchy = Hierarchy(world.agents, edges)
     problem = DecisionProblem(
-        rules, hierarchy, A, world.groups, False, "reward", "best-response", 0.9, "team"
+        rules, hierarchy, A, world.groups, "reward", "best-response", 0.9, "team"
     )
 
     class Apart:

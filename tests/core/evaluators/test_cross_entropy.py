@@ -39,9 +39,7 @@ class Corridor:
 
 def planner(rule: str = "reward", edges: tuple[str, ...] = ("ab",), **settings: float) -> Evaluator:
     hierarchy = Hierarchy("ab", [tuple(edge) for edge in edges])
-    problem = DecisionProblem(
-        RULES, hierarchy, 3, ((0,), (1,)), False, rule, "best-response", 0.9, "own"
-    )
+    problem = DecisionProblem(RULES, hierarchy, 3, ((0,), (1,)), rule, "best-response", 0.9, "own")
     return CrossEntropySettings(**settings).build(problem)
 
 

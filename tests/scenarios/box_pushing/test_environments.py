@@ -10,8 +10,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from pettingzoo.test import parallel_api_test, parallel_seed_test
 
-from nested_agents.scenarios import BoxPushing, BoxPushingSettings
-from nested_agents.scenarios.box_pushing.config import SeizedSettings
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.environments import (
     ENV_ID,
     BoxPushingEnv,
@@ -19,6 +18,8 @@ from nested_agents.scenarios.box_pushing.environments import (
     WheelsEnv,
 )
 from nested_agents.scenarios.box_pushing.pictures.rendering import SIDES
+from nested_agents.scenarios.box_pushing.scenario import BoxPushing
+from nested_agents.scenarios.box_pushing.world.settings import SeizedSettings
 
 PARALLEL = [WheelsEnv, RobotsEnv]
 SETTINGS = [

@@ -6,8 +6,8 @@ from made_up_results import NOTHING, Arrays
 
 from nested_agents.studies.catalogue import games as module
 from nested_agents.studies.catalogue.games import AFTER_ONE, analyse, check, draw, measure
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
-from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.trial import trials_of
 

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import made_up
 import pytest
 from made_up_results import NOTHING, Arrays, hierarchies
 
@@ -15,14 +16,14 @@ from nested_agents.studies.catalogue.hierarchies import (
     seeds_needed,
     verdicts_of,
 )
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.presentation.tables import tabulate
 from nested_agents.studies.results.results import read
-from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.arrangement import check as measures_of
 from nested_agents.studies.trials.trial import trials_of
+from nested_agents.studies.workers import runner
 
 CHANCES = {
     (topology, value_of, robots): chance if robots > 2 and value_of == "team" else 0.9
@@ -162,21 +163,21 @@ def test_a_tiny_study_is_run_and_read(tmp_path: Path) -> None:
         {
             "study": "hierarchies", "seeds": [7, 8], "episodes": 1, "steps": 3, "evaluation": 1,
             "learner": {"weights": "role", "decision": {"evaluator": "best-response"}},
+            "overrides": [{"name": "chain"}, {"name": "chain of robots", "agents": "body"}],
             "sweep": {
-                "topology": ["chain", "per-robot"],
                 "learner.decision.value_of": ["own", "team"],
                 "scenario.robots": [1, 2],
             },
         }
     )  # fmt: skip
-    with Store.create(tmp_path, spec, measures_of(spec)) as store:
+    with made_up.opened(tmp_path, spec, measures_of(spec)) as store:
         for trial in trials_of(spec):
-            store.save(trial, measure(trial), 1.0)
+            runner.save(store, trial, measure(trial), 1.0)
         results = read(store)
     analysis = analyse(results)
     assert [line.condition for line in analysis.table[:5]] == [
-        "1 robot, own, chain", "1 robot, own, per-robot",
-        "1 robot, team, chain", "1 robot, team, per-robot",
+        "1 robot, own, chain", "1 robot, own, chain of robots",
+        "1 robot, team, chain", "1 robot, team, chain of robots",
         "2 robots, own, chain",
     ]  # fmt: skip
     messages = [float(line.estimates["messages"].value) for line in analysis.table]

@@ -12,8 +12,8 @@ from made_up_results import NOTHING, Arrays
 from nested_agents.studies.catalogue import wheel_failure
 from nested_agents.studies.catalogue.peers import analyse, check, draw, measure, stops
 from nested_agents.studies.catalogue.study import load_study
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
-from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import trials_of

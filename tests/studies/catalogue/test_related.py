@@ -6,9 +6,9 @@ from made_up_results import NOTHING, Arrays
 
 from nested_agents.studies.catalogue import related as module
 from nested_agents.studies.catalogue.related import analyse, check, draw, measure
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.results.results import Results
-from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.trial import trials_of
 

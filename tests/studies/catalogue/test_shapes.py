@@ -5,8 +5,8 @@ from made_up_results import NOTHING, shapes
 
 from nested_agents.studies.catalogue import shapes as module
 from nested_agents.studies.catalogue.shapes import analyse, check, draw, least_ratio, measure
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
-from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import trials_of

@@ -14,8 +14,8 @@ from nested_agents.studies.catalogue.wheel_failure import (
     draw,
     measure,
 )
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
-from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import Session, run_trial
 from nested_agents.studies.trials.trial import trials_of

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from nested_agents.scenarios import BoxPushing, BoxPushingSettings
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
+from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.checking.checker import CHECKS
 from nested_agents.studies.cli.main import main
 

@@ -16,10 +16,11 @@ import pytest
 from made_up_commands import finish, heeding_interrupts, run_here, start, wait_for_results
 
 from nested_agents.studies.api import run_study as studies_run
+from nested_agents.studies.api.study import run
 from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli import commands
+from nested_agents.studies.cli.display import show_results
 from nested_agents.studies.cli.main import COMMANDS, main
-from nested_agents.studies.cli.running import run_and_show
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.spec.toml import dumps
 from nested_agents.studies.store.store import DATABASE
@@ -63,7 +64,7 @@ def test_help_and_version_import_little(line, modules):
         "import sys; from nested_agents.__main__ import main; main(); "
         "heavy = {'numpy', 'numba', 'joblib', 'matplotlib', 'scipy'} & set(sys.modules); "
         "commands = {m.rpartition('.')[2] for m in sys.modules if '.cli.commands.' in m}; "
-        "print(sorted(heavy | (commands - {'options'})), file=sys.stderr)"
+        "print(sorted(heavy | commands), file=sys.stderr)"
     )
     done = subprocess.run([sys.executable, "-c", program, *line], capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, f"{modules}\n")
@@ -76,7 +77,7 @@ def test_every_command_has_a_module_and_a_line_of_help(capsys, monkeypatch):
     listed = [line.split()[0] for line in lines if line]
     assert listed[: len(COMMANDS)] == list(COMMANDS)
     modules = {path.stem for path in Path(commands.__file__).parent.glob("*.py")}
-    assert modules - {"__init__", "options"} == set(COMMANDS)
+    assert modules - {"__init__"} == set(COMMANDS)
 
 
 def test_version(capsys):
@@ -198,7 +199,8 @@ def test_a_replay_of_the_first_and_the_last_episode_is_drawn_once(tmp_path, monk
     monkeypatch.setattr(learning_curve, "measure", made_up.measure)
     monkeypatch.setattr(studies_run, "check", lambda spec: made_up.MEASURES)
     for _ in range(2):
-        assert run_and_show(made_up.SPEC, tmp_path, jobs=2, replay=True) == 0
+        study = run(made_up.SPEC, tmp_path, jobs=2, progress=False)
+        assert show_results(study, with_replays=True) == 0
     assert len(drawn) == 2
     assert sorted(p.name for p in (tmp_path / "replay").iterdir()) == [
         "first-episode.gif", "last-episode.gif",
@@ -207,7 +209,8 @@ def test_a_replay_of_the_first_and_the_last_episode_is_drawn_once(tmp_path, monk
 
 def test_the_replay_of_one_episode_is_of_the_last(tmp_path):
     spec = Spec.of({"seeds": 1, "episodes": 1, "steps": 2, "evaluation": 0})
-    assert run_and_show(spec, tmp_path, jobs=1, replay=True) == 0
+    study = run(spec, tmp_path, jobs=1, progress=False)
+    assert show_results(study, with_replays=True) == 0
     assert [p.name for p in (tmp_path / "replay").iterdir()] == ["last-episode.gif"]
 
 
@@ -232,34 +235,34 @@ BAD = {
     "run {spec} --out x --set topology=chan": "'chan'",
     "run {spec} --out x --set steps=4 seeds=a": "seeds = 'a'",
     "run {spec} --out x --jobs 0": "--jobs 0: must be at least 1",
-    "run {spec} --out x --jobs two": "error: --jobs two: must be a whole number",
-    "run {spec} --out x --jobs 1.5": "error: --jobs 1.5: must be a whole number",
-    "run {spec} --out ''": "error: --out '': must not be empty",
-    "run '' --out x": "error: SPEC.toml '': must not be empty",
-    "run {spec} --out x --set ''": "error: --set '': must not be empty",
-    "demo --out ''": "error: --out '': must not be empty",
-    "export '' --out x": "error: DIR '': must not be empty",
-    "explain a --seed x": "error: --seed x: must be a whole number",
-    "check '' --steps 5": "NAME '': must not be empty",
-    "check {spec} --steps 0": "error: --steps 0: must be at least 2",
+    "run {spec} --out x --jobs two": "'--jobs': 'two' is not a valid integer",
+    "run {spec} --out x --jobs 1.5": "'--jobs': '1.5' is not a valid integer",
+    "run {spec} --out ''": "error: --out: must not be empty; see nested-agents",
+    "run '' --out x": "error: an argument: must not be empty; see nested-agents run --help",
+    "run {spec} --out x --set ''": "error: --set: must not be empty",
+    "demo --out=": "error: --out: must not be empty",
+    "demo --out ''": "error: --out: must not be empty; see nested-agents",
+    "export '' --out x": "error: an argument: must not be empty",
+    "explain a --seed x": "error: Invalid value for '--seed': 'x' is not a valid integer",
+    "check '' --steps 5": "error: an argument: must not be empty",
+    "check {spec} --steps 0": "error: steps = 0: must be at least 2",
     "claims --jobs 0": "error: --jobs: needs --out",
     "claims --jobs 0 --out x": "error: --jobs 0: must be at least 1",
-    "cost --topology ''": "error: --topology '': must not be empty",
+    "cost --topology ''": "error: --topology: must not be empty",
     "run {spec} --out {spec}": "spec.toml: ",
     "run {spec} --out /proc/nowhere/x": "/proc/nowhere",
-    "run {spec}": "error: --out: is missing; see nested-agents run --help",
-    "run": "error: SPEC.toml: is missing; see nested-agents run --help",
+    "run {spec}": "error: Missing option '--out'; see nested-agents run --help",
+    "run": "error: Missing argument 'SPEC.toml'; see nested-agents run --help",
     "run {spec} --out": "'--out' requires an argument; see nested-agents run --help",
     "demo --out --print-spec": "error: --out --print-spec: is an option; a value must come first",
     "results nowhere": "nowhere: holds no study",
-    "results nowhere --format xml": "error: --format xml: known: csv, json, table",
-    "results nowhere --format jsn": "error: --format jsn: did you mean 'json'? known: csv, json",
+    "results nowhere --format xml": "'--format': 'xml' is not one of 'table', 'csv', 'json'",
     "status nowhere": "nowhere: holds no study",
     "retry nowhere": "nowhere: holds no study",
     "presets papr": "did you mean 'paper'",
     "rum": "error: rum: unknown command; did you mean 'run'? known: check, claims",
-    "--versio": "error: --versio: unknown option; did you mean '--version'?",
-    "demo --job 3": "error: --job: unknown option; did you mean '--jobs'? known: --help, --jobs",
+    "--versio": "'--versio'. Did you mean '--version'?",
+    "demo --job 3": "No such option '--job'. (Did you mean one of: '--jobs', '--out'?)",
     "demo extra": "unexpected extra argument (extra); see nested-agents demo --help",
 }
 

@@ -17,6 +17,7 @@ from made_up_commands import finish, run_here, start, wait_for_results
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.toml import dumps
 from nested_agents.studies.store.store import Store
+from nested_agents.studies.workers.runner import save
 
 CLAIMS = """
 import sys
@@ -185,9 +186,9 @@ def test_text_in_csv_is_no_formula(tmp_path, capsys):
     labels = ["=cmd|' /C calc'!A0", "+1+1", "-2+3", "@SUM(A1)", "sound", "-0.5"]
     overrides = [{"name": n, "learner": {"ridge": i}} for i, n in enumerate(labels, 1)]
     spec = made_up.Spec.of({"seeds": 2, "episodes": 1, "evaluation": 0, "overrides": overrides})
-    with Store.create(tmp_path / "study", spec, made_up.MEASURES) as store:
+    with made_up.opened(tmp_path / "study", spec) as store:
         for trial in made_up.trials_of(spec):
-            store.save(trial, made_up.measure(trial), 1.0)
+            save(store, trial, made_up.measure(trial), 1.0)
     study = str(tmp_path / "study")
     texts = []
     for line in (["results", study, "--format", "csv"], ["table", study, "--format", "csv"]):

@@ -111,10 +111,10 @@ def test_numbers() -> None:
         (("--actions", "1"), "actions = 1, allowed: 2 or more"),
         (("--rules", "0"), "rules = 0, allowed: 1 or more"),
         (("--topology", "ring"), "topology 'ring': known: chain,"),
-        (("--topology",), "'--topology' requires an argument"),
+        (("--topology",), "'--topology' requires an argument; see nested-agents cost --help"),
         (("--topology", "--format", "csv"), "--topology --format: is an option"),
-        (("--topology", "per-robot"), "what whole robots try is in: nested-agents topology show"),
-        (("--format", "xml"), "--format xml: known: csv, json, latex, table"),
+        (("--topology", "per-robot"), "agents = 'body', topology = 'chain'"),
+        (("--format", "xml"), "'xml' is not one of 'table', 'json', 'csv', 'latex'"),
         (("--plot", "cost.txt"), "cost.txt: suffix must be"),
     ],
 )

@@ -2,6 +2,7 @@
 
 import sqlite3
 
+import made_up
 import numpy as np
 import pytest
 
@@ -13,11 +14,12 @@ from nested_agents.studies.explain import text as explain_text
 from nested_agents.studies.spec.conditions import ConditionSettings
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store import reading
+from nested_agents.studies.store.schema import RESULTS_VERSION
 from nested_agents.studies.store.store import DATABASE, Store
 from nested_agents.studies.trials.arrangement import build
-from nested_agents.studies.trials.code import RESULTS_VERSION
 from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import trials_of
+from nested_agents.studies.workers.runner import save
 
 SPEC = Spec.of(
     {
@@ -44,9 +46,9 @@ SPEC = Spec.of(
 def study(tmp_path_factory):
     """Finished are all conditions but the last."""
     directory = tmp_path_factory.mktemp("study") / "out"
-    with Store.create(directory, SPEC, MEASURES) as store:
+    with made_up.opened(directory, SPEC, MEASURES) as store:
         for trial in trials_of(SPEC)[:3]:
-            store.save(trial, run_trial(trial), 1.0)
+            save(store, trial, run_trial(trial), 1.0)
     return directory
 
 
@@ -141,8 +143,8 @@ def test_a_topology_file_that_has_changed_since(tmp_path, capsys):
     file.write_text("def mine(agents, groups): return list(zip(agents, agents[1:]))")
     spec = Spec.of({"seeds": [3], "episodes": 1, "steps": 1, "topology": f"{file}:mine"})
     (trial,) = trials_of(spec)
-    with Store.create(tmp_path / "out", spec, MEASURES) as store:
-        store.save(trial, run_trial(trial), 1.0)
+    with made_up.opened(tmp_path / "out", spec, MEASURES) as store:
+        save(store, trial, run_trial(trial), 1.0)
     file.write_text("def mine(agents, groups): return []")
     status, _ = run(capsys, tmp_path / "out")
     assert status == 0  # by the study's own copy
@@ -150,11 +152,11 @@ def test_a_topology_file_that_has_changed_since(tmp_path, capsys):
 
 @pytest.mark.slow
 def test_an_agent_for_each_robot(tmp_path, capsys):
-    one = {"overrides": (), "topology": {"kind": "per-robot"}, "evaluation": 0, "episodes": 2}
+    one = {"overrides": (), "agents": "body", "evaluation": 0, "episodes": 2}
     spec = Spec.of({**SPEC.table(), **one})
     (trial,) = trials_of(spec)
-    with Store.create(tmp_path, spec, MEASURES) as store:
-        store.save(trial, run_trial(trial), 1.0)
+    with made_up.opened(tmp_path, spec, MEASURES) as store:
+        save(store, trial, run_trial(trial), 1.0)
     status, said = run(capsys, tmp_path)
     assert status == 0
     assert "Not drawn: its agents are no wheels." in said.out

@@ -9,8 +9,8 @@ import pytest
 
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.trial import trials_of
+from nested_agents.studies.workers.runner import save
 
 SPEC = Spec.of(
     made_up.SPEC.table()
@@ -23,11 +23,11 @@ def study(tmp_path_factory):
     """Seven trials that are done, one that failed."""
     directory = tmp_path_factory.mktemp("study") / "out"
     *done, last = trials_of(SPEC)
-    with Store.create(directory, SPEC, made_up.MEASURES) as store:
+    with made_up.opened(directory, SPEC) as store:
         for trial in done:
             result = made_up.measure(trial)
             result.numbers["messages"] = trial.seed + 0.5
-            store.save(trial, result, 2.5)
+            save(store, trial, result, 2.5)
         store.fail(last, "Traceback\n  in measure\nRuntimeError: a wheel came off\n")
     return directory
 

@@ -7,10 +7,10 @@ import made_up
 import numpy as np
 import pytest
 
-from nested_agents.scenarios.box_pushing.config import BoxSettings, label
+from nested_agents.scenarios.box_pushing.world.settings import BoxSettings, label
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.trial import trials_of
+from nested_agents.studies.workers.runner import save
 
 SPEC = Spec.of({"seeds": 3, "episodes": 4, "steps": 5, "evaluation": 2,
                 "sweep": {"preset": ["default", "frozen"]}})  # fmt: skip
@@ -50,13 +50,13 @@ def recording(steps: int = STEPS) -> dict[str, np.ndarray]:
 
 def keep(directory: Path, spec: Spec = SPEC, *, done: int = 6, failed: int = 0) -> Path:
     """Keep a study of which some trials are done, and some of the next ones failed."""
-    with Store.create(directory, spec, made_up.MEASURES) as store:
+    with made_up.opened(directory, spec) as store:
         for i, trial in enumerate(trials_of(spec)):
             if i < done:
                 result = made_up.measure(trial)
                 kept = dict.fromkeys(trial.recorded.values(), recording(STEPS + i))
                 result = replace(result, recordings=kept)
-                store.save(trial, result, 1.0)
+                save(store, trial, result, 1.0)
             elif i < done + failed:
                 store.fail(trial, ERROR)
     return directory

@@ -8,6 +8,7 @@ from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.studies.report import replays as module
 from nested_agents.studies.report.replays import body, pack, replays
 from nested_agents.studies.store.store import Store
+from nested_agents.studies.trials.keeping import spec_of
 from nested_agents.studies.trials.trial import trials_of
 
 
@@ -57,7 +58,7 @@ def test_shapes_hold_holes_and_discs(recorded):
 
 def read(directory, **options):
     with Store.open(directory) as store:
-        return replays(store, trials_of(store.spec()), **options)
+        return replays(store, trials_of(spec_of(store)), **options)
 
 
 def test_first_and_last_of_all_finished_trials(kept, tmp_path):

@@ -1,8 +1,8 @@
 import pytest
 from made_up_results import hierarchies, scaling
 
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.results.contrasts import contrasts
-from nested_agents.studies.spec.errors import SpecError
 
 CHANCES = {
     ("chain", "team", 2): 0.9,

@@ -3,14 +3,15 @@
 from dataclasses import replace
 from pathlib import Path
 
+import made_up
 from made_up import MEASURES, SPEC, TRIALS, measure
 
 from nested_agents.studies.results.results import read
-from nested_agents.studies.store.store import Store
+from nested_agents.studies.workers.runner import save
 
 
 def test_phases_numbers_and_usage_are_read_by_condition(tmp_path: Path) -> None:
-    with Store.create(tmp_path / "study", SPEC, MEASURES) as store:
+    with made_up.opened(tmp_path / "study", SPEC, MEASURES) as store:
         for trial in TRIALS[:-1]:
             result = measure(trial)
             further = tuple(
@@ -22,7 +23,7 @@ def test_phases_numbers_and_usage_are_read_by_condition(tmp_path: Path) -> None:
                 numbers={"messages": 6.0 + trial.seed},
                 usage={"peak_bytes": 10.0 * trial.seed},
             )
-            store.save(trial, result, 2.0)
+            save(store, trial, result, 2.0)
         results = read(store)
     assert {c: results.seeds(c) for c in results.conditions} == {
         "default": (0, 1, 2), "frozen": (0, 1),

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from made_up_results import hierarchies, scaling
 
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.results.selection import Where, chosen, together
-from nested_agents.studies.spec.errors import SpecError
 
 SETTINGS = {"scenario": {"robots": 8, "box": "square"}, "learner": {"kind": "batch-td"}}
 COLUMNS = {"learner.self_model.enabled": "true"}

@@ -1,10 +1,10 @@
 import pytest
 
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.curriculum import StageSettings
-from nested_agents.studies.spec.difference import difference
-from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.spec.toml import dumps
+from nested_agents.studies.trials.refusal import difference, noted_of
 
 TWO_STAGES = """
 [scenario]
@@ -78,13 +78,12 @@ def test_what_is_wrong_is_said_in_one_line(text):
 
 
 def test_another_curriculum_is_another_study():
-    spec = Spec.parse(TWO_STAGES)
-    settings = {c.label: c.settings.model_dump(mode="json") for c in spec.conditions()}
-    assert difference(spec, settings, Spec.parse(TWO_STAGES)) is None
+    there = noted_of(Spec.parse(TWO_STAGES))
+    assert difference(there, noted_of(Spec.parse(TWO_STAGES))) is None
     other = Spec.parse(TWO_STAGES.replace("episodes = 6", "episodes = 7"))
-    assert difference(spec, settings, other).startswith("curriculum = [{name = 'two'")
-    without = Spec.parse("scenario.robots = 8")
-    assert "curriculum = [] there" in difference(without, settings, spec)
+    assert difference(there, noted_of(other)).startswith("curriculum = [{name = 'two'")
+    without = noted_of(Spec.parse("scenario.robots = 8"))
+    assert "curriculum = [] there" in difference(without, there)
 
 
 def test_a_stage_may_hold_settings_made_by_python():

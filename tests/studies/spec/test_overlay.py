@@ -1,6 +1,6 @@
 import pytest
 
-from nested_agents.scenarios.box_pushing.config import Failure
+from nested_agents.scenarios.box_pushing.world.settings import Failure
 from nested_agents.studies.spec.conditions import ConditionSettings
 from nested_agents.studies.spec.overlay import (
     assignment,

@@ -21,7 +21,7 @@ class Here:
 
     def arrivals(self, trials, measure, started):
         for trial in trials:
-            started(trial)
+            started(trial.identity)
             yield attempt(measure, trial)
 
 

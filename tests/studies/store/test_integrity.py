@@ -8,19 +8,21 @@ import made_up
 import pytest
 
 from nested_agents.studies.cli.main import main
-from nested_agents.studies.spec.errors import SpecError
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.schema import study_checksum
 from nested_agents.studies.store.store import DATABASE, SPEC_FILE, Store
+from nested_agents.studies.trials.keeping import pending
+from nested_agents.studies.workers.runner import save
 
 
 def finish(directory):
     """Run what is left; return what had to be said and how many trials ran."""
-    with Store.create(directory, made_up.SPEC, made_up.MEASURES) as store:
-        pending = store.pending(made_up.TRIALS)
-        for trial in pending:
-            store.save(trial, made_up.measure(trial), 1.5)
-        return store.notes, len(pending)
+    with made_up.opened(directory) as store:
+        left = pending(store, made_up.TRIALS)
+        for trial in left:
+            save(store, trial, made_up.measure(trial), 1.5)
+        return store.notes, len(left)
 
 
 def content(directory):
@@ -133,7 +135,7 @@ def test_another_study_is_refused_even_if_the_database_is_damaged(study):
     other = made_up.Spec.of(made_up.SPEC.table() | {"episodes": 9})
     with (
         pytest.raises(SpecError, match="holds another study: episodes = 4 there, 9 here"),
-        Store.create(study, other, made_up.MEASURES),
+        made_up.opened(study, other),
     ):
         pass
     assert {p: p.read_bytes() for p in study.rglob("*") if p.is_file()} == before
@@ -157,7 +159,7 @@ def test_a_database_that_may_not_be_read_is_not_damaged(study, monkeypatch):
     monkeypatch.setattr(sqlite3, "connect", locked)
     with (
         pytest.raises(SpecError, match=r"database is locked$"),
-        Store.create(study, made_up.SPEC, made_up.MEASURES),
+        made_up.opened(study),
     ):
         pass
     assert not list(study.glob("*.damaged-*"))
@@ -185,7 +187,7 @@ def test_a_database_that_is_no_study_is_left_alone(tmp_path):
         connection.execute("CREATE TABLE precious (x)")
     before = (tmp_path / DATABASE).read_bytes()
     refused = pytest.raises(SpecError, match="is a database, but no study")
-    with refused, Store.create(tmp_path, made_up.SPEC, made_up.MEASURES):
+    with refused, made_up.opened(tmp_path):
         pass
     assert (tmp_path / DATABASE).read_bytes() == before
     assert {path.name for path in tmp_path.iterdir()} <= {DATABASE, ".lock"}
@@ -257,9 +259,9 @@ def small(directory):
     """Three of four trials are done, one has failed."""
     spec = made_up.Spec.of(made_up.SPEC.table() | {"seeds": 2, "episodes": 1, "evaluation": 1})
     trials = made_up.trials_of(spec)
-    with Store.create(directory, spec, made_up.MEASURES) as store:
+    with made_up.opened(directory, spec) as store:
         for trial in trials[:3]:
-            store.save(trial, made_up.measure(trial), 1.5)
+            save(store, trial, made_up.measure(trial), 1.5)
         store.fail(trials[3], "Traceback:\nRuntimeError: a wheel came off")
     return directory
 

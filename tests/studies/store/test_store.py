@@ -5,13 +5,16 @@ import sqlite3
 import made_up
 import pytest
 
-from nested_agents.studies.spec.errors import SpecError
+from nested_agents.studies.errors import SpecError
+from nested_agents.studies.spec import spec as spec_module
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store import reading
 from nested_agents.studies.store import store as store_module
+from nested_agents.studies.store.schema import RESULTS_VERSION
 from nested_agents.studies.store.store import DATABASE, SPEC_FILE, Store
-from nested_agents.studies.trials.code import RESULTS_VERSION
+from nested_agents.studies.trials.keeping import pending, spec_of
 from nested_agents.studies.trials.trial import trials_of
+from nested_agents.studies.workers.runner import save
 
 NAMES = [measure.name for measure in made_up.MEASURES]
 
@@ -23,22 +26,22 @@ def changed(**changes):
 @pytest.fixture
 def finished(tmp_path):
     directory = tmp_path / "study"
-    with Store.create(directory, made_up.SPEC, made_up.MEASURES) as store:
+    with made_up.opened(directory) as store:
         for trial in made_up.TRIALS:
-            store.save(trial, made_up.measure(trial), 1.5)
+            save(store, trial, made_up.measure(trial), 1.5)
     return directory
 
 
 def test_what_was_saved_is_read_back_digit_by_digit(finished):
     with Store.open(finished) as store:
         names, rows = store.rows("training")
-        assert store.spec() == made_up.SPEC
+        assert spec_of(store) == made_up.SPEC
         for trial in made_up.TRIALS:
             result = made_up.measure(trial)
             expected = [row.flat(NAMES) for row in result.rows if row.phase == "training"]
             head = (trial.condition, trial.condition, trial.seed)
             assert [row[3:] for row in rows if row[:3] == head] == expected
-            recording = store.recording(trial, "last")
+            recording = store.recording(trial.identity, "last")
             assert recording.keys() == result.recordings["last"].keys()
             assert (recording["box_pose"] == result.recordings["last"]["box_pose"]).all()
     assert names[2:] == [
@@ -48,16 +51,16 @@ def test_what_was_saved_is_read_back_digit_by_digit(finished):
 
 
 def test_rows_are_in_order_whatever_the_order_of_arrival(tmp_path, finished):
-    with Store.create(tmp_path / "other", made_up.SPEC, made_up.MEASURES) as other:
+    with made_up.opened(tmp_path / "other") as other:
         for trial in reversed(made_up.TRIALS):
-            other.save(trial, made_up.measure(trial), 9.0)
+            save(other, trial, made_up.measure(trial), 9.0)
         with Store.open(finished) as store:
             assert store.rows() == other.rows()
 
 
 def test_recordings_are_equal_bytes(tmp_path, finished):
-    with Store.create(tmp_path / "other", made_up.SPEC, made_up.MEASURES) as other:
-        other.save(made_up.TRIALS[0], made_up.measure(made_up.TRIALS[0]), 9.0)
+    with made_up.opened(tmp_path / "other") as other:
+        save(other, made_up.TRIALS[0], made_up.measure(made_up.TRIALS[0]), 9.0)
     name = f"recordings/{made_up.TRIALS[0].identity}.npz"
     assert (tmp_path / "other" / name).read_bytes() == (finished / name).read_bytes()
 
@@ -70,16 +73,16 @@ def test_another_tool_reads_it_with_one_query(finished):
 
 
 def test_the_database_is_written_through(finished):
-    with Store.create(finished, made_up.SPEC, made_up.MEASURES) as store:
+    with made_up.opened(finished) as store:
         assert store._db.execute("PRAGMA journal_mode").fetchone() == ("wal",)
         assert store._db.execute("PRAGMA synchronous").fetchone() == (2,)
 
 
 def test_a_saved_trial_replaces_what_was_there(finished):
     trial = made_up.TRIALS[0]
-    with Store.create(finished, made_up.SPEC, made_up.MEASURES) as store:
+    with made_up.opened(finished) as store:
         before = store.rows()
-        store.save(trial, made_up.measure(trial), 1.0)
+        save(store, trial, made_up.measure(trial), 1.0)
         assert store.rows() == before
         assert store.counts() == {"done": 6, "failed": 0}
 
@@ -102,8 +105,8 @@ def test_a_damaged_recording_is_run_again(finished, damage):
     else:
         content[len(content) // 2] ^= 4
         path.write_bytes(content)
-    with Store.create(finished, made_up.SPEC, made_up.MEASURES) as store:
-        assert store.pending(made_up.TRIALS) == [made_up.TRIALS[2]]
+    with made_up.opened(finished) as store:
+        assert pending(store, made_up.TRIALS) == [made_up.TRIALS[2]]
 
 
 def test_a_recording_that_cannot_be_read_is_named(finished):
@@ -111,21 +114,21 @@ def test_a_recording_that_cannot_be_read_is_named(finished):
     path = finished / "recordings" / f"{trial.identity}.npz"
     with Store.open(finished) as store:
         with pytest.raises(SpecError, match="holds no recording 'middle'"):
-            store.recording(trial, "middle")
+            store.recording(trial.identity, "middle")
         path.write_bytes(b"PK")
         with pytest.raises(SpecError, match="is damaged"):
-            store.recording(trial, "last")
+            store.recording(trial.identity, "last")
         path.unlink()
         with pytest.raises(SpecError, match="no such file"):
-            store.recording(trial, "last")
+            store.recording(trial.identity, "last")
 
 
 def test_seeds_may_be_added(finished):
     more = changed(seeds=5)
-    with Store.create(finished, more, made_up.MEASURES) as store:
-        left = store.pending(trials_of(more))
+    with made_up.opened(finished, more) as store:
+        left = pending(store, trials_of(more))
         assert {trial.seed for trial in left} == {3, 4}
-        assert store.spec() == more
+        assert spec_of(store) == more
     assert Spec.load(finished / SPEC_FILE) == more
 
 
@@ -144,7 +147,7 @@ def test_another_study_is_refused_and_nothing_changed(finished, changes, said):
     before = {p: p.read_bytes() for p in finished.rglob("*") if p.is_file()}
     with (
         pytest.raises(SpecError) as caught,
-        Store.create(finished, changed(**changes), made_up.MEASURES),
+        made_up.opened(finished, changed(**changes)),
     ):
         pass
     assert said in str(caught.value)
@@ -157,16 +160,16 @@ def test_results_of_another_version_are_refused(finished, monkeypatch):
     said = f"holds results of version {RESULTS_VERSION}, this is version 99"
     with (
         pytest.raises(SpecError, match=said),
-        Store.create(finished, made_up.SPEC, made_up.MEASURES),
+        made_up.opened(finished),
     ):
         pass
 
 
 def test_two_writers_at_a_time_are_refused(finished):
     with (
-        Store.create(finished, made_up.SPEC, made_up.MEASURES),
+        made_up.opened(finished),
         pytest.raises(SpecError, match="another process is writing"),
-        Store.create(finished, made_up.SPEC, made_up.MEASURES),
+        made_up.opened(finished),
     ):
         pass
 
@@ -177,22 +180,22 @@ def test_another_study_that_came_first_is_not_overwritten(tmp_path, monkeypatch)
     def late(lock, directory):
         with monkeypatch.context() as patch:
             patch.setattr(store_module, "_take", take)
-            with Store.create(directory, other, made_up.MEASURES):
+            with made_up.opened(directory, other):
                 pass
         take(lock, directory)
 
     monkeypatch.setattr(store_module, "_take", late)
     with (
         pytest.raises(SpecError, match="holds another study"),
-        Store.create(tmp_path, made_up.SPEC, made_up.MEASURES),
+        made_up.opened(tmp_path),
     ):
         pass
     with Store.open(tmp_path) as store:
-        assert store.spec() == other
+        assert spec_of(store) == other
 
 
 def test_one_reads_one_state_while_another_writes(finished):
-    with Store.create(finished, made_up.SPEC, made_up.MEASURES) as writer:
+    with made_up.opened(finished) as writer:
         with Store.open(finished) as reader:
             writer.fail(made_up.TRIALS[0], "Traceback")
             assert reader.counts() == {"done": 6, "failed": 0}
@@ -204,8 +207,8 @@ def test_one_reads_one_state_while_another_writes(finished):
 def test_a_run_killed_before_it_noted_its_spec_is_begun_anew(tmp_path):
     sqlite3.connect(tmp_path / DATABASE).close()
     (tmp_path / DATABASE).touch()
-    with Store.create(tmp_path, made_up.SPEC, made_up.MEASURES) as store:
-        assert store.pending(made_up.TRIALS) == list(made_up.TRIALS)
+    with made_up.opened(tmp_path) as store:
+        assert pending(store, made_up.TRIALS) == list(made_up.TRIALS)
 
 
 @pytest.mark.parametrize("content", ["", "no database"])
@@ -214,7 +217,7 @@ def test_what_is_no_study_is_named(tmp_path, content):
         pass
     (tmp_path / DATABASE).write_text(content)
     with pytest.raises(SpecError, match=r"results\.sqlite: "), Store.open(tmp_path) as store:
-        store.spec()
+        spec_of(store)
 
 
 def test_a_file_in_the_way_is_named(tmp_path):
@@ -222,14 +225,14 @@ def test_a_file_in_the_way_is_named(tmp_path):
     for directory in (tmp_path / "file", tmp_path / "file" / "below"):
         with (
             pytest.raises(SpecError, match="file"),
-            Store.create(directory, made_up.SPEC, made_up.MEASURES),
+            made_up.opened(directory),
         ):
             pass
 
 
 def test_a_users_own_spec_is_neither_overwritten_nor_refused(tmp_path):
     (tmp_path / SPEC_FILE).write_text("# mine\nseeds = 2\n")
-    with Store.create(tmp_path, Spec.of({"seeds": 2}), made_up.MEASURES):
+    with made_up.opened(tmp_path, Spec.of({"seeds": 2})):
         pass
     assert (tmp_path / SPEC_FILE).read_text().startswith("# mine")
     other = tmp_path / "other"
@@ -237,7 +240,7 @@ def test_a_users_own_spec_is_neither_overwritten_nor_refused(tmp_path):
     shutil.copy(tmp_path / SPEC_FILE, other)
     with (
         pytest.raises(SpecError, match="in the way"),
-        Store.create(other, made_up.SPEC, made_up.MEASURES),
+        made_up.opened(other),
     ):
         pass
 
@@ -247,7 +250,7 @@ def test_an_unwritable_directory_is_named(tmp_path):
     tmp_path.chmod(0o500)
     with (
         pytest.raises(SpecError, match="Permission denied"),
-        Store.create(tmp_path, made_up.SPEC, made_up.MEASURES),
+        made_up.opened(tmp_path),
     ):
         pass
 
@@ -256,10 +259,16 @@ def test_a_full_disk_is_one_line_and_keeps_what_was_there(finished, monkeypatch)
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    with Store.create(finished, made_up.SPEC, made_up.MEASURES) as store:
+    with made_up.opened(finished) as store:
         before = store.rows()
         monkeypatch.setattr(os, "fsync", full)
         with pytest.raises(OSError, match="No space left"):
-            store.save(made_up.TRIALS[0], made_up.measure(made_up.TRIALS[0]), 1.0)
+            save(store, made_up.TRIALS[0], made_up.measure(made_up.TRIALS[0]), 1.0)
         assert store.rows() == before
-        assert store.pending(made_up.TRIALS) == []
+        assert pending(store, made_up.TRIALS) == []
+
+
+def test_no_condition_is_computed_anew_to_go_on_with_a_study(finished, monkeypatch):
+    monkeypatch.setattr(spec_module, "grid", None)
+    with made_up.opened(finished) as store:
+        assert pending(store, made_up.TRIALS) == []

@@ -7,9 +7,10 @@ from pathlib import Path
 import made_up
 import pytest
 
-from nested_agents.studies.spec.errors import SpecError
-from nested_agents.studies.store.store import Store
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.trials import code
+from nested_agents.studies.trials.keeping import pending
+from nested_agents.studies.workers.runner import save
 
 MODULES = {"core/team.py": "N = 3  # agents", "core/loop.py": "def loop(): pass"}
 
@@ -54,10 +55,9 @@ def test_rows_of_two_codes_are_mixed_only_if_asked_for(
 ) -> None:
     def kept(text: str, number: int, *, accept_code: bool = False) -> None:
         monkeypatch.setattr(code, "modules", lambda: {"core/team.py": text})
-        arguments = (tmp_path / "study", made_up.SPEC, made_up.MEASURES)
-        with Store.create(*arguments, accept_code=accept_code) as store:
-            for trial in store.pending(made_up.TRIALS)[:number]:
-                store.save(trial, made_up.measure(trial), 0.0)
+        with made_up.opened(tmp_path / "study", accept_code=accept_code) as store:
+            for trial in pending(store, made_up.TRIALS)[:number]:
+                save(store, trial, made_up.measure(trial), 0.0)
 
     kept("N = 3", 1)
     kept("N = 3  # agents", 1)

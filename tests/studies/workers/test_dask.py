@@ -14,12 +14,13 @@ import pytest
 from nested_agents.studies.api import run_study as studies_run
 from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli.main import main
-from nested_agents.studies.spec.errors import SpecError
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.toml import dumps
 from nested_agents.studies.store.store import Store
+from nested_agents.studies.trials.keeping import pending
 from nested_agents.studies.workers import dask as dask_workers
 from nested_agents.studies.workers.dask import DaskWorkers
-from nested_agents.studies.workers.runner import ATTEMPTS, run_trials
+from nested_agents.studies.workers.runner import ATTEMPTS, run_trials, save
 
 DASK = Path(sys.executable).with_name("dask")
 pytestmark = pytest.mark.slow
@@ -68,15 +69,15 @@ def cluster(tmp_path_factory):
 
 @contextmanager
 def written(directory):
-    with Store.create(directory, made_up.SPEC, made_up.MEASURES) as store:
-        yield store, store.pending(made_up.TRIALS)
+    with made_up.opened(directory) as store:
+        yield store, pending(store, made_up.TRIALS)
 
 
 @pytest.fixture(scope="module")
 def expected(tmp_path_factory):
     with written(tmp_path_factory.mktemp("expected")) as (store, trials):
         for trial in trials:
-            store.save(trial, made_up.measure(trial), 0.0)
+            save(store, trial, made_up.measure(trial), 0.0)
         return content(store)
 
 
@@ -112,7 +113,7 @@ def test_a_local_cluster_and_a_trial_that_kills_every_worker(tmp_path, expected)
         assert (condition, seed) == ("frozen", 1)
         assert f"died {ATTEMPTS} times" in error
         assert store.forget_failed() == 1
-        again = store.pending(trials)
+        again = pending(store, trials)
         assert [o.error for o in run_trials(again, store, made_up.measure, workers)] == [None]
         assert content(store) == expected
 

@@ -8,14 +8,15 @@ from nested_agents.studies.store import reading
 from nested_agents.studies.store.running import LOCK, MARK, Running, look
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.workers.progress import _estimate, progress
+from nested_agents.studies.workers.runner import save
 
 
 @pytest.fixture
 def study(tmp_path):
     """Four of six trials are done: both conditions, seeds 0 and 1; each took 2 s or 4 s."""
-    with Store.create(tmp_path, made_up.SPEC, made_up.MEASURES) as store:
+    with made_up.opened(tmp_path) as store:
         for trial in made_up.TRIALS[:4]:
-            store.save(trial, made_up.measure(trial), 2.0 if trial.condition == "default" else 4.0)
+            save(store, trial, made_up.measure(trial), 2.0 if trial.condition == "default" else 4.0)
     return tmp_path
 
 
@@ -31,17 +32,17 @@ def test_between_two_runs_everything_unfinished_is_left(study):
 
 
 def test_what_a_run_has_handed_out_is_running(study):
-    with Store.create(study, made_up.SPEC, made_up.MEASURES) as store, Running(study, 3) as running:
+    with made_up.opened(study) as store, Running(study, 3) as running:
         assert look(study).seconds == {}
-        running.begin(made_up.TRIALS[5])
+        running.begin(made_up.TRIALS[5].identity)
         now = read(study)
         assert (now.done, now.left, now.processes) == (4, 1, 3)
         ((condition, seed, seconds),) = now.running
         assert (condition, seed) == ("frozen", 2)
         assert 0 <= seconds < 60
-        store.save(made_up.TRIALS[5], made_up.measure(made_up.TRIALS[5]), 4.0)
+        save(store, made_up.TRIALS[5], made_up.measure(made_up.TRIALS[5]), 4.0)
         assert read(study).running == ()
-        running.end(made_up.TRIALS[5])
+        running.end(made_up.TRIALS[5].identity)
         assert look(study).seconds == {}
     assert not (study / MARK).exists()
     assert look(study) is None
@@ -57,7 +58,7 @@ def test_a_mark_that_outlived_its_process_is_passed_over(study):
 
 @pytest.mark.parametrize("content", ["", "{", "[]", '{"begun": 3}'])
 def test_a_mark_that_cannot_be_read_does_no_harm(study, content):
-    with Store.create(study, made_up.SPEC, made_up.MEASURES):
+    with made_up.opened(study):
         (study / MARK).write_text(content)
         assert read(study).done == 4
 
@@ -65,12 +66,12 @@ def test_a_mark_that_cannot_be_read_does_no_harm(study, content):
 def test_looking_does_not_keep_a_run_from_beginning(study):
     for _ in range(50):
         look(study)
-        with Store.create(study, made_up.SPEC, made_up.MEASURES):
+        with made_up.opened(study):
             pass
 
 
 def test_failed_and_damaged_trials_are_counted_once(study, capsys):
-    with Store.create(study, made_up.SPEC, made_up.MEASURES) as store:
+    with made_up.opened(study) as store:
         store.fail(made_up.TRIALS[4], "Traceback\nRuntimeError: a wheel came off\n")
     path = study / "recordings" / f"{made_up.TRIALS[0].identity}.npz"
     path.write_bytes(b"PK")

@@ -9,7 +9,7 @@ import made_up
 import pytest
 from joblib.externals.loky import get_reusable_executor
 
-from nested_agents.studies.store.store import Store
+from nested_agents.studies.trials.keeping import pending
 from nested_agents.studies.workers.loky import LokyWorkers
 from nested_agents.studies.workers.runner import ATTEMPTS, run_trials
 from nested_agents.studies.workers.workers import start_workers
@@ -20,9 +20,9 @@ def content(store):
 
 
 def run(directory, measure, jobs=2):
-    with Store.create(directory, made_up.SPEC, made_up.MEASURES) as store:
-        pending = store.pending(made_up.TRIALS)
-        outcomes = list(run_trials(pending, store, measure, LokyWorkers(jobs)))
+    with made_up.opened(directory) as store:
+        left = pending(store, made_up.TRIALS)
+        outcomes = list(run_trials(left, store, measure, LokyWorkers(jobs)))
         return outcomes, content(store), store.failed()
 
 
@@ -43,12 +43,12 @@ def test_one_and_two_jobs_give_the_same_rows_and_recordings(tmp_path, uninterrup
 
 
 def test_results_are_kept_one_by_one_and_the_rest_runs_later(tmp_path, uninterrupted):
-    with Store.create(tmp_path, made_up.SPEC, made_up.MEASURES) as store:
-        running = run_trials(store.pending(made_up.TRIALS), store, made_up.slow, LokyWorkers(2))
+    with made_up.opened(tmp_path) as store:
+        running = run_trials(pending(store, made_up.TRIALS), store, made_up.slow, LokyWorkers(2))
         first = next(running)
         assert store.counts()["done"] >= 1
         running.close()
-        left = store.pending(made_up.TRIALS)
+        left = pending(store, made_up.TRIALS)
         assert first.trial not in left
         assert 0 < len(left) < len(made_up.TRIALS)
     outcomes, rows, _ = run(tmp_path, made_up.measure)
@@ -70,7 +70,7 @@ def test_a_failed_trial_is_run_again_only_on_request(tmp_path, uninterrupted):
     run(tmp_path, made_up.failing)
     outcomes, _, _ = run(tmp_path, made_up.measure)
     assert outcomes == []
-    with Store.create(tmp_path, made_up.SPEC, made_up.MEASURES) as store:
+    with made_up.opened(tmp_path) as store:
         assert store.forget_failed() == 1
     outcomes, rows, failed = run(tmp_path, made_up.measure)
     assert (len(outcomes), failed, rows) == (1, [], uninterrupted)
@@ -97,7 +97,7 @@ def test_a_trial_that_kills_every_worker_fails_alone(tmp_path):
 
 def test_workers_compute_with_one_thread(tmp_path):
     for jobs in (1, 2):
-        with Store.create(tmp_path / str(jobs), made_up.SPEC, made_up.MEASURES) as store:
+        with made_up.opened(tmp_path / str(jobs)) as store:
             workers = LokyWorkers(jobs)
             outcomes = list(run_trials(made_up.TRIALS[:2], store, made_up.threads, workers))
             assert [o.error for o in outcomes] == [None, None]
@@ -114,9 +114,8 @@ def test_workers_do_not_outlive_a_killed_parent(tmp_path):
         import made_up
         from nested_agents.studies.workers.loky import LokyWorkers
         from nested_agents.studies.workers.runner import run_trials
-        from nested_agents.studies.store.store import Store
         from pathlib import Path
-        with Store.create(Path(sys.argv[1]), made_up.SPEC, made_up.MEASURES) as store:
+        with made_up.opened(Path(sys.argv[1])) as store:
             for _ in run_trials(made_up.TRIALS, store, made_up.pids, LokyWorkers(2)):
                 pass
     """
@@ -140,7 +139,7 @@ def test_never_more_trials_are_said_to_run_than_there_are_processes():
     started, left = [], set(made_up.TRIALS)
     for arrival in LokyWorkers(2).arrivals(made_up.TRIALS, made_up.slow, started.append):
         left.remove(arrival.trial)
-        running = [trial for trial in started if trial in left]
+        running = [trial for trial in left if trial.identity in started]
         assert len(running) == min(2, len(left))
     assert len(started) == len(set(started)) == len(made_up.TRIALS)
 

@@ -31,7 +31,7 @@ def test_any_message_can_be_stored_and_is_short(tmp_path, message: str) -> None:
 
     arrival = attempt(measure, made_up.TRIALS[0])
     assert len(arrival.error.encode()) < 2 * MOST_ERROR
-    with Store.create(tmp_path, made_up.SPEC, made_up.MEASURES) as store:
+    with made_up.opened(tmp_path) as store:
         store.fail(arrival.trial, arrival.error)
         assert len(store.failed()) == 1
 

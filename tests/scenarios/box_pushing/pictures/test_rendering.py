@@ -6,7 +6,6 @@ import imageio.v3 as imageio
 import numpy as np
 import pytest
 
-from nested_agents.scenarios.box_pushing.config import BoxSettings, InfraredSettings, label
 from nested_agents.scenarios.box_pushing.pictures.rendering import (
     HIT_COLOUR,
     SIDES,
@@ -14,6 +13,7 @@ from nested_agents.scenarios.box_pushing.pictures.rendering import (
     picture,
     snapshot,
 )
+from nested_agents.scenarios.box_pushing.world.settings import BoxSettings, InfraredSettings, label
 
 
 @pytest.fixture

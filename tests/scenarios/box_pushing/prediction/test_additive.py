@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nested_agents.scenarios import BoxPushingSettings
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 
 
 def moved(robots: int, seed: int, **settings):

@@ -5,13 +5,12 @@ import pytest
 from pydantic import ValidationError
 
 from nested_agents.core.adaptation.calibration import CalibrationSettings
-from nested_agents.core.agents.joint_agents import per_robot
+from nested_agents.core.agents.joint_agents import join_agents
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.settings import Decision
-from nested_agents.core.interface.protocols import CalibratedScenario
 from nested_agents.core.learners.batch import BatchTDSettings
-from nested_agents.scenarios import BoxPushing, BoxPushingSettings
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.prediction.belief import (
     CONSTANTS,
     believing,
@@ -20,8 +19,9 @@ from nested_agents.scenarios.box_pushing.prediction.belief import (
 )
 from nested_agents.scenarios.box_pushing.prediction.prediction import mean_twists
 from nested_agents.scenarios.box_pushing.prediction.push import push
+from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.scripted.controller import ScriptedController
-from nested_agents.topologies import parse
+from nested_agents.topologies import build
 
 SOFT = {"stiffness": 0.5, "load": 2.0, "contact_friction": 0.5}
 STIFF = {"stiffness": 2.0, "load": 0.5, "contact_friction": 2.0}
@@ -34,12 +34,12 @@ def scenario(**table):
     return BoxPushing(BoxPushingSettings.model_validate(table))
 
 
-def calibrating(world, topology="chain"):
+def calibrating(world, agents="actuator"):
     settings = BatchTDSettings(
         calibration=CalibrationSettings(enabled=True), decision=Decision(rule="random")
     )
-    seen, hierarchy = parse(topology).arrange(world)
-    return seen, Team.build(settings, seen, hierarchy, policy_seed(0))
+    seen = join_agents(world, agents)
+    return seen, Team.build(settings, seen, build("chain", seen.agents), policy_seed(0))
 
 
 def pushed(model, twists=TWISTS):
@@ -121,19 +121,18 @@ def test_wrong_constants_are_found_out_by_pushing(believed):
     assert box[:2].max() < 0.005
 
 
-def test_what_was_pushed_is_not_told_when_robots_touch():
+def test_the_twist_of_the_box_is_not_measured_when_robots_touch():
     world = scenario(start="easy")
     world.reset(0)
-    assert world.step(np.zeros(4, dtype=int)).pushed.shape == (3,)
+    assert world.step(np.zeros(4, dtype=int)).twists.shape == (3, 3)
     robots = world.world.robot_poses.copy()
     robots[1, :2] = robots[0, :2] + [0.0, 0.075]
     world.world.place(robots, world.world.box_pose.copy())
-    assert world.step(np.zeros(4, dtype=int)).pushed is None
+    assert world.step(np.zeros(4, dtype=int)).twists.shape == (2, 3)
 
 
 def test_a_team_of_robots_calibrates_too_and_is_saved_whole(tmp_path):
-    (world, team), (_, other) = (calibrating(scenario(start="easy"), "per-robot") for _ in "ab")
-    assert isinstance(world, CalibratedScenario)
+    (world, team), (_, other) = (calibrating(scenario(start="easy"), "body") for _ in "ab")
     assert world.constants == CONSTANTS
     for _ in control_loop(world, team, episodes=1, steps=30, seed=0):
         pass
@@ -145,7 +144,7 @@ def test_a_team_of_robots_calibrates_too_and_is_saved_whole(tmp_path):
 
 
 def test_robots_of_other_scenarios_have_no_constants(line_world):
-    assert not hasattr(per_robot(line_world(2, 2)), "constants")
+    assert not hasattr(join_agents(line_world(2, 2), "body"), "constants")
 
 
 @pytest.mark.parametrize("predictor", ["rigid", "static", "exact"])

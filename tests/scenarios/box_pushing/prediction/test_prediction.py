@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from nested_agents.scenarios import BoxPushing, BoxPushingSettings
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.prediction.prediction import mean_twists
+from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 
 
 def moving(**settings) -> BoxPushing:

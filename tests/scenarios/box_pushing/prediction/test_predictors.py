@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from nested_agents.core.agents.loop import world_seed
-from nested_agents.scenarios import BoxPushing, BoxPushingSettings
-from nested_agents.scenarios.box_pushing.config import (
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
+from nested_agents.scenarios.box_pushing.scenario import BoxPushing
+from nested_agents.scenarios.box_pushing.world.settings import (
     DelayedSettings,
     NoisySettings,
     SeizedSettings,

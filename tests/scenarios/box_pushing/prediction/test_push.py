@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nested_agents.scenarios import BoxPushing, BoxPushingSettings
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.prediction.push import PushModel, push
 from nested_agents.scenarios.box_pushing.prediction.push_lanes import (
     BOX_SIZE,
@@ -16,6 +16,7 @@ from nested_agents.scenarios.box_pushing.prediction.push_lanes import (
     head,
 )
 from nested_agents.scenarios.box_pushing.prediction.push_reference import push_one
+from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS, compliance
 

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from nested_agents.scenarios import BoxPushing, BoxPushingSettings
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
+from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.scripted.controller import (
     ScriptedController,
     decisions_to_goal,

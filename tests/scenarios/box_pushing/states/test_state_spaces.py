@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from nested_agents.core.interface.spaces import Variable
 from nested_agents.core.numerics.arrays import FloatArray
 from nested_agents.core.plugins.sources import Sources
-from nested_agents.scenarios import BoxPushing, BoxPushingSettings
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
+from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.states.kernels import COMPILED, Columns, angle_of
 from nested_agents.scenarios.box_pushing.states.state_spaces import (
     STATE_SPACES,

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from shapely.affinity import rotate, translate
 from shapely.geometry import Polygon
 
-from nested_agents.scenarios.box_pushing.config import BoxSettings, label
 from nested_agents.scenarios.box_pushing.world.boxes import AREA, BOXES, BoxSpec, box_for, growth
 from nested_agents.scenarios.box_pushing.world.polygons import _merged, moments, polygon_edges
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
+from nested_agents.scenarios.box_pushing.world.settings import BoxSettings, label
 from nested_agents.scenarios.box_pushing.world.world import UNIT, World
 
 L_SHAPE = ((0, 0), (0.2, 0), (0.2, 0.1), (0.1, 0.1), (0.1, 0.2), (0, 0.2))

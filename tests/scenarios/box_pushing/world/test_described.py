@@ -7,13 +7,14 @@ import pytest
 
 from nested_agents.core.agents.loop import world_seed
 from nested_agents.core.plugins.settings import SettingsError
-from nested_agents.scenarios import BoxPushing, BoxPushingSettings
-from nested_agents.scenarios.box_pushing.config import BoxSettings, RobotSettings, label
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
+from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.world.robots import (
     E_PUCK_SENSORS,
     ROBOTS,
     robot_for,
 )
+from nested_agents.scenarios.box_pushing.world.settings import BoxSettings, RobotSettings, label
 from nested_agents.scenarios.checking.checker import CHECKS, check_scenario
 from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec

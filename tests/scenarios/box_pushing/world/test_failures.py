@@ -9,8 +9,8 @@ from scipy.linalg import expm
 
 from nested_agents.core.agents.loop import world_seed
 from nested_agents.core.numerics.arrays import FloatArray
-from nested_agents.scenarios import BoxPushing, BoxPushingSettings
-from nested_agents.scenarios.box_pushing.config import Failure, FailureSettings
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
+from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.failures import WheelFailures
 from nested_agents.scenarios.box_pushing.world.robots import (
@@ -18,6 +18,7 @@ from nested_agents.scenarios.box_pushing.world.robots import (
     RobotSpec,
     nominal_effect,
 )
+from nested_agents.scenarios.box_pushing.world.settings import Failure, FailureSettings
 from nested_agents.scenarios.box_pushing.world.world import World
 
 WHEELS = ("robot1.left", "robot1.right", "robot2.left", "robot2.right")

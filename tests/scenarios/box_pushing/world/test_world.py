@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from nested_agents.core.numerics.arrays import FloatArray
-from nested_agents.scenarios.box_pushing.config import CONTROL_PERIOD
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES, box_for
 from nested_agents.scenarios.box_pushing.world.robots import (
     ROBOTS,
     compliance,
     nominal_effect,
 )
+from nested_agents.scenarios.box_pushing.world.settings import CONTROL_PERIOD
 from nested_agents.scenarios.box_pushing.world.starts import place
 from nested_agents.scenarios.box_pushing.world.world import World
 

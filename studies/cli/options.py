@@ -1,17 +1,69 @@
-"""Arguments and options that several commands share."""
+"""Arguments and options that several commands share, and what all arguments must be.
+
+An option that may be given several times takes several values at once, too: `complete`.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
 import click
 
-from ..arguments import Assignments, Choice, File, Several, Text, Whole
+PATH = click.Path(path_type=Path)
+"""A path, which need not exist."""
 
-directory = click.argument("directory", type=File(), metavar="DIR")
+
+def complete(command: click.Command, arguments: Iterable[str]) -> Iterator[str]:
+    """Yield arguments in which each further value of an option has the option's name before it.
+
+    Values go on up to the next option; those of ``KEY=VALUE`` up to an argument without ``=``.
+
+    Raises
+    ------
+    click.UsageError
+        If an argument is empty, as an unset shell variable is, or a value is missing.
+
+    Examples
+    --------
+    >>> command = click.Command("run", params=[click.Option(["--log"], multiple=True)])
+    >>> list(complete(command, ["--log", "a", "b", "--jobs", "3"]))
+    ['--log', 'a', '--log', 'b', '--jobs', '3']
+    """
+    options = {
+        name: option
+        for option in command.params
+        if isinstance(option, click.Option) and not option.is_flag
+        for name in option.opts
+    }
+    name, is_due = "", False
+    for argument in arguments:
+        if argument in ("", *(f"{option}=" for option in options)):
+            empty = name if is_due else argument.rstrip("=") or "an argument"
+            raise click.UsageError(f"{empty}: must not be empty")
+        if is_due and argument.startswith("--"):
+            raise click.UsageError(f"{name} {argument}: is an option; a value must come first")
+        if is_due:
+            is_due = False
+        elif argument in options:
+            name, is_due = argument, True
+        elif name and options[name].multiple and _is_further(argument, options[name]):
+            yield name
+        else:
+            name = ""
+        yield argument
+
+
+def _is_further(argument: str, option: click.Option) -> bool:
+    return argument[0] != "-" and ("=" in argument or "=" not in str(option.metavar))
+
+
+directory = click.argument("directory", type=PATH, metavar="DIR")
 """An existing study."""
 
 jobs = click.option(
     "--jobs",
-    type=Whole(),
+    type=int,
     metavar="N",
     help="Trials at a time; one for every core unless said otherwise.",
 )
@@ -19,7 +71,7 @@ jobs = click.option(
 
 backend = click.option(
     "--backend",
-    type=Choice(["loky", "dask"]),
+    type=click.Choice(["loky", "dask"]),
     default="loky",
     help="Who runs the trials: loky, processes of this machine, or dask, workers of a Dask cluster "
     "(extra nested-agents[dask]). The results are the same.",
@@ -28,7 +80,6 @@ backend = click.option(
 
 address = click.option(
     "--address",
-    type=Text(),
     metavar="tcp://HOST:PORT",
     help="Of the scheduler of a running Dask cluster, all of whose workers are used unless --jobs "
     "says otherwise. If missing, a cluster is started here.",
@@ -53,8 +104,7 @@ trust = click.option(
 changes = click.option(
     "--set",
     "changes",
-    cls=Assignments,
-    type=Text(),
+    multiple=True,
     metavar="KEY=VALUE...",
     help='Lay values over the spec: --set learner.ridge=1 "seeds=[3, 5]". May be repeated.',
 )
@@ -62,8 +112,8 @@ changes = click.option(
 
 figures = click.option(
     "--figures",
-    cls=Several,
-    type=Choice(["png", "svg", "pdf"]),
+    multiple=True,
+    type=click.Choice(["png", "svg", "pdf"]),
     metavar="png|svg|pdf...",
     default=("png", "svg"),
     help="Formats of the figures.",
@@ -71,14 +121,13 @@ figures = click.option(
 """What figures of a study are written as."""
 
 plot = click.option(
-    "--plot", type=File(), metavar="PATH", help="A figure to write: SVG, PNG or PDF by suffix."
+    "--plot", type=PATH, metavar="PATH", help="A figure to write: SVG, PNG or PDF by suffix."
 )
 """A picture to write."""
 
 as_study = click.option(
     "--as",
     "study",
-    type=Text(),
     metavar="STUDY",
     help="Analyse the trials as this study does, by its name or file.py:NAME; nothing is run.",
 )
@@ -86,7 +135,6 @@ as_study = click.option(
 
 where = click.option(
     "--where",
-    type=Text(),
     metavar="CHOICE",
     help='Only the trials of a choice: "robots == 8 and seed < 5", "box in [square, circle]".',
 )
@@ -95,7 +143,7 @@ where = click.option(
 form = click.option(
     "--format",
     "form",
-    type=Choice(["table", "markdown", "latex", "csv"]),
+    type=click.Choice(["table", "markdown", "latex", "csv"]),
     default="table",
     help="How to print the table; CSV holds every digit, LaTeX needs the package booktabs.",
 )

@@ -1,0 +1,16 @@
+"""The settings of predictions."""
+
+from __future__ import annotations
+
+from ....core.plugins.settings import Positive, Settings
+
+
+class BeliefSettings(Settings):
+    """By what factors the push predictor takes constants for other than the world has them."""
+
+    stiffness: Positive = 1.0
+    """Factor on the stiffness of the wheels, ahead and sideways."""
+    load: Positive = 1.0
+    """Factor on the ground friction of the box."""
+    contact_friction: Positive = 1.0
+    """Factor on the friction between robots and box."""

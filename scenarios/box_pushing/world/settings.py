@@ -1,0 +1,218 @@
+"""The settings of robots, boxes, sensors, failures and the reward."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
+
+from ....core.plugins.settings import NonNegative, Positive, Settings
+from ...faults.settings import (
+    Delayed,
+    FailureSettings,
+    Free,
+    Names,
+    Noisy,
+    Reversed,
+    Seized,
+    Stuck,
+    Weak,
+)
+
+CONTROL_PERIOD = 0.064
+"""Time between commands to the wheels [s]; the basic time step of the e-puck in Webots."""
+
+Periods = Annotated[int, Field(ge=1, le=10_000)]
+"""Control periods: ten minutes at most."""
+
+
+class RewardSettings(Settings):
+    """The constants of the reward (Eq. 15-17); distances in metres, angles in radians."""
+
+    of: Literal["team", "robot"] = "team"
+    """Whose contact and infrared readings the conditions ask for: those of all robots, as in the
+    paper, one reward for all agents; or those of each robot, a reward for the agents of each."""
+    c1: NonNegative = 0.01
+    """Weight of R1 (Eq. 15), the reward for the box being near the goal."""
+    r1: NonNegative = 1.5
+    """Decay of R1 per metre of the box's distance to the goal."""
+    c2: NonNegative = 0.0007
+    """Weight of R2 and R3 (Eq. 16), the reward for robots being near the box."""
+    r2: NonNegative = 5.0
+    """Decay per unit of infrared reading of a robot (Eq. 16, for any number of robots)."""
+    c4: NonNegative = 0.0003
+    """Penalty per radian of the box's orientation error (Eq. 17)."""
+    least_approach: NonNegative = 0.001
+    """By how much the box must have come nearer in a decision period for a negative Delta D [m];
+    with 0 a box that creeps by rounding errors is paid as one that is pushed."""
+    receding: float = 0.000001
+    """Reward under Condition 2."""
+    some_out_of_range: float = -0.0015
+    """Reward under Condition 4."""
+    all_out_of_range: float = -0.002
+    """Reward under Condition 5."""
+    pays_at_goal: bool = True
+    """Whether reaching the goal pays c1, even if a robot has lost touch of the box; otherwise the
+    conditions hold there as anywhere."""
+    attraction_without_contact: bool = False
+    """Whether R1 counts under Condition 3 as printed; without it robots do not hover."""
+
+
+class WheelFailure(FailureSettings):
+    """Wheels that fail."""
+
+    part: ClassVar[str] = "wheels"
+
+    wheels: Names
+    """Wheels by agent name or pattern: ``robot1.left``, ``robot1.*``, ``*.left``; one or a list."""
+
+
+class SeizedSettings(Seized, WheelFailure):
+    """The wheel does not turn."""
+
+    kind: Literal["seized"] = "seized"
+
+
+class FreeSettings(Free, WheelFailure):
+    """The wheel has no drive and turns freely."""
+
+    kind: Literal["free"] = "free"
+
+
+class WeakSettings(Weak, WheelFailure):
+    """The wheel turns at a fraction of its command."""
+
+    kind: Literal["weak"] = "weak"
+
+
+class ReversedSettings(Reversed, WheelFailure):
+    """The wheel turns against its command."""
+
+    kind: Literal["reversed"] = "reversed"
+
+
+class StuckSettings(Stuck, WheelFailure):
+    """The wheel turns at one speed whatever its command."""
+
+    kind: Literal["stuck"] = "stuck"
+
+
+class DelayedSettings(Delayed, WheelFailure):
+    """The wheel carries out its commands too late, by control periods of 64 ms."""
+
+    kind: Literal["delayed"] = "delayed"
+
+
+class NoisySettings(Noisy, WheelFailure):
+    """The wheel turns at its command plus noise."""
+
+    kind: Literal["noisy"] = "noisy"
+
+
+Failure = Annotated[
+    SeizedSettings
+    | FreeSettings
+    | WeakSettings
+    | ReversedSettings
+    | StuckSettings
+    | DelayedSettings
+    | NoisySettings,
+    Field(discriminator="kind"),
+]
+"""Any failure's settings, distinguished by `kind`."""
+
+
+Vertices = Annotated[tuple[tuple[float, float], ...], Field(min_length=3)]
+
+
+class Described(Settings):
+    """Something of one's own, described by a table that may say what it is called."""
+
+    name: Annotated[str, Field(min_length=1, pattern=r"^[^\x00-\x1f\x7f]+$")] | None = None
+    """What labels call it; nothing depends on it."""
+
+    @model_serializer(mode="wrap")
+    def _without_no_name(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        # Without a name it is written as it ever was, and its trials are the same.
+        table: dict[str, Any] = write(self)
+        return {key: value for key, value in table.items() if key != "name" or value is not None}
+
+
+class BoxSettings(Described):
+    """A box of one's own: ``box = { vertices = [[0, 0], [0.2, 0], [0.2, 0.1]] }``."""
+
+    vertices: Vertices
+    """Outline, counter-clockwise [m]; concave outlines are allowed."""
+    holes: tuple[Vertices, ...] = ()
+    """Outlines of holes [m]."""
+    mass: Positive = 0.4
+    """Mass of the box [kg]."""
+    friction: NonNegative = 0.2
+    """Coefficient of friction with the ground."""
+    contact_friction: NonNegative = 0.3
+    """Coefficient of friction with robots."""
+    grows: bool | Literal["width"] = False
+    """Whether it grows with the number of robots, as the boxes known by name do; or along its
+    ``width`` only, the side behind which robots start."""
+
+
+class WheelSettings(Settings):
+    """A wheel of a robot of one's own."""
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")]
+    """Name of the wheel; its agent is called ``robot1.NAME``."""
+    x: float
+    """Position of the wheel ahead of the centre [m]."""
+    y: float
+    """Position of the wheel to the left of the centre [m]."""
+
+
+class RobotSettings(Described):
+    """A robot of one's own; what is not given is the e-Puck's."""
+
+    wheels: Annotated[tuple[WheelSettings, ...], Field(min_length=1)]
+    """Its wheels, one agent each."""
+    radius: Annotated[float, Field(ge=0.001, le=10)] = 0.037
+    """Radius of the round body [m]."""
+    mass: Positive = 0.15
+    """Mass of the robot [kg]."""
+    max_speed: Positive = 0.13
+    """Greatest wheel speed [m/s]; state spaces lay the memberships of wheel speeds over it."""
+    stiffness: Positive = 6.5
+    """Stiffness of one wheel's servo [N per m/s]."""
+    lateral_stiffness: Positive = 20.0
+    """Stiffness of one wheel's grip sideways [N per m/s]."""
+    traction: Positive = 0.8
+    """Coefficient of friction between wheels and ground."""
+    sensors: tuple[float, ...] | None = None
+    """Directions of the infrared sensors [rad]; none: those of the e-Puck."""
+
+
+class InfraredSettings(Settings):
+    """How the infrared sensors of all robots read; the default is the e-Puck's."""
+
+    reach: Positive = 0.06
+    """Distance beyond which they read 0 [m]; the e-Puck's are useful up to about 6 cm."""
+    normalisation: Literal["exponential", "linear", "binary"] = "exponential"
+    """How a distance within reach becomes a reading in [0, 1], 1 when touching: exp(-distance /
+    decay), 1 - distance / reach, or 1."""
+    decay: Positive = 0.015
+    """Distance over which an exponential reading falls to 1/e [m]."""
+    noise: Annotated[float, Field(ge=0, le=1)] = 0.0
+    """Standard deviation of a normal error, as a fraction of the reading (as in lookup tables of
+    Webots); drawn anew for every sensor and decision, the result cut to [0, 1]."""
+
+    @model_validator(mode="after")
+    def _decays(self) -> Self:
+        default = type(self).model_fields["decay"].default
+        if self.normalisation != "exponential" and self.decay != default:
+            raise ValueError(
+                f"decay = {self.decay} is for normalisation = 'exponential', "
+                f"received {self.normalisation!r}"
+            )
+        return self
+
+
+def label(thing: str | Settings) -> str:
+    """Return the name of a thing, or what it consists of, as text that can be read back."""
+    return thing if isinstance(thing, str) else thing.model_dump_json()

@@ -1,0 +1,35 @@
+"""What is wrong with something that the user can mend, in one line to act on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+LONGEST = 1200
+"""Characters of a message; of a longer one the middle is left out."""
+
+
+class SpecError(ValueError):
+    """Something the user can mend: its message is one line that names what, and what is allowed."""
+
+    def __init__(self, message: str) -> None:
+        line = " ".join(message.split())
+        if len(line) > LONGEST:
+            line = f"{line[: LONGEST // 2]} ... {line[-LONGEST // 4 :]}"
+        # A terminal obeys control characters, and cannot write half of a surrogate pair.
+        shown = (c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)
+        super().__init__("".join(shown))
+
+
+def show(value: object, width: int | None = 60) -> str:
+    """Return a value as TOML would write it, shortened to `width` characters if that is given."""
+    if isinstance(value, bool):
+        text = str(value).lower()
+    elif isinstance(value, str):
+        text = repr(value)
+    elif isinstance(value, Mapping):
+        text = "{" + ", ".join(f"{k} = {show(v, width)}" for k, v in value.items()) + "}"
+    elif isinstance(value, Sequence):
+        text = "[" + ", ".join(show(v, width) for v in value) + "]"
+    else:
+        text = str(value)
+    return text if width is None or len(text) <= width else text[: width - 3] + "..."
