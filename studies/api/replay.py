@@ -51,7 +51,7 @@ def draw(
     condition, seed
         Which trial; the first one unless said otherwise.
     episode
-        ``first`` or ``last``; ``before`` or ``after`` where a wheel fails.
+        ``first`` or ``last``; ``before`` or ``after`` where something fails.
     path
         Of the animation, GIF or MP4; in the folder ``replay`` of the study unless said otherwise.
 

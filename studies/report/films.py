@@ -1,7 +1,7 @@
 """Recorded episodes as animations, where the canvas of a report cannot play them.
 
-The canvas knows robots that push a box. Any other scenario that draws its episodes, one's own
-included, has them drawn as it does itself (`can_draw`).
+Any scenario without a player that draws its episodes, one's own included, has them drawn as it does
+itself (`can_draw`).
 """
 
 from __future__ import annotations

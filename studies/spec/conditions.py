@@ -11,7 +11,7 @@ import itertools
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
 from pydantic import Field, SerializerFunctionWrapHandler, ValidationError, model_serializer
 
@@ -23,8 +23,7 @@ from ...core.learners.batch import BatchTDSettings
 from ...core.plugins.messages import closest
 from ...core.plugins.plugged import Plugged
 from ...core.plugins.settings import ScenarioSettings, Settings, tuples
-from ...scenarios import SCENARIOS
-from ...scenarios.box_pushing.config import BoxPushingSettings
+from ...scenarios import DEFAULT, SCENARIOS
 from ...topologies import build
 from ...topologies.config import ChainSettings, Topology, parse
 from ..errors import SpecError, show
@@ -40,7 +39,9 @@ SECTIONS = ("scenario", "topology", "learner")
 class ConditionSettings(Settings):
     """All that a trial depends on besides its seed and its length."""
 
-    scenario: Annotated[ScenarioSettings, Plugged(SCENARIOS)] = BoxPushingSettings()
+    scenario: Annotated[ScenarioSettings, Plugged(SCENARIOS)] = Field(
+        default_factory=lambda: cast(ScenarioSettings, SCENARIOS.parsed(DEFAULT))
+    )
     agents: Agents = "actuator"
     topology: Topology = ChainSettings()
     learner: Annotated[TeamSettings, Plugged(LEARNERS)] = BatchTDSettings()

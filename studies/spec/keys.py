@@ -261,7 +261,11 @@ def meanings(model: type[Settings]) -> dict[str, str]:
     for cls in reversed(model.__mro__):
         if not (issubclass(cls, Settings) and cls is not Settings):
             continue
-        (definition,) = ast.parse(textwrap.dedent(inspect.getsource(cls))).body
+        try:
+            source = inspect.getsource(cls)
+        except OSError:  # made of classes that are written down, which are looked at, too
+            continue
+        (definition,) = ast.parse(textwrap.dedent(source)).body
         body = definition.body if isinstance(definition, ast.ClassDef) else []
         for field, text in pairwise(body):
             if (

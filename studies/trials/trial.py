@@ -132,7 +132,7 @@ class Trial:
     def recorded(self) -> dict[int, str]:
         """Names of the training episodes that are recorded, by number.
 
-        The first and the last; if a wheel fails, also the one before, and the one in which it does.
+        The first and the last; if something is scheduled to fail, also that one and the one before.
         """
         named = {}
         onset = self.settings.scenario.onset

@@ -29,9 +29,9 @@ from ...results.results import Results
 from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
 from ...results.summary import EVALUATED, Summary, evaluated
 from ...spec.spec import Spec
-from ...trials.contact import ContactShares
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
+from ..contact import ContactShares
 from ..study import check_rule_bases
 
 if TYPE_CHECKING:

@@ -21,9 +21,9 @@ from ...results.statistics import Estimate, bootstrap, rate
 from ...results.summary import Summary
 from ...results.verdicts import power_lines
 from ...spec.spec import Spec
-from ...trials.contact import ContactShares
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
+from ..contact import ContactShares
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -21,7 +21,7 @@ from .. import options
 )
 @options.trust
 def command(directory: Path, condition: str | None, seed: int | None, trust: bool) -> int:
-    """Explain a trained team: its rules in words, its policy around the box, its self-model.
+    """Explain a trained team: its rules in words, its policy, its self-model.
 
     DIR is where the study is kept. Text and figures go into its folder explain. Training is run
     again for it, which takes seconds, and must give the episodes that are kept.
