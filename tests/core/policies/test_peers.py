@@ -11,7 +11,7 @@ from nested_agents.core.learners import LEARNERS
 from nested_agents.core.policies.inputs import FARTHEST, Inputs, RewardScale
 from nested_agents.core.policies.seen import Seen, SeenScenario
 from nested_agents.scenarios.line_up import LineUpSettings
-from nested_agents.studies.spec.errors import SpecError
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import check
 from nested_agents.studies.trials.session import Session, run_trial
