@@ -39,7 +39,6 @@ from ...core.plugins.deferred import Deferred
 from ...core.rules.settings import RuleBaseSettings
 from ...scenarios.line_up import LineUp, LineUpSettings
 from ...topologies import build, parse
-from ...topologies.config import ChainSettings, CoordinationGraphSettings, IndependentSettings
 from ...topologies.view import team_of
 from ..results.statistics import Estimate
 
@@ -146,10 +145,9 @@ def agents_below(text: str, n: int) -> Sequence[int]:
     ValueError
         If the topology is refused.
     """
-    settings = parse(text)
-    if isinstance(settings, ChainSettings) and isinstance(settings.order, str):
+    if text in ("chain", "chain:reversed", "chain:interleaved"):
         return range(n)  # a thousand hierarchies of a thousand agents take their time
-    return below_counts(build(settings, team_of(n, None, None).agents, pairs(n)))
+    return below_counts(build(text, team_of(n, None, None).agents, pairs(n)))
 
 
 def pairs(n: int) -> tuple[tuple[int, ...], ...]:
@@ -205,7 +203,7 @@ def _arrange(text: str, line_up: LineUp) -> tuple[TDLambdaSettings, Scenario, Hi
         learner = LEARNER.model_copy(update={"rule_base": base})
         return learner, scenario, Hierarchy(scenario.agents, [])
     settings = parse(text)
-    learner = COORDINATED if isinstance(settings, CoordinationGraphSettings) else LEARNER
+    learner = COORDINATED if settings.kind == "coordination-graph" else LEARNER
     return learner, line_up, build(settings, line_up.agents, pairs(n))
 
 
@@ -247,8 +245,8 @@ def exponent(
 def _warm_up() -> None:
     """Have everything imported and compiled before memory is traced and time taken."""
     line_up = LineUpSettings(carts=2).build()
-    for settings in (ChainSettings(), IndependentSettings()):
-        hierarchy = build(settings, line_up.agents)
+    for topology in ("chain", "independent"):
+        hierarchy = build(topology, line_up.agents)
         _steps(Team.build(LEARNER, line_up, hierarchy, policy_seed(0)), line_up, 1)
 
 

@@ -209,7 +209,7 @@ def _table(
     told = meanings(model)
     laid = _laid_by_preset(name, kinds[0])
     keys = tuple(
-        _laid_over(_key(field, info, told.get(field, "")), laid)
+        _laid_over(_key(field, info, told.get(field, info.description or "")), laid)
         for field, info in model.model_fields.items()
         if field != "kind" and not (field in base and base[field].default == info.default)
     )
