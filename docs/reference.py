@@ -90,8 +90,8 @@ MODULES = {
         "api.run_study",
         "errors", "spec.spec", "spec.keys", "spec.presets", "trials.trial",
         "trials.arrangement", "trials.session",
-        "store.store", "results.results", "results.analysis", "results.statistics", "results.comparison",
-        "results.power", "results.summary", "catalogue.study", "cost.cost", "claims.claims",
+        "store.store", "results.results", "results.analysis", "results.statistics",
+        "results.comparison", "results.power", "results.summary", "catalogue.study", "cost.cost", "claims.claims",
     )),
 }  # fmt: skip
 """The public modules of each package, by what the package is for."""
