@@ -122,4 +122,4 @@ class ExactPrediction(BoxPrediction):
             poses.append(pose)
             gaps.append(gap)
         pose, gap = np.array(poses)[which], np.array(gaps)[which]
-        return self.seen(pose[:, 1:], pose[:, 0], gap, seconds)
+        return self.premises.seen(self.situation, pose[:, 1:], pose[:, 0], gap, seconds)
