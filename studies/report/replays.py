@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from ...core.plugins.places import located
+from ...core.plugins.deferred import located
 from ...scenarios import SCENARIOS
 from ..spec.errors import SpecError
 from ..store.durable import NotRecordedError, Recording
