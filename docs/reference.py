@@ -91,7 +91,8 @@ MODULES = {
         "errors", "spec.spec", "spec.keys", "spec.presets", "trials.trial",
         "trials.arrangement", "trials.session",
         "store.store", "results.results", "results.analysis", "results.statistics",
-        "results.comparison", "results.power", "results.summary", "catalogue.study", "cost.cost", "claims.claims",
+        "results.comparison", "results.power", "results.summary", "catalogue.study", "cost.cost",
+        "claims.claims",
     )),
 }  # fmt: skip
 """The public modules of each package, by what the package is for."""
