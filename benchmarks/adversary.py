@@ -154,11 +154,11 @@ class Here:
         self.adversary = adversary
 
     def arrivals(
-        self, trials: Sequence[Trial], run_trial: RunTrial, started: Callable[[Trial], None]
+        self, trials: Sequence[Trial], run_trial: RunTrial, started: Callable[[str], None]
     ) -> Generator[Arrival]:
         """See `nested_agents.studies.workers.workers.Workers.arrivals`."""
         for trial in trials:
-            started(trial)
+            started(trial.identity)
             time.sleep(0.08)
             yield Arrival(trial, self.adversary.result(trial), None, 1.0)
 

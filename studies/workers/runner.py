@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 
 from ..store.running import Running
 from ..store.store import Store
+from .arrivals import Workers
 from .interrupts import undisturbed
 from .worker import Arrival, RunTrial
-from .workers import Workers
 
 if TYPE_CHECKING:
     from ..trials.trial import Trial, TrialResult
