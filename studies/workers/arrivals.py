@@ -13,7 +13,7 @@ from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any
 
 from .interrupts import ignore_interrupts
-from .worker import Arrival, RunTrial
+from .worker import Outcome, RunTrial
 
 if TYPE_CHECKING:
     from ..trials.trial import Trial
@@ -35,7 +35,7 @@ class Workers(ABC):
         """Hand a trial to a worker that is free, and return its future."""
 
     @abstractmethod
-    def fetch(self, future: Any, trial: Trial) -> Arrival | None:
+    def fetch(self, future: Any, trial: Trial) -> Outcome | None:
         """Return what became of a trial whose future is done; None if it runs once more."""
 
     @abstractmethod
@@ -44,7 +44,7 @@ class Workers(ABC):
 
     def arrivals(
         self, trials: Sequence[Trial], run_trial: RunTrial, started: Callable[[str], None]
-    ) -> Generator[Arrival]:
+    ) -> Generator[Outcome]:
         """Run trials and yield what becomes of each, in whatever order; closing stops them.
 
         Parameters
@@ -75,14 +75,14 @@ class Workers(ABC):
                     future = finished.get(timeout=POLL)
                 except Empty:
                     continue
-                arrival = self.fetch(future, running[future])
-                if arrival is None:
+                outcome = self.fetch(future, running[future])
+                if outcome is None:
                     future.add_done_callback(finished.put)
                     continue
                 del running[future]
                 left -= 1
                 hand_out()  # nobody waits until the result is kept
-                yield arrival
+                yield outcome
         finally:
             if running:
                 self.stop(list(running))

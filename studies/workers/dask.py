@@ -20,7 +20,7 @@ from ..errors import SpecError
 from ..trials.trial import Trial
 from .arrivals import Workers
 from .interrupts import ignore_interrupts
-from .worker import ONE_THREAD, Arrival, RunTrial, UnlikeWorkerError, attempt_alike, versions
+from .worker import ONE_THREAD, Outcome, RunTrial, UnlikeWorkerError, attempt_alike, versions
 
 CONNECT = 10.0
 """How long to try to reach a scheduler [s]."""
@@ -103,21 +103,21 @@ class DaskWorkers(Workers):
         """See `Workers.submit`."""
         return self._client.submit(attempt_alike, versions(), run_trial, trial, pure=False)
 
-    def fetch(self, future: Future, trial: Trial) -> Arrival | None:
+    def fetch(self, future: Future, trial: Trial) -> Outcome | None:
         """See `Workers.fetch`."""
         try:
-            arrival: Arrival = future.result(timeout=CONNECT)
+            outcome: Outcome = future.result(timeout=CONNECT)
         except TimeoutError:
             return None  # the worker that held the result died
         except KilledWorker:
-            return Arrival(trial, None, f"killed, in {self._name}", 0.0, lost=True)
+            return Outcome(trial, f"killed, in {self._name}", 0.0, lost=True)
         except UnlikeWorkerError as error:
             raise SpecError(f"{self._name}: {error}") from None
         except (CancelledError, CommClosedError):
             raise self._gone() from None
         except ImportError as error:
             raise SpecError(f"{self._name}: a worker cannot begin: {error}") from None
-        return arrival
+        return outcome
 
     def stop(self, futures: Sequence[Future]) -> None:
         """See `Workers.stop`."""

@@ -11,7 +11,7 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from ..trials.trial import Trial
 from .arrivals import Workers
-from .worker import ONE_THREAD, Arrival, RunTrial, attempt, begin
+from .worker import ONE_THREAD, Outcome, RunTrial, attempt, begin
 
 QUIET = "ignore:resource_tracker:UserWarning"
 """The process that tidies up after a killed run would complain at length of what it tidies up."""
@@ -51,22 +51,22 @@ class LokyWorkers(Workers):
         if QUIET not in filters:  # processes that are started from here on inherit it
             os.environ["PYTHONWARNINGS"] = f"{filters},{QUIET}".lstrip(",")
 
-    def submit(self, run_trial: RunTrial, trial: Trial) -> Future[Arrival]:
+    def submit(self, run_trial: RunTrial, trial: Trial) -> Future[Outcome]:
         """See `Workers.submit`."""
         executor = get_reusable_executor(  # another one, if a worker has died
             self.processes, timeout=IDLE, initializer=begin, initargs=(os.getpid(),),
             env=ONE_THREAD | dict.fromkeys(THREADS, "1"),
         )  # fmt: skip
-        future: Future[Arrival] = executor.submit(attempt, run_trial, trial)
+        future: Future[Outcome] = executor.submit(attempt, run_trial, trial)
         return future
 
-    def fetch(self, future: Future[Arrival], trial: Trial) -> Arrival:
+    def fetch(self, future: Future[Outcome], trial: Trial) -> Outcome:
         """See `Workers.fetch`."""
         try:
             return future.result()
         except TerminatedWorkerError as death:
-            return Arrival(trial, None, str(death), 0.0, lost=True)
+            return Outcome(trial, str(death), 0.0, lost=True)
 
-    def stop(self, futures: Sequence[Future[Arrival]]) -> None:
+    def stop(self, futures: Sequence[Future[Outcome]]) -> None:
         """See `Workers.stop`."""
         get_reusable_executor().shutdown(wait=True, kill_workers=True)

@@ -42,7 +42,8 @@ class Cluster:
         self.address = json.loads((folder / "scheduler.json").read_text())["address"]
 
     def start(self, *arguments):
-        environment = {**os.environ, "PYTHONPATH": str(Path(made_up.__file__).parent),
+        places = [str(Path(made_up.__file__).parent), os.environ.get("PYTHONPATH", "")]
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, places)),
                        "MADE_UP_MARK": str(self.mark)}  # fmt: skip
         process = subprocess.Popen(
             [DASK, *map(str, arguments)], env=environment, cwd=self.folder,
