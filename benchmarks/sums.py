@@ -24,7 +24,7 @@ import numpy as np
 from nested_agents.core.agents.loop import world_seed
 from nested_agents.core.coordination.elimination import Elimination, Scope, total
 from nested_agents.core.coordination.max_plus import MaxPlus
-from nested_agents.core.interface.protocols import Prediction
+from nested_agents.core.interface.prediction import Prediction
 from nested_agents.core.numerics.arrays import FloatArray, IntArray
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import EVALUATION_WORLDS, Session

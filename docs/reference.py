@@ -11,7 +11,7 @@ from pathlib import Path
 import click
 
 import nested_agents
-from nested_agents.core.interface.protocols import Measure
+from nested_agents.core.interface.measures import Measure
 from nested_agents.scenarios import SCENARIOS
 from nested_agents.scenarios.box_pushing.states.variables import STATE_VARIABLES
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
@@ -54,7 +54,8 @@ VARIABLES = {"box-pushing": STATE_VARIABLES, "kinematic-chain": CHAIN_VARIABLES}
 """State variables by the scenario that has them."""
 MODULES = {
     "core": ("How agents perceive, predict, decide and learn, and what that costs.", (
-        "interface.hierarchy", "interface.spaces", "interface.protocols", "agents.team",
+        "interface.hierarchy", "interface.spaces", "interface.prediction",
+        "interface.scenario", "interface.measures", "agents.team",
         "agents.rows", "adaptation.mirror", "agents.loop", "decision.settings",
         "decision.exploration", "rules.kernels.fuzzy", "rules.rule_base", "rules.settings",
         "learners.learner", "learners.td", "learners.batch", "learners.anova",

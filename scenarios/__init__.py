@@ -14,7 +14,7 @@ from __future__ import annotations
 from ..core.plugins.plugged import SettingsRegistry
 from ..core.plugins.settings import ScenarioSettings
 
-__all__ = ["SCENARIOS"]
+__all__ = ["DEFAULT", "SCENARIOS"]
 
 SCENARIOS = SettingsRegistry(
     "scenario",
@@ -30,3 +30,6 @@ SCENARIOS = SettingsRegistry(
     ScenarioSettings,
 )
 """Scenarios by the name that specs use."""
+
+DEFAULT = "box-pushing"
+"""That of specs that name none."""

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
-from nested_agents.core.interface.protocols import Blocks, Transition
+from nested_agents.core.interface.prediction import Blocks
+from nested_agents.core.interface.scenario import Transition
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
+from nested_agents.scenarios.box_pushing.world.settings import BoxSettings, label
 
 # The first example of a test may compile a kernel.
 settings.register_profile("no deadline", deadline=None)
@@ -122,3 +124,41 @@ def state_home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 def line_world() -> type[LineWorld]:
     """The class: ``line_world(carts=2, wheels=2)`` is a scenario without physics."""
     return LineWorld
+
+
+RING = BoxSettings(
+    vertices=((-0.1, -0.1), (0.1, -0.1), (0.1, 0.1), (-0.1, 0.1)),
+    holes=(((-0.05, -0.05), (0.05, -0.05), (0.05, 0.05), (-0.05, 0.05)),),
+)
+
+
+def wrapped(poses: np.ndarray) -> np.ndarray:
+    """Headings within half a turn of 0, so that they jump where they cross the cut."""
+    return np.concatenate([poses[..., :2], (poses[..., 2:] + np.pi) % (2 * np.pi) - np.pi], axis=-1)
+
+
+def recording(steps: int = 30) -> dict[str, np.ndarray]:
+    """Two four-wheel robots push a box with a hole; one wheel fails half-way."""
+    t = np.linspace(0.0, 1.0, steps + 1)
+    box = np.stack([t, 0.1 * np.sin(5 * t), 3.0 + t], axis=1)
+    robots = np.stack([box - [0.15, 0.06, 0.2], box - [0.15, -0.06, 0.1]], axis=1)
+    failed = np.zeros((steps + 1, 8), dtype=bool)
+    failed[steps // 2 :, 3] = True
+    return {
+        "robot_poses": wrapped(robots),
+        "box_pose": wrapped(box),
+        "goal_pose": np.array([1.0, 0.0, 0.0]),
+        "wheel_speeds": 0.13 * np.cos(np.outer(t, np.arange(1, 9))),
+        "contact": np.stack([t > 0.2, t > 0.4], axis=1),
+        "failed": failed,
+        "reward": np.zeros(steps),
+        "dt": np.array(5.12),
+        "robot": np.array("four-wheel"),
+        "box": np.array(label(RING)),
+    }
+
+
+@pytest.fixture(scope="session")
+def recorded():
+    """The function `recording`."""
+    return recording

@@ -340,3 +340,5 @@ def test_the_wheel_holds_the_four_packages(tmp_path: Path, tracked: list[Path]) 
     assert sources <= names
     assert {"nested_agents/__main__.py", "nested_agents/py.typed"} <= names
     assert {name.split("/")[0] for name in names if ".dist-info" not in name} == {"nested_agents"}
+    assert [name for name in names if "/published/" in name] == []
+    assert "nested_agents/studies/claims/quick/shapes.toml" in names

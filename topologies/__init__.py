@@ -20,8 +20,7 @@ def build(
     Parameters
     ----------
     settings
-        Any topology's settings but those of agents for several wheels; or a text or a table for
-        `parse`.
+        Any topology's settings; or a text or a table for `parse`.
     agents
         Distinct names, in agent order.
     groups

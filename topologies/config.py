@@ -13,9 +13,7 @@ import numpy as np
 from pydantic import Field
 from typing_extensions import TypeAliasType
 
-from ..core.agents.joint_agents import per_robot, single_agent
 from ..core.interface.hierarchy import Hierarchy
-from ..core.interface.protocols import Scenario, groups_of
 from ..core.plugins import sources
 from ..core.plugins.deferred import Deferred
 from ..core.plugins.messages import closest
@@ -55,20 +53,8 @@ class TopologySettings(Settings):
         return self.kind or type(self).__name__
 
     def build(self, agents: Sequence[str], groups: Groups) -> Any:
-        """Return the graph over named agents, given by group too."""
-        raise ValueError(f"is not of these {len(agents)} agents; see `arrange`")
-
-    def arrange(self, scenario: Scenario) -> tuple[Scenario, Hierarchy]:
-        """Return a scenario and the hierarchy of its agents.
-
-        The scenario is the given one, except where the agents are others than its own.
-
-        Raises
-        ------
-        ValueError
-            If the settings do not fit the agents; one line that names the culprit.
-        """
-        return scenario, hierarchy_of(self, scenario.agents, groups_of(scenario))
+        """Return the graph over named agents, given by body too."""
+        raise ValueError("has no kind, and makes no hierarchy")
 
 
 class ChainSettings(TopologySettings):
@@ -305,28 +291,6 @@ class FileSettings(TopologySettings):
             raise ValueError(f"{self.path}: {error}") from None
 
 
-class SingleAgentSettings(TopologySettings):
-    """No hierarchy: one agent over the joint state, with |A|^n actions (Eq. 23)."""
-
-    kind: Literal["single-agent"] = "single-agent"
-
-    def arrange(self, scenario: Scenario) -> tuple[Scenario, Hierarchy]:
-        """Return the scenario as that of one agent."""
-        one = single_agent(scenario)
-        return one, Hierarchy(one.agents, [])
-
-
-class PerRobotSettings(TopologySettings):
-    """One agent per robot, driving all its wheels; these agents form a chain."""
-
-    kind: Literal["per-robot"] = "per-robot"
-
-    def arrange(self, scenario: Scenario) -> tuple[Scenario, Hierarchy]:
-        """Return the scenario as that of one agent per robot, and their chain."""
-        robots = per_robot(scenario)
-        return robots, Hierarchy(robots.agents, builders.chain(robots.agents).edges)
-
-
 TOPOLOGIES = SettingsRegistry(
     "topology",
     {
@@ -340,10 +304,12 @@ TOPOLOGIES = SettingsRegistry(
         "edges": f"{__name__}:EdgesSettings",
         "random": f"{__name__}:RandomSettings",
         "file": f"{__name__}:FileSettings",
-        "single-agent": f"{__name__}:SingleAgentSettings",
-        "per-robot": f"{__name__}:PerRobotSettings",
     },
     TopologySettings,
+    moved={
+        "single-agent": "who the agents are has a key of its own: agents = 'team'",
+        "per-robot": "who the agents are has a key of its own: agents = 'body', topology = 'chain'",
+    },
 )
 """Topologies by name."""
 
@@ -377,6 +343,8 @@ def parse(text: str | Mapping[str, Any]) -> TopologySettings:
             model = TOPOLOGIES.model(kind)
             assert issubclass(model, TopologySettings)
             return model.parsed(argument) if colon else model()
+        if kind in TOPOLOGIES.moved:
+            raise ValueError(TOPOLOGIES.moved[kind])
         if sources.is_file(text):
             return FileSettings(path=text)
         if sources.is_reference(text) or text in TOPOLOGIES.installed():

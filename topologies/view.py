@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from ..core.agents.cost import below_counts
-from ..core.agents.joint_agents import MOST_ROBOT_ACTIONS, robot_of
+from ..core.agents.joint_agents import Agents, joint_blocks
 from ..core.interface.hierarchy import Hierarchy
 from . import TOPOLOGIES, TopologySettings, build, builders, parse
 from .checks import check_legible
@@ -21,8 +21,6 @@ from .config import (
     CoordinationGraphSettings,
     EdgesSettings,
     FileSettings,
-    PerRobotSettings,
-    SingleAgentSettings,
     TeamsSettings,
 )
 
@@ -50,9 +48,9 @@ class HierarchyView:
     text
         The topology as the user wrote it.
     hierarchy, groups
-        What it makes, and the robots.
+        What it makes, and its agents by body.
     tries
-        Joint actions that each agent tries per step, in agent order. An agent may be a robot.
+        Joint actions that each agent tries per step, in agent order.
     """
 
     text: str
@@ -76,9 +74,16 @@ class HierarchyView:
 
 
 def view(
-    text: str, agents: int | None, robots: int | None, wheels: int | None, actions: int
+    text: str,
+    agents: int | None,
+    robots: int | None,
+    wheels: int | None,
+    actions: int,
+    per: Agents = "actuator",
 ) -> HierarchyView:
     """Build the topology written as `text`, over as many agents as asked for.
+
+    With `per` it is built over those who act for the agents of a body each, or for all.
 
     Raises
     ------
@@ -88,29 +93,14 @@ def view(
     if actions < 2:
         raise ValueError(f"actions = {actions}, allowed: 2 or more")
     settings = parse(text)
-    team = team_of(agents, robots, wheels, named_by(settings))
-    if isinstance(settings, SingleAgentSettings):
-        single = Hierarchy(["single"], [])
-        return HierarchyView(text, single, ((0,),), (actions ** len(team.agents),))
-    if isinstance(settings, PerRobotSettings):
-        return _of_robots(text, team, actions)
-    hierarchy = build(settings, team.agents, team.groups)
-    tries = tuple(actions ** (1 + count) for count in below_counts(hierarchy))
-    return HierarchyView(text, hierarchy, team.groups, tries)
-
-
-def _of_robots(text: str, team: Crew, actions: int) -> HierarchyView:
-    """Return the view of one agent per robot, which tries the joint actions of all its wheels."""
-    own = actions ** len(team.groups[0])
-    if own > MOST_ROBOT_ACTIONS:
-        raise ValueError(
-            f"topology {text!r}: {actions} ** {len(team.groups[0])} actions of a robot, allowed: "
-            f"{MOST_ROBOT_ACTIONS} or fewer"
-        )
-    robots = tuple(robot_of(team.agents[wheels[0]]) for wheels in team.groups)
-    hierarchy = Hierarchy(robots, builders.chain(robots).edges)
+    named = named_by(settings) if per == "actuator" else ()
+    team = team_of(agents, robots, wheels, named)
+    names, blocks = joint_blocks(team.agents, team.groups, actions, per)
+    groups = team.groups if per == "actuator" else tuple((i,) for i in range(len(names)))
+    hierarchy = build(settings, names, groups)
+    own = actions ** len(blocks[0])
     tries = tuple(own ** (1 + count) for count in below_counts(hierarchy))
-    return HierarchyView(text, hierarchy, tuple((r,) for r in range(len(robots))), tries)
+    return HierarchyView(text, hierarchy, groups, tries)
 
 
 def named_by(settings: TopologySettings) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..interface.protocols import MirroredScenario, Scenario
+from ..interface.scenario import Scenario
 from ..numerics.arrays import FloatArray, IntArray
 
 
@@ -45,7 +45,7 @@ class Mirror:
         ValueError
             If it has none, or a state variable does not say what a mirror does to it; one line.
         """
-        if not isinstance(scenario, MirroredScenario):
+        if not hasattr(scenario, "partners"):
             raise ValueError("learner.mirrored: the scenario does not tell what a mirror does")
         variables = scenario.state_space.variables
         for variable in variables:

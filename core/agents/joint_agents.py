@@ -1,51 +1,124 @@
-"""One agent that acts for a block of agents: for the wheels of a robot, or for the whole team.
+"""Who the agents are: one for every actuator, one for every body, or one for the whole team.
 
-`JointAgents` shows a scenario as one of fewer agents. The action of each is the actions of all
-agents of its block at once, their digits read as one number, so that joint actions keep their
-indices. Everything else of this package works on it unchanged. There are two ways:
+A scenario has an agent for every actuator: a wheel, a joint, a player of a game. `join_agents`
+shows it as one of fewer agents. The action of each of these is the actions of all agents of its
+block at once, their digits read as one number, so that joint actions keep their indices.
+Everything else of this package, hierarchies too, works on it unchanged.
 
-`per_robot`
-    One agent per robot: the mapping that the paper's one agent per wheel stands against (X-B). Its
-    state is the own variables of all its wheels and the variables that they share.
-`single_agent`
+`body`
+    One agent for every body: the mapping that the paper's one agent per wheel stands against (X-B).
+    Its state is the own variables of its actuators and the variables that they share.
+`team`
     The one agent that Section VII compares with (Eq. 23). Its state is the states of all agents one
     after the other, its action one of ``|A| ** n``: practicable for few agents only.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import product
-from typing import Any, cast
+from typing import Any, Literal, cast
 
 import numpy as np
 
-from ..interface.protocols import (
-    Blocks,
-    CalibratedScenario,
-    EmbodiedPrediction,
+from ..interface.measures import measures_of
+from ..interface.prediction import Blocks, Prediction
+from ..interface.scenario import (
     EmbodiedScenario,
-    Prediction,
-    RewardPrediction,
     Scenario,
     Transition,
     groups_of,
     joint_reward,
-    measures_of,
     roles_of,
 )
 from ..interface.spaces import ActionSet, StateSpace, Variable
 from ..numerics.arrays import FloatArray, IntArray
 
-MOST_ROBOT_ACTIONS = 4**4
-"""The most actions of a robot that are still distinguished: those of four wheels."""
-MOST_TEAM_ACTIONS = 4**6
-"""The most joint actions of a team that are still named one by one."""
+Agents = Literal["actuator", "body", "team"]
+"""What there is one agent for."""
+Names = tuple[str, ...]
+MOST_ACTIONS = {"body": 4**4, "team": 4**6}
+"""The most actions of a body, those of four wheels, and of a team."""
+OF_JOINT_ACTIONS = ("rewards", "commands", "slips", "outcomes")
+"""What a prediction may offer whose first argument are joint actions."""
+
+
+def join_agents(scenario: Scenario, agents: Agents) -> Scenario:
+    """Return a scenario as one of an agent for each of these; with ``actuator`` as it is.
+
+    Raises
+    ------
+    ValueError
+        As `joint_blocks`.
+    """
+    if agents == "actuator":
+        return scenario
+    groups, space, n_actions = groups_of(scenario), scenario.state_space, len(scenario.action_set)
+    names, blocks = joint_blocks(scenario.agents, groups, n_actions, agents)
+    if agents == "team":
+        variables = _named(scenario.agents, space.variables)
+        joint = StateSpace(f"joint {space.name}", variables)
+        return JointAgents(scenario, blocks, names, names, joint, whole=True)
+    own = _named((scenario.agents[i].rpartition(".")[2] for i in blocks[0]), space.own)
+    roles = tuple("+".join(roles_of(scenario)[i] for i in block) for block in blocks)
+    joint = StateSpace(f"bodies' {space.name}", (*own, *space.shared), len(own))
+    kind = EmbodiedJointAgents if isinstance(scenario, EmbodiedScenario) else JointAgents
+    return kind(scenario, blocks, names, roles, joint)
+
+
+def joint_blocks(
+    agents: Sequence[str], groups: Sequence[Sequence[int]], n_actions: int, each: Agents
+) -> tuple[Names, tuple[tuple[int, ...], ...]]:
+    """Return the names of those who act, and which agents of a scenario each acts for.
+
+    Parameters
+    ----------
+    agents, groups
+        Names of the scenario's agents, and these by body.
+    n_actions
+        Actions of each of them.
+    each
+        What there is one agent for.
+
+    Raises
+    ------
+    ValueError
+        If bodies differ in their number of actuators, or there are more actions than
+        `MOST_ACTIONS`.
+
+    Examples
+    --------
+    >>> joint_blocks(["a.left", "a.right", "b.left", "b.right"], [(0, 1), (2, 3)], 4, "body")
+    (('a', 'b'), ((0, 1), (2, 3)))
+    """
+    if each == "actuator":
+        return tuple(agents), tuple((i,) for i in range(len(agents)))
+    blocks = (tuple(range(len(agents))),) if each == "team" else tuple(map(tuple, groups))
+    sizes = sorted({len(block) for block in blocks})
+    if len(sizes) > 1:
+        raise ValueError(f"agents = 'body': bodies of {sizes} actuators, allowed: equally many")
+    if n_actions ** sizes[0] > MOST_ACTIONS[each]:
+        raise ValueError(
+            f"agents = {each!r}: {n_actions} ** {sizes[0]} actions each, allowed: "
+            f"{MOST_ACTIONS[each]} or fewer"
+        )
+    names = ("single",) if each == "team" else tuple(body_of(agents[b[0]]) for b in blocks)
+    return names, blocks
+
+
+def body_of(agent: str) -> str:
+    """Return the body's part of an actuator's name, or the name if it has none.
+
+    >>> body_of("robot1.front-left"), body_of("a")
+    ('robot1', 'a')
+    """
+    return agent.rpartition(".")[0] or agent
 
 
 class JointAgents:
-    """A scenario seen as that of one agent per block of agents; see `per_robot`, `single_agent`.
+    """A scenario seen as that of one agent per block of agents; see `join_agents`.
 
     Parameters
     ----------
@@ -66,8 +139,8 @@ class JointAgents:
         self,
         scenario: Scenario,
         blocks: Sequence[Sequence[int]],
-        agents: tuple[str, ...],
-        roles: tuple[str, ...],
+        agents: Names,
+        roles: Names,
         state_space: StateSpace,
         *,
         whole: bool = False,
@@ -98,18 +171,7 @@ class JointAgents:
 
     def predict(self) -> JointPrediction:
         """Predict from the present state."""
-        return self.prediction_of(self.scenario.predict())
-
-    def prediction_of(self, prediction: Prediction) -> JointPrediction:
-        """Return the scenario's own prediction for those who act, with what it can do."""
-        kind = JointPrediction
-        if hasattr(prediction, "rewards" if self.whole else "reward_table"):
-            kind = TabulatedJointPrediction
-        elif self.whole:
-            kind = BlocksJointPrediction
-        elif hasattr(prediction, "rewards"):
-            kind = RewardedJointPrediction
-        return kind(prediction, self)
+        return JointPrediction(self.scenario.predict(), self)
 
     def actions(self, joint_actions: IntArray) -> IntArray:
         """Return the actions ``(..., n)`` of all agents for those of who acts for them."""
@@ -130,7 +192,7 @@ class JointAgents:
 
 
 class EmbodiedJointAgents(JointAgents):
-    """The same of a scenario that is open to self-models."""
+    """The same of a scenario that is open to self-models, and perhaps to calibration."""
 
     @property
     def nominal_effects(self) -> tuple[FloatArray, ...]:
@@ -138,28 +200,27 @@ class EmbodiedJointAgents(JointAgents):
         return cast(EmbodiedScenario, self.scenario).nominal_effects
 
     @property
-    def constants(self) -> tuple[str, ...]:
+    def constants(self) -> Names:
         """Names of the constants that can be calibrated, if any."""
-        return self.scenario.constants if isinstance(self.scenario, CalibratedScenario) else ()
+        return getattr(self.scenario, "constants", ())
 
     @property
     def levers(self) -> FloatArray:
         """Speed per turning rate of what is pushed and of the bodies."""
-        return cast(CalibratedScenario, self.scenario).levers
+        return cast(Any, self.scenario).levers
 
     def predict_with(
         self, effects: Sequence[FloatArray], constants: FloatArray | None = None
     ) -> JointPrediction:
         """Predict from the present state, believing in these effects and constants."""
-        if constants is None:
-            prediction = cast(EmbodiedScenario, self.scenario).predict_with(effects)
-        else:
-            prediction = cast(CalibratedScenario, self.scenario).predict_with(effects, constants)
-        return self.prediction_of(prediction)
+        beliefs = (effects,) if constants is None else (effects, constants)
+        return JointPrediction(cast(Any, self.scenario).predict_with(*beliefs), self)
 
 
 class JointPrediction:
     """The prediction of a scenario of all agents, for those who act for blocks of them.
+
+    It can do what the scenario's own can; one who acts for all has tables of next states, too.
 
     Parameters
     ----------
@@ -171,6 +232,22 @@ class JointPrediction:
 
     def __init__(self, prediction: Prediction, joint: JointAgents) -> None:
         self._prediction, self._joint = prediction, joint
+        for name in OF_JOINT_ACTIONS:
+            if hasattr(prediction, name):
+                setattr(self, name, partial(_ask, getattr(prediction, name), joint))
+        if joint.whole:
+            self.blocks = partial(_whole_blocks, prediction, joint)
+            if hasattr(prediction, "rewards"):
+                self.reward_table = partial(_ask, prediction.rewards, joint, joint.every())
+        elif hasattr(prediction, "reward_table"):  # which the tables of next states are used with
+            self.blocks = partial(_body_blocks, prediction, joint)
+            self.reward_table = prediction.reward_table
+
+    @property
+    def groups(self) -> tuple[tuple[int, ...], ...]:
+        """Actuators by body."""
+        groups: tuple[tuple[int, ...], ...] = cast(Any, self._prediction).groups
+        return groups
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of who acts for a block, for actions ``(m, M)``."""
@@ -178,114 +255,29 @@ class JointPrediction:
         block = self._joint.blocks[agent]
         return self._joint.joined([self._prediction.states(i, actions) for i in block])
 
-    @property
-    def groups(self) -> tuple[tuple[int, ...], ...]:
-        """Wheels by body."""
-        return cast(EmbodiedPrediction, self._prediction).groups
 
-    def commands(self, joint_action: IntArray) -> FloatArray:
-        """Return the wheel speeds that a joint action ``(M,)`` would command."""
-        actions = self._joint.actions(joint_action)
-        return cast(EmbodiedPrediction, self._prediction).commands(actions)
-
-    def slips(self, joint_action: IntArray) -> FloatArray:
-        """Return by how much contact is predicted to change the bodies' twists, ``(M, 3)``."""
-        actions = self._joint.actions(joint_action)
-        return cast(EmbodiedPrediction, self._prediction).slips(actions)
-
-    def outcomes(self, joint_action: IntArray, constants: FloatArray) -> FloatArray:
-        """Return what a joint action ``(M,)`` would lead to under constants ``(k, n)``."""
-        actions = self._joint.actions(joint_action)
-        return cast(Any, self._prediction).outcomes(actions, constants)
+# Without references to the prediction that they serve, which would keep it until collected.
 
 
-class RewardedJointPrediction(JointPrediction):
-    """The same of a prediction that knows the reward."""
-
-    def rewards(self, joint_actions: IntArray) -> FloatArray:
-        """Return the predicted rewards ``(m,)`` of joint actions ``(m, M)``."""
-        actions = self._joint.actions(joint_actions)
-        return cast(RewardPrediction, self._prediction).rewards(actions)
+def _ask(
+    question: Callable[..., FloatArray], joint: JointAgents, joint_actions: IntArray, *rest: Any
+) -> FloatArray:
+    """Return what a scenario's own prediction says of the actions of those who act."""
+    return question(joint.actions(joint_actions), *rest)
 
 
-class BlocksJointPrediction(JointPrediction):
-    """The same with tables of next states: of one who acts for all, they need none below."""
-
-    def blocks(self, agent: int) -> Blocks:
-        """Return the next states of who acts for a block, for all joint actions."""
-        if self._joint.whole:  # no variable is its own alone
-            return Blocks(np.zeros((1, 0)), self.states(0, self._joint.every()), 1)
-        tables = cast(Any, self._prediction)
-        blocks = [tables.blocks(i) for i in self._joint.blocks[agent]]
-        own = [b.own[b.own_rows] if len(b.own_rows) else b.own for b in blocks]
-        return replace(
-            blocks[0], own=np.concatenate(own, axis=1), own_rows=np.zeros(0, dtype=np.int64)
-        )
+def _whole_blocks(prediction: Prediction, joint: JointAgents, agent: int) -> Blocks:
+    """Return the next states of one who acts for all, of which no variable is its own alone."""
+    actions = joint.actions(joint.every())
+    states = joint.joined([prediction.states(i, actions) for i in joint.blocks[agent]])
+    return Blocks(np.zeros((1, 0)), states, 1)
 
 
-class TabulatedJointPrediction(BlocksJointPrediction, RewardedJointPrediction):
-    """The same with tables of next states and of the reward."""
-
-    def reward_table(self) -> FloatArray:
-        """Return the predicted rewards of all joint actions by index."""
-        if self._joint.whole:
-            return self.rewards(self._joint.every())
-        return cast(Any, self._prediction).reward_table()
-
-
-def per_robot(scenario: Scenario) -> JointAgents:
-    """Return a scenario as one of one agent per robot.
-
-    Raises
-    ------
-    ValueError
-        If groups differ in size, or have more than `MOST_ROBOT_ACTIONS` actions.
-    """
-    blocks, names, roles = groups_of(scenario), scenario.agents, roles_of(scenario)
-    space, actions = scenario.state_space, len(scenario.action_set)
-    sizes = {len(block) for block in blocks}
-    if len(sizes) > 1:
-        raise ValueError(f"robots: of {sorted(sizes)} wheels, allowed: equally many")
-    if actions ** max(sizes) > MOST_ROBOT_ACTIONS:
-        raise ValueError(
-            f"robots: {actions} ** {max(sizes)} actions each, allowed: {MOST_ROBOT_ACTIONS} "
-            "or fewer"
-        )
-    own = _named((names[i].rpartition(".")[2] for i in blocks[0]), space.own)
-    return (EmbodiedJointAgents if isinstance(scenario, EmbodiedScenario) else JointAgents)(
-        scenario,
-        blocks,
-        tuple(robot_of(names[block[0]]) for block in blocks),
-        tuple("+".join(roles[i] for i in block) for block in blocks),
-        StateSpace(f"robots' {space.name}", (*own, *space.shared), len(own)),
-    )
-
-
-def single_agent(scenario: Scenario) -> JointAgents:
-    """Return a scenario as one of a single agent.
-
-    Raises
-    ------
-    ValueError
-        If there are more than `MOST_TEAM_ACTIONS` joint actions.
-    """
-    n, actions, space = len(scenario.agents), len(scenario.action_set), scenario.state_space
-    if actions**n > MOST_TEAM_ACTIONS:
-        raise ValueError(
-            f"single agent: {actions} ** {n} actions, allowed: {MOST_TEAM_ACTIONS} or fewer"
-        )
-    joint = StateSpace(f"joint {space.name}", _named(scenario.agents, space.variables))
-    one = ("single",)
-    return JointAgents(scenario, (range(n),), one, one, joint, whole=True)
-
-
-def robot_of(agent: str) -> str:
-    """Return the robot's part of a wheel's name, or the name if it has none.
-
-    >>> robot_of("robot1.front-left"), robot_of("a")
-    ('robot1', 'a')
-    """
-    return agent.rpartition(".")[0] or agent
+def _body_blocks(prediction: Any, joint: JointAgents, agent: int) -> Blocks:
+    """Return the next states of who acts for a body, for all joint actions."""
+    blocks = [prediction.blocks(i) for i in joint.blocks[agent]]
+    own = [b.own[b.own_rows] if len(b.own_rows) else b.own for b in blocks]
+    return replace(blocks[0], own=np.concatenate(own, axis=1), own_rows=np.zeros(0, dtype=np.int64))
 
 
 def _named(agents: Iterable[str], variables: Sequence[Variable]) -> tuple[Variable, ...]:

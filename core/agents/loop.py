@@ -12,14 +12,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from time import perf_counter
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import NamedTuple
 
 import numpy as np
 
 from ..interface.acting import Actors
-from ..interface.protocols import Scenario, Transition
+from ..interface.scenario import Scenario, Transition
 from ..numerics.arrays import FloatArray, IntArray
-from .team import Team
 
 
 @dataclass(frozen=True)
@@ -53,27 +52,18 @@ class StepRecord:
 
 
 class EpisodeSummary(NamedTuple):
-    """What a whole episode came to."""
+    """What a whole episode came to.
+
+    A scenario's own ``run_episode(team, seed, episode, steps, learn=...)`` returns it, and leaves
+    scenario and team as `control_loop` would; or it returns None and changes nothing, if the team
+    has parts that it does not know.
+    """
 
     steps: int
     measures: Mapping[str, float]
     """Values of the scenario's measures by name."""
     return_: float
     """Sum of the rewards."""
-
-
-@runtime_checkable
-class EpisodicScenario(Scenario, Protocol):
-    """A scenario that runs whole episodes of some teams at once, compiled."""
-
-    def run_episode(
-        self, team: Team, seed: np.random.SeedSequence, episode: int, steps: int, *, learn: bool
-    ) -> EpisodeSummary | None:
-        """Run an episode, and leave scenario and team as `control_loop` would.
-
-        None, and nothing is changed, if the team has parts that it does not know.
-        """
-        ...
 
 
 def world_seed(seed: int, episode: int) -> np.random.SeedSequence:

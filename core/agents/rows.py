@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..interface.protocols import Scenario, roles_of
+from ..interface.scenario import Scenario, roles_of
 from ..numerics.arrays import IntArray
 
 

@@ -11,24 +11,15 @@ import numpy as np
 from ..adaptation.calibration import Calibration
 from ..adaptation.mirror import Mirror
 from ..adaptation.self_model import SelfModel
-from ..decision.exploration import Explorer, Greedy, SuccessorExplorer
+from ..decision.exploration import Explorer, Greedy
 from ..evaluators.evaluator import NOTHING_GIVEN, DecisionProblem, Deliberation, Evaluator
 from ..interface.acting import Actors
 from ..interface.hierarchy import Hierarchy
-from ..interface.protocols import (
-    CalibratedScenario,
-    ContinuedPrediction,
-    EmbodiedPrediction,
-    EmbodiedScenario,
-    Prediction,
-    RewardPrediction,
-    Scenario,
-    Transition,
-    groups_of,
-)
+from ..interface.prediction import Prediction
+from ..interface.scenario import EmbodiedScenario, Scenario, Transition, groups_of
 from ..interface.spaces import ActionSet
 from ..learners.batch import ReplaySettings
-from ..learners.learner import Learner, LearnerSettings, SuccessorLearner
+from ..learners.learner import Learner, LearnerSettings
 from ..numerics.arrays import FloatArray, IntArray
 from ..rules.rule_base import RuleBase
 from .rows import rows_of
@@ -126,14 +117,14 @@ class Team:
             self_model = SelfModel(settings.self_model, scenario.nominal_effects)
         calibration = None
         if settings.calibration.enabled:
-            if not isinstance(scenario, CalibratedScenario) or not scenario.constants:
+            constants = getattr(scenario, "constants", ())
+            if not isinstance(scenario, EmbodiedScenario) or not constants:
                 raise ValueError(
                     "learner.calibration.enabled: the scenario's predictor has no constants "
                     "to calibrate"
                 )
-            calibration = Calibration(
-                settings.calibration, len(scenario.constants), scenario.levers
-            )
+            levers = scenario.levers  # type: ignore[attr-defined]
+            calibration = Calibration(settings.calibration, len(constants), levers)
         rules = RuleBase.build(scenario.state_space, settings.rule_base)
         rows = rows_of(scenario, shared=settings.weights == "role")
         is_mirrored = isinstance(settings, ReplaySettings) and settings.mirrored
@@ -176,13 +167,12 @@ class Team:
         problem = getattr(self.evaluator, "problem", None)
         if not isinstance(problem, DecisionProblem) or problem.rule == "value":
             return
-        if not isinstance(prediction, RewardPrediction):
+        if not hasattr(prediction, "rewards"):
             raise ValueError(
                 f"learner.decision.rule = {problem.rule!r}: the scenario predicts no rewards, "
                 "use value"
             )
-        goes_on = isinstance(prediction, ContinuedPrediction)
-        if getattr(self.evaluator, "continues", False) and not goes_on:
+        if getattr(self.evaluator, "continues", False) and not hasattr(prediction, "after"):
             raise ValueError(
                 "learner.decision.evaluator: plans of several decisions need a scenario that "
                 "predicts from predicted states"
@@ -200,8 +190,8 @@ class Team:
         embodied = cast(EmbodiedScenario, scenario)
         effects = self.self_model.effects if self.self_model else embodied.nominal_effects
         if self.calibration is None:
-            return embodied.predict_with(effects)
-        return cast(CalibratedScenario, scenario).predict_with(effects, self.calibration.constants)
+            return cast(Prediction, embodied.predict_with(effects))
+        return cast(Prediction, embodied.predict_with(effects, self.calibration.constants))
 
     def act(self, prediction: Prediction, *, explore: bool = True) -> IntArray:
         """Decide a joint action ``(n,)``, from the top of the hierarchy down.
@@ -252,7 +242,7 @@ class Team:
             self._calibrate(prediction, joint_action, transition)
         if self.self_model is None or transition.twists is None:
             return
-        embodied = cast(EmbodiedPrediction, prediction)
+        embodied = cast(Any, prediction)
         speeds = embodied.commands(joint_action)
         slips = embodied.slips(joint_action)
         free = transition.twists[-len(slips) :] - slips
@@ -302,9 +292,9 @@ class Team:
             If the learner or the exploration knows no way; one line.
         """
         learner, explorer = self.learner, self.explorer
-        if not isinstance(learner, SuccessorLearner):
+        if not hasattr(learner, "take_over"):
             raise ValueError(f"learner.kind: {_no_successor(learner)}")
-        if not isinstance(explorer, SuccessorExplorer):
+        if not hasattr(explorer, "take_over"):
             raise ValueError(f"learner.exploration.kind: {_no_successor(explorer)}")
         learner.take_over(former.learner, rows)
         explorer.take_over(former.explorer)

@@ -8,7 +8,7 @@ resting wheel lead to the same state).
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Protocol, runtime_checkable
+from typing import Annotated, Any, Literal, Protocol
 
 import numpy as np
 from pydantic import Field
@@ -30,7 +30,11 @@ def boltzmann(values: FloatArray, temperature: float) -> FloatArray:
 
 
 class Explorer(Protocol):
-    """Chooses actions; its whole memory is one array."""
+    """Chooses actions; its whole memory is one array.
+
+    An explorer that can go on from one of the same settings, which served other agents, also has
+    ``take_over(former)``.
+    """
 
     memory: FloatArray
 
@@ -42,15 +46,6 @@ class Explorer(Protocol):
 
     def advance(self) -> None:
         """Note that all agents have decided this step."""
-
-
-@runtime_checkable
-class SuccessorExplorer(Protocol):
-    """An explorer that can go on from where one of the same kind ended with other agents."""
-
-    def take_over(self, former: Any) -> None:
-        """Go on from an explorer of the same settings, between two episodes."""
-        ...
 
 
 class ExplorationSettings(Settings):
@@ -80,6 +75,53 @@ class Greedy:
         return greatest(values, rng)
 
 
+class BoltzmannExploration(ExplorationSettings):
+    """Actions drawn from the Boltzmann distribution (Eq. 14) while its temperature falls.
+
+    ``T(t) = 1 + T_max exp(-s t)`` after t steps; the defaults are those of Kapetanakis and Kudenko
+    (2002) for games of 1,000 plays.
+    """
+
+    kind: Literal["boltzmann"] = "boltzmann"
+    max_temperature: Positive = 500.0
+    """Temperature that is added at first, T_max."""
+    decay: NonNegative = 0.006
+    """Decay of the temperature per step, s."""
+
+    def build(self, n_agents: int) -> Explorer:
+        """Return the explorer of a team."""
+        return Boltzmann(self)
+
+
+class Boltzmann:
+    """Samples the Boltzmann distribution; the clock counts the steps of the whole run."""
+
+    def __init__(self, settings: BoltzmannExploration | PaperExploration) -> None:
+        self.settings: Any = settings
+        self.memory: FloatArray = np.zeros(1)  # t, the steps counted by the clock
+
+    @property
+    def temperature(self) -> float:
+        """T(t) = 1 + T_max exp(-s t)."""
+        s = self.settings
+        return 1.0 + s.max_temperature * float(np.exp(-s.decay * self.memory[0]))
+
+    def begin_episode(self) -> None:
+        """Go on counting."""
+
+    def take_over(self, former: Boltzmann) -> None:
+        """Go on with the clock."""
+        self.memory[:] = former.memory
+
+    def advance(self) -> None:
+        """Let the clock tick."""
+        self.memory[0] += 1.0
+
+    def choose(self, agent: int, values: FloatArray, rng: np.random.Generator) -> int:
+        """Draw an action."""
+        return int(rng.choice(len(values), p=boltzmann(values, self.temperature)))
+
+
 class PaperExploration(ExplorationSettings):
     """Epsilon-decreasing with a diminishing temperature (Section V).
 
@@ -106,18 +148,8 @@ class PaperExploration(ExplorationSettings):
         return EpsilonDecreasingBoltzmann(self)
 
 
-class EpsilonDecreasingBoltzmann:
+class EpsilonDecreasingBoltzmann(Boltzmann):
     """The paper's epsilon-decreasing exploration with a diminishing temperature (Section V)."""
-
-    def __init__(self, settings: PaperExploration) -> None:
-        self.settings = settings
-        self.memory: FloatArray = np.zeros(1)  # t, the steps counted by the clock
-
-    @property
-    def temperature(self) -> float:
-        """T(t) = 1 + T_max exp(-s t)."""
-        s = self.settings
-        return 1.0 + s.max_temperature * float(np.exp(-s.decay * self.memory[0]))
 
     @property
     def rate(self) -> float:
@@ -130,14 +162,6 @@ class EpsilonDecreasingBoltzmann:
         if self.settings.clock == "episode":
             self.memory[0] = 0.0
 
-    def take_over(self, former: EpsilonDecreasingBoltzmann) -> None:
-        """Go on with the clock."""
-        self.memory[:] = former.memory
-
-    def advance(self) -> None:
-        """Let the clock tick."""
-        self.memory[0] += 1.0
-
     def choose(self, agent: int, values: FloatArray, rng: np.random.Generator) -> int:
         """Exploit with probability 1 - rate, else explore, each as the settings say."""
         if rng.random() < self.rate:
@@ -146,54 +170,7 @@ class EpsilonDecreasingBoltzmann:
         elif self.settings.exploit == "greatest":
             # Eq. 14 is increasing in the value: the greatest probability is the greatest value.
             return greatest(values, rng)
-        return int(rng.choice(len(values), p=boltzmann(values, self.temperature)))
-
-
-class BoltzmannExploration(ExplorationSettings):
-    """Actions drawn from the Boltzmann distribution (Eq. 14) while its temperature falls.
-
-    ``T(t) = 1 + T_max exp(-s t)`` after t steps; the defaults are those of Kapetanakis and Kudenko
-    (2002) for games of 1,000 plays.
-    """
-
-    kind: Literal["boltzmann"] = "boltzmann"
-    max_temperature: Positive = 500.0
-    """Temperature that is added at first, T_max."""
-    decay: NonNegative = 0.006
-    """Decay of the temperature per step, s."""
-
-    def build(self, n_agents: int) -> Explorer:
-        """Return the explorer of a team."""
-        return Boltzmann(self)
-
-
-class Boltzmann:
-    """Samples the Boltzmann distribution; the clock counts the steps of the whole run."""
-
-    def __init__(self, settings: BoltzmannExploration) -> None:
-        self.settings = settings
-        self.memory: FloatArray = np.zeros(1)
-
-    @property
-    def temperature(self) -> float:
-        """T(t) = 1 + T_max exp(-s t)."""
-        s = self.settings
-        return 1.0 + s.max_temperature * float(np.exp(-s.decay * self.memory[0]))
-
-    def begin_episode(self) -> None:
-        """Go on counting."""
-
-    def take_over(self, former: Boltzmann) -> None:
-        """Go on with the clock."""
-        self.memory[:] = former.memory
-
-    def advance(self) -> None:
-        """Let the clock tick."""
-        self.memory[0] += 1.0
-
-    def choose(self, agent: int, values: FloatArray, rng: np.random.Generator) -> int:
-        """Draw an action."""
-        return int(rng.choice(len(values), p=boltzmann(values, self.temperature)))
+        return super().choose(agent, values, rng)
 
 
 class BurstExploration(ExplorationSettings):

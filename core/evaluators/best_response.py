@@ -21,7 +21,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ..interface.protocols import Prediction
+from ..interface.prediction import Prediction
 from ..numerics.arrays import FloatArray, IntArray
 from ..numerics.ties import greatest
 from .evaluator import (

@@ -19,7 +19,7 @@ from pydantic import Field
 
 from ..coordination.elimination import Elimination, Scope
 from ..coordination.max_plus import MaxPlus
-from ..interface.protocols import Prediction
+from ..interface.prediction import Prediction
 from ..numerics.arrays import FloatArray, IntArray
 from .evaluator import Aggregation, DecisionProblem, Deliberation, EvaluatorSettings, combinations
 

@@ -10,12 +10,12 @@ from nothing. It learns nothing and has the reward function: a control for what 
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, cast
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
 
-from ..interface.protocols import ContinuedPrediction, Prediction
+from ..interface.prediction import Prediction
 from ..numerics.arrays import FloatArray, IntArray
 from .evaluator import Aggregation, DecisionProblem, Deliberation, EvaluatorSettings
 
@@ -52,7 +52,7 @@ class CrossEntropy(Aggregation):
     """
 
     continues = True
-    """It needs a `ContinuedPrediction`."""
+    """It needs a prediction with ``after``."""
 
     def __init__(self, settings: CrossEntropySettings, problem: DecisionProblem) -> None:
         super().__init__(problem)
@@ -83,7 +83,7 @@ class CrossEntropy(Aggregation):
     def _planned(self, deliberation: Deliberation) -> IntArray:
         """Return the joint action ``(n,)`` that the best plan begins with."""
         s, rng = self.settings, deliberation.rng
-        prediction = cast(ContinuedPrediction, deliberation.prediction)
+        prediction: Any = deliberation.prediction
         shape = s.horizon, len(self.hierarchy), self.n_actions
         probabilities = np.full(shape, 1.0 / self.n_actions)
         n_elite = max(1, round(s.elite * s.samples))
@@ -106,7 +106,7 @@ class CrossEntropy(Aggregation):
     def _follow(
         self,
         agent: int,
-        prediction: ContinuedPrediction,
+        prediction: Any,
         plans: IntArray,
         rows: IntArray,
         found: FloatArray,

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, NamedTuple, Protocol, cast
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
 from ..interface.hierarchy import Hierarchy
-from ..interface.protocols import Prediction, RewardPrediction
+from ..interface.prediction import Prediction
 from ..numerics.arrays import FloatArray, IntArray
 from ..plugins.settings import Settings
 from .pooled import Pooled, Pooling
@@ -191,11 +191,12 @@ class Aggregation:
 
     def worth(self, deliberation: Deliberation, joint_actions: IntArray) -> FloatArray:
         """Return what joint actions ``(m, n)`` are worth to the deciding agent, ``(m,)``."""
-        prediction, concerned = deliberation.prediction, self.concerned[deliberation.agent]
+        prediction: Any = deliberation.prediction
+        concerned = self.concerned[deliberation.agent]
         self.count(deliberation.agent, len(joint_actions))
         rewards = values = None
         if self.problem.rule != "value":
-            rewards = cast(RewardPrediction, prediction).rewards(joint_actions)
+            rewards = prediction.rewards(joint_actions)
         if self.problem.rule != "reward":
             if len(concerned) == 1:
                 states = prediction.states(deliberation.agent, joint_actions)

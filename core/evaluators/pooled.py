@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..interface.protocols import Prediction, states_by_group
+from ..interface.prediction import Prediction, states_by_group
 from ..numerics.arrays import FloatArray, IntArray
 
 if TYPE_CHECKING:

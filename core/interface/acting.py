@@ -7,7 +7,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..numerics.arrays import FloatArray, IntArray
-from .protocols import Scenario, Transition
+from .scenario import Scenario, Transition
 
 
 class Actors(Protocol):

@@ -11,20 +11,17 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from ..numerics.arrays import FloatArray, IntArray
-from ..plugins.settings import NonNegative, Positive
-from .learner import LearnerSettings
-from .online import OneStep
+from ..plugins.settings import NonNegative
+from .online import OneStep, OneStepSettings
 
 if TYPE_CHECKING:
     from ..rules.rule_base import RuleBase
 
 
-class FMQSettings(LearnerSettings):
+class FMQSettings(OneStepSettings):
     """Frequency maximum Q-value, for agents that do not see one another."""
 
     kind: Literal["fmq"] = "fmq"
-    step_size: Positive = 0.1
-    """alpha, divided by the squared length of the feature vector."""
     weight: NonNegative = 10.0
     """c: how much the frequency of the maximum reward counts."""
 

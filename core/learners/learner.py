@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol
 
 from pydantic import Field
 
@@ -25,6 +25,10 @@ class Learner(Protocol):
 
     Agents that share weights have one row of them in common; `rows`, which a learner is built with,
     says which row is whose.
+
+    A learner that can begin with what one of the same settings has learned for other agents also
+    has ``take_over(former, rows)``: ``rows`` ``(n_rows,)`` says from which row of ``former``, which
+    is not modified and whose episodes are over, each row goes on.
     """
 
     theta: FloatArray
@@ -58,23 +62,6 @@ class Learner(Protocol):
 
     def restore(self, arrays: Mapping[str, FloatArray]) -> None:
         """Continue from `arrays`."""
-        ...
-
-
-@runtime_checkable
-class SuccessorLearner(Protocol):
-    """A learner that can begin with what one of the same kind has learned for other agents."""
-
-    def take_over(self, former: Any, rows: IntArray) -> None:
-        """Begin with weights and experience of a learner whose episodes are over.
-
-        Parameters
-        ----------
-        former
-            Of the same settings and rule base, which is not modified.
-        rows
-            ``(n_rows,)`` the row of it that each row goes on from.
-        """
         ...
 
 

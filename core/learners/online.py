@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..numerics.arrays import FloatArray, IntArray
+from ..plugins.settings import Positive
+from .learner import LearnerSettings
 
 if TYPE_CHECKING:
     from ..rules.rule_base import RuleBase
@@ -109,18 +111,11 @@ class Online(ABC):
             self.weights = self.theta
 
 
-class OneStepSettings(Protocol):
-    """What the settings of a `OneStep` learner have."""
+class OneStepSettings(LearnerSettings):
+    """What the settings of `OneStep` learners share."""
 
-    @property
-    def discount(self) -> float:
-        """Discount per decision, gamma of Eq. 7."""
-        ...
-
-    @property
-    def step_size(self) -> float:
-        """alpha, divided by the squared length of the feature vector."""
-        ...
+    step_size: Positive = 0.1
+    """alpha, divided by the squared length of the feature vector."""
 
 
 class OneStep(Online):
@@ -152,12 +147,3 @@ class OneStep(Online):
         steps = self.settings.step_size * delta / lengths
         kernels.add_features(self.weights, self.rows, states, steps, self.rules.layout)
         return self.theta.size
-
-
-class OfASum(OneStep):
-    """Learns parts of a sum: what all are paid together is shared out, so that parts add up."""
-
-    def observe(self, states: FloatArray, reward: float | FloatArray, terminated: bool) -> int:
-        """Update for the step from the previous states to these, each agent by its share."""
-        shared = reward / len(states) if np.ndim(reward) == 0 else reward
-        return super().observe(states, shared, terminated)

@@ -12,20 +12,17 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from ..numerics.arrays import FloatArray, IntArray
-from ..plugins.settings import Fraction, Positive
-from .learner import LearnerSettings
-from .online import OneStep
+from ..plugins.settings import Fraction
+from .online import OneStep, OneStepSettings
 
 if TYPE_CHECKING:
     from ..rules.rule_base import RuleBase
 
 
-class OptimisticTDSettings(LearnerSettings):
+class OptimisticTDSettings(OneStepSettings):
     """TD(0) whose values rise faster than they fall, for agents that do not see one another."""
 
     kind: Literal["optimistic-td"] = "optimistic-td"
-    step_size: Positive = 0.1
-    """alpha, divided by the squared length of the feature vector."""
     falling: Fraction = 0.0
     """Step size of negative TD errors over alpha: 0 never lowers a value (distributed Q-learning),
     in between is hysteretic, 1 is TD(0)."""

@@ -13,14 +13,13 @@ import numpy as np
 
 from ..numerics.arrays import FloatArray, IntArray
 from ..plugins.settings import Positive
-from .learner import LearnerSettings
-from .online import OneStep
+from .online import OneStep, OneStepSettings
 
 if TYPE_CHECKING:
     from ..rules.rule_base import RuleBase
 
 
-class QLearningSettings(LearnerSettings):
+class QLearningSettings(OneStepSettings):
     """Q-learning, for state spaces that hold the actions taken."""
 
     kind: Literal["q-learning"] = "q-learning"

@@ -8,28 +8,26 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal
 
+import numpy as np
+
 from ..numerics.arrays import FloatArray, IntArray
-from ..plugins.settings import Positive
-from .learner import LearnerSettings
-from .online import OfASum
+from .online import OneStep, OneStepSettings
 
 if TYPE_CHECKING:
     from ..rules.rule_base import RuleBase
 
 
-class SparseCooperativeSettings(LearnerSettings):
+class SparseCooperativeSettings(OneStepSettings):
     """Agents learn the parts of a sum, each by its share of the reward."""
 
     kind: Literal["sparse-cooperative"] = "sparse-cooperative"
-    step_size: Positive = 0.1
-    """alpha, divided by the squared length of the feature vector."""
 
     def build(self, rules: RuleBase, rows: IntArray) -> SparseCooperative:
         """Return the learner of a team."""
         return SparseCooperative(self, rules, rows)
 
 
-class SparseCooperative(OfASum):
+class SparseCooperative(OneStep):
     """TD(0) for each part of a sum (Kok and Vlassis 2006, Eq. 11, on after-states).
 
     On entering state s' after state s, agent i of n learns::
@@ -41,6 +39,11 @@ class SparseCooperative(OfASum):
     error of ``sum_i f_i``. The state entered stands for the best one, which is what the greedy
     joint action of the graph leads to.
     """
+
+    def observe(self, states: FloatArray, reward: float | FloatArray, terminated: bool) -> int:
+        """Update for the step from the previous states to these, each agent by its share."""
+        shared = reward / len(states) if np.ndim(reward) == 0 else reward
+        return super().observe(states, shared, terminated)
 
     def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
         return self._step(states, self.errors(self.theta, states, rewards, entered))

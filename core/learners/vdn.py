@@ -12,14 +12,14 @@ import numpy as np
 
 from ..numerics.arrays import FloatArray, IntArray
 from ..plugins.settings import Positive
-from .learner import LearnerSettings
-from .online import OfASum
+from .online import OneStepSettings
+from .sparse_cooperative import SparseCooperative
 
 if TYPE_CHECKING:
     from ..rules.rule_base import RuleBase
 
 
-class ValueDecompositionSettings(LearnerSettings):
+class ValueDecompositionSettings(OneStepSettings):
     """The sum of all agents' values learns from the TD error of the team."""
 
     kind: Literal["vdn"] = "vdn"
@@ -31,7 +31,7 @@ class ValueDecompositionSettings(LearnerSettings):
         return ValueDecomposition(self, rules, rows)
 
 
-class ValueDecomposition(OfASum):
+class ValueDecomposition(SparseCooperative):
     """TD(0) on the sum of the agents' values, without the networks of the original.
 
     On entering state s' after state s, with R the reward of all (the sum, if each has its own)::

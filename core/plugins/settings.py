@@ -80,6 +80,9 @@ class ScenarioSettings(Settings):
     kind: str = ""
     factory: ClassVar[str] = ""
     """Where the class is that is built of them, imported when it is wanted."""
+    player: ClassVar[str] = ""
+    """Where the module is that plays recordings on a page, see `studies.report.replays`; empty:
+    recordings are drawn as films."""
 
     def build(self) -> Any:
         """Return the scenario.

@@ -6,7 +6,7 @@ import numpy as np
 from gymnasium.spaces import Discrete
 from stable_baselines3 import DQN
 
-from ..interface.protocols import Scenario, Transition
+from ..interface.scenario import Scenario, Transition
 from ..numerics.arrays import FloatArray, IntArray
 from .inputs import Inputs, RewardScale
 from .networks import Layers, drawing_from, prepare, weights_of
@@ -39,7 +39,7 @@ class DeepQ(Peer):
         if len(scenario.agents) > 1:
             raise ValueError(
                 f"learner.kind = 'dqn': acts for one agent, there are {len(scenario.agents)}; "
-                "use topology = 'single-agent'"
+                "use agents = 'team'"
             )
         super().__init__(seed)
         self._settings, self._inputs = settings, Inputs(scenario)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..interface.protocols import Scenario, groups_of
+from ..interface.scenario import Scenario, groups_of
 from ..interface.spaces import StateSpace
 from ..numerics.arrays import FloatArray
 

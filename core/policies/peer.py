@@ -6,7 +6,7 @@ from typing import cast
 
 import numpy as np
 
-from ..interface.protocols import Scenario, Transition
+from ..interface.scenario import Scenario, Transition
 from ..numerics.arrays import FloatArray, IntArray
 from .seen import Seen
 

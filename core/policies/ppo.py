@@ -18,7 +18,7 @@ from gymnasium.spaces import Discrete, MultiDiscrete
 from scipy.special import logsumexp
 from stable_baselines3 import PPO
 
-from ..interface.protocols import Scenario, Transition
+from ..interface.scenario import Scenario, Transition
 from ..numerics.arrays import FloatArray, IntArray
 from .central_critic import CentralCriticPolicy
 from .inputs import Inputs, RewardScale

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..interface.protocols import Scenario, Transition, groups_of, measures_of, roles_of
+from ..interface.measures import measures_of
+from ..interface.scenario import Scenario, Transition, groups_of, roles_of
 from ..numerics.arrays import FloatArray, IntArray
 
 

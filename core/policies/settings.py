@@ -107,7 +107,7 @@ class MAPPOSettings(PolicyGradientSettings):
 
 
 class DQNSettings(NetworkSettings):
-    """DQN (Mnih et al. 2015) for one agent, such as that of ``topology = "single-agent"``."""
+    """DQN (Mnih et al. 2015) for one agent, such as that of ``agents = "team"``."""
 
     kind: Literal["dqn"] = "dqn"
     memory: Count = 50_000

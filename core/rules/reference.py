@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..interface.protocols import Blocks
+from ..interface.prediction import Blocks
 from ..numerics.arrays import FloatArray, IntArray
 from .rule_base import RuleBase
 

@@ -20,7 +20,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..interface.protocols import Blocks
+from ..interface.prediction import Blocks
 from ..interface.spaces import StateSpace
 from ..numerics.arrays import FloatArray, IntArray
 from . import kernels

@@ -27,6 +27,7 @@ from .world.settings import (
 class BoxTaskSettings(ScenarioSettings):
     """Robots, box, task and servo layer: what all scenarios of box pushing have in common."""
 
+    player: ClassVar[str] = f"{__package__}.pictures.player"
     robots: Annotated[int, Field(ge=1, le=64)] = 2
     """Number of robots."""
     robot: str | RobotSettings = "e-puck"

@@ -23,7 +23,7 @@ import numpy as np
 from gymnasium.spaces import Box, Discrete, MultiDiscrete
 from pettingzoo import ParallelEnv
 
-from ...core.interface.protocols import Transition
+from ...core.interface.scenario import Transition
 from ...core.numerics.arrays import FloatArray, IntArray
 from .config import BoxPushingSettings
 from .pictures.screen import Screen

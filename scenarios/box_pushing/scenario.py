@@ -10,11 +10,13 @@ from collections.abc import Mapping, Sequence
 from math import pi
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...core.interface.protocols import SUCCESS, Measure, Transition
+from ...core.agents.team import Team
+from ...core.interface.measures import SUCCESS, Measure
+from ...core.interface.scenario import Transition
 from ...core.interface.spaces import ActionSet, StateSpace
 from ...core.numerics.arrays import BoolArray, FloatArray, IntArray
 from .config import BoxPushingSettings
@@ -33,6 +35,9 @@ from .world.robots import nominal_effect, robot_for
 from .world.settings import CONTROL_PERIOD
 from .world.starts import place
 from .world.world import World, WorldState
+
+if TYPE_CHECKING:
+    from .pictures.policy import Policy
 
 SENSING = 2**32 - 1
 """Key of the stream of sensor noise under the seed of an episode; failures have 0, 1, ..."""
@@ -283,6 +288,20 @@ class BoxPushing:
         from .pictures.rendering import animate
 
         animate(recording, path)
+
+    def show_policy(self, team: Team) -> Policy:
+        """Return what a team does around the box; the scenario begins another episode.
+
+        Raises
+        ------
+        ValueError
+            If its predictions cannot begin anywhere.
+        """
+        from .pictures.policy import policy_of
+
+        self.reset(0)
+        robots = [self.robot] * self.settings.robots
+        return policy_of(team, team.predict(self), self.box, robots, self.settings.start)
 
     def _save(self) -> None:
         # After every step, asked for or not, as saving costs the world its order of contacts.

@@ -21,13 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.interface.protocols import (
-    ExactlyPredictedScenario,
-    RecordedScenario,
-    Scenario,
-    groups_of,
-    roles_of,
-)
+from ...core.interface.scenario import RecordedScenario, Scenario, groups_of, roles_of
 from ...core.numerics.arrays import IntArray
 from .frames import (
     FIELDS,
@@ -298,7 +292,7 @@ def _senses(of: Examination) -> str | None:
     """Check that variables mean the same in sensing and prediction, where that can be told."""
     for seed, episode in _all(of):
         scenario: Any = of.factory()
-        if not isinstance(scenario, ExactlyPredictedScenario):
+        if not hasattr(scenario, "with_exact_prediction"):
             return None
         exact = scenario.with_exact_prediction()
         fault = fault_of_exact(exact, seed, episode, of.actions(exact, seed)) or fault_at_rest(

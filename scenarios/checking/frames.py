@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...core.agents.loop import world_seed
-from ...core.interface.protocols import RewardPrediction, Scenario, Transition
+from ...core.interface.scenario import Scenario, Transition
 from ...core.numerics.arrays import IntArray
 
 Frame = dict[str, Any]
@@ -131,7 +131,7 @@ def _look_ahead(scenario: Scenario) -> None:
     some[1] = len(scenario.action_set) - 1
     for agent in range(len(scenario.agents)):
         prediction.states(agent, some)
-    if isinstance(prediction, RewardPrediction):
+    if hasattr(prediction, "rewards"):
         prediction.rewards(some)
     measured(scenario)
 

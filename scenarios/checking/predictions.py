@@ -11,13 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ...core.interface.protocols import (
-    Blocks,
-    RewardPrediction,
-    Scenario,
-    groups_of,
-    states_by_group,
-)
+from ...core.interface.prediction import Blocks, states_by_group
+from ...core.interface.scenario import Scenario, groups_of
 from ...core.numerics.arrays import FloatArray, IntArray
 
 MOST_JOINT_ACTIONS = 4**8
@@ -48,7 +43,7 @@ def fault_of_prediction(
         f"states of agent {i}": (prediction.states(i, joint_actions), (m, d))
         for i in range(len(scenario.agents))
     }
-    if isinstance(prediction, RewardPrediction):
+    if hasattr(prediction, "rewards"):
         wanted["rewards"] = prediction.rewards(joint_actions), (m,)
     if hasattr(prediction, "states_of_all"):
         together = prediction.states_of_all(joint_actions)
@@ -112,7 +107,7 @@ def _wrong_tables(scenario: Scenario, prediction: Any, rng: np.random.Generator)
             )
             if fault is not None:
                 return f"blocks of agent {agent}: {fault}"
-    if isinstance(prediction, RewardPrediction):
+    if hasattr(prediction, "rewards"):
         return _wrong_rewards(prediction, count, indices, joint_actions)
     return None
 

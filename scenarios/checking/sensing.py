@@ -1,7 +1,7 @@
 """Whether what is predicted is what is then sensed: state variables mean one thing.
 
 Predictions need not come true, so that of most scenarios nothing can be said. But one that is
-predicted exactly (`ExactlyPredictedScenario`) must sense what was predicted, and where nothing
+predicted exactly (``with_exact_prediction``) must sense what was predicted, and where nothing
 moves, so must any predictor. What differs then is a variable that is computed in two ways.
 """
 
@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.agents.loop import world_seed
-from ...core.interface.protocols import Scenario
+from ...core.interface.scenario import Scenario
 from ...core.numerics.arrays import FloatArray, IntArray
 from .frames import at
 from .predictions import apart

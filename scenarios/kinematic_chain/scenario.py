@@ -16,7 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from ...core.interface.protocols import SUCCESS, Measure, Transition
+from ...core.interface.measures import SUCCESS, Measure
+from ...core.interface.scenario import Transition
 from ...core.interface.spaces import ActionSet, StateSpace
 from ...core.numerics.arrays import BoolArray, FloatArray, IntArray
 from ..faults.schedule import Failures

@@ -17,7 +17,8 @@ from pydantic import AfterValidator, Field
 
 from ...core.agents.loop import EpisodeSummary
 from ...core.agents.team import Team
-from ...core.interface.protocols import SUCCESS, Measure, Transition
+from ...core.interface.measures import SUCCESS, Measure
+from ...core.interface.scenario import Transition
 from ...core.interface.spaces import ActionSet, StateSpace, Variable
 from ...core.numerics.arrays import FloatArray, IntArray
 from ...core.plugins.settings import ScenarioSettings
@@ -141,7 +142,7 @@ class MatrixGame:
     def run_episode(
         self, team: Team, seed: np.random.SeedSequence, episode: int, steps: int, *, learn: bool
     ) -> EpisodeSummary | None:
-        """Run an episode at once, see `nested_agents.core.agents.loop.EpisodicScenario`."""
+        """Run an episode at once, see `nested_agents.core.agents.loop.EpisodeSummary`."""
         from .plays import parts_of, run  # the kernel takes its time to load
 
         parts = parts_of(self, team, learn=learn)
@@ -157,7 +158,7 @@ class MatrixGame:
 
 
 class MatrixGamePrediction:
-    """What joint actions lead to; a `RewardPrediction`."""
+    """What joint actions lead to; rewards, too."""
 
     def __init__(self, game: MatrixGame) -> None:
         self._game = game

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ...core.interface.protocols import Measure
+from ...core.interface.measures import Measure
 from ..errors import SpecError
 from ..results.numbers import NUMBERS
 from ..store.reading import NamesAndRows

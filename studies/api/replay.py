@@ -5,8 +5,9 @@ from __future__ import annotations
 import base64
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from ...core.interface.protocols import DrawnScenario
+from ...core.interface.scenario import can_draw
 from ...core.plugins.messages import closest
 from ..errors import SpecError
 from ..store.store import Store
@@ -50,7 +51,7 @@ def draw(
     condition, seed
         Which trial; the first one unless said otherwise.
     episode
-        ``first`` or ``last``; ``before`` or ``after`` where a wheel fails.
+        ``first`` or ``last``; ``before`` or ``after`` where something fails.
     path
         Of the animation, GIF or MP4; in the folder ``replay`` of the study unless said otherwise.
 
@@ -76,8 +77,8 @@ def draw(
             episode = "last"  # of one episode
         if episode not in recorded:
             raise SpecError(f"episode = {episode!r}: {closest(episode, recorded)}")
-        scenario = chosen.world()
-        if not isinstance(scenario, DrawnScenario):
+        scenario: Any = chosen.world()
+        if not can_draw(scenario):
             raise SpecError(f"no replay: {type(scenario).__name__} does not draw its episodes")
         if store.states().get(chosen.identity) != "done":
             raise SpecError(f"{chosen.condition}, seed {chosen.seed}: has not finished")

@@ -222,7 +222,7 @@ class StudyResults:
         condition, seed
             Which trial; the first unless said otherwise.
         episode
-            ``first`` or ``last``; ``before`` or ``after`` where a wheel fails.
+            ``first`` or ``last``; ``before`` or ``after`` where something fails.
         path
             Where to write, GIF or MP4; the study's folder ``replay`` unless said otherwise.
         """

@@ -39,7 +39,7 @@ def _print_table(findings: Sequence[Finding]) -> None:
         claim, colour = finding.claim, COLOURS[finding.verdict]
         table.add_row(
             f"{claim.text} [dim]({claim.place})[/]",
-            f"{claim.measure}: [dim]{claim.criterion}[/]",
+            f"{claim.measure}: [dim]{claim.criterion.text}[/]",
             result(finding),
             f"[{colour}]{finding.verdict}[/]",
         )
@@ -71,7 +71,7 @@ def markdown(findings: Sequence[Finding]) -> str:
     for finding in findings:
         c = finding.claim
         cells = (
-            c.text, c.place, c.study, c.measure, c.criterion, result(finding),
+            c.text, c.place, c.study, c.measure, c.criterion.text, result(finding),
             f"**{finding.verdict}**",
         )  # fmt: skip
         lines.append("| " + " | ".join(str(cell) for cell in cells) + " |")
@@ -89,7 +89,7 @@ def latex(findings: Sequence[Finding]) -> str:
     ]
     for finding in findings:
         c = finding.claim
-        cells = (f"{c.text} ({c.place})", f"{c.measure}: {c.criterion}", result(finding))
+        cells = (f"{c.text} ({c.place})", f"{c.measure}: {c.criterion.text}", result(finding))
         lines.append(" & ".join(map(escaped, (*cells, finding.verdict))) + r" \\")
     return "\n".join([*lines, r"\bottomrule", r"\end{tabularx}"])
 
@@ -107,7 +107,7 @@ def _record(finding: Finding) -> dict[str, Any]:
         "place": claim.place,
         "study": claim.study,
         "measure": claim.measure,
-        "criterion": str(claim.criterion),
+        "criterion": claim.criterion.text,
         "verdict": finding.verdict,
     }
     if found is not None:

@@ -1,24 +1,36 @@
-"""What the user sees of a study on the terminal: its table, and where things are."""
+"""What the user sees of a study on the terminal: its table, and where figures and rows are."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from shutil import get_terminal_size
+from textwrap import fill
+from typing import TYPE_CHECKING
 
-from rich.console import Console
-
-from ..api.study import StudyResults
-from ..presentation.tables import NOTHING, SummaryTable
-from ..presentation.terminal_tables import print_rows
+if TYPE_CHECKING:
+    from ..api.study import StudyResults
+    from ..presentation.tables import SummaryTable
 
 
-def print_table(found: SummaryTable) -> None:
+def print_wrapped(text: str, first: str = "", indent: int = 4) -> None:
+    """Print a text over the width of the terminal, after `first`; further lines are indented."""
+    width = get_terminal_size().columns
+    print(fill(text, width, initial_indent=first, subsequent_indent=" " * indent))
+
+
+def print_table(table: SummaryTable) -> None:
     """Print estimates by condition, each over its 95 % interval."""
-    if not found.rows:
+    from rich.console import Console
+
+    from ..presentation.tables import NOTHING
+    from ..presentation.terminal_tables import print_rows
+
+    if not table.rows:
         print(NOTHING)
         return
-    print_rows(found.titles, found.rows, Console())
-    for line in found.legend:
+    print_rows(table.titles, table.rows, Console())
+    for line in table.legend:
         print(line)
 
 
@@ -32,11 +44,58 @@ def print_study(study: StudyResults, columns: Sequence[str] = ()) -> None:
             print(line)
 
 
-def print_places(directory: Path, figures: Sequence[Path], replays: Sequence[Path]) -> None:
-    """Say where pictures and results are."""
-    print()
-    for what, paths in (("figure", figures), ("replay", replays)):
-        for path in paths:
-            print(f"{what:<8}{path}")
-    print(f"{'rows':<8}nested-agents results {directory} --format csv")
-    print(f"{'report':<8}nested-agents report {directory}")
+def show_results(
+    study: StudyResults, formats: Sequence[str] = (), *, with_replays: bool = False
+) -> int:
+    """Print the table of a study that has been run, draw its figures, say where everything is.
+
+    Parameters
+    ----------
+    study
+        What has been run.
+    formats
+        Of the figures; none: PNG and SVG.
+    with_replays
+        Whether to draw replays of the first condition's first seed, too.
+
+    Returns
+    -------
+    int
+        1 if any trial failed, else 0.
+    """
+    from ..presentation import figures  # Matplotlib takes its time, for which no trial has to wait
+    from ..presentation.progress import say
+    from ..presentation.words import count
+
+    directory = study.directory
+    replays = list(_replays(study)) if with_replays and not study.failed else []
+    print_study(study)
+    folder = directory / "figures"
+    folder.mkdir(exist_ok=True)
+    drawn = figures.save(study.figures, folder, formats or figures.USUAL)
+    print("", *(f"figure  {path}" for path in drawn), sep="\n")
+    for path in replays:
+        print(f"replay  {path}")
+    print(f"rows    nested-agents results {directory} --format csv")
+    print(f"report  nested-agents report {directory}")
+    if study.failed:
+        say(f"{count(len(study.failed), 'trial')} failed: nested-agents status {directory}")
+    return 1 if study.failed else 0
+
+
+def _replays(study: StudyResults) -> Iterator[Path]:
+    """Draw once what is recorded of the first trial, if its scenario knows how."""
+    from ..presentation.progress import say
+    from ..spec.errors import SpecError
+
+    folder = study.directory / "replay"
+    folder.mkdir(exist_ok=True)
+    for name in ("first", "last") if study.outline.episodes > 1 else ("last",):
+        path = folder / f"{name}-episode.gif"
+        try:
+            if not path.exists():
+                study.replay(episode=name, path=path)
+        except SpecError as error:
+            say(str(error))
+            return
+        yield path

@@ -17,7 +17,7 @@ import click
 
 from ...core.plugins.messages import closest
 from ..spec.errors import SpecError
-from .options import with_every_name
+from .options import complete
 
 PROGRAM = "nested-agents"
 
@@ -62,7 +62,7 @@ class _Commands(click.Group):
         command = self.get_command(ctx, args[0])
         if command is None:
             raise SpecError(f"{args[0]}: unknown command; {closest(args[0], COMMANDS)}")
-        return args[0], command, list(with_every_name(command, args[1:]))
+        return args[0], command, list(complete(command, args[1:]))
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):

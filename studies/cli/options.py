@@ -1,6 +1,6 @@
-"""Arguments and options that several commands share, and how texts and paths are read.
+"""Arguments and options that several commands share, and what all arguments must be.
 
-An option that may be given several times takes several values at once, too: `with_every_name`.
+An option that may be given several times takes several values at once, too: `complete`.
 """
 
 from __future__ import annotations
@@ -10,55 +10,55 @@ from pathlib import Path
 
 import click
 
-
-def text(value: str) -> str:
-    """Return an argument as it is, unless it is empty or an option whose own value is missing.
-
-    An unset shell variable gives an empty one.
-    """
-    if not value:
-        raise click.BadParameter("must not be empty")
-    if value.startswith("--"):
-        raise click.BadParameter(f"{value!r} is an option; a value must come first")
-    return value
+PATH = click.Path(path_type=Path)
+"""A path, which need not exist."""
 
 
-def path(value: str) -> Path:
-    """Return the path that an argument names, which need not exist."""
-    return Path(text(value))
-
-
-def with_every_name(command: click.Command, arguments: Iterable[str]) -> Iterator[str]:
+def complete(command: click.Command, arguments: Iterable[str]) -> Iterator[str]:
     """Yield arguments in which each further value of an option has the option's name before it.
 
     Values go on up to the next option; those of ``KEY=VALUE`` up to an argument without ``=``.
 
+    Raises
+    ------
+    click.UsageError
+        If an argument is empty, as an unset shell variable is, or a value is missing.
+
     Examples
     --------
     >>> command = click.Command("run", params=[click.Option(["--log"], multiple=True)])
-    >>> list(with_every_name(command, ["--log", "a", "b", "--jobs", "3"]))
+    >>> list(complete(command, ["--log", "a", "b", "--jobs", "3"]))
     ['--log', 'a', '--log', 'b', '--jobs', '3']
     """
-    is_assignment = {
-        name: "=" in str(option.metavar)
+    options = {
+        name: option
         for option in command.params
-        if isinstance(option, click.Option) and option.multiple
+        if isinstance(option, click.Option) and not option.is_flag
         for name in option.opts
     }
-    name, is_first = "", False
+    name, is_due = "", False
     for argument in arguments:
-        if argument in is_assignment:
-            name, is_first = argument, True
-        elif is_first:
-            is_first = False
-        elif name and argument[:1] != "-" and ("=" in argument or not is_assignment[name]):
+        if argument in ("", *(f"{option}=" for option in options)):
+            empty = name if is_due else argument.rstrip("=") or "an argument"
+            raise click.UsageError(f"{empty}: must not be empty")
+        if is_due and argument.startswith("--"):
+            raise click.UsageError(f"{name} {argument}: is an option; a value must come first")
+        if is_due:
+            is_due = False
+        elif argument in options:
+            name, is_due = argument, True
+        elif name and options[name].multiple and _is_further(argument, options[name]):
             yield name
         else:
             name = ""
         yield argument
 
 
-directory = click.argument("directory", type=path, metavar="DIR")
+def _is_further(argument: str, option: click.Option) -> bool:
+    return argument[0] != "-" and ("=" in argument or "=" not in str(option.metavar))
+
+
+directory = click.argument("directory", type=PATH, metavar="DIR")
 """An existing study."""
 
 jobs = click.option(
@@ -80,7 +80,6 @@ backend = click.option(
 
 address = click.option(
     "--address",
-    type=text,
     metavar="tcp://HOST:PORT",
     help="Of the scheduler of a running Dask cluster, all of whose workers are used unless --jobs "
     "says otherwise. If missing, a cluster is started here.",
@@ -106,7 +105,6 @@ changes = click.option(
     "--set",
     "changes",
     multiple=True,
-    type=text,
     metavar="KEY=VALUE...",
     help='Lay values over the spec: --set learner.ridge=1 "seeds=[3, 5]". May be repeated.',
 )
@@ -123,14 +121,13 @@ figures = click.option(
 """What figures of a study are written as."""
 
 plot = click.option(
-    "--plot", type=path, metavar="PATH", help="A figure to write: SVG, PNG or PDF by suffix."
+    "--plot", type=PATH, metavar="PATH", help="A figure to write: SVG, PNG or PDF by suffix."
 )
 """A picture to write."""
 
 as_study = click.option(
     "--as",
     "study",
-    type=text,
     metavar="STUDY",
     help="Analyse the trials as this study does, by its name or file.py:NAME; nothing is run.",
 )
@@ -138,7 +135,6 @@ as_study = click.option(
 
 where = click.option(
     "--where",
-    type=text,
     metavar="CHOICE",
     help='Only the trials of a choice: "robots == 8 and seed < 5", "box in [square, circle]".',
 )

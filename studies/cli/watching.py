@@ -1,30 +1,30 @@
-"""A study as it is watched: trials, learning curves as they grow, time left, failures."""
+"""A study as it is watched: how far it is, learning curves as they grow, failures."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from rich.console import Group, RenderableType
+from rich.console import Group
 from rich.markup import escape
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from ..presentation.words import count, duration
 from ..results.results import Results, read
-from ..spec.outline import Outline
 from ..store.store import Store
 from ..workers.progress import Progress, progress
+from .standing import describe, warnings
 
 BLOCKS = "▁▂▃▄▅▆▇█"
 CURVE = 24
 """Characters of a curve at most."""
 MOST_FAILURES = 5
-"""Failures that are told one by one."""
+"""Failures that are shown one by one."""
 MOST_CONDITIONS = 30
-"""Conditions that are told one by one."""
+"""Conditions that are shown one by one."""
 
 
 def curve(rates: Sequence[float], width: int = CURVE) -> str:
@@ -41,43 +41,29 @@ def curve(rates: Sequence[float], width: int = CURVE) -> str:
 
 
 def frame(directory: Path) -> tuple[Group, bool]:
-    """Return what there is to see of a study now, and whether anything is still to come."""
+    """Return what there is to see of a study now, and whether anything is still to come.
+
+    Rows that are damaged, or of another version, are not drawn. Of a damaged study nothing is to
+    come unless somebody runs it.
+    """
     with Store.open(directory) as store:
-        outline, now, failed = Outline.kept(store), progress(store), store.failed()
-        results = read(store) if store.other_version() is None else Results({}, {})
-        planned = store.planned()
-    planned_of: dict[str, int] = {}
-    for trial in planned:
-        planned_of[trial.condition] = planned_of.get(trial.condition, 0) + 1
-    title = Text(f"{outline.study}: {directory}", style="bold")
-    bar = Table.grid(padding=(0, 1), expand=True)
-    bar.add_column(ratio=1)
-    bar.add_column(justify="right")
-    bar.add_row(ProgressBar(total=max(now.total, 1), completed=now.done), _standing(now))
-    parts: list[RenderableType] = [title, bar, Text("")]
-    parts.append(_conditions(results, planned_of, now))
-    for condition, seed, error in failed[-MOST_FAILURES:]:
-        last = error.strip().splitlines()[-1] if error.strip() else "failed"
-        parts.append(Text(f"failed: {condition}, seed {seed}: {last}", style="red"))
-    if len(failed) > MOST_FAILURES:
-        parts.append(Text(f"and {len(failed) - MOST_FAILURES} more", style="red"))
-    if now.refusal:
-        parts.append(Text(f"nothing can be added: {now.refusal}", style="yellow"))
-    return Group(*parts), bool(now.refusal is None and (now.left or now.running))
+        now = progress(store)
+        lines = Text("\n".join([*describe(store, now), *warnings(now)]))
+        is_whole = not now.damaged and store.other_version() is None
+        results = read(store) if is_whole else Results({}, {})
+        failed = store.failed()
+        planned = Counter(trial.condition for trial in store.planned())
+    shown = [f"failed: {c}, seed {s}: {(e.strip() or '-').splitlines()[-1]}" for c, s, e in failed]
+    more = len(shown) - MOST_FAILURES
+    parts = [*shown[-MOST_FAILURES:], *([f"and {more} more"] if more > 0 else [])]
+    bar = ProgressBar(total=max(now.total, 1), completed=now.done)
+    curves = _conditions(results, planned, now)
+    group = Group(lines, bar, Text(""), curves, Text("\n".join(parts), style="red"))
+    is_possible = now.refusal is None and not now.damaged
+    return group, bool(now.running or (now.left and is_possible))
 
 
-def _standing(now: Progress) -> Text:
-    said = f"{now.done} of {count(now.total, 'trial')}"
-    if now.running:
-        said += f", {len(now.running)} running"
-    if now.failed:
-        said += f", {now.failed} failed"
-    if now.seconds:
-        said += f", about {duration(now.seconds)} left"
-    return Text(said)
-
-
-def _conditions(results: Results, planned: dict[str, int], now: Progress) -> Table:
+def _conditions(results: Results, planned: Mapping[str, int], now: Progress) -> Table:
     table = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, header_style="bold")
     table.add_column("condition", overflow="fold")
     for heading in ("trials", "running", "last 5"):

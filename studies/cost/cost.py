@@ -25,24 +25,20 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from ...core.agents.cost import Problem, below_counts, is_chain
+from ...core.agents.joint_agents import join_agents
 from ...core.agents.loop import control_loop, policy_seed
 from ...core.agents.team import Team
 from ...core.decision.settings import Decision
 from ...core.evaluators.coordination import VariableEliminationSettings
 from ...core.evaluators.exact import ExactSettings
-from ...core.interface.protocols import Scenario
+from ...core.interface.hierarchy import Hierarchy
+from ...core.interface.scenario import Scenario
 from ...core.learners.td import TDLambdaSettings
 from ...core.plugins.deferred import Deferred
 from ...core.rules.settings import RuleBaseSettings
 from ...scenarios.line_up import LineUpSettings
 from ...topologies import build, parse
-from ...topologies.config import (
-    ChainSettings,
-    CoordinationGraphSettings,
-    IndependentSettings,
-    PerRobotSettings,
-    SingleAgentSettings,
-)
+from ...topologies.config import ChainSettings, CoordinationGraphSettings, IndependentSettings
 from ...topologies.view import team_of
 from ..results.distributions import t_quantile
 from ..results.statistics import Estimate
@@ -52,6 +48,8 @@ if TYPE_CHECKING:
 else:
     stats = Deferred("scipy.stats")
 
+SINGLE_AGENT = "single-agent"
+"""Stands in place of a topology for the one agent of Eq. 23."""
 MEMBERSHIPS = 5
 PAPER = Problem(5**7, 4, 450)
 """|S|, |A| and L of the paper's experiment."""
@@ -146,7 +144,7 @@ def cost_rows(
         for n in agents:
             found = measure(text, n) if measured else None
             single = problem.single_agent(n)
-            if isinstance(parse(text), SingleAgentSettings):
+            if text == SINGLE_AGENT:
                 yield CostRow(n, text, None, None, None, single, found)
                 continue
             below = agents_below(text, n)
@@ -168,14 +166,9 @@ def agents_below(text: str, n: int) -> Sequence[int]:
     Raises
     ------
     ValueError
-        If the topology is refused; so is that of whole robots, for which there is no one |A|.
+        If the topology is refused.
     """
     settings = parse(text)
-    if isinstance(settings, PerRobotSettings):
-        raise ValueError(
-            f"topology {text!r}: the cost formulas are of an agent per wheel; what whole robots "
-            f"try is in: nested-agents topology show {text}"
-        )
     if isinstance(settings, ChainSettings) and isinstance(settings.order, str):
         return range(n)  # a thousand hierarchies of a thousand agents take their time
     return below_counts(build(settings, team_of(n, None, None).agents, pairs(n)))
@@ -194,20 +187,19 @@ def pairs(n: int) -> tuple[tuple[int, ...], ...]:
 
 def measure(text: str, n: int) -> Measured | None:
     """Count and time a step of n agents; none where it would take too long or too much memory."""
-    settings = parse(text)
     line_up, rules = LineUpSettings(carts=n).build(), RULES
     actions = len(line_up.action_set)
-    if isinstance(settings, SingleAgentSettings):
+    if text == SINGLE_AGENT:
         joint, rules, updates = actions**n, rules**n, rules**n
     else:
         joint, updates = Problem(rules, actions).decision(agents_below(text, n)), n * rules
     if joint * rules > MOST_OPERATIONS:
         return None
-    scenario: Scenario = line_up
-    if isinstance(settings, SingleAgentSettings):
-        scenario, hierarchy = settings.arrange(line_up)
-        learner = _of_order(2 * n)
+    if text == SINGLE_AGENT:
+        scenario, learner = join_agents(line_up, "team"), _of_order(2 * n)
+        hierarchy = Hierarchy(scenario.agents, [])
     else:
+        settings, scenario = parse(text), line_up
         is_graph = isinstance(settings, CoordinationGraphSettings)
         learner = COORDINATED if is_graph else LEARNER
         hierarchy = build(settings, line_up.agents, pairs(n))

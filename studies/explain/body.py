@@ -1,4 +1,4 @@
-"""What robots believe their wheels to do: the self-model against the robots as they were built."""
+"""What bodies believe their actuators to do: the self-model against the bodies as built."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from ...core.adaptation.self_model import SelfModel
 from ...core.numerics.arrays import FloatArray
 
 ROWS = (("ahead", "m/s"), ("left", "m/s"), ("turning", "rad/s"))
-"""The rows of an effect, in units per m/s of wheel speed."""
+"""The rows of an effect, in units per unit of commanded speed."""
 LEAST_CHANGE = 0.25
-"""A smaller change of a wheel's drive is not spoken of."""
+"""A smaller change of an actuator's drive is not spoken of."""
 Effects = tuple[FloatArray, ...]
 
 
 @dataclass
 class Bodies:
-    """What the robots were believed to be at some moments.
+    """What the bodies were believed to be at some moments.
 
     Attributes
     ----------
     moments
-        Effects of all robots by moment: ``built``, perhaps ``before`` the first failure, ``after``
+        Effects of all bodies by moment: ``built``, perhaps ``before`` the first failure, ``after``
         all training.
     deviations
         Standard deviations of the last of them, as the self-model has them.
@@ -39,13 +39,13 @@ class Bodies:
         self.deviations = model.deviations
 
 
-def table(bodies: Bodies, wheels: Sequence[str]) -> Iterator[str]:
-    """Yield the effects of every robot's wheels, row by row and moment by moment."""
-    for r, own in enumerate(by_robot(bodies, wheels)):
+def table(bodies: Bodies, actuators: Sequence[str]) -> Iterator[str]:
+    """Yield the effects of every body's actuators, row by row and moment by moment."""
+    for r, own in enumerate(by_body(bodies, actuators)):
         names = [name.rpartition(".")[2].replace("-", "-\n") for name in own]
         wide, lines = headed([*names, "constant"], 8)
         for i, line in enumerate(lines):
-            yield ((body_name(own, r) if i == len(lines) - 1 else "").ljust(16) + line).rstrip()
+            yield ((body_name(own) if i == len(lines) - 1 else "").ljust(16) + line).rstrip()
         for row, (name, _) in enumerate(ROWS):
             if not any(effects[r][row].any() for effects in bodies.moments.values()):
                 continue  # a joint can but turn
@@ -55,13 +55,13 @@ def table(bodies: Bodies, wheels: Sequence[str]) -> Iterator[str]:
         yield ""
 
 
-def body_name(own: Sequence[str], number: int) -> str:
-    """Return how a body is called: by its number, or like the one agent that it is.
+def body_name(own: Sequence[str]) -> str:
+    """Return how a body is called: as what the names of its actuators begin with.
 
-    >>> body_name(["robot1.left", "robot1.right"], 0), body_name(["joint2"], 1)
-    ('robot 1', 'joint2')
+    >>> body_name(["robot1.left", "robot1.right"]), body_name(["joint2"])
+    ('robot1', 'joint2')
     """
-    return f"robot {number + 1}" if "." in own[0] else own[0]
+    return own[0].partition(".")[0]
 
 
 def headed(names: Sequence[str], least: int) -> tuple[int, list[str]]:
@@ -73,32 +73,32 @@ def headed(names: Sequence[str], least: int) -> tuple[int, list[str]]:
     return wide, ["".join(head[i].rjust(wide) for head in padded) for i in range(depth)]
 
 
-def verdicts(bodies: Bodies, wheels: Sequence[str]) -> Iterator[str]:
-    """Yield, for every wheel whose drive is not what it was built with, what it is taken for.
+def verdicts(bodies: Bodies, actuators: Sequence[str]) -> Iterator[str]:
+    """Yield, for every actuator whose drive is not what it was built with, what it is taken for.
 
     Its drive is the part of its effect that is along the one it was built with; a change within
     two of its standard deviations is said to be uncertain.
     """
     built, last = bodies.moments["built"], bodies.moments["after"]
-    for r, names in enumerate(by_robot(bodies, wheels)):
-        # A turning rate counts as the speed of a wheel that is built to turn most.
+    for r, names in enumerate(by_body(bodies, actuators)):
+        # A turning rate counts as the speed of an actuator that is built to turn most.
         unit = np.array([1.0, 1.0, 1.0 / max(1.0, float(np.abs(built[r][2]).max()))]) ** 2
-        for wheel, name in enumerate(names):
-            own = unit * built[r][:, wheel]
-            length = float(own @ built[r][:, wheel])
-            left = float(own @ last[r][:, wheel]) / length
-            around = float(np.sqrt(own**2 @ bodies.deviations[r][:, wheel] ** 2)) / length
+        for actuator, name in enumerate(names):
+            own = unit * built[r][:, actuator]
+            length = float(own @ built[r][:, actuator])
+            left = float(own @ last[r][:, actuator]) / length
+            around = float(np.sqrt(own**2 @ bodies.deviations[r][:, actuator] ** 2)) / length
             if abs(left - 1.0) > LEAST_CHANGE:
                 doubt = "" if abs(left - 1.0) > 2.0 * around else "; uncertain"
                 share = f"{left:+.2f} ± {around:.2f} of its drive"
                 yield f"{name}: {share}, {_like(left)}{doubt}"
 
 
-def by_robot(bodies: Bodies, wheels: Sequence[str]) -> Iterator[Sequence[str]]:
-    """Yield the names of every robot's wheels."""
+def by_body(bodies: Bodies, actuators: Sequence[str]) -> Iterator[Sequence[str]]:
+    """Yield the names of every body's actuators."""
     first = 0
     for effect in bodies.moments["built"]:
-        yield wheels[first : first + effect.shape[1] - 1]
+        yield actuators[first : first + effect.shape[1] - 1]
         first += effect.shape[1] - 1
 
 

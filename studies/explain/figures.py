@@ -10,17 +10,11 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle, PathPatch
-from matplotlib.path import Path as Outline
 from matplotlib.ticker import MultipleLocator
 
 from ...core.numerics.arrays import FloatArray
-from ...scenarios.box_pushing.config import BoxPushingSettings
-from ...scenarios.box_pushing.world.boxes import BoxSpec, box_for
-from ...scenarios.box_pushing.world.robots import robot_for
 from ..presentation.figures import COLOURS, MARKERS, SETTINGS, STYLES
-from .body import ROWS, Bodies, body_name, by_robot
-from .policy import AROUND, MOVES, Field
+from .body import ROWS, Bodies, body_name, by_body
 from .rules import exponent, labels, percent, strongest_pairs
 from .team import Explained
 
@@ -29,8 +23,7 @@ MOST_LINES = 8
 MOST_MAPS = 4
 """Agents in the figure of pairs."""
 MOST_BODIES = 8
-"""Robots in the figure of the self-model."""
-MOVE_COLOURS = dict(zip(MOVES, ("#0072B2", "#D55E00", "#009E73", "#999999"), strict=True))
+"""Bodies in the figure of the self-model."""
 
 
 def draw(found: Explained) -> dict[str, Figure]:
@@ -47,10 +40,10 @@ def _figures(found: Explained) -> Iterator[tuple[str, Figure]]:
             yield name, _functions(found, slice(first, first + MOST_LINES))
         if strongest_pairs(found.parts):
             yield "pairs", _pairs(found)
-    if not isinstance(found.fields, str):
-        yield "policy", _policy(found, found.fields)
+    if not isinstance(found.policy, str):
+        yield "policy", found.policy.figure()
     if found.bodies is not None:
-        yield "self-model", _bodies(found.wheels, found.bodies)
+        yield "self-model", _bodies(found.actuators, found.bodies)
 
 
 def _functions(found: Explained, block: slice) -> Figure:
@@ -61,7 +54,7 @@ def _functions(found: Explained, block: slice) -> Figure:
     panels = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
     times = 10.0 ** exponent(found.parts)
     names, parts = found.agents[block], found.parts[block]
-    robots = list(dict.fromkeys(name.partition(".")[0] for name in names))
+    bodies = list(dict.fromkeys(name.partition(".")[0] for name in names))
     for j, (variable, partition) in enumerate(
         zip(found.variables, found.rules.partitions, strict=True)
     ):
@@ -74,11 +67,11 @@ def _functions(found: Explained, block: slice) -> Figure:
         x = np.union1d(np.linspace(low, high, 401), partition.centres)
         strengths = partition.strengths(x)
         for i, (name, part) in enumerate(zip(names, parts, strict=True)):
-            robot = name.partition(".")[0]
-            wheel = [n for n in names if n.partition(".")[0] == robot].index(name)
-            number = robots.index(robot)
+            body = name.partition(".")[0]
+            member = [n for n in names if n.partition(".")[0] == body].index(name)
+            number = bodies.index(body)
             look: dict[str, Any] = {
-                "color": COLOURS[number % len(COLOURS)], "ls": STYLES[wheel % len(STYLES)],
+                "color": COLOURS[number % len(COLOURS)], "ls": STYLES[member % len(STYLES)],
                 "marker": MARKERS[number % len(MARKERS)], "ms": 3,
             }  # fmt: skip
             at = np.searchsorted(x, partition.centres)
@@ -125,85 +118,21 @@ def _pairs(found: Explained) -> Figure:
     return figure
 
 
-def _policy(found: Explained, fields: list[Field]) -> Figure:
-    settings = found.trial.settings.scenario
-    assert isinstance(settings, BoxPushingSettings)  # no other scenario has fields
-    box, robot = box_for(settings.box, settings.robots), robot_for(settings.robot)
-    columns = min(2, len(fields))
-    rows = ceil(len(fields) / columns)
-    figure = Figure(figsize=(4.1 * columns, 4.3 * rows + 0.9), layout="constrained")
-    panels = figure.subplots(rows, columns, squeeze=False).ravel()
-    for axes, field in zip(panels, fields, strict=False):
-        _field(axes, field, box, robot.radius)
-    for axes in panels[len(fields) :]:
-        axes.set_visible(False)
-    handles = [
-        mpl.lines.Line2D([], [], ls="", marker="o", ms=6, color=colour, label=move)
-        for move, colour in MOVE_COLOURS.items()
-    ]
-    figure.legend(
-        handles=handles, loc="outside lower center", ncols=4, frameon=False,
-        title="what a robot at rest, looking at the box, does next; grey discs: the other robots",
-    )  # fmt: skip
-    return figure
-
-
-def _field(axes: Axes, field: Field, box: BoxSpec, radius: float) -> None:
-    reach = box.reach + AROUND
-    spacing = 2 * reach / 16
-    moves = np.array(field.moves)
-    colours = [MOVE_COLOURS[move] for move in moves]
-    longest = max(float(np.hypot(*field.ways.T).max()), 1e-9)
-    ways = 0.9 * spacing * field.ways / longest
-    axes.add_patch(PathPatch(_outline(box), fc="#E69F00", ec="black", alpha=0.75))
-    for place in field.others:
-        axes.add_patch(Circle((place[0], place[1]), radius, fc="#bbbbbb", ec="#777777"))
-    axes.quiver(
-        *field.points[:, :2].T, *ways.T, color=colours,
-        angles="xy", scale_units="xy", scale=1.0, width=0.006, headwidth=4, headlength=4.5,
-    )  # fmt: skip
-    for move, turning in (("turns", True), ("rests", False)):
-        here = moves == move
-        if not here.any():
-            continue
-        look: dict[str, Any] = {"color": MOVE_COLOURS[move], "ls": ""}
-        if not turning:
-            axes.plot(*field.points[here, :2].T, marker=".", ms=3, **look)
-            continue
-        for sign, marker in ((1, r"$\circlearrowleft$"), (-1, r"$\circlearrowright$")):
-            own = here & (np.sign(field.turns) == sign)
-            axes.plot(*field.points[own, :2].T, marker=marker, ms=7, **look)
-    axes.arrow(0, 0, 0.6 * box.reach, 0, width=0.004, head_width=0.02, color="black")
-    axes.text(0.25 * box.reach, 0.03, "to the goal", ha="center", fontsize=7)
-    axes.set_xlim(-reach - spacing, reach + spacing)
-    axes.set_ylim(-reach - spacing, reach + spacing)
-    axes.set_box_aspect(1.0)  # a square of equal lengths; `set_aspect` would cut the title off
-    axes.set_title(f"robot {field.robot + 1}; longest arrow {1000 * longest:.0f} mm", loc="left")
-    axes.set_xlabel("along the course to the goal [m]")
-
-
-def _outline(box: BoxSpec) -> Outline:
-    if box.polygon is None:
-        return Outline.circle((0, 0), box.radius)
-    rings = [np.array(r.coords) for r in (box.polygon.exterior, *box.polygon.interiors)]
-    return Outline.make_compound_path(*(Outline(ring, closed=True) for ring in rings))
-
-
-def _bodies(wheels: tuple[str, ...], bodies: Bodies) -> Figure:
+def _bodies(actuators: tuple[str, ...], bodies: Bodies) -> Figure:
     moments = bodies.moments
-    robots = min(len(moments["built"]), MOST_BODIES)
+    n_bodies = min(len(moments["built"]), MOST_BODIES)
     every = [effect for effects in moments.values() for effect in effects]
     # What no body does is not drawn: a joint can but turn.
     rows = [k for k in range(len(ROWS)) if any(effect[k, :-1].any() for effect in every)]
-    figure = Figure(figsize=(8.0, 1.9 * robots + 0.6), layout="constrained")
-    panels = figure.subplots(robots, len(rows), squeeze=False)
-    # All robots on one scale, and ahead and left too, which have one unit.
+    figure = Figure(figsize=(8.0, 1.9 * n_bodies + 0.6), layout="constrained")
+    panels = figure.subplots(n_bodies, len(rows), squeeze=False)
+    # All bodies on one scale, and ahead and left too, which have one unit.
     extent = {unit: [0.0] for _, unit in ROWS}
     for effect in every:
         for row, (_, unit) in enumerate(ROWS):
             extent[unit] += effect[row, :-1].tolist()
     limits = {name: (1.08 * min(extent[unit]), 1.08 * max(extent[unit])) for name, unit in ROWS}
-    for r, (axes_row, own) in enumerate(zip(panels, by_robot(bodies, wheels), strict=False)):
+    for r, (axes_row, own) in enumerate(zip(panels, by_body(bodies, actuators), strict=False)):
         names = [name.rpartition(".")[2] for name in own]
         for axes, row in zip(axes_row, rows, strict=True):
             name, unit = ROWS[row]
@@ -211,7 +140,7 @@ def _bodies(wheels: tuple[str, ...], bodies: Bodies) -> Figure:
             axes.set_ylim(limits[name])
             if r == 0:
                 axes.set_title(f"{name} [{unit} per m/s]", loc="left")
-        axes_row[0].set_ylabel(body_name(own, r))
+        axes_row[0].set_ylabel(body_name(own))
     handles, titles = panels[0][0].get_legend_handles_labels()
     figure.legend(handles, titles, loc="outside lower center", ncols=3, frameon=False)
     return figure

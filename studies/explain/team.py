@@ -12,27 +12,25 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 from rich.progress import track
 
 from ...core.agents.team import Team, of_fuzzy_agents
-from ...core.interface.protocols import Scenario
+from ...core.interface.scenario import Scenario
 from ...core.interface.spaces import Variable
 from ...core.learners import LearnerSettings
 from ...core.plugins.messages import closest
 from ...core.rules.rule_base import RuleBase
-from ...scenarios.box_pushing.scenario import BoxPushing
 from ..spec.errors import SpecError
 from ..store.schema import STAGE, columns
 from ..store.store import Store
 from ..trials.keeping import spec_of
 from ..trials.session import Session
 from ..trials.trial import Trial, trials_of
-from . import policy as explain_policy
 from . import rules as explain_rules
 from .body import Bodies
-from .policy import Field
 from .rules import Parts
 
 
@@ -44,25 +42,26 @@ class Explained:
     ----------
     trial
         The trial that it was trained in.
-    agents, wheels
-        Its agents and the robots' wheels by name; mostly the same.
+    agents, actuators
+        Its agents and what moves the bodies, by name; mostly the same.
     rules, variables
         The rule base that all of them have, and its state variables.
     parts
         What each agent's f consists of.
-    fields
-        What robots do around the box; or why that is not known.
+    policy
+        What its scenario shows of what it does: text by ``lines()``, a drawing by ``figure()``; or
+        why there is none.
     bodies
-        What robots believed their wheels to do; none: they have no self-model.
+        What bodies believed their actuators to do; none: they have no self-model.
     """
 
     trial: Trial
     agents: tuple[str, ...]
-    wheels: tuple[str, ...]
+    actuators: tuple[str, ...]
     rules: RuleBase
     variables: tuple[Variable, ...]
     parts: tuple[Parts, ...]
-    fields: list[Field] | str
+    policy: Any
     bodies: Bodies | None
 
 
@@ -110,21 +109,22 @@ def _explained(store: Store, trial: Trial) -> Explained:
     rules = RuleBase.build(scenario.state_space, learner.rule_base)
     taken = [explain_rules.take_apart(rules, theta) for theta in team.learner.theta]
     parts = tuple(taken[row] for row in team.rows)
-    fields: list[Field] | str
-    world = trial.settings.scenario.build()
-    if not isinstance(world, BoxPushing):
-        fields = "the scenario has no robots around a box"
-    elif not isinstance(scenario, BoxPushing):
-        fields = "its agents are no wheels"
-    elif team.evaluator is None:
-        fields = "actions are drawn at random"
-    else:
-        try:
-            fields = explain_policy.fields(team, scenario)
-        except ValueError as error:
-            fields = str(error)
     variables = scenario.state_space.variables
-    return Explained(trial, scenario.agents, world.agents, rules, variables, parts, fields, bodies)
+    actuators = trial.settings.scenario.build().agents
+    policy = _policy(team, scenario)
+    return Explained(trial, scenario.agents, actuators, rules, variables, parts, policy, bodies)
+
+
+def _policy(team: Team, scenario: Any) -> Any:
+    """Return what a scenario shows of what a team does, or why it does not."""
+    if not hasattr(scenario, "show_policy"):
+        return "the scenario does not show what agents such as these do"
+    if team.evaluator is None:
+        return "actions are drawn at random"
+    try:
+        return scenario.show_policy(team)
+    except ValueError as error:
+        return str(error)
 
 
 def _trained(store: Store, trial: Trial) -> tuple[Team, Scenario, Bodies | None]:

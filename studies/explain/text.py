@@ -8,7 +8,6 @@ from textwrap import fill
 import numpy as np
 
 from . import body as explain_body
-from . import policy as explain_policy
 from . import rules as explain_rules
 from .rules import percent
 from .team import Explained
@@ -33,18 +32,10 @@ def text(found: Explained, agents: int | None = None) -> Iterator[str]:
     yield from _functions(found, len(found.agents) if agents is None else agents)
     yield "POLICY"
     yield ""
-    if isinstance(found.fields, str):
-        yield f"Not drawn: {found.fields}."
+    if isinstance(found.policy, str):
+        yield f"Not drawn: {found.policy}."
     else:
-        yield from _wrapped(
-            "What a robot does that stands at rest around the box and looks at it, the goal "
-            "60 cm ahead of the box, the other robots behind it."
-        )
-        yield ""
-        yield from explain_policy.table(found.fields)
-        left = len(found.fields[0].others) + 1 - len(found.fields)
-        if left:
-            yield f"{left} more robots are not shown."
+        yield from found.policy.lines()
     yield ""
     yield "SELF-MODEL"
     yield ""
@@ -111,12 +102,12 @@ def _bodies(found: Explained) -> Iterator[str]:
     bodies = found.bodies
     if bodies is None:
         yield from _wrapped(
-            "None: predictions take every robot for what it was built as "
+            "None: predictions take every body for what it was built as "
             "(learner.self_model.enabled = false)."
         )
         return
-    said = list(explain_body.verdicts(bodies, found.wheels))
-    yield from said or ["No wheel is taken to drive otherwise than it was built to."]
+    verdicts = list(explain_body.verdicts(bodies, found.actuators))
+    yield from verdicts or ["No actuator is taken to drive otherwise than it was built to."]
     yield ""
     moments = {
         "built": "as built",
@@ -124,14 +115,13 @@ def _bodies(found: Explained) -> Iterator[str]:
         "after": "after all training",
     }
     yield from _wrapped(
-        "What a wheel does to the motion of its robot, or a joint to itself, per unit of its "
-        "commanded speed: metres per second ahead and to the left, radians per second. Wheels that "
-        "are driven alike most of "
-        "the time are hardly distinguished. Shown: "
+        "What an actuator does to the motion of its body per unit of its commanded speed: metres "
+        "per second ahead and to the left, radians per second. Actuators that are driven alike "
+        "most of the time are hardly distinguished. Shown: "
         f"{', '.join(moments[m] for m in bodies.moments)}."
     )
     yield ""
-    yield from explain_body.table(bodies, found.wheels)
+    yield from explain_body.table(bodies, found.actuators)
 
 
 def _wrapped(sentence: str) -> Sequence[str]:

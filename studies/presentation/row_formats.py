@@ -14,7 +14,7 @@ from shutil import get_terminal_size
 from textwrap import wrap
 from typing import Any, Literal, TextIO
 
-from ...core.interface.protocols import Measure
+from ...core.interface.measures import Measure
 from .csv_text import write_csv
 
 Format = Literal["table", "csv", "json"]

@@ -2,6 +2,6 @@
 
 `page` gathers what the template ``page.html.jinja`` shows; `words` puts it in sentences, `tables`
 in rows, `pictures` are the study's own figures, `replays` its recorded episodes, packed for the
-canvas that ``replay.js`` draws. Whatever the study, its `analyse`, `notes` and `draw` are all that
-is asked of it. Equal results, written by equal software, give equal bytes.
+canvas that the scenario's player draws. Whatever the study, its `analyse`, `notes` and `draw` are
+all that is asked of it. Equal results, written by equal software, give equal bytes.
 """

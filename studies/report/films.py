@@ -1,7 +1,7 @@
 """Recorded episodes as animations, where the canvas of a report cannot play them.
 
-The canvas knows robots that push a box. Any other scenario that draws its episodes, one's own
-included, has them drawn as it does itself (`DrawnScenario`).
+Any scenario without a player that draws its episodes, one's own included, has them drawn as it does
+itself (`can_draw`).
 """
 
 from __future__ import annotations
@@ -11,8 +11,9 @@ import tempfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from ...core.interface.protocols import DrawnScenario
+from ...core.interface.scenario import can_draw
 from ..spec.errors import SpecError
 from ..store.store import Planned, Store
 from ..trials.keeping import spec_of
@@ -69,8 +70,8 @@ def _trials(store: Store) -> Mapping[str, Trial]:
 
 def _drawn(store: Store, trial: Trial) -> bytes:
     """Return the GIF of a trial's last episode; nothing if its scenario cannot."""
-    scenario = trial.world()
-    if not isinstance(scenario, DrawnScenario) or LAST not in trial.recorded.values():
+    scenario: Any = trial.world()
+    if not can_draw(scenario) or LAST not in trial.recorded.values():
         return b""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "episode.gif"

@@ -70,7 +70,7 @@ def page(directory: Path) -> str:
         outdated=version != str(RESULTS_VERSION),
         css=_own("page.css"),
         js=_own("page.js"),
-        replay_js=_own("replay.js"),
+        replay_js=Markup(packed.script),
     )
 
 

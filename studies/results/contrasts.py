@@ -8,7 +8,7 @@ from textwrap import wrap
 
 import numpy as np
 
-from ...core.interface.protocols import Measure
+from ...core.interface.measures import Measure
 from ...core.plugins.messages import closest
 from ..spec.errors import SpecError
 from ..spec.labels import label

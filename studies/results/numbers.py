@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ...core.interface.protocols import Measure
+from ...core.interface.measures import Measure
 
 
 class Number(NamedTuple):

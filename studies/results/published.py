@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.interface.protocols import SUCCESS, Measure
+from ...core.interface.measures import SUCCESS, Measure
 from ..spec.errors import SpecError
 from ..spec.outline import Outline
 from ..store import durable

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.interface.protocols import SUCCESS, Measure
+from ...core.interface.measures import SUCCESS, Measure
 from ..store.schema import AFTER, ELSEWHERE
 from ..store.store import Store
 

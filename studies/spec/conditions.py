@@ -11,17 +11,20 @@ import itertools
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
-from pydantic import Field, ValidationError
+from pydantic import Field, SerializerFunctionWrapHandler, ValidationError, model_serializer
 
+from ...core.agents.joint_agents import Agents, join_agents
+from ...core.interface.hierarchy import Hierarchy
+from ...core.interface.scenario import Scenario, groups_of
 from ...core.learners import LEARNERS, TeamSettings
 from ...core.learners.batch import BatchTDSettings
 from ...core.plugins.messages import closest
 from ...core.plugins.plugged import Plugged
 from ...core.plugins.settings import ScenarioSettings, Settings, tuples
-from ...scenarios import SCENARIOS
-from ...scenarios.box_pushing.config import BoxPushingSettings
+from ...scenarios import DEFAULT, SCENARIOS
+from ...topologies import build
 from ...topologies.config import ChainSettings, Topology, parse
 from ..errors import SpecError, show
 from .curriculum import Curriculum, Name, Stage, StageSettings
@@ -36,9 +39,34 @@ SECTIONS = ("scenario", "topology", "learner")
 class ConditionSettings(Settings):
     """All that a trial depends on besides its seed and its length."""
 
-    scenario: Annotated[ScenarioSettings, Plugged(SCENARIOS)] = BoxPushingSettings()
+    scenario: Annotated[ScenarioSettings, Plugged(SCENARIOS)] = Field(
+        default_factory=lambda: cast(ScenarioSettings, SCENARIOS.parsed(DEFAULT))
+    )
+    agents: Agents = "actuator"
     topology: Topology = ChainSettings()
     learner: Annotated[TeamSettings, Plugged(LEARNERS)] = BatchTDSettings()
+
+    @model_serializer(mode="wrap")
+    def _table(self, handler: SerializerFunctionWrapHandler) -> TomlTable:
+        """Leave out the agents where there is one for every actuator.
+
+        Versions before there was a choice wrote no more, and identities of trials stay as they are.
+        """
+        table: TomlTable = handler(self)
+        if self.agents == "actuator":
+            del table["agents"]
+        return table
+
+    def arrange(self, world: Scenario) -> tuple[Scenario, Hierarchy]:
+        """Return a world as the agents see it, and their hierarchy.
+
+        Raises
+        ------
+        ValueError
+            If agents or topology do not fit the world; one line that names the culprit.
+        """
+        scenario = join_agents(world, self.agents)
+        return scenario, build(self.topology, scenario.agents, groups_of(scenario))
 
     def canonical(self) -> str:
         """Return the JSON text that equal settings share, whatever wrote them."""
@@ -56,6 +84,8 @@ class Override(Settings):
     """The preset under its tables; none: the spec's."""
     scenario: Mapping[str, Any] = Field(default_factory=dict)
     """Laid over the spec's scenario."""
+    agents: Agents | None = None
+    """In place of the spec's; none: the spec's."""
     topology: Mapping[str, Any] = Field(default_factory=dict)
     """Laid over the spec's topology."""
     learner: Mapping[str, Any] = Field(default_factory=dict)
@@ -64,11 +94,6 @@ class Override(Settings):
     """Lists of values by dotted key, for this override alone."""
     curriculum: Curriculum | None = None
     """Stages in place of the spec's; none: the spec's."""
-
-    @property
-    def tables(self) -> Mapping[str, TomlTable]:
-        """The tables by section."""
-        return {name: dict(getattr(self, name)) for name in SECTIONS}
 
 
 @dataclass(frozen=True)
@@ -104,9 +129,16 @@ class Condition:
         return [self.settings.model_dump(mode="json"), *elsewhere, *stages]
 
 
+def layer_of(settings: Settings) -> TomlTable:
+    """Return what a spec or an override lays over what is below it: its sections and agents."""
+    layer: TomlTable = {name: dict(getattr(settings, name)) for name in SECTIONS}
+    agents = getattr(settings, "agents", None)
+    return layer if agents is None else layer | {"agents": agents}
+
+
 def grid(
     preset: str,
-    tables: Mapping[str, TomlTable],
+    tables: Mapping[str, Any],
     sweep: Mapping[str, Sequence[Any]],
     overrides: Sequence[Override] = (),
     evaluations: Mapping[str, Mapping[str, Any]] | None = None,
@@ -119,7 +151,7 @@ def grid(
     preset
         Name of the preset under conditions that name none.
     tables
-        The spec's own `scenario`, `topology` and `learner` tables.
+        The spec's own layer, see `layer_of`.
     sweep
         Lists of values by dotted key.
     overrides
@@ -175,7 +207,7 @@ def _points(
 
 def resolve(
     preset: str,
-    tables: Mapping[str, TomlTable],
+    tables: Mapping[str, Any],
     point: Mapping[str, Any],
     where: str = "",
     override: Override | None = None,
@@ -185,7 +217,7 @@ def resolve(
     name = point.get("preset", preset if own is None else own)
     if not isinstance(name, str) or name not in PRESETS:
         raise SpecError(f"preset = {show(name)}: {closest(name, PRESETS)}{where}")
-    own_layers = [tables, override.tables if override else {}]
+    own_layers = [tables, layer_of(override) if override else {}]
     own_layers += [nested(key, value) for key, value in point.items() if key != "preset"]
     table = _laid([PRESETS[name].table, *own_layers])
     scenario = _validated({"scenario": table["scenario"]}, where).scenario
@@ -198,7 +230,7 @@ def _laid(layers: Sequence[Mapping[str, Any]]) -> TomlTable:
     """Return the table of layers, each over the one before, the first over the defaults."""
     table = ConditionSettings().model_dump()
     for layer in layers:
-        expanded = {key: section(key, value) for key, value in layer.items()}
+        expanded = {k: section(k, v) if k in SECTIONS else v for k, v in layer.items()}
         table = overlay(table, expanded, ConditionSettings)
     return table
 

@@ -1,7 +1,7 @@
 """The spec of a study, as it stands in a TOML file.
 
 ``study``, ``preset``, ``seeds``, ``episodes``, ``steps``, ``evaluation``,
-``evaluation_steps``, then the tables
+``evaluation_steps``, ``agents``, then the tables
 ``[scenario]``, ``[topology]``, ``[learner]``, laid over the preset. What is compared:
 ``[[overrides]]``, further tables by name, and ``[sweep]``, lists of values by dotted key; the
 conditions are their combinations. ``[[curriculum]]`` are stages of training before that of the
@@ -19,11 +19,12 @@ from typing import Annotated, Any
 
 from pydantic import Field, PrivateAttr, ValidationError, field_validator
 
+from ...core.agents.joint_agents import Agents
 from ...core.plugins.messages import closest
 from ...core.plugins.settings import Settings, tuples
 from ...core.plugins.sources import Sources, is_reference, named
 from ..errors import SpecError, show
-from .conditions import SECTIONS, Condition, ConditionSettings, Override, grid, section
+from .conditions import SECTIONS, Condition, ConditionSettings, Override, grid, layer_of, section
 from .curriculum import Curriculum, Length, Name
 from .objects import plain
 from .overlay import TomlTable, assignment, flat, overlay
@@ -72,6 +73,8 @@ class Spec(Settings):
     """Most decisions in an episode of evaluation; as in training unless it is said."""
     scenario: Mapping[str, Any] = Field(default_factory=dict)
     """Laid over the preset's scenario."""
+    agents: Agents | None = None
+    """What there is one agent for: each actuator (unless said otherwise), each body, the team."""
     topology: Mapping[str, Any] = Field(default_factory=dict)
     """Laid over the preset's topology; may be written as a string."""
     learner: Mapping[str, Any] = Field(default_factory=dict)
@@ -163,10 +166,10 @@ class Spec(Settings):
         if points * len(spec.seeds) > MOST_TRIALS:
             grid_size = f"{points} conditions x {len(spec.seeds)} seeds"
             raise SpecError(f"sweep: {grid_size}, at most {MOST_TRIALS} trials")
-        tables = {name: getattr(spec, name) for name in SECTIONS}
         spec._conditions = grid(
-            spec.preset, tables, spec.sweep, spec.overrides, spec.evaluations, spec.curriculum
-        )
+            spec.preset, layer_of(spec), spec.sweep, spec.overrides, spec.evaluations,
+            spec.curriculum,
+        )  # fmt: skip
         spec._sources = sources.only(
             named([spec.study, *(condition.tables for condition in spec._conditions)])
         )
@@ -293,8 +296,8 @@ def _read(table: Mapping[str, Any], where: str) -> TomlTable:
 def _sweep(table: Mapping[str, Any], where: str) -> Iterable[tuple[str, Any]]:
     for key, values in flat(table):
         head, _, tail = key.partition(".")
-        if key not in ("preset", "topology") and not (head in SECTIONS and tail):
-            known = [*(f"{name}.*" for name in SECTIONS), "preset", "topology"]
+        if key not in ("preset", "agents", "topology") and not (head in SECTIONS and tail):
+            known = [*(f"{name}.*" for name in SECTIONS), "preset", "agents", "topology"]
             hint = misplaced(key, ConditionSettings) or closest(key, known)
             raise SpecError(f"{where}.{key}: unknown key; {hint}")
         if not isinstance(values, list | tuple) or not values:

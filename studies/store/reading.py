@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
-from ...core.interface.protocols import Measure
+from ...core.interface.measures import Measure
 from ..errors import SpecError
 from . import database, integrity
 from .database import DATABASE

@@ -16,7 +16,7 @@ from itertools import groupby
 from operator import itemgetter
 from typing import Any, NamedTuple
 
-from ...core.interface.protocols import Measure
+from ...core.interface.measures import Measure
 from .database import insert, quoted
 
 RESULTS_VERSION = 4

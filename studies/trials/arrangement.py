@@ -14,7 +14,8 @@ from ...core.agents.loop import policy_seed
 from ...core.agents.rows import carried_rows
 from ...core.agents.team import Team, of_fuzzy_agents
 from ...core.interface.acting import Actors
-from ...core.interface.protocols import Measure, Scenario, measures_of
+from ...core.interface.measures import Measure, measures_of
+from ...core.interface.scenario import Scenario
 from ...core.learners import LearnerSettings, TeamSettings
 from ...core.numerics.arrays import IntArray
 from ...core.plugins.settings import ScenarioSettings
@@ -76,7 +77,7 @@ def arrange(settings: ConditionSettings, seed: int) -> Arrangement:
         If the settings do not fit together; one line.
     """
     world = settings.scenario.build()
-    scenario, hierarchy = settings.topology.arrange(world)
+    scenario, hierarchy = settings.arrange(world)
     learner, source = settings.learner, policy_seed(seed)
     if isinstance(learner, LearnerSettings):
         team: Actors = Team.build(learner, scenario, hierarchy, source)

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.interface.protocols import Measure, RecordedScenario, Transition
+from ...core.interface.measures import Measure
+from ...core.interface.scenario import RecordedScenario, Transition
 from ..store.durable import Recording
 
 if TYPE_CHECKING:

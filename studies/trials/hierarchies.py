@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...core.agents.cost import below_counts
-from ...core.interface.protocols import groups_of
+from ...core.interface.scenario import groups_of
 from ...topologies.view import HierarchyView
 from ..errors import SpecError
 from ..spec.conditions import Condition
@@ -31,7 +31,7 @@ def views(spec: Spec) -> list[HierarchyView]:
 
 def _view(condition: Condition) -> HierarchyView:
     settings = condition.settings
-    scenario, hierarchy = settings.topology.arrange(settings.scenario.build())
+    scenario, hierarchy = settings.arrange(settings.scenario.build())
     actions = len(scenario.action_set)
     tries = tuple(actions ** (1 + below) for below in below_counts(hierarchy))
     return HierarchyView(condition.label, hierarchy, groups_of(scenario), tries)

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-from ...core.interface.protocols import Measure
+from ...core.interface.measures import Measure
 from ...core.plugins.sources import FOLDER, kept_name
 from ..spec.outline import sources_of
 from ..spec.spec import Spec

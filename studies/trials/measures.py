@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from ...core.interface.protocols import Measure
+from ...core.interface.measures import Measure
 from ..errors import SpecError
 from ..store.schema import AFTER, BEFORE
 

@@ -6,10 +6,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from time import perf_counter
 
-from ...core.agents.loop import EpisodicScenario, StepRecord, control_loop, world_seed
+from ...core.agents.loop import StepRecord, control_loop, world_seed
 from ...core.agents.team import Team
 from ...core.interface.acting import Actors
-from ...core.interface.protocols import Measure, RecordedScenario, measures_of
+from ...core.interface.measures import Measure, measures_of
+from ...core.interface.scenario import RecordedScenario
 from ...core.plugins.settings import ScenarioSettings
 from ..store.durable import Recording
 from ..store.schema import ELSEWHERE, STAGE
@@ -202,7 +203,7 @@ class Session:
     ) -> bool:
         """Run whole episodes compiled and keep their rows, or return that it cannot be done."""
         scenario = there.scenario
-        if not isinstance(scenario, EpisodicScenario) or not isinstance(there.team, Team):
+        if not hasattr(scenario, "run_episode") or not isinstance(there.team, Team):
             return False
         for episode in range(first, first + episodes):
             begin = perf_counter()

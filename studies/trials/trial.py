@@ -9,7 +9,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-from ...core.interface.protocols import Measure, Scenario
+from ...core.interface.measures import Measure
+from ...core.interface.scenario import Scenario
 from ...core.plugins.settings import ScenarioSettings
 from ...core.plugins.sources import Sources, named
 from ..spec.conditions import ConditionSettings
@@ -131,7 +132,7 @@ class Trial:
     def recorded(self) -> dict[int, str]:
         """Names of the training episodes that are recorded, by number.
 
-        The first and the last; if a wheel fails, also the one before, and the one in which it does.
+        The first and the last; if something is scheduled to fail, also that one and the one before.
         """
         named = {}
         onset = self.settings.scenario.onset

@@ -9,7 +9,8 @@ import made_up
 import numpy as np
 import pytest
 
-from nested_agents.core.interface.protocols import SUCCESS, Measure, groups_of
+from nested_agents.core.interface.measures import SUCCESS, Measure
+from nested_agents.core.interface.scenario import groups_of
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.line_up import LineUp, LineUpSettings
 from nested_agents.studies.api.study import load
@@ -232,7 +233,7 @@ def test_results_of_an_older_version_are_not_read(study, monkeypatch):
 
 
 def test_the_world_is_asked_and_not_what_agents_see_of_it(carts):
-    spec = Spec.of(SPEC.table() | {"topology": {"kind": "single-agent"}})
+    spec = Spec.of(SPEC.table() | {"agents": "team"})
     session = Session(trials_of(spec)[1])
     assert session.scenario is not session.world
     assert len(groups_of(session.world)) == 2

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 import nested_agents as na
 from nested_agents.core.interface.hierarchy import Hierarchy
-from nested_agents.core.interface.protocols import SUCCESS
+from nested_agents.core.interface.measures import SUCCESS
 from nested_agents.studies.catalogue.learning_curve.analysis import metrics_of
 from nested_agents.studies.catalogue.scaling import analyse as analyse_scaling
 from nested_agents.studies.catalogue.wheel_failure import analyse as analyse_failures
@@ -105,7 +105,7 @@ def test_a_failure_after_the_last_episode_is_refused(tmp_path, capsys) -> None:
         (lambda: na.BoxPushingSettings(robot=4), "robot = 4: .*; did you mean 'robots'"),
         (lambda: na.BoxPushingSettings(box="hexagn").build(), "did you mean 'hexagon'"),
         (lambda: na.parse_topology(None), "topology None: must be a name, a file or a table"),
-        (lambda: na.build_hierarchy(na.TopologySettings(), "ab"), "is not of these 2 agents"),
+        (lambda: na.build_hierarchy(na.TopologySettings(), "ab"), "has no kind"),
         (lambda: na.parse_topology({"kind": "tems"}), "did you mean 'teams'"),
         (lambda: na.parse_topology({"members": 3}), "topology.members = 3: must be a list"),
     ],
@@ -130,7 +130,9 @@ def test_files_of_teams_are_topologies(tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "teams.json").write_text('{"members": [["a", "b"], ["c", ["d", "e"]]]}')
     (tmp_path / "teams.toml").write_text('link = "star"\nmembers = [["a", "b"], ["c", "d"]]\n')
-    (tmp_path / "spec.toml").write_text('[sweep]\ntopology = ["chain", "teams", "per-robot"]\n')
+    (tmp_path / "spec.toml").write_text(
+        '[sweep]\nagents = ["actuator", "body"]\ntopology = ["chain", "teams"]\n'
+    )
     hierarchy = na.build_hierarchy("teams.json", list("abcde"))
     assert hierarchy.edges == ((0, 1), (0, 2), (2, 3), (3, 4))
     for name, shown in (("teams.json", "5 agents, depth 4"), ("teams.toml", "4 agents, depth 3")):
@@ -139,7 +141,10 @@ def test_files_of_teams_are_topologies(tmp_path, monkeypatch, capsys) -> None:
         assert (tmp_path / f"{name}.svg").exists()
     assert main(["topology", "show", "spec.toml", "--plot", "all.svg"]) == 0
     out = capsys.readouterr().out
-    assert ["chain:" in out, "teams:" in out, "per-robot: 2 agents" in out] == [True] * 3
+    assert [line.partition(", depth")[0] for line in out.splitlines() if "depth" in line] == [
+        "agents=actuator, topology=chain: 4 agents", "agents=actuator, topology=teams: 4 agents",
+        "agents=body, topology=chain: 2 agents",
+    ]  # fmt: skip
     assert {path.name for path in tmp_path.glob("all*")} == {f"all-{k}.svg" for k in (1, 2, 3)}
     assert main(["topology", "show", "spec.toml", "--agents", "4"]) == 2
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
+from nested_agents.core.agents.joint_agents import join_agents
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.settings import Decision
@@ -18,11 +19,11 @@ from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.learners.td import TDLambdaSettings
 from nested_agents.core.rules.settings import RuleBaseSettings
 from nested_agents.scenarios.line_up import LineUp, LineUpSettings
-from nested_agents.topologies import TOPOLOGIES, Topology, build, parse
+from nested_agents.topologies import TOPOLOGIES, Topology, build
 
 ADAPTER = TypeAdapter(Topology)
 SIZES = (2, 4, 6, 8)
-KINDS = [*sorted(TOPOLOGIES.built_in.keys() - {"single-agent", "per-robot"}), "pairs.py:pairs"]
+KINDS = [*sorted(TOPOLOGIES.built_in), "pairs.py:pairs"]
 LEARNER = TDLambdaSettings(
     step_size=0.1,
     rule_base=RuleBaseSettings(order=1),
@@ -132,7 +133,8 @@ def decided_values(team: Team, theta: np.ndarray, prediction) -> np.ndarray:
 
 @pytest.mark.parametrize("n", [2, 4])
 def test_the_single_agent_acts_learns_saves_and_loads(n: int, tmp_path: Path) -> None:
-    scenario, hierarchy = parse("single-agent").arrange(LineUp(LineUpSettings(carts=n)))
+    scenario = join_agents(LineUp(LineUpSettings(carts=n)), "team")
+    hierarchy = build("chain", scenario.agents)
     team = Team.build(LEARNER, scenario, hierarchy, policy_seed(0))
     joint_actions = steps(scenario, team)
     assert max(map(max, joint_actions)) < 4**n

@@ -11,7 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
-from nested_agents.core.agents.joint_agents import JointAgents
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.topologies import (
     TOPOLOGIES,
@@ -103,8 +102,10 @@ REFUSED = {
     "nothing.py:f": "topology 'nothing.py:f': nothing.py: No such file or directory",
     "chian": "topology 'chian': did you mean 'chain'? known: chain, coordination-graph, edges,",
     "": "topology '': known: chain,",
-    "single-agent": "topology 'single-agent': is not of these 4 agents; see `arrange`",
-    "per-robot": "topology 'per-robot': is not of these 4 agents; see `arrange`",
+    "single-agent": "topology 'single-agent': who the agents are has a key of its own: "
+    "agents = 'team'",
+    "per-robot": "topology 'per-robot': who the agents are has a key of its own: agents = 'body', "
+    "topology = 'chain'",
 }
 
 
@@ -207,15 +208,6 @@ def test_groups_may_be_arrays() -> None:
 def test_no_agents_are_refused(text: str) -> None:
     with pytest.raises(ValueError, match=f"^topology '{text}': no agents$"):
         build(parse(text), ())
-
-
-def test_the_single_agent_sees_a_scenario_of_its_own(line_world) -> None:
-    world = line_world(2, 1)
-    scenario, hierarchy = parse("single-agent").arrange(world)
-    assert isinstance(scenario, JointAgents)
-    assert (scenario.agents, scenario.whole) == (("single",), True)
-    assert hierarchy.agents == scenario.agents
-    assert parse("chain").arrange(world)[0] is world
 
 
 def graph_files(folder: Path) -> dict[str, Path]:

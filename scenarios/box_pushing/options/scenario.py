@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from ....core.interface.protocols import Transition
+from ....core.interface.scenario import Transition
 from ....core.interface.spaces import ActionSet, StateSpace, Variable
 from ....core.numerics.arrays import FloatArray, IntArray
 from ..config import BoxPushingSettings, BoxTaskSettings

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ....core.interface.protocols import Transition
+from ....core.interface.scenario import Transition
 
 SHOWN = ("robot_poses", "box_pose", "wheel_speeds", "contact", "failed")
 

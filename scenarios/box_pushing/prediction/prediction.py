@@ -14,7 +14,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ....core.interface.protocols import Blocks
+from ....core.interface.prediction import Blocks
 from ....core.numerics.arrays import FloatArray, IntArray
 from ..states.view import View
 from ..world.infrared import expected_reading

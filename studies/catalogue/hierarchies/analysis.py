@@ -48,11 +48,11 @@ def check(spec: Spec) -> None:
     """Raise `SpecError` unless there are hierarchies to compare and episodes to compare them by."""
     if spec.evaluation < 1:
         raise SpecError("evaluation = 0: hierarchies compares evaluation success, needs 1 or more")
-    first, *others = (condition.settings.topology for condition in spec.conditions())
-    if all(other == first for other in others):
+    settings = [condition.settings for condition in spec.conditions()]
+    if len({(one.agents, one.topology.model_dump_json()) for one in settings}) < 2:
         raise SpecError(
-            f"topology = {first.title!r} in every condition: hierarchies needs two or more, sweep "
-            "topology"
+            f"topology = {settings[0].topology.title!r} in every condition: hierarchies needs two "
+            "or more, sweep topology"
         )
 
 

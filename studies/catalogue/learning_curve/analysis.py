@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from ....core.interface.protocols import SUCCESS, Measure
+from ....core.interface.measures import SUCCESS, Measure
 from ...results.results import Arrays, Results
 from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, rates
 from ...results.summary import EVALUATED, Summary, evaluated

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from ....core.interface.protocols import Measure
+from ....core.interface.measures import Measure
 from ...presentation.figures import COLOURS, SETTINGS, STYLES
 from ...results.statistics import Estimate
 from .analysis import LearningCurves

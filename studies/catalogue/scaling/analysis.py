@@ -21,15 +21,15 @@ from typing import Any
 import numpy as np
 
 from ....core.agents.team import of_fuzzy_agents
-from ....core.interface.protocols import groups_of
+from ....core.interface.scenario import groups_of
 from ...presentation.words import count
 from ...results.results import Results
 from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
 from ...results.summary import Summary, evaluated
 from ...spec.spec import Spec
-from ...trials.contact import ContactShares
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
+from ..contact import ContactShares
 from ..study import check_rule_bases
 
 TIMES = {"deciding": "decide [ms]", "learning": "learn [ms]"}

@@ -20,9 +20,9 @@ from ...results.summary import Summary
 from ...results.verdicts import power_lines
 from ...spec.errors import SpecError
 from ...spec.spec import Spec
-from ...trials.contact import ContactShares
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
+from ..contact import ContactShares
 
 TRAINED = "trained on"
 """How the box of training is called among the others."""

@@ -15,7 +15,7 @@ Case = tuple[str, Callable[[], Any], list[int]]
 
 
 @click.command()
-@click.argument("source", type=options.text, metavar="SPEC.toml|FILE.py:NAME")
+@click.argument("source", metavar="SPEC.toml|FILE.py:NAME")
 @click.option(
     "--steps",
     type=int,
@@ -30,14 +30,10 @@ def command(source: str, steps: int, changes: tuple[str, ...]) -> int:
     SPEC.toml is a spec, whose conditions are checked; FILE.py:NAME a function or class in a Python
     file that makes a scenario of one's own.
     """
-    from shutil import get_terminal_size
-    from textwrap import fill
-
-    from ....scenarios.checking.checker import LEAST_STEPS, ScenarioError, check_scenario
+    from ....scenarios.checking.checker import ScenarioError, check_scenario
     from ...spec.errors import SpecError
+    from ..display import print_wrapped
 
-    if steps < LEAST_STEPS:
-        raise SpecError(f"--steps {steps}: must be at least {LEAST_STEPS}")
     faults = 0
     for label, factory, episodes in _cases(source, changes):
         try:
@@ -48,8 +44,7 @@ def command(source: str, steps: int, changes: tuple[str, ...]) -> int:
         except ValueError as error:
             raise SpecError(str(error)) from None
         else:
-            told = f"passed  {label}: {', '.join(passed)}"
-            print(fill(told, get_terminal_size().columns, subsequent_indent=8 * " "))
+            print_wrapped(f"{label}: {', '.join(passed)}", "passed  ", 8)
     return 1 if faults else 0
 
 
@@ -69,10 +64,8 @@ def _cases(source: str, changes: tuple[str, ...]) -> Iterator[Case]:
         try:
             factory()
         except Exception as error:
-            said = " ".join(str(error).split())
-            raise SpecError(
-                f"{source}, called without arguments, raised {type(error).__name__}: {said}"
-            ) from None
+            message = f"raised {type(error).__name__}: {' '.join(str(error).split())}"
+            raise SpecError(f"{source}, called without arguments, {message}") from None
         yield source.rpartition(":")[2], factory, [0, 1]
         return
     seen: set[Any] = set()

@@ -1,4 +1,4 @@
-"""``nested-agents claims``: what the paper claims, and what was found of it."""
+"""``nested-agents claims``: what the paper claims, and the verdict on each."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 @click.command()
 @click.option(
     "--out",
-    type=options.path,
+    type=options.PATH,
     metavar="DIR",
     help="Run the studies that the claims rest on, each in a directory of its own below this one; "
     "what has been run before is read.",
@@ -35,18 +35,10 @@ if TYPE_CHECKING:
     default="table",
     help="How to print the table.",
 )
-@click.option(
-    "--publish",
-    type=options.path,
-    metavar="DIR",
-    help="Also write the results that it rests on, as one small JSON file a study.",
-)
-def command(
-    out: Path | None, quick: bool, jobs: int | None, form: Format, publish: Path | None
-) -> int:
+def command(out: Path | None, quick: bool, jobs: int | None, form: Format) -> int:
     """Print one table: each claim of the paper, its measure, the result, the verdict.
 
-    Without --out the table is made from the results that come with the program.
+    Without --out the table is made from the results that are committed in the repository.
     """
     from ...claims import claims
     from ...claims.table import print_claims
@@ -54,26 +46,28 @@ def command(
     from ...results import published
     from ...spec.errors import SpecError
 
-    if out is None:
-        for option, given in (("--quick", quick), ("--publish", publish), ("--jobs", jobs)):
-            if given is not None and given is not False:
-                raise SpecError(f"{option}: needs --out, the directory of the studies")
-        found = published.read(claims.PUBLISHED, claims.STUDIES_OF_CLAIMS)
+    if out is not None:
+        results = _run(out, quick=quick, jobs=jobs)
+    elif quick or jobs is not None:
+        raise SpecError(
+            f"{'--quick' if quick else '--jobs'}: needs --out, where to run the studies"
+        )
+    elif claims.PUBLISHED.is_dir():
+        results = published.read(claims.PUBLISHED, claims.STUDIES_OF_CLAIMS)
     else:
-        found = _run(out, quick=quick, jobs=jobs)
-    for study, of_study in found.items():
+        raise SpecError(
+            "claims: the committed results are in the repository, in studies/claims/published, "
+            "not in the installed package; with --out DIR the studies are run"
+        )
+    for study, of_study in results.items():
         if of_study.note:
             say(f"{study}: {of_study.note}")
-    if publish is not None:
-        publish.mkdir(parents=True, exist_ok=True)
-        for study, (outline, results, _) in found.items():
-            published.write(publish / f"{study}.json", outline, results)
-    print_claims(claims.judge({study: p.results for study, p in found.items()}), form)
+    print_claims(claims.judge({study: p.results for study, p in results.items()}), form)
     return 0
 
 
 def _run(out: Path, *, quick: bool, jobs: int | None) -> dict[str, Published]:
-    """Run the studies of the claims, or what is left of them; return what they found."""
+    """Run the studies of the claims, or what is left of them; return the results by study."""
     from ...api.run_study import run_study
     from ...claims import claims
     from ...presentation.progress import Terminal
@@ -83,7 +77,7 @@ def _run(out: Path, *, quick: bool, jobs: int | None) -> dict[str, Published]:
     from ...spec.outline import Outline
     from ...spec.spec import Spec
 
-    found = {}
+    results = {}
     for study in claims.STUDIES_OF_CLAIMS:
         name = study.replace("-", "_")
         folder = claims.QUICK if quick else claims.SPECS / name
@@ -94,5 +88,5 @@ def _run(out: Path, *, quick: bool, jobs: int | None) -> dict[str, Published]:
                     f"{out / study}: {len(failed)} trials failed: nested-agents status "
                     f"{out / study}"
                 )
-            found[study] = published.loads(published.dumps(Outline.kept(store), read(store)))
-    return found
+            results[study] = published.loads(published.dumps(Outline.kept(store), read(store)))
+    return results

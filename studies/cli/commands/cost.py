@@ -19,7 +19,6 @@ MOST_AGENTS = 10_000
 @click.command()
 @click.option(
     "--agents",
-    type=options.text,
     metavar="N|RANGE",
     default="4",
     help="Number of agents, or a range: 4, 1:16, 2:64:2.",
@@ -27,10 +26,9 @@ MOST_AGENTS = 10_000
 @click.option(
     "--topology",
     multiple=True,
-    type=options.text,
     metavar="SPEC...",
     default=("chain",),
-    help="One or more topologies as in a spec: chain teams tree:2 ...",
+    help="One or more topologies as in a spec: chain teams tree:2 ...; single-agent: Eq. 23.",
 )
 @click.option("--rules", type=int, metavar="N", default=5**7, help="|S|, rules of one agent.")
 @click.option("--actions", type=int, metavar="N", default=4, help="|A|, actions of one agent.")

@@ -12,7 +12,7 @@ from .. import options
 @click.command()
 @click.option(
     "--out",
-    type=options.path,
+    type=options.PATH,
     metavar="DIR",
     default="nested-agents-demo",
     help="Where to keep the study; made if it does not exist. The same command again continues it.",
@@ -27,7 +27,10 @@ def command(out: Path, jobs: int | None, print_spec: bool) -> int:
     if print_spec:
         print(text, end="")
         return 0
+    from ...api.study import run
+    from ...presentation.progress import Terminal
     from ...spec.spec import Spec
-    from ..running import run_and_show
+    from ..display import show_results
 
-    return run_and_show(Spec.parse(text), out, jobs=jobs, replay=True)
+    study = run(Spec.parse(text), out, jobs=jobs, observer=Terminal())
+    return show_results(study, with_replays=True)

@@ -13,7 +13,6 @@ from .. import options
 @options.directory
 @click.option(
     "--condition",
-    type=options.text,
     metavar="LABEL",
     help="Label of the condition; the first one unless said otherwise.",
 )
@@ -22,7 +21,7 @@ from .. import options
 )
 @options.trust
 def command(directory: Path, condition: str | None, seed: int | None, trust: bool) -> int:
-    """Explain a trained team: its rules in words, its policy around the box, its self-model.
+    """Explain a trained team: its rules in words, its policy, its self-model.
 
     DIR is where the study is kept. Text and figures go into its folder explain. Training is run
     again for it, which takes seconds, and must give the episodes that are kept.
@@ -34,7 +33,7 @@ def command(directory: Path, condition: str | None, seed: int | None, trust: boo
     from ...presentation.progress import say
     from ...store import durable
     from ...store.store import Store
-    from ..trusting import trust_files
+    from ..loading import trust_files
 
     if trust:
         trust_files(directory)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--out",
-    type=options.path,
+    type=options.PATH,
     metavar="PATH",
     help="Folder of the files; export in the study's own unless said otherwise.",
 )

@@ -4,32 +4,27 @@ from __future__ import annotations
 
 import click
 
-from .. import options
-
 
 @click.command()
-@click.argument("prefix", type=options.text, metavar="[PREFIX]", required=False)
+@click.argument("prefix", metavar="[PREFIX]", required=False)
 def command(prefix: str | None) -> int:
     """List the keys of a spec: default, type, what is allowed, meaning.
 
-    A spec begins from the preset default; where that has another value than the key, both are told.
+    A spec begins from the preset default; where that has another value, both are listed.
 
     PREFIX is a table or a key, such as learner.rule_base or scenario.box.mass.
     """
-    from shutil import get_terminal_size
-    from textwrap import fill
-
     from ...spec.errors import SpecError
     from ...spec.keys import keys_below, nearest
+    from ..display import print_wrapped
 
-    found = keys_below(prefix or "")
-    if not found:
+    tables = keys_below(prefix or "")
+    if not tables:
         raise SpecError(f"{prefix}: there is no such key; {nearest(prefix or '')}")
-    width = get_terminal_size().columns
-    for number, table in enumerate(found):
+    for number, table in enumerate(tables):
         print(*[""] * bool(number), table.heading, sep="\n")
         for key in table.keys:
-            told = ", ".join(filter(None, [key.type, key.allowed, key.unit and f"[{key.unit}]"]))
-            print(fill(f"{key.name} = {key.value}: {told}", width, subsequent_indent="    "))
-            print(fill(key.meaning, width, initial_indent="    ", subsequent_indent="    "))
+            words = ", ".join(filter(None, [key.type, key.allowed, key.unit and f"[{key.unit}]"]))
+            print_wrapped(f"{key.name} = {key.value}: {words}")
+            print_wrapped(key.meaning, "    ")
     return 0

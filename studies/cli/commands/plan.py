@@ -10,7 +10,7 @@ from .. import options
 
 
 @click.command()
-@click.argument("spec", type=options.path, metavar="SPEC.toml")
+@click.argument("spec", type=options.PATH, metavar="SPEC.toml")
 @options.jobs
 @click.option(
     "--deviation",

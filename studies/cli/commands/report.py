@@ -13,7 +13,7 @@ from .. import options
 @options.directory
 @click.option(
     "--out",
-    type=options.path,
+    type=options.PATH,
     metavar="FILE.html",
     help="Where to write; report.html in the study's directory unless said otherwise.",
 )
@@ -23,11 +23,8 @@ def command(directory: Path, out: Path | None, trust: bool) -> int:
 
     DIR is where the study is kept; it may be unfinished.
     """
-    from ...api.study import load
-    from ..trusting import trust_files
+    from ..loading import load_results
 
-    if trust:
-        trust_files(directory)
-    path = load(directory).report(out)
+    path = load_results([directory], None, None, is_trusted=trust).report(out)
     print(f"{path}: {path.stat().st_size / 1e6:.1f} MB, nothing outside it is needed")
     return 0

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--phase",
-    type=options.text,
     metavar="PHASE",
     default="training",
     help="The episodes of training, those of the greedy evaluation after it (evaluation), of a "

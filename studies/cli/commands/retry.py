@@ -32,21 +32,19 @@ def command(
 
     DIR is where the study is kept.
     """
+    from ...api.study import run
+    from ...presentation.progress import Terminal
     from ...store.store import Store
     from ...trials.keeping import spec_of
-    from ..running import run_and_show
-    from ..trusting import trust_files
+    from ..display import show_results
+    from ..loading import trust_files
 
     if trust:
         trust_files(directory)
     with Store.open(directory) as store:
         spec = spec_of(store)
-    return run_and_show(
-        spec,
-        directory,
-        jobs=jobs,
-        backend=backend,
-        address=address,
-        retry_failed=True,
-        accept_code=accept_code,
-    )
+    study = run(
+        spec, directory, jobs=jobs, backend=backend, address=address, retry_failed=True,
+        accept_code=accept_code, observer=Terminal(),
+    )  # fmt: skip
+    return show_results(study)

@@ -14,10 +14,10 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("spec", type=options.path, metavar="SPEC.toml")
+@click.argument("spec", type=options.PATH, metavar="SPEC.toml")
 @click.option(
     "--out",
-    type=options.path,
+    type=options.PATH,
     metavar="DIR",
     required=True,
     help="Where to keep the study; made if it does not exist. Every trial is kept the moment it "
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     "--log",
     "loggers",
     multiple=True,
-    type=options.text,
     metavar="file.py:NAME...",
     help="Tell this logger of every finished trial, as for TensorBoard or MLflow.",
 )
@@ -54,11 +53,13 @@ def command(
 
     SPEC.toml says what to run; `nested-agents demo --print-spec` prints an example.
     """
+    from ...api.study import run
+    from ...presentation.progress import Terminal
     from ...spec.errors import SpecError
     from ...spec.spec import Spec
     from ...store.store import DATABASE, SPEC_FILE
-    from ..running import run_and_show
-    from ..trusting import trust_files
+    from ..display import show_results
+    from ..loading import trust_files
 
     for directory in {out.resolve(), spec.resolve().parent} if trust else ():
         if (directory / DATABASE).exists():
@@ -72,13 +73,8 @@ def command(
             f"{error}; if you did not edit {spec}, it is damaged: nested-agents retry {out} goes "
             "on by the database"
         ) from None
-    return run_and_show(
-        given,
-        out,
-        jobs=jobs,
-        backend=backend,
-        address=address,
-        accept_code=accept_code,
-        formats=figures,
-        loggers=loggers,
-    )
+    study = run(
+        given, out, jobs=jobs, backend=backend, address=address, accept_code=accept_code,
+        observer=Terminal(), loggers=loggers,
+    )  # fmt: skip
+    return show_results(study, figures)

@@ -16,40 +16,23 @@ def command(directory: Path) -> int:
 
     DIR is where the study is kept.
     """
-    from shutil import get_terminal_size
-    from textwrap import fill
-
-    from ...presentation.words import count, duration
     from ...results.power import SMALLEST, USUAL_DEVIATION
     from ...results.verdicts import power_told
     from ...spec.outline import Outline
     from ...store.store import Store
     from ...workers.progress import progress
+    from ..display import print_wrapped
+    from ..standing import describe, warnings
 
     with Store.open(directory) as store:
-        outline, now, failed = Outline.kept(store), progress(store), store.failed()
-        versions = store.versions_of_code()
-    extent = f"{count(len(outline.columns), 'condition')} x {count(len(outline.seeds), 'seed')}"
-    print(f"study    {outline.study}: {extent}")
-    print(f"done     {now.done} of {now.total} trials")
-    print(f"running  {len(now.running)}")
-    for condition, seed, seconds in now.running:
-        print(f"         {condition}, seed {seed}, for {duration(seconds)}")
-    print(f"failed   {now.failed}")
-    print(f"left     {now.left}")
-    if now.seconds:
-        processes = count(now.processes, "process", "es")
-        print(f"time     about {duration(now.seconds)} with {processes}")
-    if versions > 1:
-        print(f"code     finished trials are of {versions} versions of the installed code")
+        now = progress(store)
+        print(*describe(store, now), sep="\n")
+        outline, failed = Outline.kept(store), store.failed()
     if len(outline.columns) > 1:
-        told = power_told(len(outline.seeds), len(outline.columns) - 1, USUAL_DEVIATION, SMALLEST)
-        width = get_terminal_size().columns
-        print(fill(told, width, initial_indent="power    ", subsequent_indent=9 * " "))
-    if now.refusal:
-        print(f"\nnothing can be added: {now.refusal}")
-    for line in now.damaged:
-        print(f"\n{line}")
+        power = power_told(len(outline.seeds), len(outline.columns) - 1, USUAL_DEVIATION, SMALLEST)
+        print_wrapped(power, "power    ", 9)
+    for line in warnings(now):
+        print(line)
     for condition, seed, error in failed:
         print(f"\n{condition}, seed {seed} failed:\n{error.rstrip()}")
     if failed:

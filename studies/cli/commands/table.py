@@ -1,4 +1,4 @@
-"""``nested-agents table``: what a study found, as one table."""
+"""``nested-agents table``: the results of a study, as one table."""
 
 from __future__ import annotations
 
@@ -10,13 +10,12 @@ from .. import options
 
 
 @click.command()
-@click.argument("sources", type=options.path, metavar="DIR...|FILE.json", nargs=-1, required=True)
+@click.argument("sources", type=options.PATH, metavar="DIR...|FILE.json", nargs=-1, required=True)
 @options.as_study
 @options.where
 @click.option(
     "--columns",
     multiple=True,
-    type=options.text,
     metavar="TITLE...",
     help="Headings of the columns to print, in this order; all unless said otherwise.",
 )
@@ -35,12 +34,12 @@ def command(
     DIR is where a study is kept; several are analysed together, as the first one says. FILE.json is
     a file of results that `export --format json` has written.
     """
-    from ..asking import asked
     from ..display import print_study
+    from ..loading import load_results
 
-    found = asked(sources, study, where, trust=trust)
+    results = load_results(sources, study, where, is_trusted=trust)
     if form == "table":
-        print_study(found, columns)
+        print_study(results, columns)
     else:
-        print(getattr(found.table(columns), form), end="")
+        print(getattr(results.table(columns), form), end="")
     return 0

@@ -10,12 +10,13 @@ import click
 from .. import options
 
 if TYPE_CHECKING:
+    from ....core.agents.joint_agents import Agents
     from ....topologies.view import Form
 
 
 @click.command()
 @click.argument("action", type=click.Choice(["list", "show"]), metavar="list|show")
-@click.argument("topology", type=options.text, metavar="[SPEC]", required=False)
+@click.argument("topology", metavar="[SPEC]", required=False)
 @click.option(
     "--agents",
     type=int,
@@ -35,7 +36,13 @@ if TYPE_CHECKING:
     metavar="N",
     help="Wheels (agents) of a robot; default: 2 if the number of agents is even, else 1.",
 )
-@click.option("--actions", type=int, metavar="N", default=4, help="Actions of each agent.")
+@click.option(
+    "--per",
+    type=click.Choice(["actuator", "body", "team"]),
+    default="actuator",
+    help="What there is one agent for, as the key agents of a spec says.",
+)
+@click.option("--actions", type=int, metavar="N", default=4, help="Actions of each actuator.")
 @click.option(
     "--format",
     "form",
@@ -50,6 +57,7 @@ def command(
     agents: int | None,
     robots: int | None,
     wheels: int | None,
+    per: Agents,
     actions: int,
     form: Form,
     plot: Path | None,
@@ -78,8 +86,8 @@ def command(
         else:
             found = of_spec(topology)
             if found is None:
-                found = [view(topology, agents, robots, wheels, actions)]
-            elif agents or robots or wheels:
+                found = [view(topology, agents, robots, wheels, actions, per)]
+            elif agents or robots or wheels or per != "actuator":
                 raise SpecError(f"{topology}: is the spec of a study, which says its own agents")
             for number, shown in enumerate(found, 1):
                 if plot is not None:

@@ -24,6 +24,7 @@ def command(directory: Path, every: float, once: bool) -> int:
     Ctrl-C stops the watching only.
     """
     import time
+    from math import inf
 
     from rich.console import Console
     from rich.live import Live
@@ -31,7 +32,7 @@ def command(directory: Path, every: float, once: bool) -> int:
     from ...spec.errors import SpecError
     from ..watching import frame
 
-    if not every >= LEAST_SECONDS:
+    if not LEAST_SECONDS <= every < inf:
         raise SpecError(f"--every {every:g}: must be at least {LEAST_SECONDS}")
     console = Console()
     shown, is_going_on = frame(directory)

@@ -6,25 +6,25 @@ import numpy as np
 import pytest
 
 from nested_agents.core.adaptation.self_model import SelfModelSettings
-from nested_agents.core.agents.joint_agents import JointAgents, per_robot, single_agent
+from nested_agents.core.agents.joint_agents import Agents, JointPrediction, join_agents
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.settings import Decision
 from nested_agents.core.interface.hierarchy import Hierarchy
-from nested_agents.core.interface.protocols import EmbodiedScenario, roles_of
+from nested_agents.core.interface.scenario import EmbodiedScenario, Scenario, roles_of
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.learners.td import TDLambdaSettings
 from nested_agents.core.rules.settings import RuleBaseSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.checking.checker import CHECKS, check_scenario
-from nested_agents.topologies import parse
+from nested_agents.topologies import build
 
 
 @pytest.fixture
 def pair(line_world):
     """A world of two agents and the same one seen as one agent's, in the same state."""
-    world, single = line_world(2, 1), single_agent(line_world(2, 1))
+    world, single = line_world(2, 1), join_agents(line_world(2, 1), "team")
     assert (single.reset(1) == world.reset(1).reshape(1, -1)).all()
     return world, single
 
@@ -41,6 +41,17 @@ def test_one_agent_with_all_joint_actions_and_variables(pair) -> None:
     assert names[:4] == ["cart0.wheel0.speed", "cart0.wheel0.phase", "cart0.wheel0.gap",
                          "cart1.wheel0.speed"]  # fmt: skip
     assert single.state_space.n_variables == 6
+
+
+def test_an_agent_for_every_actuator_is_the_scenario_itself(line_world) -> None:
+    world = line_world(2, 2)
+    assert join_agents(world, "actuator") is world
+
+
+def test_any_hierarchy_is_built_over_bodies(line_world) -> None:
+    bodies = join_agents(line_world(3, 2), "body")
+    assert build("star:cart1", bodies.agents).edges == ((1, 0), (1, 2))
+    assert build("tree:2", bodies.agents).edges == ((0, 1), (0, 2))
 
 
 def test_steps_are_those_of_the_world(pair) -> None:
@@ -95,15 +106,15 @@ class Bare:
 def test_predictions_can_do_what_the_scenarios_can(
     names, of_robots: set[str], of_one: set[str], line_world
 ) -> None:
-    for view, expected in ((per_robot, of_robots), (single_agent, of_one)):
-        scenario = view(line_world(2, 1))
+    for agents, expected in (("body", of_robots), ("team", of_one)):
+        scenario = join_agents(line_world(2, 1), agents)
         scenario.reset(0)
-        found = scenario.prediction_of(Bare(scenario.scenario.predict(), *names))
+        found = JointPrediction(Bare(scenario.scenario.predict(), *names), scenario)
         assert {n for n in ("rewards", "blocks", "reward_table") if hasattr(found, n)} == expected
 
 
 def test_a_robot_has_the_states_and_actions_of_its_wheels(line_world) -> None:
-    world, robots = line_world(2, 2), per_robot(line_world(2, 2))
+    world, robots = line_world(2, 2), join_agents(line_world(2, 2), "body")
     assert not isinstance(robots, EmbodiedScenario)
     assert robots.agents == ("cart0", "cart1")
     assert len(robots.action_set) == 16
@@ -118,7 +129,7 @@ def test_a_robot_has_the_states_and_actions_of_its_wheels(line_world) -> None:
 
 
 def test_predictions_by_blocks_are_those_by_states(line_world) -> None:
-    robots = per_robot(line_world(2, 2))
+    robots = join_agents(line_world(2, 2), "body")
     robots.reset(0)
     robots.step(np.array([0, 5]))
     prediction = robots.predict()
@@ -132,26 +143,29 @@ def test_predictions_by_blocks_are_those_by_states(line_world) -> None:
 
 def test_robots_whose_wheels_have_the_same_roles_are_of_one_role(line_world) -> None:
     world = line_world(2, 2)
-    assert roles_of(per_robot(world)) == ("cart0.wheel0+cart0.wheel1", "cart1.wheel0+cart1.wheel1")
+    assert roles_of(join_agents(world, "body")) == (
+        "cart0.wheel0+cart0.wheel1",
+        "cart1.wheel0+cart1.wheel1",
+    )
     world.roles = ("front", "rear") * 2
-    assert roles_of(per_robot(world)) == ("front+rear", "front+rear")
+    assert roles_of(join_agents(world, "body")) == ("front+rear", "front+rear")
 
 
-@pytest.mark.parametrize(("topology", "agents"), [("per-robot", 2), ("single-agent", 1)])
-def test_rewards_of_wheels_are_joined(topology: str, agents: int) -> None:
+@pytest.mark.parametrize(("agents", "n"), [("body", 2), ("team", 1)])
+def test_rewards_of_wheels_are_joined(agents: Agents, n: int) -> None:
     settings = BoxPushingSettings.model_validate({"reward": {"of": "robot"}})
     world = BoxPushing(settings)
-    scenario, _ = parse(topology).arrange(BoxPushing(settings))
+    scenario = join_agents(BoxPushing(settings), agents)
     world.reset(0)
     scenario.reset(0)
     of_wheels = np.asarray(world.step(np.full(4, world.action_set.neutral)).reward)
-    joined = scenario.step(np.full(agents, scenario.action_set.neutral)).reward
-    assert joined == pytest.approx(of_wheels.reshape(agents, -1).mean(axis=1))
+    joined = scenario.step(np.full(n, scenario.action_set.neutral)).reward
+    assert joined == pytest.approx(of_wheels.reshape(n, -1).mean(axis=1))
 
 
 def test_the_scenario_keeps_its_promises() -> None:
-    def make() -> JointAgents:
-        return per_robot(BoxPushing(BoxPushingSettings()))
+    def make() -> Scenario:
+        return join_agents(BoxPushing(BoxPushingSettings()), "body")
 
     assert check_scenario(make, steps=10) == tuple(CHECKS)
 
@@ -164,7 +178,8 @@ def test_both_evaluators_and_a_self_model_work_on_it() -> None:
             decision=Decision(evaluator=evaluator),  # type: ignore[arg-type]
             self_model=SelfModelSettings(enabled=True),
         )
-        scenario, hierarchy = parse("per-robot").arrange(BoxPushing(settings))
+        scenario = join_agents(BoxPushing(settings), "body")
+        hierarchy = build("chain", scenario.agents)
         assert hierarchy.edges == ((0, 1),)
         team = Team.build(learner, scenario, hierarchy, policy_seed(0))
         nominal = team.self_model.effects[0].copy()
@@ -176,11 +191,11 @@ def test_both_evaluators_and_a_self_model_work_on_it() -> None:
 
 
 def test_what_cannot_be_is_refused(line_world) -> None:
-    with pytest.raises(ValueError, match=r"robots: 4 \*\* 5 actions each, allowed: 256"):
-        per_robot(line_world(1, 5))
+    with pytest.raises(ValueError, match=r"agents = 'body': 4 \*\* 5 actions each, allowed: 256"):
+        join_agents(line_world(1, 5), "body")
     world = line_world(1, 3)
     world.groups = ((0, 1), (2,))
-    with pytest.raises(ValueError, match=r"robots: of \[1, 2\] wheels"):
-        per_robot(world)
-    with pytest.raises(ValueError, match=r"single agent: 4 \*\* 7 actions, allowed: 4096 or fewer"):
-        single_agent(line_world(7, 1))
+    with pytest.raises(ValueError, match=r"agents = 'body': bodies of \[1, 2\] actuators"):
+        join_agents(world, "body")
+    with pytest.raises(ValueError, match=r"agents = 'team': 4 \*\* 7 actions each, allowed: 4096"):
+        join_agents(line_world(7, 1), "team")

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nested_agents.core.agents.joint_agents import per_robot
+from nested_agents.core.agents.joint_agents import join_agents
 from nested_agents.core.agents.rows import carried_rows
 from nested_agents.core.agents.team import Team
 from nested_agents.core.evaluators.exact import ExactEnumeration
@@ -278,7 +278,7 @@ def test_the_evaluator_follows_the_settings(decision: dict, kind: type, world) -
 
 def test_what_is_too_much_to_enumerate_is_sampled(line_world) -> None:
     # 256 joint actions of four wheels each: four agents have four thousand million.
-    scenario = per_robot(line_world(carts=4, wheels=4))
+    scenario = join_agents(line_world(carts=4, wheels=4), "body")
     learner = settings_of({"kind": "frozen"})
     hierarchy = chain_of(scenario.agents)
     team = Team.build(learner, scenario, hierarchy, np.random.SeedSequence(1))

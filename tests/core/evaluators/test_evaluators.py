@@ -16,7 +16,7 @@ from nested_agents.core.evaluators.evaluator import (
 from nested_agents.core.evaluators.exact import MOST_JOINT_ACTIONS, ExactEnumeration
 from nested_agents.core.evaluators.sampling import Sampling
 from nested_agents.core.interface.hierarchy import Hierarchy
-from nested_agents.core.interface.protocols import Blocks
+from nested_agents.core.interface.prediction import Blocks
 from nested_agents.core.interface.spaces import StateSpace, Variable
 from nested_agents.core.rules.rule_base import RuleBase
 from nested_agents.core.rules.settings import RuleBaseSettings

@@ -5,7 +5,7 @@ import pytest
 
 from nested_agents.core.learners.batch import REWARD_SCALE, BatchTD, BatchTDSettings
 from nested_agents.core.learners.frozen import Frozen
-from nested_agents.core.learners.learner import SuccessorLearner
+from nested_agents.core.learners.learner import Learner
 
 from .test_shared_weights import LEARNING, ROLES, experience, feed, learner_of, rules_of
 
@@ -15,10 +15,9 @@ def name(request: pytest.FixtureRequest) -> str:
     return request.param
 
 
-def followed(former: SuccessorLearner, name: str, rows: np.ndarray, goes_on: list[int]):
+def followed(former: Learner, name: str, rows: np.ndarray, goes_on: list[int]):
     """A learner for agents of these rows that takes over from `former`."""
     learner = learner_of(name, rows)
-    assert isinstance(learner, SuccessorLearner)
     learner.take_over(former, np.array(goes_on))
     return learner
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from nested_agents.core.agents.joint_agents import per_robot, single_agent
+from nested_agents.core.agents.joint_agents import join_agents
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.exploration import EXPLORATIONS
@@ -127,10 +127,10 @@ def test_a_team_of_ones_own_parts(line_world, tmp_path) -> None:
 
 
 @pytest.mark.parametrize("name", ["auto", "exact", "sampling"])
-@pytest.mark.parametrize("view", [None, per_robot, single_agent])
-def test_a_scenario_of_few_members_is_learned(name: str, view, line_world) -> None:
+@pytest.mark.parametrize("agents", ["actuator", "body", "team"])
+def test_a_scenario_of_few_members_is_learned(name: str, agents, line_world) -> None:
     scenario = FewMembers(line_world(carts=2, wheels=1))
-    seen = view(scenario) if view else scenario
+    seen = join_agents(scenario, agents)
     settings = BatchTDSettings.model_validate({"decision": {"evaluator": name}})
     team = team_of(settings, seen)
     records = list(control_loop(seen, team, episodes=2, steps=5, seed=0))
@@ -138,11 +138,11 @@ def test_a_scenario_of_few_members_is_learned(name: str, view, line_world) -> No
     assert team.learner.theta.any()
 
 
-@pytest.mark.parametrize("view", [None, per_robot, single_agent])
+@pytest.mark.parametrize("agents", ["actuator", "body", "team"])
 @pytest.mark.parametrize("rule", ["reward", "reward-and-value"])
-def test_rewards_that_are_not_predicted_cannot_decide(rule: str, view, line_world) -> None:
+def test_rewards_that_are_not_predicted_cannot_decide(rule: str, agents, line_world) -> None:
     scenario = FewMembers(line_world(carts=2, wheels=1))
-    seen = view(scenario) if view else scenario
+    seen = join_agents(scenario, agents)
     team = team_of(BatchTDSettings.model_validate({"decision": {"rule": rule}}), seen)
     seen.reset(0)
     said = rf"^learner\.decision\.rule = '{rule}': the scenario predicts no rewards, use value$"

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nested_agents.core.interface.protocols import Transition
+from nested_agents.core.interface.scenario import Transition
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.core.learners import LEARNERS
 from nested_agents.core.policies.inputs import FARTHEST, Inputs, RewardScale
@@ -30,7 +30,7 @@ SHORT = {
 
 
 def spec_of(kind: str, **changes: Any) -> Spec:
-    single = {"topology": "single-agent"} if kind == "dqn" else {}
+    single = {"agents": "team"} if kind == "dqn" else {}
     return Spec.of({**TABLE, **single, "learner": SHORT[kind], **changes})
 
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nested_agents.core.interface.protocols import Blocks
+from nested_agents.core.interface.prediction import Blocks
 from nested_agents.core.rules import kernels, reference
 from nested_agents.core.rules.kernels.fuzzy import Partition
 from nested_agents.core.rules.rule_base import RuleBase

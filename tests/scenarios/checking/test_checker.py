@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 
 from nested_agents import View, state_variable
-from nested_agents.core.agents.joint_agents import per_robot, single_agent
-from nested_agents.core.interface.protocols import SUCCESS, Blocks, Measure, Scenario, Transition
+from nested_agents.core.agents.joint_agents import join_agents
+from nested_agents.core.interface.measures import SUCCESS, Measure
+from nested_agents.core.interface.prediction import Blocks
+from nested_agents.core.interface.scenario import Scenario, Transition
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
@@ -46,11 +48,11 @@ def line(**changes: Callable[..., Any]) -> Callable[[], Scenario]:
     "factory",
     [
         lambda: LineUp(LineUpSettings(carts=3)),
-        lambda: single_agent(LineUp(LineUpSettings())),
+        lambda: join_agents(LineUp(LineUpSettings()), "team"),
         lambda: BoxPushing(BoxPushingSettings()),
         lambda: BoxPushing(BoxPushingSettings(state_space="paper", start="hard", box="bar")),
         lambda: BoxPushing(BoxPushingSettings(failures=FAILURES)),
-        lambda: per_robot(BoxPushing(BoxPushingSettings(state_space="paper"))),
+        lambda: join_agents(BoxPushing(BoxPushingSettings(state_space="paper")), "body"),
     ],
     ids=["line-up", "single agent", "box pushing", "paper", "failures", "robots"],
 )

@@ -148,8 +148,8 @@ def test_a_tiny_study_is_run_and_read(tmp_path: Path) -> None:
         {
             "study": "hierarchies", "seeds": [7, 8], "episodes": 1, "steps": 3, "evaluation": 1,
             "learner": {"weights": "role", "decision": {"evaluator": "best-response"}},
+            "overrides": [{"name": "chain"}, {"name": "chain of robots", "agents": "body"}],
             "sweep": {
-                "topology": ["chain", "per-robot"],
                 "learner.decision.value_of": ["own", "team"],
                 "scenario.robots": [1, 2],
             },
@@ -160,8 +160,8 @@ def test_a_tiny_study_is_run_and_read(tmp_path: Path) -> None:
             runner.save(store, trial, measure(trial), 1.0)
         analysis = analyse(read(store))
     assert [line.condition for line in analysis.table[:5]] == [
-        "1 robot, own, chain", "1 robot, own, per-robot",
-        "1 robot, team, chain", "1 robot, team, per-robot",
+        "1 robot, own, chain", "1 robot, own, chain of robots",
+        "1 robot, team, chain", "1 robot, team, chain of robots",
         "2 robots, own, chain",
     ]  # fmt: skip
     messages = [float(line.estimates["messages"].value) for line in analysis.table]

@@ -3,7 +3,7 @@ import io
 import numpy as np
 import pytest
 
-from nested_agents.core.interface.protocols import SUCCESS, Measure
+from nested_agents.core.interface.measures import SUCCESS, Measure
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
 from nested_agents.studies.catalogue.learning_curve import draw
 from nested_agents.studies.catalogue.learning_curve.analysis import analyse, metrics_of

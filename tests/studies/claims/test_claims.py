@@ -10,7 +10,7 @@ from made_up_results import ablation, arrays, games, related, scaling, shapes, w
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
 from nested_agents.studies.catalogue.study import load_study
 from nested_agents.studies.claims import claims
-from nested_agents.studies.claims.claims import CLAIMS, AtLeast, AtMost, Within, judge
+from nested_agents.studies.claims.claims import CLAIMS, at_least, at_most, judge, within
 from nested_agents.studies.claims.measures import Measured
 from nested_agents.studies.claims.table import markdown, print_claims
 from nested_agents.studies.cli.main import main
@@ -34,17 +34,17 @@ def found(value: float, low: float, high: float, p: float | None = None) -> Meas
 @pytest.mark.parametrize(
     ("criterion", "measured", "verdict"),
     [
-        (AtLeast(0.8), found(0.9, 0.8, 1.0), "holds"),
-        (AtLeast(0.8), found(0.9, 0.79, 1.0), "not decided"),
-        (AtLeast(0.8), found(0.5, 0.4, 0.79), "does not hold"),
-        (AtLeast(0.8), found(0.9, np.nan, np.nan), "not decided"),
-        (AtMost(1.0), found(0.9, 0.8, 1.0), "holds"),
-        (AtMost(1.0), found(1.0, 0.8, 1.1), "not decided"),
-        (AtMost(1.0), found(1.2, 1.1, 1.3), "does not hold"),
-        (Within(0.1), found(0.0, -0.1, 0.1), "holds"),
-        (Within(0.1), found(0.0, -0.2, 0.1, p=0.5), "not decided"),
-        (Within(0.1), found(0.0, -0.1, 0.1, p=0.04), "does not hold"),
-        (Within(0.1), found(-0.3, -0.4, -0.2), "does not hold"),
+        (at_least(0.8), found(0.9, 0.8, 1.0), "holds"),
+        (at_least(0.8), found(0.9, 0.79, 1.0), "not decided"),
+        (at_least(0.8), found(0.5, 0.4, 0.79), "does not hold"),
+        (at_least(0.8), found(0.9, np.nan, np.nan), "not decided"),
+        (at_most(1.0), found(0.9, 0.8, 1.0), "holds"),
+        (at_most(1.0), found(1.0, 0.8, 1.1), "not decided"),
+        (at_most(1.0), found(1.2, 1.1, 1.3), "does not hold"),
+        (within(0.1), found(0.0, -0.1, 0.1), "holds"),
+        (within(0.1), found(0.0, -0.2, 0.1, p=0.5), "not decided"),
+        (within(0.1), found(0.0, -0.1, 0.1, p=0.04), "does not hold"),
+        (within(0.1), found(-0.3, -0.4, -0.2), "does not hold"),
     ],
 )
 def test_criteria_decide_by_the_whole_interval(criterion, measured, verdict) -> None:
@@ -203,6 +203,14 @@ def test_options_that_run_need_a_directory(capsys) -> None:
     assert "--quick: needs --out" in capsys.readouterr().err
 
 
+def test_an_installed_package_says_where_the_results_are(tmp_path, capsys, monkeypatch) -> None:
+    monkeypatch.setattr(claims, "PUBLISHED", tmp_path / "published")
+    assert main(["claims"]) == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1)
+    assert "in the repository, in studies/claims/published" in err
+
+
 def test_the_committed_results_make_the_page(capsys) -> None:
     files = list(claims.PUBLISHED.glob("*.json"))
     assert {path.stem for path in files} == {
@@ -307,7 +315,7 @@ def test_studies_are_run_read_again_and_published(tmp_path, capsys, monkeypatch)
     monkeypatch.setattr(claims, "QUICK", tmp_path / "quick")
     monkeypatch.setattr(claims, "PUBLISHED", tmp_path / "published")
     arguments = ["claims", "--quick", "--out", str(tmp_path / "out"), "--jobs", "1"]
-    arguments += ["--publish", str(tmp_path / "published"), "--format", "markdown"]
+    arguments += ["--format", "markdown"]
     assert main(arguments) == 0
     first = capsys.readouterr()
     assert first.out.count("**not decided**") + first.out.count("**does not hold**") >= 5
@@ -316,5 +324,11 @@ def test_studies_are_run_read_again_and_published(tmp_path, capsys, monkeypatch)
     again = capsys.readouterr()
     assert again.out == first.out
     assert "4 of 4 trials were run before" in again.err
+    for study in REST:
+        folder = tmp_path / "out" / study
+        assert main(["export", str(folder), "--format", "json"]) == 0
+        (tmp_path / "published").mkdir(exist_ok=True)
+        (folder / "export" / "results.json").rename(tmp_path / "published" / f"{study}.json")
+    capsys.readouterr()
     assert main(["claims", "--format", "markdown"]) == 0
     assert capsys.readouterr().out == first.out

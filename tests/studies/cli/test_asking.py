@@ -1,5 +1,9 @@
 """Asking again without running again, watching, logging: the commands, with made-up results."""
 
+import shutil
+import sqlite3
+from contextlib import closing
+
 import made_up
 import pytest
 from made_up_commands import run_here
@@ -124,11 +128,36 @@ def test_watching_shows_trials_curves_and_failures(study, capsys, monkeypatch) -
     monkeypatch.setenv("COLUMNS", "80")
     status, printed, _ = said_by(capsys, "watch", study[0], "--once")
     assert status == 0
-    assert "5 of 6 trials, 1 failed" in printed
+    assert said_by(capsys, "status", study[0])[1].startswith(printed.partition("left ")[0])
+    assert "done     5 of 6 trials" in printed
     assert "failed: frozen, seed 1: RuntimeError: a wheel came off" in printed
     assert any(block in printed for block in "▁▂▃▄▅▆▇█")
     assert max(map(len, printed.splitlines())) <= 80
     assert said_by(capsys, "watch", study[0], "--every", "0")[0] == 2
+
+
+@pytest.mark.parametrize("what", ["a row altered", "a row deleted", "a recording deleted"])
+def test_watching_says_of_damage_what_status_says_and_draws_none(
+    study, tmp_path, capsys, monkeypatch, what
+) -> None:
+    monkeypatch.setenv("COLUMNS", "400")
+    out = tmp_path / "out"
+    shutil.copytree(study[0], out)
+    if what == "a recording deleted":
+        next((out / "recordings").glob("*.npz")).unlink()
+    else:
+        change = "DELETE FROM" if what == "a row deleted" else "UPDATE"
+        change += " episodes" + " SET steps = steps + 1" * (change == "UPDATE")
+        one = "identity = (SELECT min(identity) FROM episodes) AND phase = 'training'"
+        with closing(sqlite3.connect(out / "results.sqlite")) as connection, connection:
+            connection.execute(f"{change} WHERE {one} AND episode = 0")
+    lines = said_by(capsys, "status", out)[1].splitlines()
+    (warning,) = [line for line in lines if "must run again" in line]
+    status, printed, _ = said_by(capsys, "watch", out)
+    assert status == 0
+    assert warning in printed
+    assert not any(block in printed for block in "▁▂▃▄▅▆▇█")
+    assert not frame(out)[1]
 
 
 def test_watching_ends_when_nothing_is_to_come(study) -> None:

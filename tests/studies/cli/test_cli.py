@@ -16,10 +16,11 @@ import pytest
 from made_up_commands import finish, heeding_interrupts, run_here, start, wait_for_results
 
 from nested_agents.studies.api import run_study as studies_run
+from nested_agents.studies.api.study import run
 from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli import commands
+from nested_agents.studies.cli.display import show_results
 from nested_agents.studies.cli.main import COMMANDS, main
-from nested_agents.studies.cli.running import run_and_show
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.spec.toml import dumps
 from nested_agents.studies.store.store import DATABASE
@@ -198,7 +199,8 @@ def test_a_replay_of_the_first_and_the_last_episode_is_drawn_once(tmp_path, monk
     monkeypatch.setattr(learning_curve, "measure", made_up.measure)
     monkeypatch.setattr(studies_run, "check", lambda spec: made_up.MEASURES)
     for _ in range(2):
-        assert run_and_show(made_up.SPEC, tmp_path, jobs=2, replay=True) == 0
+        study = run(made_up.SPEC, tmp_path, jobs=2, progress=False)
+        assert show_results(study, with_replays=True) == 0
     assert len(drawn) == 2
     assert sorted(p.name for p in (tmp_path / "replay").iterdir()) == [
         "first-episode.gif", "last-episode.gif",
@@ -207,7 +209,8 @@ def test_a_replay_of_the_first_and_the_last_episode_is_drawn_once(tmp_path, monk
 
 def test_the_replay_of_one_episode_is_of_the_last(tmp_path):
     spec = Spec.of({"seeds": 1, "episodes": 1, "steps": 2, "evaluation": 0})
-    assert run_and_show(spec, tmp_path, jobs=1, replay=True) == 0
+    study = run(spec, tmp_path, jobs=1, progress=False)
+    assert show_results(study, with_replays=True) == 0
     assert [p.name for p in (tmp_path / "replay").iterdir()] == ["last-episode.gif"]
 
 
@@ -234,23 +237,24 @@ BAD = {
     "run {spec} --out x --jobs 0": "--jobs 0: must be at least 1",
     "run {spec} --out x --jobs two": "'--jobs': 'two' is not a valid integer",
     "run {spec} --out x --jobs 1.5": "'--jobs': '1.5' is not a valid integer",
-    "run {spec} --out ''": "error: Invalid value for '--out': must not be empty",
-    "run '' --out x": "error: Invalid value for 'SPEC.toml': must not be empty",
-    "run {spec} --out x --set ''": "error: Invalid value for '--set': must not be empty",
-    "demo --out ''": "error: Invalid value for '--out': must not be empty",
-    "export '' --out x": "error: Invalid value for 'DIR': must not be empty",
+    "run {spec} --out ''": "error: --out: must not be empty; see nested-agents",
+    "run '' --out x": "error: an argument: must not be empty; see nested-agents run --help",
+    "run {spec} --out x --set ''": "error: --set: must not be empty",
+    "demo --out=": "error: --out: must not be empty",
+    "demo --out ''": "error: --out: must not be empty; see nested-agents",
+    "export '' --out x": "error: an argument: must not be empty",
     "explain a --seed x": "error: Invalid value for '--seed': 'x' is not a valid integer",
-    "check '' --steps 5": "NAME': must not be empty",
-    "check {spec} --steps 0": "error: --steps 0: must be at least 2",
+    "check '' --steps 5": "error: an argument: must not be empty",
+    "check {spec} --steps 0": "error: steps = 0: must be at least 2",
     "claims --jobs 0": "error: --jobs: needs --out",
     "claims --jobs 0 --out x": "error: --jobs 0: must be at least 1",
-    "cost --topology ''": "error: Invalid value for '--topology': must not be empty",
+    "cost --topology ''": "error: --topology: must not be empty",
     "run {spec} --out {spec}": "spec.toml: ",
     "run {spec} --out /proc/nowhere/x": "/proc/nowhere",
     "run {spec}": "error: Missing option '--out'; see nested-agents run --help",
     "run": "error: Missing argument 'SPEC.toml'; see nested-agents run --help",
     "run {spec} --out": "'--out' requires an argument; see nested-agents run --help",
-    "demo --out --print-spec": "'--out': '--print-spec' is an option; a value must come first",
+    "demo --out --print-spec": "error: --out --print-spec: is an option; a value must come first",
     "results nowhere": "nowhere: holds no study",
     "results nowhere --format xml": "'--format': 'xml' is not one of 'table', 'csv', 'json'",
     "status nowhere": "nowhere: holds no study",

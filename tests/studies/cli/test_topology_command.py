@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from nested_agents.core.agents.joint_agents import join_agents
 from nested_agents.studies.cli.main import main
-from nested_agents.topologies import TOPOLOGIES, parse
+from nested_agents.topologies import TOPOLOGIES, build
 from nested_agents.topologies.view import readable, team_of
 
 
@@ -68,7 +69,7 @@ def test_agents_are_those_asked_for(said, arguments: tuple[str, ...], agents: li
 
 
 def test_the_single_agent_is_shown_with_its_joint_actions(said) -> None:
-    out = said("show", "single-agent", "--agents", "4", "--format", "json")[1]
+    out = said("show", "chain", "--per", "team", "--agents", "4", "--format", "json")[1]
     assert json.loads(out)["joint_actions_per_step"] == 4**4
 
 
@@ -84,7 +85,9 @@ def test_robots_are_shown_as_a_chain(
     said, tmp_path: Path, arguments: tuple[str, ...], robots: list[str], tried: int
 ) -> None:
     plot = tmp_path / "robots.svg"
-    status, out, _ = said("show", "per-robot", *arguments, "--format", "json", "--plot", str(plot))
+    status, out, _ = said(
+        "show", "chain", "--per", "body", *arguments, "--format", "json", "--plot", str(plot)
+    )
     shown = json.loads(out)
     assert (status, shown["agents"]) == (0, robots)
     assert shown["edges"] == [list(pair) for pair in pairwise(robots)]
@@ -94,8 +97,11 @@ def test_robots_are_shown_as_a_chain(
 
 def test_robots_are_shown_as_they_are_arranged(said, line_world) -> None:
     world = line_world(2, 2)
-    scenario, hierarchy = parse("per-robot").arrange(world)
-    shown = json.loads(said("show", "per-robot", "--agents", "4", "--format", "json")[1])
+    scenario = join_agents(world, "body")
+    hierarchy = build("chain", scenario.agents)
+    shown = json.loads(
+        said("show", "chain", "--per", "body", "--agents", "4", "--format", "json")[1]
+    )
     assert len(shown["agents"]) == len(scenario.agents)
     assert shown["depth"] == hierarchy.depth
     assert shown["joint_actions_per_step"] == hierarchy.joint_actions(len(scenario.action_set))
@@ -116,7 +122,7 @@ def test_a_plot_is_written(said, tmp_path: Path) -> None:
         (("show", "chain:"), "topology 'chain:': order must be written a,b,c, received ''"),
         (("show", "tree:0"), "topology 'tree:0': branching = 0: must be at least 1"),
         (("show", "tree:2", "--agents", "x"), "'--agents': 'x' is not a valid integer"),
-        (("show", "chain", "--plot", ""), "'--plot': must not be empty"),
+        (("show", "chain", "--plot", ""), "--plot: must not be empty"),
         (("show", "edges:a>b,b>a"), "topology 'edges': cycle a -> b -> a"),
         (("show", "chian"), "did you mean 'chain'?"),
         (("show", "chain", "--agents", "0"), "agents = 0, allowed: 1 or more"),
@@ -126,8 +132,8 @@ def test_a_plot_is_written(said, tmp_path: Path) -> None:
         (("show", "chain", "--agents", "4", "--robots", "2", "--wheels", "3"), "are not robots"),
         (("show", "edges:a>b", "--agents", "4"), "the topology names 2 agents, 4 are asked for"),
         (
-            ("show", "per-robot", "--wheels", "5"),
-            "4 ** 5 actions of a robot, allowed: 256 or fewer",
+            ("show", "chain", "--per", "body", "--wheels", "5"),
+            "agents = 'body': 4 ** 5 actions each, allowed: 256 or fewer",
         ),
         (("show", "chain", "--plot", "chain.txt"), "chain.txt: suffix must be"),
     ],

@@ -3,20 +3,16 @@
 import sqlite3
 
 import made_up
-import numpy as np
 import pytest
 
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
 from nested_agents.studies.cli.main import main
-from nested_agents.studies.explain import policy as explain_policy
 from nested_agents.studies.explain import team as explain
 from nested_agents.studies.explain import text as explain_text
-from nested_agents.studies.spec.conditions import ConditionSettings
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store import reading
 from nested_agents.studies.store.schema import RESULTS_VERSION
 from nested_agents.studies.store.store import DATABASE, Store
-from nested_agents.studies.trials.arrangement import build
 from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import trials_of
 from nested_agents.studies.workers.runner import save
@@ -152,14 +148,14 @@ def test_a_topology_file_that_has_changed_since(tmp_path, capsys):
 
 @pytest.mark.slow
 def test_an_agent_for_each_robot(tmp_path, capsys):
-    one = {"overrides": (), "topology": {"kind": "per-robot"}, "evaluation": 0, "episodes": 2}
+    one = {"overrides": (), "agents": "body", "evaluation": 0, "episodes": 2}
     spec = Spec.of({**SPEC.table(), **one})
     (trial,) = trials_of(spec)
     with made_up.opened(tmp_path, spec, MEASURES) as store:
         save(store, trial, run_trial(trial), 1.0)
     status, said = run(capsys, tmp_path)
     assert status == 0
-    assert "Not drawn: its agents are no wheels." in said.out
+    assert "Not drawn: the scenario does not show what agents such as these do." in said.out
     assert "turning  built" in said.out
 
 
@@ -172,31 +168,6 @@ def test_folders_of_conditions_differ(tmp_path):
         for name in names
     ]
     assert folders == ["condition1-seed0", "condition2-seed0", "x-seed0", "condition4-seed0"]
-
-
-@pytest.mark.parametrize(("slope", "to_the_box"), [(-1.0, True), (1.0, False)])
-def test_a_team_that_likes_the_box_drives_to_it(slope, to_the_box):
-    scenario, team = build(ConditionSettings(), 0)
-    partitions = team.evaluator.rules.partitions
-    gap = [v.name for v in scenario.state_space.variables].index("gap")
-    begin = sum(p.size for p in partitions[:gap])
-    team.learner.theta[:, begin : begin + partitions[gap].size] = slope * np.array(
-        partitions[gap].centres
-    )
-    found = explain_policy.fields(team, scenario)
-    assert len(found) == 2
-    for field in found:
-        far = np.hypot(*field.points[:, :2].T) > 0.25
-        toward = np.array([move == "to the box" for move in field.moves])[far]
-        assert toward.mean() > 0.9 if to_the_box else toward.mean() < 0.1
-
-
-def test_sides_are_named_counter_clockwise():
-    points = np.array([[-1, 0.1, 0], [0, -1, 0], [1, 0, 0], [0, 1, 0], [-1, -0.1, 0]])
-    zeros = np.zeros(5)
-    field = explain_policy.Field(0, points, np.zeros((5, 2)), zeros, np.zeros((0, 2)))
-    assert field.sides == ["behind", "right", "ahead", "left", "behind"]
-    assert field.moves == ["rests"] * 5
 
 
 def test_percents_stay_with_their_numbers():

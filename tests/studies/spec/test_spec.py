@@ -1,10 +1,11 @@
+import re
 import tomllib
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from nested_agents.studies.spec.errors import SpecError
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.presets import PRESETS
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.spec.toml import dumps
@@ -398,3 +399,43 @@ def test_keywords_make_a_whole_spec_and_objects_stand_for_names():
 def test_a_key_that_is_nearly_another_one_is_suggested():
     with pytest.raises(SpecError, match=r"scenario\.robot = 4: .*; did you mean 'robots'\?"):
         Spec.of({"scenario": {"robot": 4}})
+
+
+def test_agents_are_laid_over_and_swept_as_topologies_are() -> None:
+    spec = Spec.of(
+        {
+            "agents": "body",
+            "topology": "tree:2",
+            "overrides": [{"name": "robots"}, {"name": "wheels", "agents": "actuator"}],
+        }
+    )
+    assert [c.settings.agents for c in spec.conditions()] == ["body", "actuator"]
+    assert Spec.of(spec.table()) == spec
+    swept = Spec.of({"sweep": {"agents": ["actuator", "body", "team"]}}).conditions()
+    assert [(c.label, c.columns) for c in swept] == [
+        (agents, {"agents": agents}) for agents in ("actuator", "body", "team")
+    ]
+
+
+def test_an_agent_for_every_actuator_is_no_part_of_an_identity() -> None:
+    plain, robots = Spec.of({"sweep": {"agents": ["actuator", "body"]}}).conditions()
+    assert plain.settings.canonical() == Spec().conditions()[0].settings.canonical()
+    assert "agents" not in plain.settings.model_dump()
+    assert robots.settings.model_dump()["agents"] == "body"
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ({"agents": "wheel"}, "agents = 'wheel': must be 'actuator', 'body' or 'team'"),
+        ({"overrides": [{"name": "a", "agents": 3}]}, "overrides[0].agents = 3: must be"),
+        ({"sweep": {"agents": ["bodies"]}}, "agents = 'bodies': must be"),
+        ({"topology": "per-robot"}, "a key of its own: agents = 'body', topology = 'chain'"),
+        ({"topology": {"kind": "single-agent"}}, "a key of its own: agents = 'team'"),
+        ({"sweep": {"topology": ["chain", "per-robot"]}}, "a key of its own: agents = 'body'"),
+    ],
+)
+def test_who_the_agents_are_is_refused_in_one_line(table, message: str) -> None:
+    with pytest.raises(SpecError, match=re.escape(message)) as refusal:
+        Spec.of(table)
+    assert "\n" not in str(refusal.value)

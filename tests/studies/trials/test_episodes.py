@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from nested_agents.core.interface.protocols import SUCCESS, Measure, Transition
+from nested_agents.core.interface.measures import SUCCESS, Measure
+from nested_agents.core.interface.scenario import Transition
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
 from nested_agents.studies.trials.episodes import EpisodeMeter, EpisodeRecorder, EpisodeRow
 

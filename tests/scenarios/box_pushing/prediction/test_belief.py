@@ -5,11 +5,10 @@ import pytest
 from pydantic import ValidationError
 
 from nested_agents.core.adaptation.calibration import CalibrationSettings
-from nested_agents.core.agents.joint_agents import per_robot
+from nested_agents.core.agents.joint_agents import join_agents
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.settings import Decision
-from nested_agents.core.interface.protocols import CalibratedScenario
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.prediction.belief import (
@@ -22,7 +21,7 @@ from nested_agents.scenarios.box_pushing.prediction.prediction import mean_twist
 from nested_agents.scenarios.box_pushing.prediction.push import push
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.scripted.controller import ScriptedController
-from nested_agents.topologies import parse
+from nested_agents.topologies import build
 
 SOFT = {"stiffness": 0.5, "load": 2.0, "contact_friction": 0.5}
 STIFF = {"stiffness": 2.0, "load": 0.5, "contact_friction": 2.0}
@@ -35,12 +34,12 @@ def scenario(**table):
     return BoxPushing(BoxPushingSettings.model_validate(table))
 
 
-def calibrating(world, topology="chain"):
+def calibrating(world, agents="actuator"):
     settings = BatchTDSettings(
         calibration=CalibrationSettings(enabled=True), decision=Decision(rule="random")
     )
-    seen, hierarchy = parse(topology).arrange(world)
-    return seen, Team.build(settings, seen, hierarchy, policy_seed(0))
+    seen = join_agents(world, agents)
+    return seen, Team.build(settings, seen, build("chain", seen.agents), policy_seed(0))
 
 
 def pushed(model, twists=TWISTS):
@@ -133,8 +132,7 @@ def test_the_twist_of_the_box_is_not_measured_when_robots_touch():
 
 
 def test_a_team_of_robots_calibrates_too_and_is_saved_whole(tmp_path):
-    (world, team), (_, other) = (calibrating(scenario(start="easy"), "per-robot") for _ in "ab")
-    assert isinstance(world, CalibratedScenario)
+    (world, team), (_, other) = (calibrating(scenario(start="easy"), "body") for _ in "ab")
     assert world.constants == CONSTANTS
     for _ in control_loop(world, team, episodes=1, steps=30, seed=0):
         pass
@@ -146,7 +144,7 @@ def test_a_team_of_robots_calibrates_too_and_is_saved_whole(tmp_path):
 
 
 def test_robots_of_other_scenarios_have_no_constants(line_world):
-    assert not hasattr(per_robot(line_world(2, 2)), "constants")
+    assert not hasattr(join_agents(line_world(2, 2), "body"), "constants")
 
 
 @pytest.mark.parametrize("predictor", ["rigid", "static", "exact"])

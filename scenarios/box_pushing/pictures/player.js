@@ -1,4 +1,4 @@
-// The replay: unpacks a recorded episode (see replays.py) and draws any moment of it on a canvas.
+// The replay: unpacks a recorded episode (see player.py) and draws any moment of it on a canvas.
 "use strict";
 (() => {
   const recorded = JSON.parse(document.getElementById("recorded").textContent);
@@ -14,7 +14,7 @@
     const packed = Uint8Array.from(atob(episode.data), (c) => c.charCodeAt(0));
     const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
     const bytes = await new Response(stream).arrayBuffer();
-    const body = recorded.bodies[episode.body];
+    const body = recorded.scenes[episode.scene];
     const moments = episode.steps + 1, wheels = body.agents.length;
     const view = new DataView(bytes);
     let place = 0;

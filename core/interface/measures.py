@@ -1,0 +1,78 @@
+"""What an episode is told by: the columns of results that a scenario declares."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from .scenario import Scenario
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A number by which an episode is told: a column of results.
+
+    Attributes
+    ----------
+    name
+        Of the column; ``success`` is the one by which scenarios are compared.
+    title
+        Its heading in tables and figures.
+    unit
+        In words of the SI, ``"1"`` for a pure number.
+    source
+        Where it is taken from at every step: a key of `Transition.info`, or ``terminated``; empty:
+        the key of its own name.
+    gathering
+        How the steps of an episode make one number: their ``last``, ``mean``, ``sum`` or ``max``.
+    better
+        Which way is better, if one is.
+    is_rate
+        Whether an episode has it or has it not: 1 or 0.
+    least, greatest
+        What it cannot be below or above, if there is such; intervals end there.
+    """
+
+    name: str
+    title: str
+    unit: str = "1"
+    source: str = ""
+    gathering: Literal["last", "mean", "sum", "max"] = "last"
+    better: Literal["higher", "lower"] | None = None
+    is_rate: bool = False
+    least: float | None = None
+    greatest: float | None = None
+
+    def __post_init__(self) -> None:
+        """Take it from the key of its own name, if no other is given."""
+        object.__setattr__(self, "source", self.source or self.name)
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """The least and the greatest value, infinite where none is known."""
+        least = -math.inf if self.least is None else self.least
+        return least, math.inf if self.greatest is None else self.greatest
+
+    @property
+    def heading(self) -> str:
+        """Title and unit.
+
+        >>> Measure("final_distance_m", "distance", "m").heading
+        'distance [m]'
+        """
+        return self.title if self.unit == "1" else f"{self.title} [{self.unit}]"
+
+
+SUCCESS = Measure("success", "success", source="terminated", better="higher", is_rate=True)
+"""Whether the episode ended with the task solved: success, unless a scenario says otherwise."""
+
+
+def measures_of(scenario: Scenario) -> tuple[Measure, ...]:
+    """Return what an episode of a scenario is told by, success first.
+
+    Of a scenario without ``measures`` it is success alone, see `SUCCESS`.
+    """
+    found: tuple[Measure, ...] = tuple(getattr(scenario, "measures", ()))
+    own = [m for m in found if m.name == SUCCESS.name] or [SUCCESS]
+    return (*own, *(m for m in found if m.name != SUCCESS.name))

@@ -1,0 +1,190 @@
+"""What a learner may know of the world: what a scenario promises, and what a step of it returns.
+
+Conventions are those of `prediction`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+
+from ..numerics.arrays import FloatArray, IntArray
+from .prediction import Prediction
+from .spaces import ActionSet, StateSpace
+
+
+@dataclass(frozen=True)
+class Transition:
+    """What one step of a scenario returns.
+
+    Attributes
+    ----------
+    states
+        ``(n, d)`` states of the agents after the step.
+    reward
+        Reward received on entering these states: one number for all agents, or ``(n,)``.
+    terminated
+        Whether the task is solved (or lost) for good.
+    truncated
+        Whether the episode ends for lack of time.
+    info
+        Measurements of the step by name, scalars or small arrays; for records, not for learners.
+    twists
+        ``(M, 3)`` mean twist of every group's body in its own frame [m/s, m/s, rad/s], where bodies
+        measure it; ``(K + M, 3)`` where they also measure what they move, its twists standing
+        first, and nothing else than these bodies moved it.
+    """
+
+    states: FloatArray
+    reward: float | FloatArray
+    terminated: bool
+    truncated: bool
+    info: Mapping[str, Any]
+    twists: FloatArray | None = None
+
+
+@runtime_checkable
+class Scenario(Protocol):
+    """A world with a task. Everything a learner may know of it.
+
+    What else it may have is asked for by `groups_of`, `roles_of` and `measures_of`, which know what
+    holds without; by `RecordedScenario` and `EmbodiedScenario`; and by name:
+
+    ``measure()``
+        See `RecordedScenario`; asked for alone where a scenario is checked.
+    ``partners()``
+        For every agent the one in whose place it stands in the mirror, or a ValueError of one line
+        if an agent has none: experience can be mirrored, see `core.adaptation.mirror`.
+    ``with_exact_prediction()``
+        The same scenario with a predictor that makes no errors but those of rounding; itself, if it
+        has one already. Then it can be checked that sensing and predicting mean the same.
+    ``run_episode(team, seed, episode, steps, learn=...)``
+        A whole episode of a team at once, compiled, see `core.agents.loop.EpisodeSummary`.
+    """
+
+    @property
+    def agents(self) -> tuple[str, ...]:
+        """Names of the agents, in agent order."""
+        ...
+
+    @property
+    def state_space(self) -> StateSpace:
+        """The state variables of every agent."""
+        ...
+
+    @property
+    def action_set(self) -> ActionSet:
+        """The actions of every agent."""
+        ...
+
+    def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
+        """Start an episode and return states ``(n, d)``.
+
+        Everything random in it follows from `seed`; what is scheduled, from its number `episode`.
+        """
+        ...
+
+    def step(self, joint_action: IntArray) -> Transition:
+        """Carry out a joint action ``(n,)`` for one decision period."""
+        ...
+
+    def predict(self) -> Prediction:
+        """Predict from the present state."""
+        ...
+
+
+@runtime_checkable
+class RecordedScenario(Scenario, Protocol):
+    """A scenario whose episodes are worth keeping step by step.
+
+    If it has ``animate(recording, path)``, too, a recording (arrays by name) can be drawn, as GIF
+    or MP4 by the suffix of ``path``; `can_draw` asks for it.
+    """
+
+    def measure(self) -> Mapping[str, Any]:
+        """Return the measurements of the present state, as in `Transition.info`.
+
+        It is asked for between steps, and before the first one.
+        """
+        ...
+
+    @property
+    def recorded(self) -> tuple[str, ...]:
+        """Names of the measurements that are kept, one array ``(T + 1, ...)`` each."""
+        ...
+
+    def constants_of_episode(self) -> Mapping[str, Any]:
+        """Return what is kept once an episode: numbers, texts, arrays."""
+        ...
+
+
+@runtime_checkable
+class EmbodiedScenario(Scenario, Protocol):
+    """A scenario whose groups are bodies on wheels, open to self-models.
+
+    If its predictions rest on positive constants that can be calibrated, it also has their names
+    ``constants`` (none if the present predictor has none), and ``levers`` ``(K + M,)``, the speed
+    per turning rate of what is moved and of the bodies [m].
+    """
+
+    @property
+    def nominal_effects(self) -> tuple[FloatArray, ...]:
+        """Per body the ``(3, w + 1)`` effect of its wheel speeds on its twist."""
+        ...
+
+    def predict_with(
+        self, effects: Sequence[FloatArray], constants: FloatArray | None = None
+    ) -> Any:
+        """Predict from the present state, believing in these effects, and in constants if given.
+
+        The constants are logarithms, in units of what is believed without them. The prediction has
+
+        ``groups``
+            Agents by body.
+        ``commands(joint_action)``
+            The wheel speeds ``(n,)`` that a joint action ``(n,)`` would command.
+        ``slips(joint_action)``
+            By how much contact is predicted to change the bodies' twists, ``(M, 3)``.
+        ``outcomes(joint_action, constants)``
+            Where there are constants: what a joint action would lead to under each of ``k`` choices
+            of them ``(k, c)``, as mean twists ``(k, K + M, 3)`` of what is moved, and then of the
+            bodies, see `Transition.twists`.
+        """
+        ...
+
+
+def can_draw(scenario: Scenario) -> bool:
+    """Return whether recordings of a scenario's episodes can be drawn."""
+    return isinstance(scenario, RecordedScenario) and hasattr(scenario, "animate")
+
+
+def groups_of(scenario: Scenario) -> tuple[tuple[int, ...], ...]:
+    """Return the agents by body, consecutive; of a scenario without ``groups``, each alone."""
+    single = tuple((i,) for i in range(len(scenario.agents)))
+    groups: tuple[tuple[int, ...], ...] = getattr(scenario, "groups", single)
+    return groups
+
+
+def joint_reward(reward: float | FloatArray, groups: Sequence[Sequence[int]]) -> float | FloatArray:
+    """Return the reward of those who act for groups of agents: the mean of each group's rewards.
+
+    Examples
+    --------
+    >>> joint_reward(0.5, [(0, 1)]), joint_reward(np.array([1.0, 3.0, 5.0]), [(0, 1), (2,)])
+    (0.5, array([2., 5.]))
+    """
+    if np.ndim(reward) == 0:
+        return reward
+    return np.array([np.asarray(reward)[list(group)].mean() for group in groups])
+
+
+def roles_of(scenario: Scenario) -> tuple[str, ...]:
+    """Return the role of every agent: agents of one role may share weights.
+
+    Of a scenario without ``roles``, every agent has its own.
+    """
+    roles: tuple[str, ...] = getattr(scenario, "roles", tuple(scenario.agents))
+    return roles

@@ -1,0 +1,272 @@
+"""What a trained team does, by where a robot stands around the box.
+
+The box lies turned as at the goal, the goal 60 cm ahead of it. One robot is put on the points of a
+grid around it, at rest and looking at the box, the others stay behind the box; the team decides
+greedily, and the predictor tells how the robot would move in the decision period.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from math import ceil, radians
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle, PathPatch
+from matplotlib.path import Path as Outline
+from shapely.geometry import Point, Polygon
+
+from ....core.agents.team import Team
+from ....core.numerics.arrays import FloatArray
+from ..prediction.prediction import BoxPrediction
+from ..prediction.situation import Situation
+from ..states.view import wrap
+from ..world.boxes import BoxSpec
+from ..world.geometry import surface
+from ..world.robots import RobotSpec
+from ..world.starts import place
+
+AHEAD = 0.6
+"""From the box to the goal [m]."""
+AROUND = 0.25
+"""How far beyond the box the grid reaches [m]."""
+POINTS = 17
+"""Of the grid, along a side."""
+LEAST_WAY = 0.002
+"""A shorter way is called none [m]."""
+LEAST_TURN = radians(3.0)
+"""A smaller turn is called none [rad]."""
+MOST_ROBOTS = 4
+"""Robots whose fields are computed."""
+SIDES = ("behind", "right", "ahead", "left")
+"""Where a robot may stand, seen along the course from box to goal; counter-clockwise."""
+MOVES = ("to the box", "away", "turns", "rests")
+COLOURS = dict(zip(MOVES, ("#0072B2", "#D55E00", "#009E73", "#999999"), strict=True))
+SHOWN = """\
+What a robot does that stands at rest around the box and looks at it, the goal
+60 cm ahead of the box, the other robots behind it.
+"""
+
+
+@dataclass(frozen=True)
+class Field:
+    """What one robot does from each point around the box.
+
+    Attributes
+    ----------
+    robot
+        Its number, from 0.
+    points
+        ``(m, 3)`` its poses in the frame of the box.
+    ways
+        ``(m, 2)`` how far it is predicted to move, in the frame of the box [m].
+    turns
+        ``(m,)`` how far it is predicted to turn [rad].
+    others
+        ``(M - 1, 2)`` places of the others.
+    """
+
+    robot: int
+    points: FloatArray
+    ways: FloatArray
+    turns: FloatArray
+    others: FloatArray
+
+    @property
+    def moves(self) -> list[str]:
+        """The kind of move from every point, one of `MOVES`."""
+        headings = np.stack([np.cos(self.points[:, 2]), np.sin(self.points[:, 2])], axis=1)
+        onward = (self.ways * headings).sum(axis=1)
+        far = np.hypot(*self.ways.T) >= LEAST_WAY
+        still = np.where(np.abs(self.turns) >= LEAST_TURN, MOVES[2], MOVES[3])
+        return [str(m) for m in np.where(far, np.where(onward > 0, MOVES[0], MOVES[1]), still)]
+
+    @property
+    def sides(self) -> list[str]:
+        """The side of the box of every point, one of `SIDES`."""
+        quarter = np.round((np.arctan2(self.points[:, 1], self.points[:, 0]) + np.pi) * 2 / np.pi)
+        return [SIDES[int(q) % 4] for q in quarter]
+
+
+@dataclass(frozen=True)
+class Policy:
+    """What each of the first `MOST_ROBOTS` robots of a team does.
+
+    Attributes
+    ----------
+    fields
+        Robot by robot.
+    box, robot
+        What stands there.
+    """
+
+    fields: tuple[Field, ...]
+    box: BoxSpec
+    robot: RobotSpec
+
+    def lines(self) -> Iterator[str]:
+        """Yield, by robot and side of the box, how often it makes which move."""
+        yield from SHOWN.splitlines()
+        yield ""
+        head = "".join(move.rjust(12) for move in MOVES)
+        yield f"{'robot':<7}{'side':<8}{'places':>7}{head}"
+        for field in self.fields:
+            for side in SIDES:
+                here = [i for i, at in enumerate(field.sides) if at == side]
+                if not here:
+                    continue
+                counted = Counter(field.moves[i] for i in here)
+                shares = (f"{100 * counted[move] / len(here):.0f} %".rjust(12) for move in MOVES)
+                yield f"{field.robot + 1:<7}{side:<8}{len(here):>7}{''.join(shares)}"
+        left = len(self.fields[0].others) + 1 - len(self.fields)
+        if left:
+            yield f"{left} more robots are not shown."
+
+    def figure(self) -> Figure:
+        """Draw how each robot moves from where."""
+        columns = min(2, len(self.fields))
+        rows = ceil(len(self.fields) / columns)
+        figure = Figure(figsize=(4.1 * columns, 4.3 * rows + 0.9), layout="constrained")
+        panels = figure.subplots(rows, columns, squeeze=False).ravel()
+        for axes, field in zip(panels, self.fields, strict=False):
+            _draw(axes, field, self.box, self.robot.radius)
+        for axes in panels[len(self.fields) :]:
+            axes.set_visible(False)
+        handles = [
+            Line2D([], [], ls="", marker="o", ms=6, color=colour, label=move)
+            for move, colour in COLOURS.items()
+        ]
+        figure.legend(
+            handles=handles, loc="outside lower center", ncols=4, frameon=False,
+            title="what a robot at rest, looking at the box, does next; grey discs: the others",
+        )  # fmt: skip
+        return figure
+
+
+def policy_of(
+    team: Team, prediction: object, box: BoxSpec, robots: list[RobotSpec], start: str
+) -> Policy:
+    """Return what a team does around the box.
+
+    Parameters
+    ----------
+    team
+        Decides.
+    prediction
+        What it predicts of any situation of the scenario; the goal, wheels and beliefs are taken
+        from it.
+    box, robots
+        Of the scenario.
+    start
+        The start distribution by which robots stand behind the box if those of ``medium`` do not.
+
+    Raises
+    ------
+    ValueError
+        If the predictor needs a world that has really come to be as it predicts from.
+    """
+    if type(prediction) is not BoxPrediction:
+        raise ValueError("its predictions play the world itself, and cannot begin anywhere")
+    goal = prediction.situation.goal
+    at = np.array([goal[0] - AHEAD, goal[1], goal[2]])
+    poses = _behind(at, box, robots, start)
+    situation = replace(prediction.situation, box=at, speeds=0 * prediction.situation.speeds)
+    fields = []
+    for robot in range(min(len(poses), MOST_ROBOTS)):
+        others = np.delete(poses, robot, axis=0) - at
+        points = _grid(box, robots[robot].radius, others)
+        moved = [_moved(team, prediction, situation, poses, robot, p + at) for p in points]
+        ways, turns = (np.array(column) for column in zip(*moved, strict=True))
+        fields.append(Field(robot, points, ways, turns, others[:, :2]))
+    return Policy(tuple(fields), box, robots[0])
+
+
+def _moved(
+    team: Team,
+    prediction: BoxPrediction,
+    situation: Situation,
+    robots: FloatArray,
+    robot: int,
+    pose: FloatArray,
+) -> tuple[FloatArray, float]:
+    """Return way and turn after the team's decision with a robot at a pose."""
+    placed = robots.copy()
+    placed[robot] = pose
+    here = BoxPrediction(replace(situation, robots=placed), prediction.model, prediction.premises)
+    view = here.poses(team.act(here, explore=False)[None])
+    after = view.robots[0, robot]
+    return (after - pose)[:2], float(wrap(after[2:] - pose[2:])[0])
+
+
+def _behind(at: FloatArray, box: BoxSpec, robots: list[RobotSpec], start: str) -> FloatArray:
+    """Return poses ``(M, 3)`` behind a box, or if they do not fit there as at a start."""
+    try:
+        poses, was, _ = place("medium", np.random.default_rng(0), robots, box)
+    except ValueError:
+        poses, was, _ = place(start, np.random.default_rng(0), robots, box)
+    turn = at[2] - was[2]
+    rotation = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
+    places = at[:2] + (poses[:, :2] - was[:2]) @ rotation.T
+    return np.column_stack([places, wrap(poses[:, 2] + turn)])
+
+
+def _grid(box: BoxSpec, radius: float, others: FloatArray) -> FloatArray:
+    """Return poses ``(m, 3)`` around the box, looking at its centre, where there is room."""
+    outline, polygon = box.outline, box.polygon
+    holes = [] if polygon is None else [Polygon(ring) for ring in polygon.interiors]
+    line = np.linspace(-1, 1, POINTS) * (box.reach + AROUND)
+    points = []
+    for y in line:
+        for x in line:
+            clear = surface(outline.edges, outline.rounding, x, y)[0] > radius
+            apart = np.hypot(others[:, 0] - x, others[:, 1] - y)
+            reached = not any(hole.contains(Point(x, y)) for hole in holes)
+            if clear and reached and (apart > 2 * radius).all():
+                points.append((x, y, np.arctan2(-y, -x)))
+    return np.array(points)
+
+
+def _draw(axes: Axes, field: Field, box: BoxSpec, radius: float) -> None:
+    reach = box.reach + AROUND
+    spacing = 2 * reach / 16
+    moves = np.array(field.moves)
+    colours = [COLOURS[move] for move in moves]
+    longest = max(float(np.hypot(*field.ways.T).max()), 1e-9)
+    ways = 0.9 * spacing * field.ways / longest
+    axes.add_patch(PathPatch(_outline(box), fc="#E69F00", ec="black", alpha=0.75))
+    for spot in field.others:
+        axes.add_patch(Circle((spot[0], spot[1]), radius, fc="#bbbbbb", ec="#777777"))
+    axes.quiver(
+        *field.points[:, :2].T, *ways.T, color=colours,
+        angles="xy", scale_units="xy", scale=1.0, width=0.006, headwidth=4, headlength=4.5,
+    )  # fmt: skip
+    for move, turning in (("turns", True), ("rests", False)):
+        here = moves == move
+        if not here.any():
+            continue
+        look: dict[str, Any] = {"color": COLOURS[move], "ls": ""}
+        if not turning:
+            axes.plot(*field.points[here, :2].T, marker=".", ms=3, **look)
+            continue
+        for sign, marker in ((1, r"$\circlearrowleft$"), (-1, r"$\circlearrowright$")):
+            own = here & (np.sign(field.turns) == sign)
+            axes.plot(*field.points[own, :2].T, marker=marker, ms=7, **look)
+    axes.arrow(0, 0, 0.6 * box.reach, 0, width=0.004, head_width=0.02, color="black")
+    axes.text(0.25 * box.reach, 0.03, "to the goal", ha="center", fontsize=7)
+    axes.set_xlim(-reach - spacing, reach + spacing)
+    axes.set_ylim(-reach - spacing, reach + spacing)
+    axes.set_box_aspect(1.0)  # a square of equal lengths; `set_aspect` would cut the title off
+    axes.set_title(f"robot {field.robot + 1}; longest arrow {1000 * longest:.0f} mm", loc="left")
+    axes.set_xlabel("along the course to the goal [m]")
+
+
+def _outline(box: BoxSpec) -> Outline:
+    if box.polygon is None:
+        return Outline.circle((0, 0), box.radius)
+    rings = [np.array(r.coords) for r in (box.polygon.exterior, *box.polygon.interiors)]
+    return Outline.make_compound_path(*(Outline(ring, closed=True) for ring in rings))

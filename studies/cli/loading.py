@@ -1,0 +1,36 @@
+"""Results that a command reads: of one study or several, or a part of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from ...core.plugins import trust
+from ..api.study import StudyResults, load
+from ..presentation.progress import say
+from ..store.store import Store
+
+
+def load_results(
+    sources: Sequence[Path], study: str | None, where: str | None, *, is_trusted: bool
+) -> StudyResults:
+    """Return the results at some places, as a study analyses them, or a choice of the trials."""
+    if is_trusted:
+        for source in sources:
+            if source.is_dir():
+                trust_files(source)
+    results = load(*sources)
+    for remark in results.remarks:
+        say(remark)
+    results = results if where is None else results.where(where)
+    return results if study is None else results.as_study(study)
+
+
+def trust_files(directory: Path) -> None:
+    """Allow the Python files that are kept with a study to be run, and say which."""
+    with Store.open(directory) as store:
+        texts = store.sources()
+    for name, text in texts.items():
+        if name.endswith(".py") and not trust.is_trusted(text):
+            say(f"{name}, which came with {directory}, is trusted from now on")
+            trust.trust(text)
