@@ -44,7 +44,7 @@ class DaskWorkers(Workers):
 
     def __init__(self, client: Client, most: int | None, name: str) -> None:
         self._client, self._most, self._name = client, most, name
-        self._seen = time.monotonic()  # when there was a worker
+        self._alone_since: float | None = None  # when there was no worker any more
 
     @classmethod
     @contextmanager
@@ -90,9 +90,12 @@ class DaskWorkers(Workers):
             found = len(self._client.nthreads())
         except (OSError, ValueError) as error:
             raise self._gone() from error
+        now = time.monotonic()
         if found:
-            self._seen = time.monotonic()
-        elif time.monotonic() - self._seen > PATIENCE:
+            self._alone_since = None
+        elif self._alone_since is None:
+            self._alone_since = now
+        elif now - self._alone_since > PATIENCE:
             raise SpecError(
                 f"{self._name} has had no worker for {PATIENCE:.0f} s; what has finished "
                 "is kept, the same command continues"
@@ -110,6 +113,7 @@ class DaskWorkers(Workers):
         except TimeoutError:
             return None  # the worker that held the result died
         except KilledWorker:
+            self._alone_since = None
             return Outcome(trial, f"killed, in {self._name}", 0.0, lost=True)
         except UnlikeWorkerError as error:
             raise SpecError(f"{self._name}: {error}") from None
