@@ -1,21 +1,25 @@
-"""The built-in hierarchies, each a pure function from agent names to a networkx graph.
+"""The built-in topologies, each a pure function from the names of agents to a networkx graph.
 
 An edge leads from a superior to its subordinate, and every agent is a node; an undirected graph
-joins neighbours. Agents are given in agent order; *groups* are the agents of one robot each. A
-graph becomes a `Hierarchy` in `nested_agents.topologies.build`.
+joins neighbours. Agents are given in agent order; *bodies* are the agents of one body each, such as
+the wheels of a robot. Keyword-only parameters are the settings of a topology, as they stand in the
+``[topology]`` table of a spec. A graph becomes a `Hierarchy` in `nested_agents.topologies.build`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import chain as concatenated
 from itertools import zip_longest
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 import numpy as np
+from pydantic import Field
+from typing_extensions import TypeAliasType
 
 from ..core.interface.hierarchy import Hierarchy
 from ..core.plugins.deferred import Deferred
+from ..core.plugins.settings import Fraction
 from .checks import check_names, with_edges
 
 if TYPE_CHECKING:
@@ -23,49 +27,73 @@ if TYPE_CHECKING:
 else:
     nx = Deferred("networkx")
 
-Member: TypeAlias = "str | Sequence[Member]"
-"""An agent, or a team of members."""
+Names: TypeAlias = Sequence[str]
+Bodies: TypeAlias = Sequence[Names]
+Pairs: TypeAlias = tuple[tuple[str, str], ...]
+Members = TypeAliasType("Members", "tuple[str | Members, ...]")
+"""The members of a team: agents, or teams of members, to any depth."""
 
 
-def chain(agents: Sequence[str]) -> nx.DiGraph:
-    """Return the paper's nested chain: each agent above the next one.
+def chain(
+    agents: Names,
+    bodies: Bodies = (),
+    *,
+    order: Annotated[
+        Literal["listed", "reversed", "interleaved"] | tuple[str, ...],
+        Field(
+            description="The agents' own order, its reverse, wheel by wheel across robots, or all "
+            "names in order."
+        ),
+    ] = "listed",
+) -> nx.DiGraph:
+    """Put each agent above the next one in `order`: the paper's nested chain.
 
     Examples
     --------
-    >>> list(chain(["a", "b", "c"]).edges)
-    [('a', 'b'), ('b', 'c')]
+    >>> list(chain(["a1", "a2", "b1", "b2"]).edges)
+    [('a1', 'a2'), ('a2', 'b1'), ('b1', 'b2')]
+    >>> list(chain(["a1", "a2", "b1"], [["a1", "a2"], ["b1"]], order="interleaved").edges)
+    [('a1', 'b1'), ('b1', 'a2')]
     """
+    ranks = zip_longest(*bodies)
+    orders = {
+        "listed": tuple(agents),
+        "reversed": tuple(reversed(agents)),
+        "interleaved": tuple(agent for rank in ranks for agent in rank if agent is not None),
+    }
+    names = orders[order] if isinstance(order, str) else order
+    check_names(names, agents, "order")
     graph = nx.DiGraph()
-    nx.add_path(graph, agents)
+    nx.add_path(graph, names)
     return graph
 
 
-def interleaved(groups: Sequence[Sequence[str]]) -> tuple[str, ...]:
-    """Return the agents in the order first of every group, second of every group, ...
+def tree(
+    agents: Names,
+    bodies: Bodies = (),
+    *,
+    branching: Annotated[int, Field(ge=1, description="Number of subordinates of an agent.")] = 2,
+) -> nx.DiGraph:
+    """Put every agent but the last ones above `branching` others.
 
     Examples
     --------
-    >>> interleaved([["a1", "a2"], ["b1", "b2"]])
-    ('a1', 'b1', 'a2', 'b2')
-    """
-    ranks = zip_longest(*groups)
-    return tuple(agent for rank in ranks for agent in rank if agent is not None)
-
-
-def tree(agents: Sequence[str], branching: int = 2) -> nx.DiGraph:
-    """Return a tree in which every agent but the last ones has `branching` subordinates.
-
-    Examples
-    --------
-    >>> list(tree(["a", "b", "c", "d"], 2).edges)
+    >>> list(tree(["a", "b", "c", "d"]).edges)
     [('a', 'b'), ('a', 'c'), ('b', 'd')]
     """
     graph = nx.full_rary_tree(branching, len(agents), create_using=nx.DiGraph)
     return nx.relabel_nodes(graph, dict(enumerate(agents)))
 
 
-def star(agents: Sequence[str], leader: str | None = None) -> nx.DiGraph:
-    """Return one leader, the first agent unless named, with everyone else right below it.
+def star(
+    agents: Names,
+    bodies: Bodies = (),
+    *,
+    leader: Annotated[
+        str | None, Field(description="Name of the leader; none: the first agent.")
+    ] = None,
+) -> nx.DiGraph:
+    """Put one leader right above everyone else.
 
     Examples
     --------
@@ -79,8 +107,42 @@ def star(agents: Sequence[str], leader: str | None = None) -> nx.DiGraph:
     return graph
 
 
-def independent(agents: Sequence[str]) -> nx.DiGraph:
-    """Return agents that do not see one another.
+def teams(
+    agents: Names,
+    bodies: Bodies = (),
+    *,
+    link: Annotated[
+        Literal["chain", "star"],
+        Field(description="Whether the leaders of the members of a team form a chain or a star."),
+    ] = "chain",
+    members: Annotated[
+        Members | None,
+        Field(
+            description="Nested lists of agent names, to any depth; none: the bodies (robots) of "
+            "the scenario."
+        ),
+    ] = None,
+) -> nx.DiGraph:
+    """Put the leaders of nested teams in a chain or a star, each above its team.
+
+    The leader of a team is that of its first member, that of an agent the agent itself. Without
+    `members`, the team is one of robots of wheels: the first wheels form a chain, each above its
+    own robot's other wheels.
+
+    Examples
+    --------
+    >>> sorted(teams(["a1", "a2", "b1", "b2"], [["a1", "a2"], ["b1", "b2"]]).edges)
+    [('a1', 'a2'), ('a1', 'b1'), ('b1', 'b2')]
+    >>> sorted(teams("abcd", members=(("a", "b", "c"), "d"), link="star").edges)
+    [('a', 'b'), ('a', 'c'), ('a', 'd')]
+    """
+    team = tuple(map(tuple, bodies)) if members is None else members
+    check_names(names_of(team), agents, "members")
+    return _team(team, chain if link == "chain" else star)
+
+
+def independent(agents: Names, bodies: Bodies = ()) -> nx.DiGraph:
+    """Let no agent see another.
 
     Examples
     --------
@@ -92,8 +154,8 @@ def independent(agents: Sequence[str]) -> nx.DiGraph:
     return graph
 
 
-def simultaneous(agents: Sequence[str]) -> nx.Graph:
-    """Return agents who are all neighbours: everybody considers everybody, nobody is told anything.
+def simultaneous(agents: Names, bodies: Bodies = ()) -> nx.Graph:
+    """Let all decide at the same time: each considers what all others might do.
 
     Examples
     --------
@@ -105,11 +167,18 @@ def simultaneous(agents: Sequence[str]) -> nx.Graph:
 
 
 def coordination_graph(
-    agents: Sequence[str],
-    shape: Literal["line", "ring"] = "line",
-    edges: Iterable[Sequence[str]] | None = None,
+    agents: Names,
+    bodies: Bodies = (),
+    *,
+    shape: Annotated[
+        Literal["line", "ring"],
+        Field(description="In agent order; on a ring the last is a neighbour of the first."),
+    ] = "line",
+    edges: Annotated[
+        Pairs | None, Field(description="Pairs of neighbours in place of a shape.")
+    ] = None,
 ) -> nx.Graph:
-    """Return neighbours on a line or a ring in agent order, or the given pairs of neighbours.
+    """Join neighbours on a line, on a ring or as listed, who decide at once.
 
     Raises
     ------
@@ -118,7 +187,7 @@ def coordination_graph(
 
     Examples
     --------
-    >>> list(coordination_graph(["a", "b", "c"], "ring").edges)
+    >>> list(coordination_graph(["a", "b", "c"], shape="ring").edges)
     [('a', 'b'), ('a', 'c'), ('b', 'c')]
     """
     graph = nx.Graph()
@@ -134,33 +203,58 @@ def coordination_graph(
     return graph
 
 
-def teams(members: Sequence[Member], link: Literal["chain", "star"] = "chain") -> nx.DiGraph:
-    """Return nested teams: the leaders of a team's members form a chain, or a star.
+def from_edges(
+    agents: Names,
+    bodies: Bodies = (),
+    *,
+    edges: Annotated[Pairs, Field(description="Pairs (superior, subordinate).")],
+    alone: Annotated[tuple[str, ...], Field(description="Agents that are in no edge.")] = (),
+) -> nx.DiGraph:
+    """Take any hierarchy, edge by edge.
 
-    A team is a list of agents or of teams, to any depth; the leader of a team is the leader of its
-    first member, that of an agent the agent itself.
+    Raises
+    ------
+    ValueError
+        If an edge occurs twice, or an agent is in no edge and not in `alone`. It is named.
 
     Examples
     --------
-    Two robots of two wheels: the leading wheels form a chain, each above its own robot's wheels.
-
-    >>> sorted(teams([["a1", "a2"], ["b1", "b2"]]).edges)
-    [('a1', 'a2'), ('a1', 'b1'), ('b1', 'b2')]
-    >>> sorted(teams([["a", "b", "c"], "d"], link="star").edges)
-    [('a', 'b'), ('a', 'c'), ('a', 'd')]
+    >>> list(from_edges(["a", "b", "c"], edges=(("a", "b"),), alone=("c",)).edges)
+    [('a', 'b')]
     """
-    if not members:
-        raise ValueError("a team has no members")
-    graph = nx.compose_all(
-        [independent([m]) if isinstance(m, str) else teams(m, link) for m in members]
-    )
-    leaders = [_leader(member) for member in members]
-    arrange = chain if link == "chain" else star
-    graph.add_edges_from(arrange(leaders).edges)
+    graph = nx.DiGraph()
+    graph.add_nodes_from(alone)
+    with_edges(graph, edges)
+    check_names(list(graph), agents, "edges and alone")
     return graph
 
 
-def names_of(members: Sequence[Member]) -> list[str]:
+def random_hierarchy(
+    agents: Names,
+    bodies: Bodies = (),
+    *,
+    seed: Annotated[int, Field(ge=0, description="Seed of its random numbers.")] = 0,
+    density: Annotated[Fraction, Field(description="Probability of each possible edge.")] = 0.3,
+) -> nx.DiGraph:
+    """Rank the agents at random, each above each lower one with a probability.
+
+    Examples
+    --------
+    >>> first, again = (random_hierarchy(["a", "b", "c", "d"], seed=1) for _ in range(2))
+    >>> nx.utils.graphs_equal(first, again), nx.is_directed_acyclic_graph(first)
+    (True, True)
+    """
+    rng = np.random.default_rng(seed)
+    ranked = [agents[i] for i in rng.permutation(len(agents))]
+    graph = independent(agents)
+    for i, superior in enumerate(ranked):
+        below = ranked[i + 1 :]
+        chosen = rng.random(len(below)) < density
+        graph.add_edges_from((superior, b) for b, c in zip(below, chosen, strict=True) if c)
+    return graph
+
+
+def names_of(members: Iterable[Any]) -> list[str]:
     """Return the agents of nested teams, from left to right.
 
     Examples
@@ -170,28 +264,6 @@ def names_of(members: Sequence[Member]) -> list[str]:
     """
     parts = ([m] if isinstance(m, str) else names_of(m) for m in members)
     return list(concatenated.from_iterable(parts))
-
-
-def from_edges(
-    agents: Sequence[str], edges: Iterable[Sequence[str]], alone: Iterable[str] = ()
-) -> nx.DiGraph:
-    """Return the hierarchy of (superior, subordinate) pairs.
-
-    Raises
-    ------
-    ValueError
-        If an edge occurs twice, or an agent is in no edge and not in `alone`. It is named.
-
-    Examples
-    --------
-    >>> list(from_edges(["a", "b", "c"], [("a", "b")], alone=["c"]).edges)
-    [('a', 'b')]
-    """
-    graph = nx.DiGraph()
-    graph.add_nodes_from(alone)
-    with_edges(graph, edges)
-    check_names(list(graph), agents, "edges and alone")
-    return graph
 
 
 def from_networkx(graph: nx.Graph, agents: Sequence[str], *, neighbours: bool = False) -> nx.Graph:
@@ -228,35 +300,12 @@ def from_networkx(graph: nx.Graph, agents: Sequence[str], *, neighbours: bool = 
     return named
 
 
-def random_hierarchy(agents: Sequence[str], seed: int, density: float = 0.3) -> nx.DiGraph:
-    """Return a random hierarchy: a random ranking, each agent above a lower one with a chance.
-
-    Parameters
-    ----------
-    agents
-        Names in agent order.
-    seed
-        Everything random follows from it.
-    density
-        Chance of each of the n (n - 1) / 2 possible edges.
-
-    Examples
-    --------
-    >>> first, again = (random_hierarchy(["a", "b", "c", "d"], seed=1) for _ in range(2))
-    >>> nx.utils.graphs_equal(first, again), nx.is_directed_acyclic_graph(first)
-    (True, True)
-    """
-    rng = np.random.default_rng(seed)
-    ranked = [agents[i] for i in rng.permutation(len(agents))]
-    graph = independent(agents)
-    for i, superior in enumerate(ranked):
-        below = ranked[i + 1 :]
-        chosen = rng.random(len(below)) < density
-        graph.add_edges_from((superior, b) for b, c in zip(below, chosen, strict=True) if c)
+def _team(members: Sequence[Any], arrange: Callable[[Names], nx.DiGraph]) -> nx.DiGraph:
+    """Return the graph of a team whose members' leaders are arranged so."""
+    if not members:
+        raise ValueError("a team has no members")
+    graph = nx.compose_all(
+        [independent([m]) if isinstance(m, str) else _team(m, arrange) for m in members]
+    )
+    graph.add_edges_from(arrange([names_of([member])[0] for member in members]).edges)
     return graph
-
-
-def _leader(member: Member) -> str:
-    while not isinstance(member, str):
-        member = member[0]
-    return member

@@ -1,26 +1,26 @@
-"""The settings of a topology, as they stand in the ``[topology]`` table of a spec, or as a string.
+"""Topologies as they stand in a spec: a ``[topology]`` table, or a string.
 
-A string is ``"kind"`` or ``"kind:argument"``, see `parse`; each settings class says what its
-argument may be. A further topology is one settings class and one line in `TOPOLOGIES`.
+A string is ``"kind"`` or ``"kind:argument"``, see `parse`. A further topology is one function in
+`builders` and one line in `TOPOLOGIES`; its keyword-only parameters are its settings. What may
+follow ``kind:`` is in `ARGUMENTS`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from pydantic import Field
-from typing_extensions import TypeAliasType
 
 from ..core.interface.hierarchy import Hierarchy
 from ..core.plugins import sources
 from ..core.plugins.deferred import Deferred
 from ..core.plugins.messages import closest
 from ..core.plugins.plugged import Plugged, SettingsRegistry
-from ..core.plugins.settings import Fraction, Settings, SettingsError, tuples
-from . import builders, files
-from .builders import from_networkx
+from ..core.plugins.settings import Settings, SettingsError, tuples
+from . import files
+from .builders import Bodies, Members, Names, from_networkx, names_of  # noqa: F401 - of a field
 from .checks import check_names
 
 if TYPE_CHECKING:
@@ -28,10 +28,7 @@ if TYPE_CHECKING:
 else:
     nx = Deferred("networkx")
 
-Count = Annotated[int, Field(ge=1)]
-Groups = Sequence[Sequence[str]]
-Names = tuple[str, ...]
-Members = TypeAliasType("Members", "tuple[str | Members, ...]")
+BUILDERS = "nested_agents.topologies.builders"
 
 
 class TopologySettings(Settings):
@@ -39,271 +36,29 @@ class TopologySettings(Settings):
 
     kind: str = ""
 
-    argument: ClassVar[str] = ""
-    """What may follow ``kind:`` in a string, for help texts; empty: nothing."""
-
-    @classmethod
-    def parsed(cls, argument: str) -> Self:
-        """Return the settings that ``"kind:argument"`` stands for."""
-        raise ValueError(f"takes no argument, received {argument!r}")
-
     @property
     def title(self) -> str:
-        """What it is called in complaints."""
-        return self.kind or type(self).__name__
+        """What it is called in messages: its file, its kind, or its class."""
+        return getattr(self, "path", "") or self.kind or type(self).__name__
 
-    def build(self, agents: Sequence[str], groups: Groups) -> Any:
+    def build(self, agents: Names, bodies: Bodies) -> Any:
         """Return the graph over named agents, given by body too."""
         raise ValueError("has no kind, and makes no hierarchy")
-
-
-class ChainSettings(TopologySettings):
-    """The paper's nested chain, from the first agent of `order` down to the last."""
-
-    kind: Literal["chain"] = "chain"
-    order: Literal["listed", "reversed", "interleaved"] | Names = "listed"
-    """The agents' own order, its reverse, wheel by wheel across robots, or all names in order."""
-
-    argument: ClassVar[str] = "reversed|interleaved|NAME,NAME,..."
-
-    @classmethod
-    def parsed(cls, argument: str) -> Self:
-        """Read the order: a word, or all names separated by commas."""
-        if argument in ("listed", "reversed", "interleaved"):
-            return cls(**{"order": argument})
-        names = _names(argument)
-        if not all(names):
-            raise ValueError(f"order must be written a,b,c, received {argument!r}")
-        return cls(order=names)
-
-    def build(self, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
-        """Return the graph."""
-        orders = {
-            "listed": tuple(agents),
-            "reversed": tuple(reversed(agents)),
-            "interleaved": builders.interleaved(groups),
-        }
-        order = orders[self.order] if isinstance(self.order, str) else self.order
-        check_names(order, agents, "order")
-        return builders.chain(order)
-
-
-class TreeSettings(TopologySettings):
-    """A tree in which every agent but the last ones has `branching` subordinates."""
-
-    kind: Literal["tree"] = "tree"
-    branching: Count = 2
-    """Number of subordinates of an agent."""
-
-    argument: ClassVar[str] = "BRANCHING"
-
-    @classmethod
-    def parsed(cls, argument: str) -> Self:
-        """Read the branching."""
-        return cls(branching=_integer(argument, "branching"))
-
-    def build(self, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
-        """Return the graph."""
-        return builders.tree(agents, self.branching)
-
-
-class StarSettings(TopologySettings):
-    """One leader with everyone else right below it."""
-
-    kind: Literal["star"] = "star"
-    leader: str | None = None
-    """Name of the leader; none: the first agent."""
-
-    argument: ClassVar[str] = "LEADER"
-
-    @classmethod
-    def parsed(cls, argument: str) -> Self:
-        """Read the leader's name."""
-        return cls(leader=argument)
-
-    def build(self, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
-        """Return the graph."""
-        return builders.star(agents, self.leader)
-
-
-class TeamsSettings(TopologySettings):
-    """Nested teams: the leaders of a team's members form a chain or a star.
-
-    The leader of a team is that of its first member. Without `members`, the team is one of robots
-    of wheels: the first wheels form a chain, each above its own robot's other wheels.
-    """
-
-    kind: Literal["teams"] = "teams"
-    link: Literal["chain", "star"] = "chain"
-    """Whether the leaders of the members of a team form a chain or a star."""
-    members: Members | None = None
-    """Nested lists of agent names, to any depth; none: the groups (robots) of the scenario."""
-
-    argument: ClassVar[str] = "star"
-
-    @classmethod
-    def parsed(cls, argument: str) -> Self:
-        """Read the link."""
-        return cls(**{"link": argument})
-
-    def build(self, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
-        """Return the graph."""
-        members = groups if self.members is None else self.members
-        check_names(builders.names_of(members), agents, "members")
-        return builders.teams(members, self.link)
-
-
-class IndependentSettings(TopologySettings):
-    """Agents that do not see one another."""
-
-    kind: Literal["independent"] = "independent"
-
-    def build(self, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
-        """Return the graph."""
-        return builders.independent(agents)
-
-
-class SimultaneousSettings(TopologySettings):
-    """Agents who decide at the same time: each considers what all others might do."""
-
-    kind: Literal["simultaneous"] = "simultaneous"
-
-    def build(self, agents: Sequence[str], groups: Groups) -> nx.Graph:
-        """Return the graph, which is undirected."""
-        return builders.simultaneous(agents)
-
-
-class CoordinationGraphSettings(TopologySettings):
-    """Neighbours on a line, on a ring or as listed, who decide at the same time."""
-
-    kind: Literal["coordination-graph"] = "coordination-graph"
-    shape: Literal["line", "ring"] = "line"
-    """In agent order; on a ring the last is a neighbour of the first."""
-    edges: tuple[tuple[str, str], ...] | None = None
-    """Pairs of neighbours in place of a shape."""
-
-    argument: ClassVar[str] = "line|ring|A-B,B-C,..."
-
-    @classmethod
-    def parsed(cls, argument: str) -> Self:
-        """Read the shape, or pairs of names as ``a-b,b-c``."""
-        if argument in ("line", "ring"):
-            return cls.model_validate({"shape": argument})
-        pairs = [tuple(name.strip() for name in part.split("-")) for part in argument.split(",")]
-        for pair in pairs:
-            if len(pair) != 2 or not all(pair):
-                raise ValueError(f"must be line, ring, or pairs a-b, received {'-'.join(pair)!r}")
-        return cls.model_validate({"edges": tuple(pairs)})
-
-    def build(self, agents: Sequence[str], groups: Groups) -> nx.Graph:
-        """Return the graph, which is undirected."""
-        return builders.coordination_graph(agents, self.shape, self.edges)
-
-
-class EdgesSettings(TopologySettings):
-    """Any hierarchy, edge by edge."""
-
-    kind: Literal["edges"] = "edges"
-    edges: tuple[tuple[str, str], ...]
-    """Pairs (superior, subordinate)."""
-    alone: Names = ()
-    """Agents that are in no edge."""
-
-    argument: ClassVar[str] = "A>B,B>C,D"
-
-    @classmethod
-    def parsed(cls, argument: str) -> Self:
-        """Read ``"a>b,b>c,d"``: edges, and agents that stand alone."""
-        parts = [tuple(n.strip() for n in part.split(">")) for part in argument.split(",")]
-        for part in parts:
-            if len(part) > 2 or not all(part):
-                raise ValueError(f"an edge must be written a>b, received {'>'.join(part)!r}")
-        edges = tuple(part for part in parts if len(part) == 2)
-        return cls(**{"edges": edges, "alone": [p[0] for p in parts if len(p) == 1]})
-
-    def build(self, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
-        """Return the graph."""
-        return builders.from_edges(agents, self.edges, self.alone)
-
-
-class RandomSettings(TopologySettings):
-    """A random hierarchy: each agent above each lower-ranked one with a chance."""
-
-    kind: Literal["random"] = "random"
-    seed: Annotated[int, Field(ge=0)] = 0
-    """Seed of its random numbers."""
-    density: Fraction = 0.3
-    """Probability of each possible edge."""
-
-    argument: ClassVar[str] = "SEED"
-
-    @classmethod
-    def parsed(cls, argument: str) -> Self:
-        """Read the seed."""
-        return cls(seed=_integer(argument, "seed"))
-
-    def build(self, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
-        """Return the graph."""
-        return builders.random_hierarchy(agents, self.seed, self.density)
-
-
-class FileSettings(TopologySettings):
-    """A graph or nested teams from a GraphML, JSON or TOML file."""
-
-    kind: Literal["file"] = "file"
-    path: str
-    """Path of the file, relative to the spec."""
-
-    argument: ClassVar[str] = "PATH.graphml|PATH.json|PATH.toml"
-
-    @classmethod
-    def parsed(cls, argument: str) -> Self:
-        """Read the path."""
-        return cls(path=argument)
-
-    @property
-    def title(self) -> str:
-        """The path."""
-        return self.path
-
-    def build(self, agents: Sequence[str], groups: Groups) -> nx.DiGraph:
-        """Return the graph."""
-        found = self.content
-        if isinstance(found, TopologySettings):
-            return found.build(agents, groups)
-        return from_networkx(found, agents)
-
-    @property
-    def content(self) -> nx.DiGraph | TopologySettings:
-        """What the file holds: a graph, or another topology.
-
-        Raises
-        ------
-        ValueError
-            If it holds neither.
-        """
-        found = files.read(self.path)
-        if isinstance(found, nx.Graph):
-            return found
-        try:
-            return parse(found)
-        except ValueError as error:
-            raise ValueError(f"{self.path}: {error}") from None
 
 
 TOPOLOGIES = SettingsRegistry(
     "topology",
     {
-        "chain": f"{__name__}:ChainSettings",
-        "tree": f"{__name__}:TreeSettings",
-        "star": f"{__name__}:StarSettings",
-        "teams": f"{__name__}:TeamsSettings",
-        "independent": f"{__name__}:IndependentSettings",
-        "simultaneous": f"{__name__}:SimultaneousSettings",
-        "coordination-graph": f"{__name__}:CoordinationGraphSettings",
-        "edges": f"{__name__}:EdgesSettings",
-        "random": f"{__name__}:RandomSettings",
-        "file": f"{__name__}:FileSettings",
+        "chain": f"{BUILDERS}:chain",
+        "tree": f"{BUILDERS}:tree",
+        "star": f"{BUILDERS}:star",
+        "teams": f"{BUILDERS}:teams",
+        "independent": f"{BUILDERS}:independent",
+        "simultaneous": f"{BUILDERS}:simultaneous",
+        "coordination-graph": f"{BUILDERS}:coordination_graph",
+        "edges": f"{BUILDERS}:from_edges",
+        "random": f"{BUILDERS}:random_hierarchy",
+        "file": f"{__name__}:from_file",
     },
     TopologySettings,
     moved={
@@ -329,7 +84,7 @@ def parse(text: str | Mapping[str, Any]) -> TopologySettings:
     Examples
     --------
     >>> parse("tree:3"), parse("chain")
-    (TreeSettings(kind='tree', branching=3), ChainSettings(kind='chain', order='listed'))
+    (TopologySettings(kind='tree', branching=3), TopologySettings(kind='chain', order='listed'))
     >>> parse({"members": [["a", "b"], ["c"]]}).members
     (('a', 'b'), ('c',))
     """
@@ -340,17 +95,13 @@ def parse(text: str | Mapping[str, Any]) -> TopologySettings:
     kind, colon, argument = text.partition(":")
     try:
         if kind in TOPOLOGIES.built_in:
-            model = TOPOLOGIES.model(kind)
-            assert issubclass(model, TopologySettings)
-            return model.parsed(argument) if colon else model()
+            return _made(kind, _arguments(kind, argument) if colon else {})
         if kind in TOPOLOGIES.moved:
             raise ValueError(TOPOLOGIES.moved[kind])
         if sources.is_file(text):
-            return FileSettings(path=text)
+            return _made("file", {"path": text})
         if sources.is_reference(text) or text in TOPOLOGIES.installed():
-            found = TOPOLOGIES.parsed(text)
-            assert isinstance(found, TopologySettings)
-            return found
+            return _made(text, {})
     except SettingsError as error:
         raise ValueError(f"topology {text!r}: {error.problem}") from None
     except ValueError as error:
@@ -365,55 +116,105 @@ def _of_table(table: Mapping[str, Any]) -> TopologySettings:
     if not isinstance(kind, str):
         raise ValueError(f"topology.kind = {kind!r}: {closest(kind, TOPOLOGIES.names())}")
     try:
-        found = TOPOLOGIES.model(kind)(**{**tuples(dict(table)), "kind": kind})
+        return _made(kind, tuples({**table, "kind": kind}))
     except SettingsError as error:
         raise ValueError(f"topology.{error.problem}") from None
     except ValueError as error:
         raise ValueError(f"topology.kind = {kind!r}: {error}") from None
-    assert isinstance(found, TopologySettings)
-    return found
+
+
+def _made(kind: str, table: Mapping[str, Any]) -> TopologySettings:
+    settings = TOPOLOGIES.model(kind)(**table)
+    assert isinstance(settings, TopologySettings)
+    return settings
 
 
 Topology = Annotated[TopologySettings, Plugged(TOPOLOGIES, parse)]
 """Any topology's settings: a table distinguished by `kind`, or a string for `parse`."""
 
 
-def hierarchy_of(
-    settings: TopologySettings,
+def build(
+    settings: TopologySettings | str | Mapping[str, Any],
     agents: Sequence[str],
     groups: Sequence[Sequence[int]] | None = None,
 ) -> Hierarchy:
-    """Build the hierarchy of `settings` over named agents; see `topologies.build`."""
+    """Build the hierarchy of `settings` over named agents.
+
+    Parameters
+    ----------
+    settings
+        Any topology's settings; or a text or a table for `parse`.
+    agents
+        Distinct names, in agent order.
+    groups
+        Agent indices, from 0, by body (robot), each once; none: every agent is a body of its own.
+
+    Raises
+    ------
+    ValueError
+        If the settings or the groups do not fit the agents, or the settings do not make a
+        hierarchy. One line; it names the culprit.
+
+    Examples
+    --------
+    >>> build(parse("chain:reversed"), ["a", "b", "c"])
+    Hierarchy(3 agents: b -> a, c -> b)
+    >>> build(parse("teams"), ["a1", "a2", "b1", "b2"], [(0, 1), (2, 3)])
+    Hierarchy(4 agents: a1 -> a2, a1 -> b1, b1 -> b2)
+    """
+    if not isinstance(settings, TopologySettings):
+        settings = parse(settings)
+    title = settings.title
     try:
         if not agents:
             raise ValueError("no agents")
-        named = [(a,) for a in agents] if groups is None else _named(agents, groups)
+        bodies = [(a,) for a in agents] if groups is None else _named(agents, groups)
         if settings.kind in TOPOLOGIES.built_in:
-            graph = settings.build(agents, named)
+            graph = settings.build(agents, bodies)
         else:
-            graph = from_networkx(files.called(settings, agents, named), agents, neighbours=True)
+            graph = files.call(settings.build, title.rpartition(":")[2], agents, bodies)
+            graph = from_networkx(graph, agents, neighbours=True)
         directed = graph.is_directed()
         return Hierarchy(agents, graph.edges if directed else (), () if directed else graph.edges)
     except ValueError as error:
-        said = str(error)
-        for start in ("hierarchy: ", f"{settings.title}: ", f"topology {settings.title!r}: "):
-            said = said.removeprefix(start)
-        raise ValueError(f"topology {settings.title!r}: {said}") from None
+        problem = str(error)
+        for start in ("hierarchy: ", f"{title}: ", f"topology {title!r}: "):
+            problem = problem.removeprefix(start)
+        raise ValueError(f"topology {title!r}: {problem}") from None
 
 
-def _names(text: str) -> Names:
-    return tuple(name.strip() for name in text.split(","))
+def from_file(
+    agents: Names,
+    bodies: Bodies = (),
+    *,
+    path: Annotated[str, Field(description="Path of the file, relative to the spec.")],
+) -> nx.DiGraph:
+    """Read a graph or nested teams from a GraphML, JSON or TOML file."""
+    content = read(path)
+    if isinstance(content, TopologySettings):
+        return content.build(agents, bodies)
+    return from_networkx(content, agents)
 
 
-def _integer(text: str, what: str) -> int:
+def read(path: str) -> nx.DiGraph | TopologySettings:
+    """Return what a file holds: a graph, or another topology.
+
+    Raises
+    ------
+    ValueError
+        If it holds neither.
+    """
+    content = files.read(path)
+    if isinstance(content, nx.Graph):
+        return content
     try:
-        return int(text)
-    except ValueError:
-        raise ValueError(f"{what} = {text!r}: must be a whole number") from None
+        return parse(content)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None
 
 
-def _named(agents: Sequence[str], groups: Sequence[Any]) -> Groups:
-    """Return the names of agents given by index, by group; refuse what is no index."""
+def _named(agents: Names, groups: Sequence[Any]) -> Bodies:
+    """Return the names of agents given by index, by body; refuse what is no index."""
     named = []
     for group in groups:
         if isinstance(group, str) or not isinstance(group, Iterable):
@@ -423,5 +224,68 @@ def _named(agents: Sequence[str], groups: Sequence[Any]) -> Groups:
                 last = len(agents) - 1
                 raise ValueError(f"groups: {i!r} is no agent index, allowed: 0 to {last}")
         named.append([agents[i] for i in group])
-    check_names(builders.names_of(named), agents, "groups")
+    check_names(names_of(named), agents, "groups")
     return named
+
+
+def _order(text: str) -> dict[str, Any]:
+    """Read a word, or all names separated by commas."""
+    if text in ("listed", "reversed", "interleaved"):
+        return {"order": text}
+    names = tuple(name.strip() for name in text.split(","))
+    if not all(names):
+        raise ValueError(f"order must be written a,b,c, received {text!r}")
+    return {"order": names}
+
+
+def _neighbours(text: str) -> dict[str, Any]:
+    """Read a shape, or pairs of names as ``a-b,b-c``."""
+    if text in ("line", "ring"):
+        return {"shape": text}
+    pairs = _split(text, "-")
+    for pair in pairs:
+        if len(pair) != 2 or not all(pair):
+            raise ValueError(f"must be line, ring, or pairs a-b, received {'-'.join(pair)!r}")
+    return {"edges": pairs}
+
+
+def _edges(text: str) -> dict[str, Any]:
+    """Read ``"a>b,b>c,d"``: edges, and agents that stand alone."""
+    parts = _split(text, ">")
+    for part in parts:
+        if len(part) > 2 or not all(part):
+            raise ValueError(f"an edge must be written a>b, received {'>'.join(part)!r}")
+    alone = tuple(part[0] for part in parts if len(part) == 1)
+    return {"edges": tuple(part for part in parts if len(part) == 2), "alone": alone}
+
+
+def _split(text: str, sign: str) -> tuple[tuple[str, ...], ...]:
+    return tuple(tuple(name.strip() for name in part.split(sign)) for part in text.split(","))
+
+
+ARGUMENTS: dict[str, tuple[str, str | Callable[[str], dict[str, Any]]]] = {
+    "chain": ("reversed|interleaved|NAME,NAME,...", _order),
+    "tree": ("BRANCHING", "branching"),
+    "star": ("LEADER", "leader"),
+    "teams": ("star", "link"),
+    "coordination-graph": ("line|ring|A-B,B-C,...", _neighbours),
+    "edges": ("A>B,B>C,D", _edges),
+    "random": ("SEED", "seed"),
+    "file": ("PATH.graphml|PATH.json|PATH.toml", "path"),
+}
+"""By kind what may follow ``kind:``, in words, and the setting that it is or how it is read."""
+
+
+def _arguments(kind: str, text: str) -> dict[str, Any]:
+    """Return the settings that stand in ``"kind:text"``."""
+    if kind not in ARGUMENTS:
+        raise ValueError(f"takes no argument, received {text!r}")
+    read_as = ARGUMENTS[kind][1]
+    if callable(read_as):
+        return read_as(text)
+    if TOPOLOGIES.model(kind).model_fields[read_as].annotation is not int:
+        return {read_as: text}
+    try:
+        return {read_as: int(text)}
+    except ValueError:
+        raise ValueError(f"{read_as} = {text!r}: must be a whole number") from None

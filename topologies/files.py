@@ -1,7 +1,7 @@
 """Hierarchies that users bring: files of graphs and teams, Python files, installed packages.
 
-A user's topology is a function ``(agents, groups) -> graph``. It is given the names of the agents
-and the same names by group (robot), and returns a networkx DiGraph over all agents, or pairs
+A user's topology is a function ``(agents, bodies) -> graph``. It is given the names of the agents
+and the same names by body (robot), and returns a networkx DiGraph over all agents, or pairs
 (superior, subordinate); an agent in no pair stands alone.
 """
 
@@ -10,13 +10,14 @@ from __future__ import annotations
 import json
 import tomllib
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
 from ..core.plugins import sources
 from ..core.plugins.deferred import Deferred
+from .builders import Bodies, Names, independent
 from .checks import check_legible, shown, with_edges
 
 if TYPE_CHECKING:
@@ -67,46 +68,32 @@ def read(path: str) -> nx.DiGraph | dict[str, Any]:
     return graph
 
 
-class Builder(Protocol):
-    """What makes a user's hierarchy: settings that build it."""
-
-    @property
-    def title(self) -> str:
-        """What it is called."""
-        ...
-
-    def build(self, agents: Sequence[str], groups: Sequence[Sequence[str]]) -> Any:
-        """Return a graph, or pairs (superior, subordinate)."""
-        ...
-
-
-def called(builder: Builder, agents: Sequence[str], groups: Sequence[Sequence[str]]) -> nx.Graph:
-    """Return the graph that a user's function makes.
+def call(build: Callable[..., Any], name: str, agents: Names, bodies: Bodies) -> nx.Graph:
+    """Return the graph that a user's function of this name makes.
 
     Raises
     ------
     ValueError
         If it raises, returns neither a graph nor pairs, or not the same ones twice.
     """
-    graph, again = (_returned(builder, agents, groups) for _ in range(2))
+    graph, again = (_called(build, name, agents, bodies) for _ in range(2))
     if set(graph.edges) != set(again.edges):
         raise ValueError(
-            f"{_name(builder)} returned another hierarchy when called again; random numbers must "
-            "be drawn from a seed of its own"
+            f"{name} returned another hierarchy when called again; random numbers must be drawn "
+            "from a seed of its own"
         )
     return graph
 
 
-def _returned(builder: Builder, agents: Sequence[str], groups: Sequence[Sequence[str]]) -> nx.Graph:
-    name = _name(builder)
+def _called(build: Callable[..., Any], name: str, agents: Names, bodies: Bodies) -> nx.Graph:
     try:
-        result = builder.build(tuple(agents), tuple(tuple(group) for group in groups))
+        result = build(tuple(agents), tuple(tuple(body) for body in bodies))
     except Exception as error:
         frame = traceback.extract_tb(error.__traceback__)[-1]
         where = "" if frame.filename == __file__ else f" in line {frame.lineno}"
         raise ValueError(
             f"{name} raised {type(error).__name__}{where}, given {len(agents)} agents of "
-            f"{len(groups)} bodies: {error}"
+            f"{len(bodies)} bodies: {error}"
         ) from None
     if isinstance(result, nx.Graph):
         return result
@@ -117,13 +104,7 @@ def _returned(builder: Builder, agents: Sequence[str], groups: Sequence[Sequence
             f"{name} returned {type(result).__name__}, allowed: a networkx DiGraph, a Graph "
             "of neighbours, or pairs (superior, subordinate)"
         ) from None
-    graph = nx.DiGraph()
-    graph.add_nodes_from(agents)
-    return with_edges(graph, edges)
-
-
-def _name(builder: Builder) -> str:
-    return builder.title.rpartition(":")[2]
+    return with_edges(independent(agents), edges)
 
 
 def _table_of(content: Any) -> dict[str, Any] | None:
@@ -190,10 +171,10 @@ def _check_graphml(text: str) -> None:
 
 
 def _list_of(content: dict[str, Any], key: str) -> list[Any]:
-    found = content.get(key)
-    if not isinstance(found, list):
-        raise ValueError(f"{key} = {shown(found)}: must be a list")
-    return found
+    value = content.get(key)
+    if not isinstance(value, list):
+        raise ValueError(f"{key} = {shown(value)}: must be a list")
+    return value
 
 
 def _no_name(constant: str) -> Any:

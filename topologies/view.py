@@ -14,15 +14,10 @@ from typing import Any, Literal
 from ..core.agents.cost import below_counts
 from ..core.agents.joint_agents import Agents, joint_blocks
 from ..core.interface.hierarchy import Hierarchy
-from . import TOPOLOGIES, TopologySettings, build, builders, parse
+from . import TOPOLOGIES, TopologySettings, build, parse
+from .builders import names_of
 from .checks import check_legible
-from .config import (
-    ChainSettings,
-    CoordinationGraphSettings,
-    EdgesSettings,
-    FileSettings,
-    TeamsSettings,
-)
+from .config import ARGUMENTS, read
 
 Form = Literal["table", "json"]
 
@@ -105,20 +100,14 @@ def view(
 
 def named_by(settings: TopologySettings) -> tuple[str, ...]:
     """Return the agents that the settings themselves name, in order; none for most kinds."""
-    names: Sequence[str] = ()
-    if isinstance(settings, ChainSettings) and not isinstance(settings.order, str):
-        names = settings.order
-    elif isinstance(settings, TeamsSettings) and settings.members is not None:
-        names = builders.names_of(settings.members)
-    elif isinstance(settings, EdgesSettings):
-        names = [name for edge in settings.edges for name in edge] + list(settings.alone)
-    elif isinstance(settings, CoordinationGraphSettings) and settings.edges is not None:
-        names = [name for pair in settings.edges for name in pair]
-    elif isinstance(settings, FileSettings):
-        found = settings.content
-        if isinstance(found, TopologySettings):
-            return named_by(found)
-        names = [str(node) for node in found]
+    if settings.kind == "file":
+        content = read(settings.title)
+        if isinstance(content, TopologySettings):
+            return named_by(content)
+        names = [str(node) for node in content]
+    else:  # lists in settings are lists of names
+        table = settings.model_dump() if settings.kind in TOPOLOGIES.built_in else {}
+        names = names_of(value for value in table.values() if isinstance(value, tuple))
     check_legible(names)
     return tuple(dict.fromkeys(names))
 
@@ -171,12 +160,10 @@ def kinds(form: Form) -> str:
     rows: list[dict[str, Any]] = []
     for kind in TOPOLOGIES.built_in:
         model = TOPOLOGIES.model(kind)
-        assert issubclass(model, TopologySettings)
         summary = (model.__doc__ or "").splitlines()[0]
         optional = not any(field.is_required() for field in model.model_fields.values())
-        rows.append(
-            {"kind": kind, "argument": model.argument, "optional": optional, "summary": summary}
-        )
+        argument, _ = ARGUMENTS.get(kind, ("", ""))
+        rows.append({"kind": kind, "argument": argument, "optional": optional, "summary": summary})
     for name, value in TOPOLOGIES.installed().items():
         summary = f"Installed: {value}"
         rows.append({"kind": name, "argument": "", "optional": True, "summary": summary})

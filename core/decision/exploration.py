@@ -16,7 +16,7 @@ from pydantic import Field
 from ..numerics.arrays import FloatArray
 from ..numerics.ties import greatest
 from ..plugins.plugged import SettingsRegistry
-from ..plugins.settings import Fraction, NonNegative, Positive, Settings
+from ..plugins.settings import Fraction, NonNegative, PartSettings, Positive
 
 
 def boltzmann(values: FloatArray, temperature: float) -> FloatArray:
@@ -48,14 +48,8 @@ class Explorer(Protocol):
         """Note that all agents have decided this step."""
 
 
-class ExplorationSettings(Settings):
-    """What the settings of all kinds of exploration inherit."""
-
-    kind: str = ""
-
-    def build(self, n_agents: int) -> Explorer:
-        """Return the explorer of a team of `n_agents`."""
-        raise TypeError(f"exploration {self.kind!r} says not how it is built")
+class ExplorationSettings(PartSettings):
+    """What the settings of all kinds of exploration inherit; `build` is given how many agents."""
 
 
 class Greedy:

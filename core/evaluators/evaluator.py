@@ -11,7 +11,7 @@ import numpy as np
 from ..interface.hierarchy import Hierarchy
 from ..interface.prediction import Prediction
 from ..numerics.arrays import FloatArray, IntArray
-from ..plugins.settings import Settings
+from ..plugins.settings import PartSettings
 from .pooled import Pooled, Pooling
 
 if TYPE_CHECKING:
@@ -121,14 +121,8 @@ class DecisionProblem:
     value_of: ValueOf = "own"
 
 
-class EvaluatorSettings(Settings):
-    """What the settings of all evaluators inherit."""
-
-    kind: str = ""
-
-    def build(self, problem: DecisionProblem) -> Evaluator:
-        """Return the evaluator of a team."""
-        raise TypeError(f"evaluator {self.kind!r} says not how it is built")
+class EvaluatorSettings(PartSettings):
+    """What the settings of all evaluators inherit; `build` is given a `DecisionProblem`."""
 
 
 def combinations(agents: tuple[int, ...], n_actions: int) -> IntArray:

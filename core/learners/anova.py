@@ -29,7 +29,7 @@ They are consequent weights like any others: the agent decides by its rules, not
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -50,6 +50,7 @@ class AnovaTDSettings(ReplaySettings):
     """Batch TD(lambda) of the full product, with a prior that prefers few variables at a time."""
 
     kind: Literal["anova-td"] = "anova-td"
+    factory: ClassVar[str] = f"{__name__}:AnovaTD"
     trace_decay: Fraction = 0.0
     """Trace decay lambda, as of batch TD."""
     interaction: Annotated[float, Field(gt=0, le=10, allow_inf_nan=False)] = 0.1
@@ -58,10 +59,6 @@ class AnovaTDSettings(ReplaySettings):
     """Share of its prior variance that may be left out of an after-state."""
     dictionary: Annotated[int, Field(ge=1, le=4096)] = 800
     """After-states that all others are described by, at most."""
-
-    def build(self, rules: RuleBase, rows: IntArray) -> AnovaTD:
-        """Return the learner of a team."""
-        return AnovaTD(self, rules, rows)
 
 
 class AnovaTD(Replay):

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -50,12 +50,9 @@ class BatchTDSettings(ReplaySettings):
     """Batch TD(lambda): towards what followed."""
 
     kind: Literal["batch-td"] = "batch-td"
+    factory: ClassVar[str] = f"{__name__}:BatchTD"
     trace_decay: Fraction = 0.0
     """Trace decay lambda: 0 bootstraps from the next state, 1 sums the rewards of an episode."""
-
-    def build(self, rules: RuleBase, rows: IntArray) -> BatchTD:
-        """Return the learner of a team."""
-        return BatchTD(self, rules, rows)
 
 
 class Experience(NamedTuple):

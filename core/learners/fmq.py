@@ -6,7 +6,7 @@ one that was lucky (Kapetanakis and Kudenko 2002).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 
@@ -22,12 +22,9 @@ class FMQSettings(OneStepSettings):
     """Frequency maximum Q-value, for agents that do not see one another."""
 
     kind: Literal["fmq"] = "fmq"
+    factory: ClassVar[str] = f"{__name__}:FMQ"
     weight: NonNegative = 10.0
     """c: how much the frequency of the maximum reward counts."""
-
-    def build(self, rules: RuleBase, rows: IntArray) -> FMQ:
-        """Return the learner of a team."""
-        return FMQ(self, rules, rows)
 
 
 class FMQ(OneStep):

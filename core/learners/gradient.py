@@ -6,7 +6,7 @@ of the expected TD error given the features, learned with its own step size beta
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 
@@ -23,6 +23,7 @@ class GradientTDSettings(LearnerSettings):
     """Gradient TD(lambda), the convergent method cited as [26]."""
 
     kind: Literal["gradient-td"] = "gradient-td"
+    factory: ClassVar[str] = f"{__name__}:GradientTD"
     correction: Literal["tdc", "gtd2"] = "tdc"
     """TD with gradient correction, or GTD2."""
     step_size: Positive = 0.01
@@ -31,10 +32,6 @@ class GradientTDSettings(LearnerSettings):
     """Step size of the second weights, beta."""
     trace_decay: Fraction = 0.4
     """Trace decay, lambda."""
-
-    def build(self, rules: RuleBase, rows: IntArray) -> GradientTD:
-        """Return the learner of a team."""
-        return GradientTD(self, rules, rows)
 
 
 class GradientTD(Online):

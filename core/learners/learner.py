@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol
+from typing import TYPE_CHECKING, Annotated, Literal, Protocol
 
 from pydantic import Field
 
@@ -11,13 +11,13 @@ from ..adaptation.calibration import CalibrationSettings
 from ..adaptation.self_model import SelfModelSettings
 from ..decision.exploration import EXPLORATIONS, BurstExploration, ExplorationSettings
 from ..decision.settings import Decision
-from ..numerics.arrays import FloatArray, IntArray
+from ..numerics.arrays import FloatArray
 from ..plugins.plugged import Plugged
-from ..plugins.settings import Settings
+from ..plugins.settings import PartSettings
 from ..rules.settings import RuleBaseSettings
 
 if TYPE_CHECKING:
-    from ..rules.rule_base import RuleBase
+    pass
 
 
 class Learner(Protocol):
@@ -65,22 +65,20 @@ class Learner(Protocol):
         ...
 
 
-class TeamSettings(Settings):
+class TeamSettings(PartSettings):
     """What stands in the ``[learner]`` table of a spec: how those who act learn.
 
     `LearnerSettings` are of a hierarchy of fuzzy agents, built by `core.agents.team`; those of
     whoever acts for all by itself are built as they are, see `core.policies`.
     """
 
-    kind: str = ""
-
-    def build(self, *given: Any) -> Any:
-        """Return what the settings are of."""
-        raise TypeError(f"learner {self.kind!r} says not how it is built")
-
 
 class LearnerSettings(TeamSettings):
-    """What the settings of all learners share."""
+    """What the settings of all learners share.
+
+    `build` returns the learner of a team, all consequent weights zero. It is given the agents' rule
+    base and the row of weights of every agent ``(n,)``; all rows are somebody's.
+    """
 
     rule_base: RuleBaseSettings = RuleBaseSettings()
     """Fuzzy rule base of every agent."""
@@ -97,15 +95,3 @@ class LearnerSettings(TeamSettings):
     """What robots learn of their own wheels."""
     calibration: CalibrationSettings = CalibrationSettings()
     """What the team learns of the constants of its predictor."""
-
-    def build(self, rules: RuleBase, rows: IntArray) -> Learner:
-        """Return the learner of a team, all consequent weights zero.
-
-        Parameters
-        ----------
-        rules
-            The agents' rule base.
-        rows
-            ``(n,)`` the row of weights of every agent; all rows are somebody's.
-        """
-        raise TypeError(f"learner {self.kind!r} says not how it is built")

@@ -7,29 +7,26 @@ let them fall, more slowly than they rise.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 
-from ..numerics.arrays import FloatArray, IntArray
+from ..numerics.arrays import FloatArray
 from ..plugins.settings import Fraction
 from .online import OneStep, OneStepSettings
 
 if TYPE_CHECKING:
-    from ..rules.rule_base import RuleBase
+    pass
 
 
 class OptimisticTDSettings(OneStepSettings):
     """TD(0) whose values rise faster than they fall, for agents that do not see one another."""
 
     kind: Literal["optimistic-td"] = "optimistic-td"
+    factory: ClassVar[str] = f"{__name__}:OptimisticTD"
     falling: Fraction = 0.0
     """Step size of negative TD errors over alpha: 0 never lowers a value (distributed Q-learning),
     in between is hysteretic, 1 is TD(0)."""
-
-    def build(self, rules: RuleBase, rows: IntArray) -> OptimisticTD:
-        """Return the learner of a team."""
-        return OptimisticTD(self, rules, rows)
 
 
 class OptimisticTD(OneStep):

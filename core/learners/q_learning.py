@@ -7,7 +7,7 @@ the value of a state is the value of an action (Watkins and Dayan 1992).
 from __future__ import annotations
 
 from itertools import product
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 
@@ -23,12 +23,9 @@ class QLearningSettings(OneStepSettings):
     """Q-learning, for state spaces that hold the actions taken."""
 
     kind: Literal["q-learning"] = "q-learning"
+    factory: ClassVar[str] = f"{__name__}:QLearning"
     step_size: Positive = 0.3
     """alpha, divided by the squared length of the feature vector."""
-
-    def build(self, rules: RuleBase, rows: IntArray) -> QLearning:
-        """Return the learner of a team."""
-        return QLearning(self, rules, rows)
 
 
 class QLearning(OneStep):

@@ -6,25 +6,22 @@ What all are paid together is shared out equally, so that the parts add up to it
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 
-from ..numerics.arrays import FloatArray, IntArray
+from ..numerics.arrays import FloatArray
 from .online import OneStep, OneStepSettings
 
 if TYPE_CHECKING:
-    from ..rules.rule_base import RuleBase
+    pass
 
 
 class SparseCooperativeSettings(OneStepSettings):
     """Agents learn the parts of a sum, each by its share of the reward."""
 
     kind: Literal["sparse-cooperative"] = "sparse-cooperative"
-
-    def build(self, rules: RuleBase, rows: IntArray) -> SparseCooperative:
-        """Return the learner of a team."""
-        return SparseCooperative(self, rules, rows)
+    factory: ClassVar[str] = f"{__name__}:SparseCooperative"
 
 
 class SparseCooperative(OneStep):

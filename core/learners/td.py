@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -20,6 +20,7 @@ class TDLambdaSettings(LearnerSettings):
     """Online TD(lambda), Eq. 7-13."""
 
     kind: Literal["td-lambda"] = "td-lambda"
+    factory: ClassVar[str] = f"{__name__}:TDLambda"
     step_size: Positive = 0.00012
     """Step size, alpha of Eq. 13."""
     trace_decay: Fraction = 0.4
@@ -28,10 +29,6 @@ class TDLambdaSettings(LearnerSettings):
     """Divide the step size by the squared length of the feature vector."""
     averaging: Annotated[float, Field(ge=1, allow_inf_nan=False)] = 1.0
     """Steps over which the weights that decide average those that learn; 1: they are the same."""
-
-    def build(self, rules: RuleBase, rows: IntArray) -> TDLambda:
-        """Return the learner of a team."""
-        return TDLambda(self, rules, rows)
 
 
 class TDLambda(Online):

@@ -6,29 +6,26 @@ agent alike, who learn what their parts must be for the sum to be right.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 
-from ..numerics.arrays import FloatArray, IntArray
+from ..numerics.arrays import FloatArray
 from ..plugins.settings import Positive
 from .online import OneStepSettings
 from .sparse_cooperative import SparseCooperative
 
 if TYPE_CHECKING:
-    from ..rules.rule_base import RuleBase
+    pass
 
 
 class ValueDecompositionSettings(OneStepSettings):
     """The sum of all agents' values learns from the TD error of the team."""
 
     kind: Literal["vdn"] = "vdn"
+    factory: ClassVar[str] = f"{__name__}:ValueDecomposition"
     step_size: Positive = 0.1
     """alpha, divided by the squared length of all agents' feature vectors together."""
-
-    def build(self, rules: RuleBase, rows: IntArray) -> ValueDecomposition:
-        """Return the learner of a team."""
-        return ValueDecomposition(self, rules, rows)
 
 
 class ValueDecomposition(SparseCooperative):

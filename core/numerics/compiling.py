@@ -4,6 +4,10 @@ numba takes a second to import and a kernel seconds to compile, so that neither 
 kernel is called: commands that only read never do. Of several processes that need the same kernel
 one compiles it and the others take it from the cache.
 
+Without the lock numba's cache is not safe: it numbers a file of code by an index that it has read
+before, so that of two processes that compile one kernel for different types each may leave the
+other's code under its own type.
+
 numba takes a cached kernel for good as long as the file of the kernel is what it was. A kernel is
 also made of the kernels that it calls and of the constants that it reads, wherever they come from:
 here the files that its own file imports, and those that these import, count as well.

@@ -1,12 +1,14 @@
 """Registries of what has settings, and fields of settings that hold any thing of a registry.
 
 What has settings is known to a registry by its *settings model*, whose method `build` makes the
-thing. A class with a nested ``Settings`` stands for the model that builds it.
+thing. A class with a nested ``Settings`` stands for the model that builds it; a function for one
+whose fields are its annotated keyword-only parameters.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from inspect import isfunction, signature
 from typing import Any, Literal, cast
 
 from pydantic import create_model
@@ -74,7 +76,7 @@ class SettingsRegistry(Registry):
         ValueError
             If its settings are not of this kind, or it cannot be called.
         """
-        if name in self.built_in:
+        if name in self.built_in and isinstance(thing, type):
             return cast(type[Settings], thing)
         key = name, id(thing)
         if key not in self._adapted:
@@ -89,17 +91,22 @@ class SettingsRegistry(Registry):
             raise ValueError(f"the settings of a {self.kind} must inherit {base}")
         if not callable(thing):
             raise ValueError(f"is no {self.kind}, but a {type(thing).__name__}")
+        has_own = hasattr(thing, "Settings")
+        fields = {} if is_model or has_own else _parameters(thing)
         model = create_model(
             own.__qualname__,
             __base__=own,
             __module__=own.__module__,
+            __doc__=own.__doc__ if is_model or has_own else thing.__doc__,
             kind=(cast(Any, Literal[name]), name),
+            **fields,
         )
         if not is_model:
-            has_own = hasattr(thing, "Settings")
 
             def build(settings: Settings, *given: Any) -> Any:
-                return thing(settings, *given) if has_own else thing(*given)
+                if has_own:
+                    return thing(settings, *given)
+                return thing(*given, **{field: getattr(settings, field) for field in fields})
 
             model.build = build  # type: ignore[attr-defined]
         return cast(type[Settings], model)
@@ -113,6 +120,19 @@ class SettingsRegistry(Registry):
             If there is no such thing, or it has settings that must be given.
         """
         return self.model(text)()
+
+
+def _parameters(thing: Any) -> dict[str, Any]:
+    """Return type and default of each annotated keyword-only parameter of a function, by name."""
+    if not isfunction(thing):
+        return {}
+    fields: dict[str, Any] = {}
+    for p in signature(thing).parameters.values():
+        if p.kind is p.KEYWORD_ONLY and p.annotation is not p.empty:
+            is_text = isinstance(p.annotation, str)  # as postponed annotations are
+            type_ = eval(p.annotation, thing.__globals__) if is_text else p.annotation
+            fields[p.name] = type_, ... if p.default is p.empty else p.default
+    return fields
 
 
 def _dumped(value: Settings, info: Any) -> Any:

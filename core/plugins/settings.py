@@ -74,8 +74,8 @@ class Settings(BaseModel, metaclass=_Made):
         return type(BaseModel).__call__(cls, **table)
 
 
-class ScenarioSettings(Settings):
-    """What the settings of all scenarios inherit."""
+class PartSettings(Settings):
+    """What the settings of all things of a registry inherit."""
 
     kind: str = ""
     factory: ClassVar[str] = ""
@@ -84,15 +84,21 @@ class ScenarioSettings(Settings):
     """Where the module is that plays recordings on a page, see `studies.report.replays`; empty:
     recordings are drawn as films."""
 
-    def build(self) -> Any:
-        """Return the scenario.
+    def build(self, *given: Any) -> Any:
+        """Return what these are the settings of, built of them and of what else is given.
 
         Raises
         ------
         ValueError
             If there can be none of these settings; one line.
         """
-        return located(self.factory)(self)
+        if not self.factory:
+            raise TypeError(f"{type(self).__name__} {self.kind!r} says not how it is built")
+        return located(self.factory)(self, *given)
+
+
+class ScenarioSettings(PartSettings):
+    """What the settings of all scenarios inherit; a scenario is built of nothing else."""
 
     def doubts(self) -> tuple[str, ...]:
         """Return what looks like a slip of the pen, a line each, such as a size in another unit."""

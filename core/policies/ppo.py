@@ -9,7 +9,6 @@ that it broke off in (Pardo et al. 2018).
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from typing import Any
 
 import numpy as np
@@ -28,8 +27,8 @@ from .seen import Seen
 from .settings import PolicyGradientSettings
 
 
-class PolicyGradient(Peer, ABC):
-    """What the three have in common.
+class IndependentPPO(Peer):
+    """One policy for every agent, which sees its own state alone; all share the weights.
 
     Parameters
     ----------
@@ -66,13 +65,13 @@ class PolicyGradient(Peer, ABC):
         self._rewards = RewardScale(settings.discount, n_envs)
         self._starts: FloatArray = np.ones(n_envs)
 
-    @abstractmethod
     def _shape(self, n_actions: int) -> tuple[int, int, Any, dict[str, Any]]:
         """Return how many act side by side, on how many inputs each, the actions, and options."""
+        return self._n, self.inputs.n_own, Discrete(n_actions), {}
 
-    @abstractmethod
     def _seen(self, states: FloatArray) -> FloatArray:
         """Return the inputs ``(n_envs, n_inputs)``."""
+        return self.inputs.each(states)
 
     def act(self, prediction: Seen, *, explore: bool = True) -> IntArray:
         """Return a joint action ``(n,)``: drawn from the policy, or the most probable."""
@@ -127,7 +126,7 @@ class PolicyGradient(Peer, ABC):
         return weights_of(self._model.policy)
 
 
-class CentralPPO(PolicyGradient):
+class CentralPPO(IndependentPPO):
     """One policy that sees all states and acts for all agents."""
 
     def _shape(self, n_actions: int) -> tuple[int, int, Any, dict[str, Any]]:
@@ -141,18 +140,8 @@ class CentralPPO(PolicyGradient):
         return np.array([np.mean(reward)])
 
 
-class IndependentPPO(PolicyGradient):
-    """One policy for every agent, which sees its own state alone; all share the weights."""
-
-    def _shape(self, n_actions: int) -> tuple[int, int, Any, dict[str, Any]]:
-        return self._n, self.inputs.n_own, Discrete(n_actions), {}
-
-    def _seen(self, states: FloatArray) -> FloatArray:
-        return self.inputs.each(states)
-
-
-class CentralCriticPPO(PolicyGradient):
-    """The same with a critic that sees the states of all agents beside its own."""
+class CentralCriticPPO(IndependentPPO):
+    """One policy for every agent, with a critic that sees all states beside the agent's own."""
 
     policy = CentralCriticPolicy
 

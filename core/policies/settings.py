@@ -5,13 +5,11 @@ Defaults are those of stable-baselines3, but for those that docs/peers.md names 
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
-import numpy as np
 from pydantic import Field
 
 from ..learners.learner import TeamSettings
-from ..plugins.places import located
 from ..plugins.settings import Fraction, NonNegative, Positive
 
 Count = Annotated[int, Field(ge=1)]
@@ -24,26 +22,22 @@ class PeerSettings(TeamSettings):
     discount: Annotated[float, Field(ge=0, lt=1)] = 0.97
     """Discount per decision."""
 
-    def build(self, scenario: Any, seed: np.random.SeedSequence) -> Any:
-        """Return the peer that acts in a scenario.
+    def build(self, *given: Any) -> Any:
+        """Return the peer that acts in a scenario, of that and a seed.
 
         Raises
         ------
         ValueError
             If it cannot act there; one line.
         """
-        raise TypeError(f"peer {self.kind!r} says not how it is built")
-
-    def _built(self, place: str, scenario: Any, seed: np.random.SeedSequence) -> Any:
         try:
-            peer = located(f"{__package__}{place}")
+            return super().build(*given)
         except ImportError as error:
             raise ValueError(
                 f"learner.kind = {self.kind!r}: needs the extra peers, pip install "
                 "'nested-agents[peers]', in a checkout ./dev exec pip install stable-baselines3 "
                 f"({error})"
             ) from None
-        return peer(self, scenario, seed)
 
 
 class NetworkSettings(PeerSettings):
@@ -80,36 +74,28 @@ class PPOSettings(PolicyGradientSettings):
     """PPO (Schulman et al. 2017): one centralised policy sees all states and acts for all."""
 
     kind: Literal["ppo"] = "ppo"
-
-    def build(self, scenario: Any, seed: np.random.SeedSequence) -> Any:
-        """Return the peer."""
-        return self._built(".ppo:CentralPPO", scenario, seed)
+    factory: ClassVar[str] = f"{__package__}.ppo:CentralPPO"
 
 
 class IPPOSettings(PolicyGradientSettings):
     """Independent PPO (de Witt et al. 2020): every agent acts by its state, all share weights."""
 
     kind: Literal["ippo"] = "ippo"
-
-    def build(self, scenario: Any, seed: np.random.SeedSequence) -> Any:
-        """Return the peer."""
-        return self._built(".ppo:IndependentPPO", scenario, seed)
+    factory: ClassVar[str] = f"{__package__}.ppo:IndependentPPO"
 
 
 class MAPPOSettings(PolicyGradientSettings):
     """Multi-agent PPO (Yu et al. 2022): as independent PPO, but the critic sees all states."""
 
     kind: Literal["mappo"] = "mappo"
-
-    def build(self, scenario: Any, seed: np.random.SeedSequence) -> Any:
-        """Return the peer."""
-        return self._built(".ppo:CentralCriticPPO", scenario, seed)
+    factory: ClassVar[str] = f"{__package__}.ppo:CentralCriticPPO"
 
 
 class DQNSettings(NetworkSettings):
     """DQN (Mnih et al. 2015) for one agent, such as that of ``agents = "team"``."""
 
     kind: Literal["dqn"] = "dqn"
+    factory: ClassVar[str] = f"{__package__}.dqn:DeepQ"
     memory: Count = 50_000
     """Transitions in the replay memory."""
     begin: Count = 500
@@ -124,7 +110,3 @@ class DQNSettings(NetworkSettings):
     """Exploration rate from `exploration_decisions` on."""
     exploration_decisions: Count = 2000
     """Decisions over which the exploration rate falls linearly."""
-
-    def build(self, scenario: Any, seed: np.random.SeedSequence) -> Any:
-        """Return the peer."""
-        return self._built(".dqn:DeepQ", scenario, seed)

@@ -7,13 +7,14 @@ is told nothing of it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import BeforeValidator, Field
 
-from . import settings as kinds
+from . import settings
+from .settings import FailureSettings, befalling
 
 
 def _names(value: object) -> object:
@@ -21,53 +22,20 @@ def _names(value: object) -> object:
     return tuple(str(one) if isinstance(one, int | np.integer) else one for one in several)
 
 
-class ActuatorFault(kinds.FailureSettings):
+class ActuatorFault(FailureSettings):
     """From when to when actuators are faulty, see `nested_agents.scenarios.faults.settings`."""
 
     part: ClassVar[str] = "actuators"
 
     actuators: Annotated[tuple[str, ...], Field(min_length=1), BeforeValidator(_names)]
     """Actuators by name, pattern or number, one or a list."""
+    kind: str = ""
+    """What is wrong with them."""
 
 
-class Seized(kinds.Seized, ActuatorFault):
-    """It does not move."""
-
-
-class Free(kinds.Free, ActuatorFault):
-    """It has no drive and gives way."""
-
-
-class Weak(kinds.Weak, ActuatorFault):
-    """It does a fraction of its command."""
-
-
-class Reversed(kinds.Reversed, ActuatorFault):
-    """It does the opposite of its command."""
-
-
-class Stuck(kinds.Stuck, ActuatorFault):
-    """It does one thing whatever its command."""
-
-
-class Delayed(kinds.Delayed, ActuatorFault):
-    """It carries out its commands some steps too late."""
-
-
-class Noisy(kinds.Noisy, ActuatorFault):
-    """It does its command plus noise."""
-
-
-KINDS: Mapping[str, type[ActuatorFault]] = {
-    "seized": Seized,
-    "free": Free,
-    "weak": Weak,
-    "reversed": Reversed,
-    "stuck": Stuck,
-    "delayed": Delayed,
-    "noisy": Noisy,
-}
+KINDS = befalling(ActuatorFault, **settings.KINDS)
 """The kinds of fault by name."""
+Seized, Free, Weak, Reversed, Stuck, Delayed, Noisy = KINDS.values()
 
 
 def draw_faults(

@@ -15,7 +15,7 @@ import gymnasium
 import numpy as np
 
 from .action_scales import ActionScale
-from .actuators import KINDS, ActuatorFault, Free, Seized
+from .actuators import ActuatorFault
 from .schedule import Failures
 
 Commands = Literal["effort", "velocity", "position"]
@@ -24,11 +24,7 @@ Mechanism = Callable[[Any, dict[str, str]], None]
 """Is called before every step with the environment beneath and the faults that no action expresses,
 kinds by actuator, as long as there are some, and once more when there are none."""
 
-INEXPRESSIBLE: Mapping[Commands, type[ActuatorFault]] = {
-    "effort": Seized,
-    "velocity": Free,
-    "position": Free,
-}
+INEXPRESSIBLE: Mapping[Commands, str] = {"effort": "seized", "velocity": "free", "position": "free"}
 """What no action expresses, by what actions command."""
 
 
@@ -68,9 +64,9 @@ class Carried:
         if commands not in INEXPRESSIBLE:
             raise ValueError(f"commands = {commands!r}, allowed: {', '.join(INEXPRESSIBLE)}")
         for i, fault in enumerate(faults):
-            if isinstance(fault, INEXPRESSIBLE[commands]) and mechanism is None:
+            if fault.kind == INEXPRESSIBLE[commands] and mechanism is None:
                 raise ValueError(
-                    f"faults[{i}]: no {commands} makes an actuator {_kind(fault)}; give a "
+                    f"faults[{i}]: no {commands} makes an actuator {fault.kind}; give a "
                     f"mechanism that does, or say what else actions command"
                 )
         self.scales = {
@@ -124,12 +120,11 @@ class Carried:
         drawn = self._rng.random(len(places))  # as many whatever fails: runs stay paired
         driven = self._failures.driven(places, 1)[0]
         changed = self._failures.failed
-        if self._commands == "position":
-            for fault, mask in self._failures.active():
-                if isinstance(fault, Seized):
-                    driven[mask] = self._held[mask]
         for fault, mask in self._failures.active():
-            if isinstance(fault, Free):
+            if fault.kind == "seized" and self._commands == "position":
+                driven[mask] = self._held[mask]
+        for fault, mask in self._failures.active():
+            if fault.kind == "free":
                 driven[mask] = 0.0
         self._held = np.where(changed, driven, places)
         if self._mechanism is not None:
@@ -144,7 +139,7 @@ class Carried:
 
     def _hook(self, mechanism: Mechanism, environment: Any) -> None:
         unexpressed = INEXPRESSIBLE[self._commands]
-        now = {n: k for n, k in self.now().items() if KINDS[k] is unexpressed}
+        now = {name: kind for name, kind in self.now().items() if kind == unexpressed}
         if now or self._hooked:
             mechanism(environment, now)
         self._hooked = bool(now)
@@ -152,11 +147,7 @@ class Carried:
     def now(self) -> dict[str, str]:
         """Return the kind of the fault of every actuator that has one; of several, the last."""
         return {
-            self.names[i]: _kind(fault)
+            self.names[i]: fault.kind
             for fault, mask in self._failures.active()
             for i in np.flatnonzero(mask)
         }
-
-
-def _kind(fault: Any) -> str:
-    return next(name for name, kind in KINDS.items() if isinstance(fault, kind))

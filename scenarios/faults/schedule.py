@@ -1,30 +1,20 @@
 """The schedule of failures: what an actuator does instead of what it is told, and when.
 
-A failure lies between the command that an actuator gets and the speed that its servo holds; the
-agents see the commands, and the failure only in how their bodies move. With u the command, held for
-a control period, and s the greatest speed of the actuator, the servo holds::
-
-    seized     0
-    weak       gain u, 0 < gain < 1
-    reversed   -u
-    stuck      speed s, whatever u
-    delayed    u of some control periods ago, 0 before the episode
-    noisy      u + deviation s z, z standard normal, drawn anew every control period, cut to +-s
-
-Failures of other kinds leave the command as it is; what they do is the scenario's own business. Of
-several failures of an actuator delays act first, then the others in the order of the spec. A world
-without failures never comes here.
+Of several failures of an actuator delays act first, then the others in the order of the spec, each
+on what the one before it holds, see `FailureSettings.held`. A world without failures never comes
+here.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from fnmatch import fnmatchcase
+from typing import Any
 
 import numpy as np
 
 from ...core.numerics.arrays import BoolArray, FloatArray
-from .settings import Delayed, FailureSettings, Noisy, Reversed, Seized, Stuck, Weak
+from .settings import Delayed, FailureSettings
 
 
 class Failures:
@@ -53,6 +43,7 @@ class Failures:
 
     Examples
     --------
+    >>> from nested_agents.scenarios.faults.settings import Seized
     >>> class SeizedCart(Seized):
     ...     part = "carts"
     ...     carts: tuple[str, ...]
@@ -110,12 +101,12 @@ class Failures:
         return changed
 
     def driven(self, commands: FloatArray, periods: int) -> FloatArray:
-        """Return the speeds ``(periods, n)`` that the servos hold .
+        """Return the speeds ``(periods, n)`` that the servos hold.
 
         Parameters
         ----------
         commands
-            ``(n,)`` commanded speeds, held for all periods .
+            ``(n,)`` commanded speeds, held for all periods.
         periods
             Control periods; they are remembered as past.
         """
@@ -127,13 +118,12 @@ class Failures:
                 first = self._memory - failure.periods
                 speeds[:, mask] = told[first : first + periods, mask]
             else:
-                speeds[:, mask] = _held(
-                    failure, speeds[:, mask], self._limits[mask], self._streams[i]
-                )
+                limits, stream = self._limits[mask], self._streams[i]
+                speeds[:, mask] = failure.held(speeds[:, mask], limits, stream)
         self._commands = told[len(told) - self._memory :]
         return speeds
 
-    def active(self) -> Iterator[tuple[FailureSettings, BoolArray]]:
+    def active(self) -> Iterator[tuple[Any, BoolArray]]:
         """Yield the failures that are on, each with the mask ``(n,)`` of what it has befallen."""
         for i in self._active:
             yield self._settings[i], self._masks[i]
@@ -149,26 +139,6 @@ def _lasts(failure: FailureSettings, now: tuple[int, int]) -> bool:
     """Return whether a failure is on at an episode and step."""
     over = failure.end_episode is not None and now >= (failure.end_episode, failure.end_step)
     return now >= (failure.episode, failure.step) and not over
-
-
-def _held(
-    failure: FailureSettings, speeds: FloatArray, limits: FloatArray, rng: np.random.Generator
-) -> FloatArray:
-    """Return what servos hold ``(periods, k)`` that are told `speeds`."""
-    match failure:
-        case Seized():
-            return np.zeros_like(speeds)
-        case Weak():
-            return failure.gain * speeds
-        case Reversed():
-            return -speeds
-        case Stuck():
-            return np.broadcast_to(failure.speed * limits, speeds.shape)
-        case Noisy():
-            noise = failure.deviation * limits * rng.standard_normal(speeds.shape)
-            return np.clip(speeds + noise, -limits, limits)
-        case _:
-            return speeds
 
 
 def _named(said: str, failure: FailureSettings, agents: Sequence[str]) -> BoolArray:

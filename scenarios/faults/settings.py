@@ -1,23 +1,29 @@
 """What fails, how, and from when to when, as it stands in the ``[[scenario.failures]]`` of a spec.
 
-The kinds of failure know nothing of what fails. A scenario says under which key its actuators are
-named, ``wheels`` or ``joints``, in a model of its own that inherits `FailureSettings`, and joins it
-with the kinds that can befall them::
+The kinds of failure, `KINDS`, know nothing of what fails. A scenario says under which key its
+actuators are named, ``wheels`` or ``joints``, in a model that inherits `FailureSettings`, and
+`befalling` joins it with the kinds that can befall them::
 
     class WheelFailure(FailureSettings):
         part = "wheels"
         wheels: Names
 
-    class SeizedSettings(Seized, WheelFailure):
-        kind: Literal["seized"] = "seized"
+    Failure = Annotated[Union[*befalling(WheelFailure, **KINDS).values()], DISCRIMINATOR]
+
+A failure lies between the command that an actuator gets and the speed that its servo holds, see
+`FailureSettings.held`; the agents see the commands, and the failure only in how their bodies move.
 """
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Self
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal, Self, cast
 
-from pydantic import BeforeValidator, Field, model_validator
+import numpy as np
+from numpy.random import Generator
+from pydantic import BeforeValidator, Field, create_model, model_validator
 
+from ...core.numerics.arrays import FloatArray
 from ...core.plugins.settings import Settings
 
 Index = Annotated[int, Field(ge=0)]
@@ -53,8 +59,21 @@ class FailureSettings(Settings):
     @property
     def names(self) -> tuple[str, ...]:
         """What fails, by name or pattern."""
-        found: tuple[str, ...] = getattr(self, self.part)
-        return found
+        return cast("tuple[str, ...]", getattr(self, self.part))
+
+    def held(self, commands: FloatArray, limits: FloatArray, rng: Generator) -> FloatArray:
+        """Return the speeds ``(periods, k)`` that the servos of what fails hold.
+
+        Parameters
+        ----------
+        commands
+            ``(periods, k)`` speeds that they are told.
+        limits
+            ``(k,)`` their greatest speeds.
+        rng
+            For noise, drawn anew every control period.
+        """
+        return commands
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
@@ -69,9 +88,13 @@ class FailureSettings(Settings):
 class Seized(FailureSettings):
     """It does not move."""
 
+    def held(self, commands: FloatArray, limits: FloatArray, rng: Generator) -> FloatArray:
+        """Return 0."""
+        return np.zeros_like(commands)
+
 
 class Free(FailureSettings):
-    """It has no drive and gives way."""
+    """It has no drive and gives way; what that does is the scenario's own business."""
 
 
 class Weak(FailureSettings):
@@ -80,9 +103,17 @@ class Weak(FailureSettings):
     gain: Annotated[float, Field(gt=0, lt=1)] = 0.3
     """Fraction of its command at which it moves."""
 
+    def held(self, commands: FloatArray, limits: FloatArray, rng: Generator) -> FloatArray:
+        """Return the gain times the command."""
+        return self.gain * commands
+
 
 class Reversed(FailureSettings):
     """It moves against its command."""
+
+    def held(self, commands: FloatArray, limits: FloatArray, rng: Generator) -> FloatArray:
+        """Return the command with its sign changed."""
+        return -commands
 
 
 class Stuck(FailureSettings):
@@ -91,9 +122,13 @@ class Stuck(FailureSettings):
     speed: Annotated[float, Field(ge=-1, le=1)] = 0.5
     """Speed at which it moves, as a fraction of the greatest."""
 
+    def held(self, commands: FloatArray, limits: FloatArray, rng: Generator) -> FloatArray:
+        """Return the one speed."""
+        return np.broadcast_to(self.speed * limits, commands.shape)
+
 
 class Delayed(FailureSettings):
-    """It carries out its commands too late."""
+    """It carries out its commands too late; `schedule.Failures` remembers them."""
 
     periods: Annotated[int, Field(ge=1, le=1000)] = 8
     """Control periods by which commands are late."""
@@ -104,3 +139,55 @@ class Noisy(FailureSettings):
 
     deviation: Annotated[float, Field(gt=0, le=1)] = 0.3
     """Standard deviation of the noise, as a fraction of the greatest speed."""
+
+    def held(self, commands: FloatArray, limits: FloatArray, rng: Generator) -> FloatArray:
+        """Return the command plus noise, cut to the greatest speed either way."""
+        noise = self.deviation * limits * rng.standard_normal(commands.shape)
+        return np.clip(commands + noise, -limits, limits)
+
+
+KINDS: Mapping[str, type[FailureSettings]] = {
+    "seized": Seized,
+    "free": Free,
+    "weak": Weak,
+    "reversed": Reversed,
+    "stuck": Stuck,
+    "delayed": Delayed,
+    "noisy": Noisy,
+}
+"""The kinds of failure by name."""
+DISCRIMINATOR = Field(discriminator="kind")
+"""Of a field that holds failures of any of several kinds."""
+
+
+def befalling(
+    naming: type[FailureSettings], **kinds: type[FailureSettings]
+) -> dict[str, type[Any]]:
+    """Return the settings of failures that befall what `naming` names, by their ``kind``.
+
+    Each inherits its kind and `naming`, and is an attribute of `naming`, by which pickles find it.
+
+    Examples
+    --------
+    >>> class CartFailure(FailureSettings):
+    ...     part = "carts"
+    ...     carts: Names
+    >>> befalling(CartFailure, loose=Free)["loose"](carts="left")
+    Loose(episode=0, step=0, end_episode=None, end_step=0, carts=('left',), kind='loose')
+    >>> CartFailure.Loose.__doc__
+    'The cart has no drive and gives way.'
+    """
+    models = {}
+    for kind, base in kinds.items():
+        sentence = (base.__doc__ or "").partition(";")[0].rstrip(".")
+        model = create_model(
+            kind.capitalize(),
+            __base__=(base, naming),
+            __module__=naming.__module__,
+            __doc__=sentence.replace("It", f"The {naming.part.removesuffix('s')}", 1) + ".",
+            kind=(cast(Any, Literal[kind]), kind),
+        )
+        model.__qualname__ = f"{naming.__qualname__}.{model.__name__}"
+        setattr(naming, model.__name__, model)
+        models[kind] = model
+    return models

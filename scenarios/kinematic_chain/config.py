@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Union
 
 from pydantic import Field, field_validator
 
 from ...core.plugins.settings import NonNegative, Positive, ScenarioSettings, Settings
-from ..faults.settings import FailureSettings, Names, Reversed, Seized, Stuck, Weak
+from ..faults.settings import (
+    DISCRIMINATOR,
+    FailureSettings,
+    Names,
+    Reversed,
+    Seized,
+    Stuck,
+    Weak,
+    befalling,
+)
 from ..state_variables import referred
 
 PERIOD = 0.1
@@ -49,33 +58,11 @@ class JointFailure(FailureSettings):
     """Joints by agent name or pattern: ``joint2``, ``joint*``; one or a list."""
 
 
-class LockedSettings(Seized, JointFailure):
-    """The joint does not turn."""
-
-    kind: Literal["locked"] = "locked"
-
-
-class WeakSettings(Weak, JointFailure):
-    """The joint turns at a fraction of its command."""
-
-    kind: Literal["weak"] = "weak"
-
-
-class ReversedSettings(Reversed, JointFailure):
-    """The joint turns against its command."""
-
-    kind: Literal["reversed"] = "reversed"
-
-
-class StuckSettings(Stuck, JointFailure):
-    """The joint turns at one speed whatever its command."""
-
-    kind: Literal["stuck"] = "stuck"
-
-
-Failure = Annotated[
-    LockedSettings | WeakSettings | ReversedSettings | StuckSettings, Field(discriminator="kind")
-]
+if TYPE_CHECKING:
+    Failure = JointFailure
+else:
+    _KINDS = befalling(JointFailure, locked=Seized, weak=Weak, reversed=Reversed, stuck=Stuck)
+    Failure = Annotated[Union[*_KINDS.values()], DISCRIMINATOR]
 """Any failure's settings, distinguished by `kind`."""
 
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import tracemalloc
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass
 from fractions import Fraction
 from functools import cache
 from math import log
@@ -30,15 +30,15 @@ from ...core.agents.loop import control_loop, policy_seed
 from ...core.agents.team import Team
 from ...core.decision.settings import Decision
 from ...core.evaluators.coordination import VariableEliminationSettings
+from ...core.evaluators.evaluator import Counts
 from ...core.evaluators.exact import ExactSettings
 from ...core.interface.hierarchy import Hierarchy
 from ...core.interface.scenario import Scenario
 from ...core.learners.td import TDLambdaSettings
 from ...core.plugins.deferred import Deferred
 from ...core.rules.settings import RuleBaseSettings
-from ...scenarios.line_up import LineUpSettings
+from ...scenarios.line_up import LineUp, LineUpSettings
 from ...topologies import build, parse
-from ...topologies.config import ChainSettings, CoordinationGraphSettings, IndependentSettings
 from ...topologies.view import team_of
 from ..results.distributions import t_quantile
 from ..results.statistics import Estimate
@@ -73,41 +73,24 @@ LEAST_ROWS = 5
 
 
 @dataclass(frozen=True)
-class Measured:
-    """What one step was found to cost, beside what the formula says.
+class StepCost:
+    """What one step of the running system costs.
 
     Attributes
     ----------
-    joint_actions_formula, joint_actions
-        Joint actions tried.
-    rule_evaluations_formula, rule_evaluations
-        The same times the rules of a rule base.
-    weight_updates_formula, weight_updates
-        Consequent weights changed.
+    formula, counted
+        What the formulas say and what was counted, for the whole team.
     deciding, learning
         Median time [s].
     memory
         Greatest memory held by team and step [bytes].
     """
 
-    joint_actions_formula: int
-    joint_actions: int
-    rule_evaluations_formula: int
-    rule_evaluations: int
-    weight_updates_formula: int
-    weight_updates: int
+    formula: Counts
+    counted: Counts
     deciding: float
     learning: float
     memory: int
-
-    @property
-    def agrees(self) -> bool:
-        """Whether all counts are what the formulas say."""
-        return (
-            self.joint_actions == self.joint_actions_formula
-            and self.rule_evaluations == self.rule_evaluations_formula
-            and self.weight_updates == self.weight_updates_formula
-        )
 
 
 @dataclass(frozen=True)
@@ -120,7 +103,7 @@ class CostRow:
     nested_closed_form: int | None
     nested_asymptotic: Fraction | None
     single_agent: int
-    measured: Measured | None = None
+    measured: StepCost | None = None
 
     @property
     def ratio(self) -> Fraction | None:
@@ -142,21 +125,16 @@ def cost_rows(
         raise ValueError("topology = none, allowed: one or more, such as chain or tree:2")
     for text in topologies:
         for n in agents:
-            found = measure(text, n) if measured else None
-            single = problem.single_agent(n)
-            if text == SINGLE_AGENT:
-                yield CostRow(n, text, None, None, None, single, found)
-                continue
-            below = agents_below(text, n)
-            chain = is_chain(below)
+            below = None if text == SINGLE_AGENT else agents_below(text, n)
+            chain = below is not None and is_chain(below)
             yield CostRow(
-                n,
-                text,
-                problem.nested(below),
-                problem.chain_closed_form(n) if chain else None,
-                problem.chain_asymptotic(n) if chain else None,
-                single,
-                found,
+                agents=n,
+                topology=text,
+                nested_exact=None if below is None else problem.nested(below),
+                nested_closed_form=problem.chain_closed_form(n) if chain else None,
+                nested_asymptotic=problem.chain_asymptotic(n) if chain else None,
+                single_agent=problem.single_agent(n),
+                measured=measure(text, n) if measured else None,
             )
 
 
@@ -168,10 +146,9 @@ def agents_below(text: str, n: int) -> Sequence[int]:
     ValueError
         If the topology is refused.
     """
-    settings = parse(text)
-    if isinstance(settings, ChainSettings) and isinstance(settings.order, str):
+    if text in ("chain", "chain:reversed", "chain:interleaved"):
         return range(n)  # a thousand hierarchies of a thousand agents take their time
-    return below_counts(build(settings, team_of(n, None, None).agents, pairs(n)))
+    return below_counts(build(text, team_of(n, None, None).agents, pairs(n)))
 
 
 def pairs(n: int) -> tuple[tuple[int, ...], ...]:
@@ -185,25 +162,18 @@ def pairs(n: int) -> tuple[tuple[int, ...], ...]:
     return tuple(tuple(range(i, min(i + 2, n))) for i in range(0, n, 2))
 
 
-def measure(text: str, n: int) -> Measured | None:
+def measure(text: str, n: int) -> StepCost | None:
     """Count and time a step of n agents; none where it would take too long or too much memory."""
-    line_up, rules = LineUpSettings(carts=n).build(), RULES
+    line_up = LineUpSettings(carts=n).build()
     actions = len(line_up.action_set)
     if text == SINGLE_AGENT:
-        joint, rules, updates = actions**n, rules**n, rules**n
+        formula = Counts(actions**n, (actions * RULES) ** n, RULES**n)
     else:
-        joint, updates = Problem(rules, actions).decision(agents_below(text, n)), n * rules
-    if joint * rules > MOST_OPERATIONS:
+        joint = Problem(RULES, actions).decision(agents_below(text, n))
+        formula = Counts(joint, joint * RULES, n * RULES)
+    if formula.rule_evaluations > MOST_OPERATIONS:
         return None
-    if text == SINGLE_AGENT:
-        scenario, learner = join_agents(line_up, "team"), _of_order(2 * n)
-        hierarchy = Hierarchy(scenario.agents, [])
-    else:
-        settings, scenario = parse(text), line_up
-        is_graph = isinstance(settings, CoordinationGraphSettings)
-        learner = COORDINATED if is_graph else LEARNER
-        hierarchy = build(settings, line_up.agents, pairs(n))
-
+    learner, scenario, hierarchy = _arrange(text, line_up)
     _warm_up()
     tracemalloc.start()
     try:
@@ -213,24 +183,29 @@ def measure(text: str, n: int) -> Measured | None:
     finally:
         tracemalloc.stop()
     assert team.evaluator is not None
-    counts = replace(team.evaluator.counts)
+    before = astuple(team.evaluator.counts)
     times = _steps(team, scenario, 1)
     while sum(map(sum, times)) < LEAST_SECONDS and len(times) < MOST_TIMES:
         times += _steps(team, scenario, 1)
     deciding, learning = (median(part) for part in zip(*times, strict=True))
-    found = team.evaluator.counts
     # An episode here has two steps, of which the second alone changes weights.
-    return Measured(
-        joint,
-        (found.joint_actions - counts.joint_actions) // (2 * len(times)),
-        joint * rules,
-        (found.rule_evaluations - counts.rule_evaluations) // (2 * len(times)),
-        updates,
-        (found.weight_updates - counts.weight_updates) // len(times),
-        deciding,
-        learning,
-        memory,
-    )
+    steps = 2 * len(times), 2 * len(times), len(times)
+    after = astuple(team.evaluator.counts)
+    counted = (int(b - a) // n for a, b, n in zip(before, after, steps, strict=True))
+    return StepCost(formula, Counts(*counted), deciding, learning, memory)
+
+
+def _arrange(text: str, line_up: LineUp) -> tuple[TDLambdaSettings, Scenario, Hierarchy]:
+    """Return the learner of a topology over line-up, what it acts in, and the hierarchy."""
+    n = len(line_up.agents)
+    if text == SINGLE_AGENT:
+        scenario = join_agents(line_up, "team")
+        base = LEARNER.rule_base.model_copy(update={"order": 2 * n})
+        learner = LEARNER.model_copy(update={"rule_base": base})
+        return learner, scenario, Hierarchy(scenario.agents, [])
+    settings = parse(text)
+    learner = COORDINATED if settings.kind == "coordination-graph" else LEARNER
+    return learner, line_up, build(settings, line_up.agents, pairs(n))
 
 
 def fitted(rows: Sequence[CostRow]) -> list[CostRow]:
@@ -254,7 +229,7 @@ def exponent(
     what is fixed per agent and step matters there, the true p is underestimated.
     """
     points = [
-        (log(r.measured.rule_evaluations_formula), log(getattr(r.measured, quantity)))
+        (log(r.measured.formula.rule_evaluations), log(getattr(r.measured, quantity)))
         for r in fitted(rows)
         if r.measured is not None
     ]
@@ -271,14 +246,9 @@ def exponent(
 def _warm_up() -> None:
     """Have everything imported and compiled before memory is traced and time taken."""
     line_up = LineUpSettings(carts=2).build()
-    for settings in (ChainSettings(), IndependentSettings()):
-        hierarchy = build(settings, line_up.agents)
+    for topology in ("chain", "independent"):
+        hierarchy = build(topology, line_up.agents)
         _steps(Team.build(LEARNER, line_up, hierarchy, policy_seed(0)), line_up, 1)
-
-
-def _of_order(order: int) -> TDLambdaSettings:
-    base = LEARNER.rule_base.model_copy(update={"order": order})
-    return LEARNER.model_copy(update={"rule_base": base})
 
 
 def _steps(team: Team, scenario: Scenario, times: int) -> list[tuple[float, float]]:

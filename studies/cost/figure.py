@@ -44,8 +44,7 @@ def draw(rows: Sequence[CostRow], path: Path) -> None:
         panels = figure.subplots(1, columns, squeeze=False)[0]
         _formulas(panels[0], series)
         if measured:
-            _counted(panels[1], series)
-            _timed(panels[2], series)
+            _measured(panels[1], panels[2], series)
         for axes in panels:
             axes.set_xlabel("agents n")
             axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
@@ -71,29 +70,21 @@ def _formulas(axes: Axes, series: dict[str, list[CostRow]]) -> None:
     axes.set_title("operations, by formula", loc="left")
 
 
-def _counted(axes: Axes, series: dict[str, list[CostRow]]) -> None:
-    for index, rows in enumerate(series.values()):
-        points = [(r.agents, r.measured) for r in rows if r.measured is not None]
-        n = [agents for agents, _ in points]
-        formula = [_log10(m.rule_evaluations_formula) for _, m in points]
-        counted = [_log10(m.rule_evaluations) for _, m in points]
-        axes.plot(n, formula, **_line(index))
-        axes.plot(n, counted, MARKERS[index % len(MARKERS)], **_marker(index))
-    axes.set_title("rule evaluations a step", loc="left")
-
-
-def _timed(axes: Axes, series: dict[str, list[CostRow]]) -> None:
+def _measured(counts: Axes, times: Axes, series: dict[str, list[CostRow]]) -> None:
     for index, rows in enumerate(series.values()):
         points = [(r.agents, r.measured) for r in rows if r.measured is not None]
         if not points:
             continue
         n = [agents for agents, _ in points]
-        times = [log10(m.deciding + m.learning) for _, m in points]
-        formula = [_log10(m.rule_evaluations_formula) for _, m in points]
-        grown = [value - formula[-1] + times[-1] for value in formula]
-        axes.plot(n, grown, **_line(index))
-        axes.plot(n, times, MARKERS[index % len(MARKERS)], **_marker(index))
-    axes.set_title("time of a step [s]", loc="left")
+        formula = [_log10(m.formula.rule_evaluations) for _, m in points]
+        counted = [_log10(m.counted.rule_evaluations) for _, m in points]
+        timed = [log10(m.deciding + m.learning) for _, m in points]
+        grown = [value - formula[-1] + timed[-1] for value in formula]
+        for axes, line, marked in ((counts, formula, counted), (times, grown, timed)):
+            axes.plot(n, line, **_line(index))
+            axes.plot(n, marked, MARKERS[index % len(MARKERS)], **_marker(index))
+    counts.set_title("rule evaluations a step", loc="left")
+    times.set_title("time of a step [s]", loc="left")
 
 
 def _legend(topologies: Sequence[str], measured: bool) -> list[Line2D]:

@@ -16,7 +16,7 @@ from typing import Any, Literal
 from ...topologies.view import aligned, readable
 from ..presentation.csv_text import write_csv
 from ..results.statistics import Estimate
-from .cost import PAPER, RULES, CostRow, Measured, exponent, fitted
+from .cost import PAPER, RULES, CostRow, StepCost, exponent, fitted
 
 Form = Literal["table", "json", "csv", "latex"]
 
@@ -83,8 +83,8 @@ def _record(row: CostRow) -> dict[str, Any]:
     if row.measured is None:
         return record
     for count in COUNTS:
-        for name in (f"{count}_formula", count):
-            record[f"{name}_per_step"] = getattr(row.measured, name)
+        record[f"{count}_formula_per_step"] = getattr(row.measured.formula, count)
+        record[f"{count}_per_step"] = getattr(row.measured.counted, count)
     record["deciding_s"] = row.measured.deciding
     record["learning_s"] = row.measured.learning
     record["memory_bytes"] = row.measured.memory
@@ -135,7 +135,7 @@ def _measured(rows: Sequence[CostRow]) -> list[str]:
     cells = [["n", "topology", *MEASURED]]
     cells += [[str(row.agents), row.topology, *_measured_cells(row.measured)] for row in rows]
     measured = [row.measured for row in rows if row.measured is not None]
-    agreeing = sum(m.agrees for m in measured)
+    agreeing = sum(m.formula == m.counted for m in measured)
     lines = [f"Per step of the running system (line-up scenario, |A| = 4, |S| = {RULES}):", ""]
     lines += [*aligned(cells, "><>>>>>>"), ""]
     lines += ["formula, counted: joint actions tried; ms: deciding and learning;"]
@@ -165,12 +165,12 @@ def _exponents(rows: Sequence[CostRow]) -> list[str]:
     ]
 
 
-def _measured_cells(measured: Measured | None) -> list[str]:
+def _measured_cells(measured: StepCost | None) -> list[str]:
     if measured is None:
         return ["-"] * len(MEASURED)
-    m = measured
-    counts = (m.joint_actions_formula, m.joint_actions, m.rule_evaluations, m.weight_updates)
-    amounts = (1e3 * (m.deciding + m.learning), 1e-6 * m.memory)
+    c = measured.counted
+    counts = measured.formula.joint_actions, c.joint_actions, c.rule_evaluations, c.weight_updates
+    amounts = (1e3 * (measured.deciding + measured.learning), 1e-6 * measured.memory)
     return [*map(scientific, counts), *(f"{a:.3g}" if a < 1000 else f"{a:,.0f}" for a in amounts)]
 
 

@@ -12,6 +12,7 @@ from ..catalogue.study import analysed, load_study
 from ..claims.claims import judge
 from ..claims.table import result
 from ..presentation.tables import tabulate
+from ..presentation.words import count
 from ..results.results import read
 from ..spec.outline import Outline, sources_of
 from ..spec.toml import dumps
@@ -83,7 +84,7 @@ def _template() -> jinja2.Template:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["count"] = words.count
+    environment.filters["count"] = count
     return environment.get_template("page.html.jinja")
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..presentation.words import count
 from ..results.summary import Summary, interval, two_figures
 from ..spec.outline import Outline
 from ..workers.worker import installed
@@ -28,15 +29,6 @@ PACKAGES = (
 """The packages that results and figures come from."""
 MOST_NAMED = 4
 """Conditions that one clause names before it only counts them."""
-
-
-def count(number: int, what: str, plural: str = "") -> str:
-    """Return a number of things.
-
-    >>> count(1, "seed"), count(2, "seed"), count(0, "entry", "entries")
-    ('1 seed', '2 seeds', '0 entries')
-    """
-    return f"{number} {what if number == 1 else plural or what + 's'}"
 
 
 def runs(values: Iterable[int]) -> str:

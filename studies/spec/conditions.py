@@ -25,7 +25,7 @@ from ...core.plugins.plugged import Plugged
 from ...core.plugins.settings import ScenarioSettings, Settings, tuples
 from ...scenarios import DEFAULT, SCENARIOS
 from ...topologies import build
-from ...topologies.config import ChainSettings, Topology, parse
+from ...topologies.config import Topology, parse
 from ..errors import SpecError, show
 from .curriculum import Curriculum, Name, Stage, StageSettings
 from .labels import label, scalar
@@ -43,7 +43,7 @@ class ConditionSettings(Settings):
         default_factory=lambda: cast(ScenarioSettings, SCENARIOS.parsed(DEFAULT))
     )
     agents: Agents = "actuator"
-    topology: Topology = ChainSettings()
+    topology: Topology = parse("chain")
     learner: Annotated[TeamSettings, Plugged(LEARNERS)] = BatchTDSettings()
 
     @model_serializer(mode="wrap")

@@ -205,7 +205,7 @@ def _table(
     told = meanings(model)
     laid = _laid_by_preset(name, kinds[0])
     keys = tuple(
-        _laid_over(_key(field, info, told.get(field, "")), laid)
+        _laid_over(_key(field, info, told.get(field, info.description or "")), laid)
         for field, info in model.model_fields.items()
         if field != "kind" and not (field in base and base[field].default == info.default)
     )
@@ -261,7 +261,11 @@ def meanings(model: type[Settings]) -> dict[str, str]:
     for cls in reversed(model.__mro__):
         if not (issubclass(cls, Settings) and cls is not Settings):
             continue
-        (definition,) = ast.parse(textwrap.dedent(inspect.getsource(cls))).body
+        try:
+            source = inspect.getsource(cls)
+        except OSError:  # made of classes that are written down, which are looked at, too
+            continue
+        (definition,) = ast.parse(textwrap.dedent(source)).body
         body = definition.body if isinstance(definition, ast.ClassDef) else []
         for field, text in pairwise(body):
             if (

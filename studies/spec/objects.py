@@ -15,7 +15,6 @@ from ...core.plugins.registry import Registry
 from ...core.plugins.settings import Settings
 from ...scenarios import SCENARIOS
 from ...topologies import TOPOLOGIES
-from ...topologies.config import EdgesSettings
 from ..errors import SpecError
 from .studies import STUDIES
 
@@ -58,7 +57,7 @@ def plain(value: Any, key: str = "") -> Any:
     if isinstance(value, Settings):
         return _of_settings(value, registry)
     if isinstance(value, Hierarchy | nx.Graph):
-        return plain(_edges(value))
+        return _edges(value)
     if isinstance(getattr(value, "settings", None), Settings):  # of something that was built
         return _of_settings(value.settings, registry)
     if isinstance(value, type) or callable(value) or hasattr(value, "function"):
@@ -67,8 +66,8 @@ def plain(value: Any, key: str = "") -> Any:
     return value
 
 
-def _edges(graph: Hierarchy | nx.Graph) -> Settings:
-    """Return the topology of just these agents and edges."""
+def _edges(graph: Hierarchy | nx.Graph) -> dict[str, Any]:
+    """Return the table of the topology of just these agents and edges."""
     if isinstance(graph, Hierarchy):
         agents: list[str] = list(graph.agents)
         edges = [(graph.agents[a], graph.agents[b]) for a, b in graph.edges]
@@ -76,7 +75,7 @@ def _edges(graph: Hierarchy | nx.Graph) -> Settings:
         agents, edges = list(map(str, graph)), [(str(a), str(b)) for a, b in graph.edges]
     joined = {name for edge in edges for name in edge}
     alone = tuple(name for name in agents if name not in joined)
-    return EdgesSettings(edges=tuple(edges), alone=alone)
+    return {"kind": "edges", "edges": tuple(edges), "alone": alone}
 
 
 def _of_settings(settings: Settings, registry: Registry | None) -> Any:

@@ -74,7 +74,9 @@ def test_a_random_hierarchy_follows_from_its_seed() -> None:
 @given(n=st.integers(1, 12), seed=st.integers(0, 1000), density=st.floats(0, 1))
 def test_every_random_graph_is_a_hierarchy(n: int, seed: int, density: float) -> None:
     agents = [f"agent{i}" for i in range(n)]
-    hierarchy = Hierarchy(agents, builders.random_hierarchy(agents, seed, density).edges)
+    hierarchy = Hierarchy(
+        agents, builders.random_hierarchy(agents, seed=seed, density=density).edges
+    )
     assert sorted(hierarchy.order) == list(range(n))
 
 

@@ -145,3 +145,15 @@ def test_bad_entry_points(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(metadata, "entry_points", points(("line", "a:f"), ("line", "b:f")))
     with pytest.raises(ValueError, match="'line' is offered twice: a:f, b:f"):
         parse("line")
+
+
+def test_keyword_only_parameters_of_a_function_are_its_settings(written) -> None:
+    kind = written(
+        "from __future__ import annotations\n"
+        "def f(agents, groups, *, width: int = 1, unnoted=None):\n"
+        "    return [(agents[0], agent) for agent in agents[1 : 1 + width]]\n"
+    )
+    assert parse(kind).model_dump() == {"kind": kind, "width": 1}
+    assert build(parse({"kind": kind, "width": 2}), AGENTS).edges == ((0, 1), (0, 2))
+    with pytest.raises(ValueError, match="width = 'two': must be a whole number"):
+        parse({"kind": kind, "width": "two"})

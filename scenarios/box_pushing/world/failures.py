@@ -10,7 +10,7 @@ import numpy as np
 
 from ....core.numerics.arrays import FloatArray
 from ...faults.schedule import Failures
-from .settings import FreeSettings
+from ...faults.settings import Free
 from .world import World
 
 
@@ -22,7 +22,7 @@ class WheelFailures(Failures):
         """What multiplies the drive stiffness of every wheel ``(n,)``: 0 for free ones, else 1."""
         grip = np.ones(len(self.failed))
         for failure, wheels in self.active():
-            if isinstance(failure, FreeSettings):
+            if isinstance(failure, Free):
                 grip[wheels] = 0.0
         return grip
 

@@ -2,22 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, Union
 
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from ....core.plugins.settings import NonNegative, Positive, Settings
-from ...faults.settings import (
-    Delayed,
-    FailureSettings,
-    Free,
-    Names,
-    Noisy,
-    Reversed,
-    Seized,
-    Stuck,
-    Weak,
-)
+from ...faults.settings import DISCRIMINATOR, KINDS, FailureSettings, Names, befalling
 
 CONTROL_PERIOD = 0.064
 """Time between commands to the wheels [s]; the basic time step of the e-puck in Webots."""
@@ -67,58 +57,10 @@ class WheelFailure(FailureSettings):
     """Wheels by agent name or pattern: ``robot1.left``, ``robot1.*``, ``*.left``; one or a list."""
 
 
-class SeizedSettings(Seized, WheelFailure):
-    """The wheel does not turn."""
-
-    kind: Literal["seized"] = "seized"
-
-
-class FreeSettings(Free, WheelFailure):
-    """The wheel has no drive and turns freely."""
-
-    kind: Literal["free"] = "free"
-
-
-class WeakSettings(Weak, WheelFailure):
-    """The wheel turns at a fraction of its command."""
-
-    kind: Literal["weak"] = "weak"
-
-
-class ReversedSettings(Reversed, WheelFailure):
-    """The wheel turns against its command."""
-
-    kind: Literal["reversed"] = "reversed"
-
-
-class StuckSettings(Stuck, WheelFailure):
-    """The wheel turns at one speed whatever its command."""
-
-    kind: Literal["stuck"] = "stuck"
-
-
-class DelayedSettings(Delayed, WheelFailure):
-    """The wheel carries out its commands too late, by control periods of 64 ms."""
-
-    kind: Literal["delayed"] = "delayed"
-
-
-class NoisySettings(Noisy, WheelFailure):
-    """The wheel turns at its command plus noise."""
-
-    kind: Literal["noisy"] = "noisy"
-
-
-Failure = Annotated[
-    SeizedSettings
-    | FreeSettings
-    | WeakSettings
-    | ReversedSettings
-    | StuckSettings
-    | DelayedSettings
-    | NoisySettings,
-    Field(discriminator="kind"),
-]
+if TYPE_CHECKING:
+    Failure = WheelFailure
+else:
+    Failure = Annotated[Union[*befalling(WheelFailure, **KINDS).values()], DISCRIMINATOR]
 """Any failure's settings, distinguished by `kind`."""
 
 

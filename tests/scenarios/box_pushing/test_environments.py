@@ -19,7 +19,7 @@ from nested_agents.scenarios.box_pushing.environments import (
 )
 from nested_agents.scenarios.box_pushing.pictures.rendering import SIDES
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
-from nested_agents.scenarios.box_pushing.world.settings import SeizedSettings
+from nested_agents.scenarios.box_pushing.world.settings import WheelFailure
 
 PARALLEL = [WheelsEnv, RobotsEnv]
 SETTINGS = [
@@ -28,7 +28,7 @@ SETTINGS = [
         robots=3, robot="three-wheel", start="hard", state_space="paper", action_repeat=2
     ),
     BoxPushingSettings(
-        failures=(SeizedSettings(wheels=("robot1.*",), episode=1),), action_repeat=2
+        failures=(WheelFailure.Seized(wheels=("robot1.*",), episode=1),), action_repeat=2
     ),
 ]
 

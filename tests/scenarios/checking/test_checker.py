@@ -20,9 +20,7 @@ from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.world.settings import (
-    DelayedSettings,
-    NoisySettings,
-    SeizedSettings,
+    WheelFailure,
 )
 from nested_agents.scenarios.checking.checker import CHECKS, ScenarioError, check_scenario
 from nested_agents.scenarios.checking.frames import random_actions
@@ -33,9 +31,9 @@ from nested_agents.scenarios.state_variables import StateVariable
 from nested_agents.studies.cli.main import main
 
 FAILURES = (
-    NoisySettings(wheels=("*",), episode=1, end_episode=2),
-    DelayedSettings(wheels=("robot1.*",), periods=5),
-    SeizedSettings(wheels=("*.left",), step=4),
+    WheelFailure.Noisy(wheels=("*",), episode=1, end_episode=2),
+    WheelFailure.Delayed(wheels=("robot1.*",), periods=5),
+    WheelFailure.Seized(wheels=("*.left",), step=4),
 )
 
 

@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 from nested_agents.core.agents.cost import Problem
+from nested_agents.core.evaluators.evaluator import Counts
 from nested_agents.studies.cli.commands.cost import numbers
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.cost.cost import (
     CostRow,
-    Measured,
+    StepCost,
     agents_below,
     cost_rows,
     exponent,
@@ -130,24 +131,25 @@ def test_what_the_user_can_mend_is_one_line(said, arguments: tuple[str, ...], me
 def test_counted_is_formula(topology: str, n: int) -> None:
     measured = measure(topology, n)
     assert measured is not None
-    assert measured.agrees
+    assert measured.formula == measured.counted
     below = agents_below(topology, n)
-    assert measured.joint_actions == sum(4 ** (1 + b) for b in below)
-    assert measured.weight_updates == 25 * n
+    assert measured.counted.joint_actions == sum(4 ** (1 + b) for b in below)
+    assert measured.counted.weight_updates == 25 * n
     assert measured.deciding > 0 < measured.memory
 
 
 def test_the_single_agent_counts_as_its_formula() -> None:
     measured = measure("single-agent", 2)
     assert measured is not None
-    assert measured.agrees
-    assert (measured.joint_actions, measured.rule_evaluations) == (16, 16 * 625)
+    assert measured.formula == measured.counted
+    assert (measured.counted.joint_actions, measured.counted.rule_evaluations) == (16, 16 * 625)
     assert measure("single-agent", 8) is None  # 65536 actions over 1.5e11 rules
 
 
 def made_up(n: int, power: float) -> CostRow:
     tried = 4**n
-    measured = Measured(tried, tried, tried, tried, n, n, 1e-6 * tried**power, 1e-6, 10 * tried)
+    counts = Counts(tried, tried, n)
+    measured = StepCost(counts, counts, 1e-6 * tried**power, 1e-6, 10 * tried)
     return CostRow(n, "chain", 1, None, None, 1, measured)
 
 

@@ -7,17 +7,15 @@ from nested_agents.core.agents.loop import world_seed
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.world.settings import (
-    DelayedSettings,
-    NoisySettings,
-    SeizedSettings,
+    WheelFailure,
 )
 from nested_agents.scenarios.checking.checker import CHECKS, check_scenario
 
 AHEAD = np.zeros(4, dtype=int)
 FAILURES = (
-    SeizedSettings(wheels=("robot1.left",), step=2),
-    NoisySettings(wheels=("robot2.left",)),
-    DelayedSettings(wheels=("robot2.right",), periods=3),
+    WheelFailure.Seized(wheels=("robot1.left",), step=2),
+    WheelFailure.Noisy(wheels=("robot2.left",)),
+    WheelFailure.Delayed(wheels=("robot2.right",), periods=3),
 )
 
 
