@@ -118,7 +118,7 @@ class Calibration:
         self._covariance = arrays["covariance"].copy()
         self._root = np.linalg.cholesky(self._covariance)
 
-    def take_over(self, former: Calibration) -> None:
+    def continue_from(self, former: Calibration) -> None:
         """Go on from what another one has learned, if it measures bodies alike; else anew."""
         if np.array_equal(self._units, former._units):
             self.restore(former.arrays())

@@ -135,7 +135,7 @@ class SelfModel:
             for r, array in enumerate(own):
                 array[:] = arrays[f"{name}{r}"]
 
-    def take_over(self, former: SelfModel) -> None:
+    def continue_from(self, former: SelfModel) -> None:
         """Go on from what another one has learned, if its bodies are built alike; else anew."""
         if len(self._nominal) == len(former._nominal) and all(
             map(np.array_equal, self._nominal, former._nominal)

@@ -271,7 +271,7 @@ class Team:
         if self.evaluator is not None:
             self.evaluator.counts.weight_updates += updates
 
-    def take_over(self, former: Team, rows: IntArray) -> None:
+    def continue_from(self, former: Team, rows: IntArray) -> None:
         """Begin where the team of another scenario ended, between two episodes.
 
         It goes on with its weights and experience, with how often agents of each row were seen to
@@ -292,12 +292,12 @@ class Team:
             If the learner or the exploration knows no way; one line.
         """
         learner, explorer = self.learner, self.explorer
-        if not hasattr(learner, "take_over"):
+        if not hasattr(learner, "continue_from"):
             raise ValueError(f"learner.kind: {_no_successor(learner)}")
-        if not hasattr(explorer, "take_over"):
+        if not hasattr(explorer, "continue_from"):
             raise ValueError(f"learner.exploration.kind: {_no_successor(explorer)}")
-        learner.take_over(former.learner, rows)
-        explorer.take_over(former.explorer)
+        learner.continue_from(former.learner, rows)
+        explorer.continue_from(former.explorer)
         self.rng.bit_generator.state = former.rng.bit_generator.state
         self.seen = np.stack(
             [former.seen[former.rows == rows[row]].mean(axis=0) for row in self.rows]
@@ -305,9 +305,9 @@ class Team:
         if self.given.shape == former.given.shape:
             self.given = former.given.copy()
         if self.self_model is not None and former.self_model is not None:
-            self.self_model.take_over(former.self_model)
+            self.self_model.continue_from(former.self_model)
         if self.calibration is not None and former.calibration is not None:
-            self.calibration.take_over(former.calibration)
+            self.calibration.continue_from(former.calibration)
 
     def save(self, path: Path | str) -> None:
         """Write everything that the team remembers to an ``.npz`` file: arrays only."""
@@ -399,4 +399,4 @@ def of_fuzzy_agents(team: Actors) -> Team:
 
 
 def _no_successor(part: object) -> str:
-    return f"{type(part).__name__} has no take_over, by which it would go on with another team"
+    return f"{type(part).__name__} has no continue_from, by which it would go on with another team"

@@ -97,7 +97,7 @@ class Elimination:
         if n_actions ** (1 + self.width) > most_entries:
             raise ValueError(
                 f"width {self.width} of the coordination graph takes tables of {n_actions} ** "
-                f"{1 + self.width} entries, allowed: {most_entries:,}"
+                f"{1 + self.width} entries, allowed: {most_entries:,}; use max-plus"
             )
         self._n_scopes = len(scopes)
         self._steps = tuple(self._planned(scopes))

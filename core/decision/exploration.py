@@ -33,7 +33,7 @@ class Explorer(Protocol):
     """Chooses actions; its whole memory is one array.
 
     An explorer that can go on from one of the same settings, which served other agents, also has
-    ``take_over(former)``.
+    ``continue_from(former)``.
     """
 
     memory: FloatArray
@@ -103,7 +103,7 @@ class Boltzmann:
     def begin_episode(self) -> None:
         """Go on counting."""
 
-    def take_over(self, former: Boltzmann) -> None:
+    def continue_from(self, former: Boltzmann) -> None:
         """Go on with the clock."""
         self.memory[:] = former.memory
 
@@ -214,7 +214,7 @@ class Bursts:
         self.memory[0] += 1.0
         self.memory[1:] = 0.0
 
-    def take_over(self, former: Bursts) -> None:
+    def continue_from(self, former: Bursts) -> None:
         """Go on counting episodes; bursts end with an episode."""
         self.memory[0] = former.memory[0]
 

@@ -10,8 +10,8 @@ agents who are told nothing agree.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable
+from functools import partial
 from typing import Annotated, Literal
 
 import numpy as np
@@ -32,9 +32,9 @@ class VariableEliminationSettings(EvaluatorSettings):
 
     kind: Literal["variable-elimination"] = "variable-elimination"
 
-    def build(self, problem: DecisionProblem) -> VariableElimination:
+    def build(self, problem: DecisionProblem) -> Coordination:
         """Return the evaluator of a team."""
-        return VariableElimination(problem)
+        return Coordination(problem, self.kind, Elimination)
 
 
 class MaxPlusSettings(EvaluatorSettings):
@@ -46,28 +46,39 @@ class MaxPlusSettings(EvaluatorSettings):
     damping: Annotated[float, Field(ge=0, lt=1)] = 0.5
     """Share of a message that is kept from the round before; in a graph without loops none is."""
 
-    def build(self, problem: DecisionProblem) -> MaxPlusMessages:
+    def build(self, problem: DecisionProblem) -> Coordination:
         """Return the evaluator of a team."""
-        return MaxPlusMessages(self, problem)
+        messages = partial(MaxPlus, rounds=self.rounds, damping=self.damping)
+        return Coordination(problem, self.kind, messages)
 
 
-class _Coordinated(Aggregation, ABC):
-    """What the two share: tables of values, and what is made of the best joint action.
+class Coordination(Aggregation):
+    """Tables of values, and what is made of the joint action of their greatest sum.
+
+    Parameters
+    ----------
+    problem
+        What all decisions have in common.
+    name
+        Of the evaluator, in messages.
+    maximiser
+        Finds the joint action of the greatest sum, for scopes, agents and actions.
 
     Raises
     ------
     ValueError
-        If nobody has neighbours, or anything but own values and best responses is asked for.
+        If nobody has neighbours, anything but own values and best responses is asked for, or the
+        coordination graph is too wide; in one line, before anything is allocated.
     """
 
-    name: str
-
-    def __init__(self, problem: DecisionProblem) -> None:
+    def __init__(
+        self, problem: DecisionProblem, name: str, maximiser: Callable[..., Elimination | MaxPlus]
+    ) -> None:
         super().__init__(problem)
         hierarchy = problem.hierarchy
         if hierarchy.edges or not hierarchy.neighbours:
             raise ValueError(
-                f"learner.decision.evaluator = {self.name!r}: the topology joins no neighbours, "
+                f"learner.decision.evaluator = {name!r}: the topology joins no neighbours, "
                 "use coordination-graph"
             )
         for key, value, allowed in (
@@ -77,7 +88,7 @@ class _Coordinated(Aggregation, ABC):
         ):
             if value != allowed:
                 raise ValueError(
-                    f"learner.decision.{key} = {value!r}: {self.name} adds up own values over "
+                    f"learner.decision.{key} = {value!r}: {name} adds up own values over "
                     f"neighbours, allowed: {allowed!r}"
                 )
         n = len(hierarchy)
@@ -85,26 +96,15 @@ class _Coordinated(Aggregation, ABC):
             tuple(sorted((i, *hierarchy.below(i)))) for i in range(n)
         )
         try:
-            self._prepare(n)
+            self._maximiser = maximiser(self.scopes, n, self.n_actions)
         except ValueError as error:
-            raise ValueError(f"learner.decision.evaluator = {self.name!r}: {error}") from None
-        self._tried = {k: combinations(tuple(range(k)), self.n_actions) for k in self._sizes}
+            raise ValueError(f"learner.decision.evaluator = {name!r}: {error}") from None
+        sizes = set(map(len, self.scopes))
+        self._tried = {k: combinations(tuple(range(k)), self.n_actions) for k in sizes}
         self._concerning = [[k for k, s in enumerate(self.scopes) if i in s] for i in range(n)]
         self._prediction: Prediction | None = None
         self._tables: list[FloatArray] = []
         self._best: IntArray = np.zeros(n, dtype=np.int64)
-
-    @property
-    def _sizes(self) -> set[int]:
-        return set(map(len, self.scopes))
-
-    @abstractmethod
-    def _prepare(self, n: int) -> None:
-        """Prepare to maximise sums of tables over the scopes."""
-
-    @abstractmethod
-    def _maximised(self, tables: Sequence[FloatArray]) -> IntArray:
-        """Return the joint action ``(n,)`` of the greatest sum."""
 
     def values(self, deliberation: Deliberation) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent."""
@@ -112,7 +112,7 @@ class _Coordinated(Aggregation, ABC):
         if agent == self.hierarchy.order[0] or deliberation.prediction is not self._prediction:
             self._prediction = deliberation.prediction
             self._tables = [self._table(deliberation, i) for i in range(len(self.scopes))]
-            self._best = self._maximised(self._tables)
+            self._best = self._maximiser.best(self._tables)
         values = np.zeros(self.n_actions)
         for k in self._concerning[agent]:
             index = [slice(None) if i == agent else self._best[i] for i in self.scopes[k]]
@@ -137,41 +137,3 @@ class _Coordinated(Aggregation, ABC):
         joint[:, list(scope)] = tried
         states = deliberation.prediction.states(agent, joint)
         return self.rules.values(weights, states).reshape(shape)
-
-
-class VariableElimination(_Coordinated):
-    """Finds the greatest sum by variable elimination.
-
-    Raises
-    ------
-    ValueError
-        If the coordination graph is too wide; in one line, before anything is allocated.
-    """
-
-    name = "variable-elimination"
-
-    def _prepare(self, n: int) -> None:
-        try:
-            self._elimination = Elimination(self.scopes, n, self.n_actions)
-        except ValueError as error:
-            raise ValueError(f"{error}; use max-plus") from None
-
-    def _maximised(self, tables: Sequence[FloatArray]) -> IntArray:
-        return self._elimination.best(tables)
-
-
-class MaxPlusMessages(_Coordinated):
-    """Finds a great sum by max-plus."""
-
-    name = "max-plus"
-
-    def __init__(self, settings: MaxPlusSettings, problem: DecisionProblem) -> None:
-        self._settings = settings
-        super().__init__(problem)
-
-    def _prepare(self, n: int) -> None:
-        s = self._settings
-        self._messages = MaxPlus(self.scopes, n, self.n_actions, s.rounds, s.damping)
-
-    def _maximised(self, tables: Sequence[FloatArray]) -> IntArray:
-        return self._messages.best(tables)

@@ -154,9 +154,9 @@ class AnovaTD(Replay):
         self._coefficients = arrays["coefficients"].copy()
         self._dictionaries, self._described = self._empty(), 0
 
-    def take_over(self, former: Replay, rows: IntArray) -> None:
+    def continue_from(self, former: Replay, rows: IntArray) -> None:
         """Begin with weights and experience of another team, of which no episode is under way."""
-        super().take_over(former, rows)
+        super().continue_from(former, rows)
         assert isinstance(former, AnovaTD)
         # Coordinates follow from the order of the after-states, which stays the same.
         self._coefficients = former._coefficients[rows]

@@ -205,7 +205,7 @@ class Replay(ABC):
             for row in range(len(self.theta))
         ]
 
-    def take_over(self, former: Replay, rows: IntArray) -> None:
+    def continue_from(self, former: Replay, rows: IntArray) -> None:
         """Begin with weights and experience of another team, of which no episode is under way."""
         self.theta = former.theta[rows]
         self._earlier = [Earlier(former.states_of(row), *former._outcomes(row)) for row in rows]

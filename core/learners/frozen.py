@@ -49,6 +49,6 @@ class Frozen:
         """Take over the consequent weights."""
         self.theta = arrays["theta"].copy()
 
-    def take_over(self, former: Frozen, rows: IntArray) -> None:
+    def continue_from(self, former: Frozen, rows: IntArray) -> None:
         """Begin with the consequent weights of another team."""
         self.theta = former.theta[rows]

@@ -27,8 +27,8 @@ class Learner(Protocol):
     says which row is whose.
 
     A learner that can begin with what one of the same settings has learned for other agents also
-    has ``take_over(former, rows)``: ``rows`` ``(n_rows,)`` says from which row of ``former``, which
-    is not modified and whose episodes are over, each row goes on.
+    has ``continue_from(former, rows)``: ``rows`` ``(n_rows,)`` says from which row of ``former``,
+    which is not modified and whose episodes are over, each row goes on.
     """
 
     theta: FloatArray

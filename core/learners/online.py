@@ -102,7 +102,7 @@ class Online(ABC):
         self._previous = arrays["previous"].copy() if arrays["previous"].size else None
         self._rewards = arrays["rewards"].copy()
 
-    def take_over(self, former: Online, rows: IntArray) -> None:
+    def continue_from(self, former: Online, rows: IntArray) -> None:
         """Begin with all weights of another team; traces are of an episode, and begin anew."""
         for name in (name for name in self.kept if name not in self.traces):
             array = getattr(former, name)

@@ -1,4 +1,4 @@
-"""Modules that are imported when something of them is first used, since they take their time."""
+"""What is imported when it is first asked for, since modules take their time."""
 
 from __future__ import annotations
 
@@ -29,3 +29,16 @@ class Deferred:
         if attribute.startswith("__"):  # asked by who inspects the object, not by who uses it
             raise AttributeError(attribute)
         return getattr(import_module(self._name), attribute)
+
+
+def located(place: str) -> Any:
+    """Return what ``"package.module:Name"`` names; without a name, the module.
+
+    >>> located("math:pi")
+    3.141592653589793
+    """
+    module, _, attribute = place.partition(":")
+    value: Any = import_module(module)
+    for part in filter(None, attribute.split(".")):
+        value = getattr(value, part)
+    return value

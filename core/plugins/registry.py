@@ -19,8 +19,8 @@ from pathlib import Path
 from typing import Any
 
 from . import sources
+from .deferred import located
 from .messages import closest
-from .places import located
 
 
 class Registry:

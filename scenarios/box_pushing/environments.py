@@ -51,9 +51,13 @@ class Seat:
         What is played.
     wheels
         Indices of the wheels.
+    by_wheel
+        Whether it observes the state of every wheel in a row of its own.
     """
 
-    def __init__(self, scenario: BoxPushing, wheels: Sequence[int]) -> None:
+    def __init__(
+        self, scenario: BoxPushing, wheels: Sequence[int], *, by_wheel: bool = False
+    ) -> None:
         self.wheels = list(wheels)
         space, bounds = scenario.state_space, scenario.bounds
         d, own = space.n_variables, space.n_own
@@ -62,16 +66,23 @@ class Seat:
             mine = [wheel for wheel in group if wheel in self.wheels]
             places += [wheel * d + i for wheel in mine for i in range(own)]
             places += [wheel * d + i for wheel in mine[:1] for i in range(own, d)]
-        self.places: IntArray = np.array(places)
+        if by_wheel:
+            places = [wheel * d + i for wheel in self.wheels for i in range(d)]
+        self.places: IntArray = np.reshape(places, (len(self.wheels), d) if by_wheel else -1)
         self.names = tuple(
             f"{scenario.agents[place // d]}.{space.variables[place % d].name}" for place in places
         )
-        low, high = bounds[self.places % d].T.astype(np.float32)
+        low, high = np.moveaxis(bounds[self.places % d].astype(np.float32), -1, 0)
         self.observation_space = Box(low, high, dtype=np.float32)
         actions = len(scenario.action_set)
         self.action_space = (
             Discrete(actions) if len(self.wheels) == 1 else MultiDiscrete([actions] * len(wheels))
         )
+
+    @classmethod
+    def of_all(cls, scenario: BoxPushing, *, by_wheel: bool = False) -> Seat:
+        """Return the seat of an agent that drives all wheels."""
+        return cls(scenario, range(len(scenario.agents)), by_wheel=by_wheel)
 
     def observe(self, states: FloatArray) -> FloatArray:
         """Return the observation in the states ``(n, d)`` of all wheels."""
@@ -304,7 +315,7 @@ class BoxPushingEnv(gymnasium.Env):
     ) -> None:
         self.game = Game(settings, steps, render_mode, sensors=sensors)
         self.render_mode = render_mode
-        self.seat = Seat(self.game.scenario, range(len(self.game.scenario.agents)))
+        self.seat = Seat.of_all(self.game.scenario)
         self.observation_space = self.seat.observation_space
         self.action_space = self.seat.action_space
 

@@ -7,7 +7,6 @@ episode), the sensing (states) and the servo layer, which turns actions into whe
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import pi
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -20,7 +19,7 @@ from ...core.interface.scenario import Transition
 from ...core.interface.spaces import ActionSet, StateSpace
 from ...core.numerics.arrays import BoolArray, FloatArray, IntArray
 from .config import BoxPushingSettings
-from .prediction.belief import APART, CONSTANTS, PushBelief, least_gap
+from .prediction.belief import APART, CONSTANTS, PushBelief, believing, least_gap
 from .prediction.prediction import BoxPrediction, mean_twists
 from .prediction.predictors import ExactPrediction, Future, push_model
 from .prediction.settings import BeliefSettings
@@ -29,7 +28,7 @@ from .states.state_spaces import state_space_for
 from .states.view import View
 from .world.boxes import box_for, growth
 from .world.failures import WheelFailures
-from .world.infrared import InfraredSpec, strongest_reading
+from .world.geometry import wrap
 from .world.reward import Task, reward
 from .world.robots import nominal_effect, robot_for
 from .world.settings import CONTROL_PERIOD
@@ -109,8 +108,7 @@ class BoxPushing:
         )
         self.roles = self.robot.wheel_names * settings.robots
         self.action_set = ActionSet()
-        self.infrared = InfraredSpec(**settings.infrared.model_dump())
-        self.world = World([self.robot] * settings.robots, self.box, infrared=self.infrared)
+        self.world = World([self.robot] * settings.robots, self.box, infrared=settings.infrared)
         self._space = state_space_for(settings.state_space, self.robot.max_speed)
         self._limits: FloatArray = np.full(len(self.agents), self.robot.max_speed)
         self._effects = (nominal_effect(self.robot),) * settings.robots
@@ -127,7 +125,7 @@ class BoxPushing:
         self._belief = PushBelief.of(self._model, robots, settings.belief.stiffness)
         self._premises = Premises(
             self._belief, self._space, self.action_set, settings.speed_increment, self._limits,
-            self._task, self.infrared, self.box.outline, settings.period,
+            self._task, settings.infrared, self.box.outline, settings.period,
             settings.prediction_horizon * CONTROL_PERIOD,
         )  # fmt: skip
         self._goal: FloatArray = np.zeros(3)
@@ -214,7 +212,7 @@ class BoxPushing:
             of_box = mean_twists(box[None], self.world.box_pose[None], period)
             twists = np.concatenate([of_box, twists])
         measured = self.measure()
-        readings = strongest_reading(self.world, self._sensing)
+        readings = self.settings.infrared.noisy(self.world.infrared_of_box(), self._sensing)
         terminated = self._reached()
         gained = reward(
             self._task,
@@ -222,7 +220,7 @@ class BoxPushing:
             np.array([measured["distance_m"] - before]),
             np.array([measured["orientation_rad"]]),
             self.world.contact[None],
-            readings[None],
+            readings.max(axis=1)[None],
         )[0]
         paid: float | FloatArray = float(gained[0])
         if self.settings.reward.of == "robot":
@@ -265,7 +263,7 @@ class BoxPushing:
             self.world.robot_poses.copy(), self.world.box_pose.copy(), self._goal,
             self._speeds, tuple(effects), self.groups,
         )  # fmt: skip
-        model = self._model if constants is None else self._belief.believing(constants)
+        model = self._model if constants is None else believing(self._belief, constants)
         if self._playground is None or self._saved is None:
             return BoxPrediction(situation, model, self._premises)
         future = Future(
@@ -352,7 +350,7 @@ class BoxPushing:
         return float(np.hypot(ahead[0], ahead[1]))
 
     def _orientation(self) -> float:
-        return float((self.world.box_pose[2] - self._goal[2] + pi) % (2.0 * pi) - pi)
+        return float(wrap(self.world.box_pose[2] - self._goal[2]))
 
     def _reached(self) -> bool:
         distance, orientation = np.array([self._distance()]), np.array([self._orientation()])
@@ -373,7 +371,7 @@ class BoxPushing:
             poses[None], world.box_pose[None], world.gaps[None], self._goal, origin, 1.0,
             self.box.outline, self.box.friction_radius,
         )  # fmt: skip
-        n_own, shared = self._space.space.n_own, self._space.sensed(view)
+        n_own, shared = self._space.space.n_own, self._space.sensed(view, range(len(poses)))
         states = np.empty((len(self.agents), self._space.space.n_variables))
         for r, group in enumerate(self.groups):
             for agent in group:

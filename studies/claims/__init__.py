@@ -1,1 +1,1 @@
-"""The claims of the paper, and what was found of them."""
+"""The claims of the paper, and the verdicts on them."""

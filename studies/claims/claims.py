@@ -216,7 +216,7 @@ QUICK = Path(__file__).parent / "quick"
 
 @dataclass(frozen=True)
 class Finding:
-    """What was found of a claim; `measured` is None if its study has no results."""
+    """The verdict on a claim; `measured` is None if its study has no results."""
 
     claim: Claim
     measured: Measured | None

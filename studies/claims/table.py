@@ -10,7 +10,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from ..presentation.tables import escaped
+from ..presentation.tables import escaped, tabular
 from .claims import Finding
 from .measures import Measured
 
@@ -52,16 +52,16 @@ def result(finding: Finding) -> str:
     """Return the value with its interval and number of seeds as text."""
     if finding.measured is None:
         return "no results"
-    found = finding.measured
-    value, low, high = _ends(found)
-    text = f"{value:.2f}" if found.seeds else f"{value:.2g}"
-    if found.seeds:
-        text += f" ({low:.2f} to {high:.2f}), {found.seeds} seeds"
+    measured = finding.measured
+    value, low, high = _ends(measured)
+    text = f"{value:.2f}" if measured.seeds else f"{value:.2g}"
+    if measured.seeds:
+        text += f" ({low:.2f} to {high:.2f}), {measured.seeds} seeds"
     else:
         text += ", computed"
-    if found.p is not None:
-        text += f", p = {found.p:.2g}"
-    return text + (f", {found.note}" if found.note else "")
+    if measured.p is not None:
+        text += f", p = {measured.p:.2g}"
+    return text + (f", {measured.note}" if measured.note else "")
 
 
 def markdown(findings: Sequence[Finding]) -> str:
@@ -80,27 +80,22 @@ def markdown(findings: Sequence[Finding]) -> str:
 
 def latex(findings: Sequence[Finding]) -> str:
     """Return the table for LaTeX, which needs the packages booktabs and tabularx."""
-    lines = [
-        "% needs \\usepackage{booktabs,tabularx}; 95 % intervals in brackets",
-        r"\begin{tabularx}{\textwidth}{XXll}",
-        r"\toprule",
-        r"claim & measure, criterion & result & verdict \\",
-        r"\midrule",
-    ]
+    lines = [["claim", "measure, criterion", "result", "verdict"]]
     for finding in findings:
         c = finding.claim
         cells = (f"{c.text} ({c.place})", f"{c.measure}: {c.criterion.text}", result(finding))
-        lines.append(" & ".join(map(escaped, (*cells, finding.verdict))) + r" \\")
-    return "\n".join([*lines, r"\bottomrule", r"\end{tabularx}"])
+        lines.append([escaped(cell) for cell in (*cells, finding.verdict)])
+    needs = "{booktabs,tabularx}; 95 % intervals in brackets"
+    return tabular(needs, r"{\textwidth}{XXll}", lines, "tabularx")
 
 
-def _ends(found: Measured) -> tuple[float, float, float]:
-    e = found.estimate
+def _ends(measured: Measured) -> tuple[float, float, float]:
+    e = measured.estimate
     return float(e.value), float(e.low), float(e.high)
 
 
 def _record(finding: Finding) -> dict[str, Any]:
-    claim, found = finding.claim, finding.measured
+    claim, measured = finding.claim, finding.measured
     record: dict[str, Any] = {
         "name": claim.name,
         "claim": claim.text,
@@ -110,8 +105,8 @@ def _record(finding: Finding) -> dict[str, Any]:
         "criterion": claim.criterion.text,
         "verdict": finding.verdict,
     }
-    if found is not None:
-        value, low, high = (v if np.isfinite(v) else None for v in _ends(found))
-        record |= {"value": value, "low": low, "high": high, "seeds": found.seeds}
-        record |= {"p": found.p, "note": found.note}
+    if measured is not None:
+        value, low, high = (v if np.isfinite(v) else None for v in _ends(measured))
+        record |= {"value": value, "low": low, "high": high, "seeds": measured.seeds}
+        record |= {"p": measured.p, "note": measured.note}
     return record

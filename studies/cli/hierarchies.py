@@ -18,7 +18,7 @@ def of_spec(path: str) -> list[HierarchyView] | None:
     try:
         table = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
     except ValueError:
-        return None  # told by whoever reads it as a topology
+        return None  # whoever reads it as a topology says why
     if TOPOLOGY & table.keys() or (list(table) == ["topology"] and "kind" not in table["topology"]):
         return None
     from ..spec.spec import Spec

@@ -25,7 +25,7 @@ COMMANDS: dict[str, str] = {
     "demo": "Train two e-Pucks to push a box: table, figures and replay.",
     "run": "Run the study of a spec, or continue it.",
     "plan": "Tell what a study will take, and what it can find.",
-    "table": "Print what a study found: conditions against estimates.",
+    "table": "Print the results of a study: conditions against estimates.",
     "compare": "Compare conditions of one study or several, seed by seed.",
     "results": "Print what every episode of a study measured.",
     "watch": "Watch a study while it runs: trials, curves, failures.",
@@ -39,7 +39,7 @@ COMMANDS: dict[str, str] = {
     "topology": "List the topologies, or show one of them.",
     "check": "Check that scenarios keep their promises.",
     "cost": "Print what hierarchies cost, by formula and measured.",
-    "claims": "Print the claims of the paper and what was found of each.",
+    "claims": "Print the claims of the paper and the verdict on each.",
 }
 """The commands and what the help says of each; their modules are imported when asked for."""
 

@@ -16,7 +16,7 @@ from ...core.numerics.arrays import FloatArray
 from ..presentation.figures import COLOURS, MARKERS, SETTINGS, STYLES
 from .body import ROWS, Bodies, body_name, by_body
 from .rules import exponent, labels, percent, strongest_pairs
-from .team import Explained
+from .team import Explanation
 
 MOST_LINES = 8
 """Agents in one figure of functions."""
@@ -26,37 +26,37 @@ MOST_BODIES = 8
 """Bodies in the figure of the self-model."""
 
 
-def draw(found: Explained) -> dict[str, Figure]:
+def draw(explained: Explanation) -> dict[str, Figure]:
     """Return all figures that there is something for, by name."""
     with mpl.rc_context(SETTINGS):  # type: ignore[arg-type]
-        return dict(_figures(found))
+        return dict(_figures(explained))
 
 
-def _figures(found: Explained) -> Iterator[tuple[str, Figure]]:
-    if any(p.variance > 0 for p in found.parts):
-        blocks = range(0, len(found.agents), MOST_LINES)
+def _figures(explained: Explanation) -> Iterator[tuple[str, Figure]]:
+    if any(p.variance > 0 for p in explained.parts):
+        blocks = range(0, len(explained.agents), MOST_LINES)
         for number, first in enumerate(blocks, 1):
             name = "functions" if len(blocks) == 1 else f"functions-{number}"
-            yield name, _functions(found, slice(first, first + MOST_LINES))
-        if strongest_pairs(found.parts):
-            yield "pairs", _pairs(found)
-    if not isinstance(found.policy, str):
-        yield "policy", found.policy.figure()
-    if found.bodies is not None:
-        yield "self-model", _bodies(found.actuators, found.bodies)
+            yield name, _functions(explained, slice(first, first + MOST_LINES))
+        if strongest_pairs(explained.parts):
+            yield "pairs", _pairs(explained)
+    if not isinstance(explained.policy, str):
+        yield "policy", explained.policy.figure()
+    if explained.bodies is not None:
+        yield "self-model", _bodies(explained.actuators, explained.bodies)
 
 
-def _functions(found: Explained, block: slice) -> Figure:
-    d = len(found.variables)
+def _functions(explained: Explanation, block: slice) -> Figure:
+    d = len(explained.variables)
     columns = 4 if d > 3 else d
     rows = ceil(d / columns)
     figure = Figure(figsize=(2.45 * columns, 2.2 * rows + 0.7), layout="constrained")
     panels = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
-    times = 10.0 ** exponent(found.parts)
-    names, parts = found.agents[block], found.parts[block]
+    times, unit_of_f = _scale(explained)
+    names, parts = explained.agents[block], explained.parts[block]
     bodies = list(dict.fromkeys(name.partition(".")[0] for name in names))
     for j, (variable, partition) in enumerate(
-        zip(found.variables, found.rules.partitions, strict=True)
+        zip(explained.variables, explained.rules.partitions, strict=True)
     ):
         axes, turn = panels[j], 180 / np.pi if variable.unit == "rad" else 1.0
         low, high = (min(partition.centres), max(partition.centres))
@@ -85,8 +85,7 @@ def _functions(found: Explained, block: slice) -> Figure:
         axes.axhline(0.0, color="#cccccc", lw=0.8, zorder=0)
     for axes in panels[d:]:
         axes.set_visible(False)
-    power = exponent(found.parts)
-    figure.supylabel("adds to f" + (rf" [$\times 10^{{{-power}}}$]" if power else ""), fontsize=9)
+    figure.supylabel(f"adds to f{unit_of_f}", fontsize=9)
     figure.legend(
         loc="outside lower center", ncols=4, frameon=False,
         title="markers: rules, less their mean; in the titles the share of the variance of f",
@@ -94,15 +93,21 @@ def _functions(found: Explained, block: slice) -> Figure:
     return figure
 
 
-def _pairs(found: Explained) -> Figure:
-    pairs, parts = strongest_pairs(found.parts), found.parts[:MOST_MAPS]
+def _scale(explained: Explanation) -> tuple[float, str]:
+    """Return what consequents are multiplied by to be read, and what an axis says of it."""
+    power = exponent(explained.parts)
+    return 10.0**power, rf" [$\times 10^{{{-power}}}$]" if power else ""
+
+
+def _pairs(explained: Explanation) -> Figure:
+    pairs, parts = strongest_pairs(explained.parts), explained.parts[:MOST_MAPS]
     figure = Figure(figsize=(2.5 * len(parts) + 1.2, 2.4 * len(pairs) + 0.3), layout="constrained")
     panels = figure.subplots(len(pairs), len(parts), squeeze=False)
-    times = 10.0 ** exponent(found.parts)
+    times, unit_of_f = _scale(explained)
     greatest = max(float(np.abs(p.pairs[pair]).max()) for p in parts for pair in pairs) * times
     for row, (j, k) in zip(panels, pairs, strict=True):
-        words = [labels(found.variables[i], found.rules.partitions[i]) for i in (j, k)]
-        for axes, name, part in zip(row, found.agents, parts, strict=False):
+        words = [labels(explained.variables[i], explained.rules.partitions[i]) for i in (j, k)]
+        for axes, name, part in zip(row, explained.agents, parts, strict=False):
             image = axes.imshow(
                 times * part.pairs[j, k], cmap="cividis", vmin=-greatest, vmax=greatest,
                 origin="lower", aspect="auto",
@@ -110,11 +115,10 @@ def _pairs(found: Explained) -> Figure:
             axes.set_title(f"{name}, {percent(part.share(part.pairs[j, k]))}", loc="left")
             axes.set_xticks(range(len(words[1])), words[1], rotation=40, ha="right", fontsize=7)
             axes.set_yticks(range(len(words[0])), words[0], fontsize=7)
-            axes.set_xlabel(found.variables[k].name)
-        row[0].set_ylabel(found.variables[j].name)
-    power = exponent(found.parts)
-    scale = rf" [$\times 10^{{{-power}}}$]" if power else ""
-    figure.colorbar(image, ax=panels, label=f"adds to f beyond either alone{scale}", shrink=0.8)
+            axes.set_xlabel(explained.variables[k].name)
+        row[0].set_ylabel(explained.variables[j].name)
+    label = f"adds to f beyond either alone{unit_of_f}"
+    figure.colorbar(image, ax=panels, label=label, shrink=0.8)
     return figure
 
 

@@ -174,8 +174,8 @@ def table(
             yield " " * margin + line
         for j in strongest:
             shares = [p.share(p.singles[j]) for p in parts[block]]
-            said = "".join(percent(s).rjust(wide) for s in shares)
-            yield f"{variables[j].name}, share of the variance"[: margin - 1].ljust(margin) + said
+            row = "".join(percent(s).rjust(wide) for s in shares)
+            yield f"{variables[j].name}, share of the variance"[: margin - 1].ljust(margin) + row
             partition = rules.partitions[j]
             for k, word in enumerate(labels(variables[j], partition)):
                 head = f"IF {variables[j].name} is {word}".ljust(first)
@@ -209,5 +209,5 @@ def strongest_pairs(parts: Sequence[Parts], most: int = 3) -> list[Pair]:
         pair: sum(p.share(p.pairs[pair]) for p in parts)
         for pair in (parts[0].pairs if parts else ())
     }
-    found = sorted(shares, key=lambda pair: -shares[pair])[:most]
-    return [pair for pair in found if shares[pair] > 0]
+    strongest = sorted(shares, key=lambda pair: -shares[pair])[:most]
+    return [pair for pair in strongest if shares[pair] > 0]

@@ -35,7 +35,7 @@ from .rules import Parts
 
 
 @dataclass(frozen=True)
-class Explained:
+class Explanation:
     """What is known of a trained team.
 
     Attributes
@@ -89,7 +89,7 @@ def choose(store: Store, condition: str | None, seed: int | None) -> Trial:
     return trial
 
 
-def explained(store: Store, trial: Trial) -> Explained:
+def explain(store: Store, trial: Trial) -> Explanation:
     """Train the team of a trial again and explain it.
 
     Raises
@@ -99,20 +99,20 @@ def explained(store: Store, trial: Trial) -> Explained:
         that is kept.
     """
     with trial.sources.active():
-        return _explained(store, trial)
+        return _explain(store, trial)
 
 
-def _explained(store: Store, trial: Trial) -> Explained:
-    team, scenario, bodies = _trained(store, trial)
+def _explain(store: Store, trial: Trial) -> Explanation:
+    team, scenario, bodies = _train(store, trial)
     learner = trial.settings.learner
-    assert isinstance(learner, LearnerSettings), "of fuzzy agents, see _trained"
+    assert isinstance(learner, LearnerSettings), "of fuzzy agents, see _train"
     rules = RuleBase.build(scenario.state_space, learner.rule_base)
     taken = [explain_rules.take_apart(rules, theta) for theta in team.learner.theta]
     parts = tuple(taken[row] for row in team.rows)
     variables = scenario.state_space.variables
     actuators = trial.settings.scenario.build().agents
     policy = _policy(team, scenario)
-    return Explained(trial, scenario.agents, actuators, rules, variables, parts, policy, bodies)
+    return Explanation(trial, scenario.agents, actuators, rules, variables, parts, policy, bodies)
 
 
 def _policy(team: Team, scenario: Any) -> Any:
@@ -127,7 +127,7 @@ def _policy(team: Team, scenario: Any) -> Any:
         return str(error)
 
 
-def _trained(store: Store, trial: Trial) -> tuple[Team, Scenario, Bodies | None]:
+def _train(store: Store, trial: Trial) -> tuple[Team, Scenario, Bodies | None]:
     try:
         session = Session(trial)
         team = of_fuzzy_agents(session.team)
@@ -153,10 +153,10 @@ def _trained(store: Store, trial: Trial) -> tuple[Team, Scenario, Bodies | None]
         bodies.note("after", model)
     measured = [measure.name for measure in store.measures()]
     kept = _kept(store, trial)
-    found = [row.flat(measured) for row in session.result().rows]
-    if kept != found:
-        pairs = zip(kept, found, strict=False)
-        other = next((ours for theirs, ours in pairs if theirs != ours), found[-1])
+    again = [row.flat(measured) for row in session.result().rows]
+    if kept != again:
+        pairs = zip(kept, again, strict=False)
+        other = next((ours for theirs, ours in pairs if theirs != ours), again[-1])
         stage = "" if other[0] == "training" else f" of {other[0]}"
         raise SpecError(
             f"{store.directory}: training {trial.condition}, seed {trial.seed} again gives another "
@@ -180,7 +180,7 @@ def _kept(store: Store, trial: Trial) -> list[tuple[object, ...]]:
     return [tuple(row[i] for i in at) for row in own]
 
 
-def folder(directory: Path, trial: Trial, conditions: Sequence[str]) -> Path:
+def folder_of(directory: Path, trial: Trial, conditions: Sequence[str]) -> Path:
     """Return where the explanation of a trial is kept: one folder for each condition and seed."""
     names = [re.sub(r"[^\w.=+-]+", "-", c)[:60].strip("-.") for c in conditions]
     at = list(conditions).index(trial.condition)

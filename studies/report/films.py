@@ -42,7 +42,7 @@ class Film:
 
 def films(store: Store, planned: Iterable[Planned], most_bytes: int) -> list[Film]:
     """Draw the first of the given trials of each condition, until there is no more room."""
-    found: list[Film] = []
+    drawn: list[Film] = []
     first: dict[str, str] = {}
     for plan in planned:
         first.setdefault(plan.condition, plan.identity)
@@ -56,8 +56,8 @@ def films(store: Store, planned: Iterable[Planned], most_bytes: int) -> list[Fil
         if not 0 < len(encoded) <= most_bytes:
             continue
         most_bytes -= len(encoded)
-        found.append(Film(trial.condition, trial.seed, encoded))
-    return found
+        drawn.append(Film(trial.condition, trial.seed, encoded))
+    return drawn
 
 
 def _trials(store: Store) -> Mapping[str, Trial]:

@@ -41,7 +41,7 @@ class Picture:
 
 def pictures(figures: Mapping[str, Figure]) -> list[Picture]:
     """Return a study's figures, by name, as they stand in a page and are taken away from it."""
-    found = []
+    drawn = []
     with mpl.rc_context(SETTINGS):  # type: ignore[arg-type]
         for number, (name, figure) in enumerate(figures.items(), 1):
             svg = io.StringIO()
@@ -50,8 +50,8 @@ def pictures(figures: Mapping[str, Figure]) -> list[Picture]:
             pdf = io.BytesIO()
             figure.savefig(pdf, format="pdf", metadata={"CreationDate": None})
             encoded = base64.b64encode(pdf.getvalue()).decode("ascii")
-            found.append(Picture(name, Markup(text), encoded))
-    return found
+            drawn.append(Picture(name, Markup(text), encoded))
+    return drawn
 
 
 def embedded(svg: str, prefix: str) -> str:

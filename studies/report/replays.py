@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from ...core.plugins.places import located
+from ...core.plugins.deferred import located
 from ...scenarios import SCENARIOS
 from ..spec.errors import SpecError
 from ..store.durable import NotRecordedError, Recording
@@ -53,14 +53,14 @@ class Replays:
     @property
     def remarks(self) -> list[str]:
         """What is missing, in words: a sentence for every reason."""
-        said = []
+        sentences = []
         for reason, trials in self.missing.items():
             by_seeds: dict[str, list[str]] = {}
             for condition, seeds in trials.items():
                 by_seeds.setdefault(runs(seeds), []).append(condition)
             parts = [f"{'; '.join(names)}: seeds {seeds}" for seeds, names in by_seeds.items()]
-            said.append(f"{reason}: {'. '.join(parts)}.")
-        return said
+            sentences.append(f"{reason}: {'. '.join(parts)}.")
+        return sentences
 
 
 def replays(store: Store, trials: Iterable[Planned], most_bytes: int = MOST_BYTES) -> Replays:
@@ -77,22 +77,22 @@ def replays(store: Store, trials: Iterable[Planned], most_bytes: int = MOST_BYTE
     others: list[Planned] = []
     size = 0
 
-    def miss(trial: Planned, reason: str) -> None:
+    def leave_out(trial: Planned, reason: str) -> None:
         missing.setdefault(reason, {}).setdefault(trial.condition, []).append(trial.seed)
 
     for trial in trials:
         if (trial.condition, trial.seed) not in done:
             continue
         if size >= most_bytes:
-            miss(trial, "Left out to keep the page small")
+            leave_out(trial, "Left out to keep the page small")
             continue
         try:
             kept = {k: store.recording(trial.identity, name) for k, name in trial.recorded.items()}
         except NotRecordedError:
-            miss(trial, "Not shown, as the scenario records no episodes")
+            leave_out(trial, "Not shown, as the scenario records no episodes")
             continue
         except SpecError:
-            miss(trial, "Not shown, as the recording is missing or damaged")
+            leave_out(trial, "Not shown, as the recording is missing or damaged")
             continue
         for number, recording in kept.items():
             player, scene = _scene_of(recording)
@@ -116,7 +116,7 @@ def replays(store: Store, trials: Iterable[Planned], most_bytes: int = MOST_BYTE
     filmed = {film.condition for film in drawn}
     for trial in others:
         if trial.condition not in filmed:
-            miss(trial, "Not shown, as the scenario cannot draw it, or there is no room")
+            leave_out(trial, "Not shown, as the scenario cannot draw it, or there is no room")
     return Replays(scenes, episodes, "".join(scripts), drawn, missing)
 
 

@@ -57,9 +57,9 @@ def extent(outline: Outline) -> str:
         longest = outline.table.get("evaluation_steps")
         after = f", {count(outline.evaluation, 'evaluation episode')} after them"
         after += f" of up to {count(longest, 'step')}" if longest else ""
-        elsewhere = len(outline.table.get("evaluations", ()))
-        each = "another scenario" if elsewhere == 1 else f"each of {elsewhere} other scenarios"
-        after += f" and as many in {each}" if elsewhere else ""
+        others = len(outline.table.get("evaluations", ()))
+        each = "another scenario" if others == 1 else f"each of {others} other scenarios"
+        after += f" and as many in {each}" if others else ""
     return (
         f"{count(len(outline.columns), 'condition')} × {count(len(outline.seeds), 'seed')}, each "
         f"{outline.lengths.replace('episode', 'training episode')} of up to "
@@ -85,8 +85,8 @@ def verdicts(analysis: Any) -> str:
     """
     headline = getattr(analysis, "headline", None)
     groups = getattr(analysis, "groups", None) or {"": analysis.table}
-    said = {name: contest(lines, headline) for name, lines in groups.items()}
-    return " ".join(f"{name}: {text}" if name else text for name, text in said.items() if text)
+    texts = {name: contest(lines, headline) for name, lines in groups.items()}
+    return " ".join(f"{name}: {text}" if name else text for name, text in texts.items() if text)
 
 
 def contest(table: Sequence[Summary], headline: str | None) -> str:
@@ -128,13 +128,13 @@ overlapping: other .85 [.70–.90].'
         else:
             below = line.estimates[title].high < floor
             groups["wholly below" if below else "overlapping"].append(line)
-    said = f"{title}: highest is {_named(best, title, ', ')}."
+    verdict = f"{title}: highest is {_named(best, title, ', ')}."
     for what, group in groups.items():
         if group:
             more = f" and {len(group) - MOST_NAMED} more" if len(group) > MOST_NAMED else ""
             named = ", ".join(_named(s, title) for s in group[:MOST_NAMED])
-            said += f" Interval{'s' * (len(group) > 1)} {what}: {named}{more}."
-    return said
+            verdict += f" Interval{'s' * (len(group) > 1)} {what}: {named}{more}."
+    return verdict
 
 
 def _named(line: Summary, title: str, between: str = " ") -> str:

@@ -36,16 +36,16 @@ class Arrangement(NamedTuple):
     team: Actors
     """The agents."""
 
-    def take_over(self, former: Arrangement, settings: TeamSettings) -> None:
+    def continue_from(self, former: Arrangement, settings: TeamSettings) -> None:
         """Let the team begin where that of another world ended.
 
         Raises
         ------
         ValueError
-            If it cannot, see `carried_rows` and `Team.take_over`; one line.
+            If it cannot, see `carried_rows` and `Team.continue_from`; one line.
         """
         rows = self._rows(former, settings)
-        of_fuzzy_agents(self.team).take_over(of_fuzzy_agents(former.team), rows)
+        of_fuzzy_agents(self.team).continue_from(of_fuzzy_agents(former.team), rows)
 
     def with_trained(self, former: Arrangement, settings: TeamSettings) -> Arrangement:
         """Return it with the team that was trained in another world: to be evaluated, not to learn.
@@ -55,12 +55,12 @@ class Arrangement(NamedTuple):
         Raises
         ------
         ValueError
-            As `take_over`.
+            As `continue_from`.
         """
         rows = self._rows(former, settings)
         if self.scenario.agents == former.scenario.agents:
             return self._replace(team=former.team)
-        of_fuzzy_agents(self.team).take_over(of_fuzzy_agents(former.team), rows)
+        of_fuzzy_agents(self.team).continue_from(of_fuzzy_agents(former.team), rows)
         return self
 
     def _rows(self, former: Arrangement, settings: TeamSettings) -> IntArray:
@@ -127,11 +127,11 @@ def _worlds(condition: Condition, where: str) -> Iterator[Scenario]:
         yield there.world
         if reached is not None:
             with _naming(f"curriculum.{stage.name}", where):
-                there.take_over(reached, settings.learner)
+                there.continue_from(reached, settings.learner)
         reached = there
     if reached is not None:
         with _naming("curriculum", where):
-            own.take_over(reached, settings.learner)
+            own.continue_from(reached, settings.learner)
     for name, scenario in condition.evaluations:
         there = _built(_changed(settings, scenario), f" (evaluation {name!r}){where}")
         yield there.world

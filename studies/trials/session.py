@@ -141,7 +141,7 @@ class Session:
         for stage in stages:
             there = self._elsewhere(stage.scenario)
             if reached is not None:
-                there.take_over(reached, self.trial.settings.learner)
+                there.continue_from(reached, self.trial.settings.learner)
             steps = control_loop(
                 there.scenario, there.team, episodes=stage.episodes, steps=self.trial.steps,
                 seed=self.trial.seed, first_world=CURRICULUM_WORLDS + done,
@@ -151,7 +151,7 @@ class Session:
                 pass
             reached, done = there, done + stage.episodes
         if reached is not None:
-            self._own.take_over(reached, self.trial.settings.learner)
+            self._own.continue_from(reached, self.trial.settings.learner)
 
     def _evaluate(self, there: Arrangement, phase: str, observe: Observer | None) -> None:
         episodes = self.trial.evaluation

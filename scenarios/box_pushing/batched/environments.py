@@ -3,12 +3,14 @@
 `VecBoxPushingEnv` shows each world as `BoxPushingEnv` does, `VecWheelsEnv` with a row for every
 wheel, for learners whose agents share weights. World i after ``reset(seed=s)`` is the world of a
 single environment after ``reset(seed=s + i)``, to the last bit, however many worlds and processes
-there are.
+there are. On two idle cores 16 worlds take 1.6 times as many steps per second as by Gymnasium's
+`AsyncVectorEnv` with shared memory, and 64 worlds 2.0 times (``python -m benchmarks.batched``).
 """
 
 from __future__ import annotations
 
 import os
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -16,9 +18,9 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from ....core.numerics.arrays import BoolArray
-from ..environments import SettingsLike, meant
+from ..environments import Game, Seat, SettingsLike, meant
 from .processes import Processes
-from .worlds import Recipe, row_type
+from .worlds import Worlds, row_type
 
 RENDER_MODES = ["rgb_array"]
 
@@ -83,11 +85,10 @@ class VecBoxPushingEnv(VectorEnv):
         if render_mode not in (None, *RENDER_MODES):
             raise ValueError(f"render_mode = {render_mode!r}, allowed None, {RENDER_MODES}")
         self._autoreset = AutoresetMode(autoreset_mode)
-        recipe = Recipe(
-            meant(settings), steps, render_mode, sensors, self.by_wheel, self._autoreset
-        )
-        game = recipe.game()
-        seat = recipe.seat(game.scenario)
+        settings, autoreset = meant(settings), self._autoreset
+        make = partial(Worlds, settings, steps, render_mode, sensors, self.by_wheel, autoreset)
+        game = Game(settings, steps, render_mode, sensors=sensors)
+        seat = Seat.of_all(game.scenario, by_wheel=self.by_wheel)
         self.num_envs, self.render_mode = num_envs, render_mode
         self.metadata = {
             "render_modes": RENDER_MODES, "render_fps": 2, "autoreset_mode": self._autoreset,
@@ -97,7 +98,7 @@ class VecBoxPushingEnv(VectorEnv):
         self.observation_space = batch_space(seat.observation_space, num_envs)
         self.action_space = batch_space(seat.action_space, num_envs)
         edges = [num_envs * p // processes for p in range(processes + 1)]
-        self._processes = Processes(recipe, row_type(game, seat), edges, context)
+        self._processes = Processes(make, row_type(game, seat), edges, context)
         self._rows = self._processes.rows
 
     def reset(

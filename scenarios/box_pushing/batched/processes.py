@@ -11,14 +11,16 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 import signal
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
 import numpy as np
 
-from .worlds import Recipe, Worlds
+from .worlds import Worlds
+
+MakeWorlds = Callable[[Any], Worlds]
 
 PATIENCE = 5.0
 """How long a process may take to end when it is asked to [s]."""
@@ -29,8 +31,8 @@ class Processes:
 
     Parameters
     ----------
-    recipe
-        What worlds are made by.
+    make
+        What makes the worlds of some rows; to be pickled.
     row
         The type of their rows.
     edges
@@ -45,7 +47,7 @@ class Processes:
     """
 
     def __init__(
-        self, recipe: Recipe, row: np.dtype[Any], edges: Sequence[int], context: str | None
+        self, make: MakeWorlds, row: np.dtype[Any], edges: Sequence[int], context: str | None
     ) -> None:
         self._edges = list(edges)
         start: Any = multiprocessing.get_context(context)
@@ -55,12 +57,12 @@ class Processes:
         for first, last in pairwise(edges[1:]):
             ours, theirs = start.Pipe()
             process = start.Process(
-                target=_work, args=(theirs, recipe, memory, row, first, last), daemon=True
+                target=_work, args=(theirs, make, memory, row, first, last), daemon=True
             )
             process.start()
             theirs.close()
             self._workers.append((process, ours))
-        self._own = Worlds(recipe, self.rows[: edges[1]])
+        self._own = make(self.rows[: edges[1]])
 
     def call(self, name: str, *arguments: Any) -> list[Any]:
         """Call a method of all `Worlds`; return what each returns.
@@ -127,13 +129,13 @@ def _called(worlds: Worlds, name: str, arguments: Sequence[Any]) -> tuple[Any, E
 
 
 def _work(
-    pipe: Connection, recipe: Recipe, memory: Any, row: np.dtype[Any], first: int, last: int
+    pipe: Connection, make: MakeWorlds, memory: Any, row: np.dtype[Any], first: int, last: int
 ) -> None:
     """Step worlds until told to end, or until the calling process is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the calling process ends this one
     parent = multiprocessing.parent_process()
     assert parent is not None
-    worlds = Worlds(recipe, np.frombuffer(memory, dtype=row)[first:last])
+    worlds = make(np.frombuffer(memory, dtype=row)[first:last])
     with contextlib.suppress(EOFError, OSError):
         while pipe in wait([pipe, parent.sentinel]):
             told = pipe.recv()

@@ -9,78 +9,17 @@ other worlds there are.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from gymnasium.spaces import Box, MultiDiscrete
 from gymnasium.vector import AutoresetMode
 
 from ....core.numerics.arrays import FloatArray
 from ..config import BoxPushingSettings
 from ..environments import Game, Seat
-from ..scenario import BoxPushing
 
 
-class WheelRows:
-    """What an outside agent sees that is told the state of every wheel in a row of its own.
-
-    Parameters
-    ----------
-    scenario
-        What is played.
-    """
-
-    def __init__(self, scenario: BoxPushing) -> None:
-        n = len(scenario.agents)
-        self.wheels = list(range(n))
-        low, high = (np.tile(bound, (n, 1)) for bound in scenario.bounds.T.astype(np.float32))
-        self.observation_space = Box(low, high, dtype=np.float32)
-        self.action_space = MultiDiscrete([len(scenario.action_set)] * n)
-
-    def observe(self, states: FloatArray) -> FloatArray:
-        """Return the observation ``(n, d)``."""
-        seen: FloatArray = states.astype(np.float32)
-        return seen
-
-    def paid(self, reward: float | FloatArray) -> float:
-        """Return the mean reward of all wheels."""
-        return float(np.mean(reward))
-
-
-@dataclass(frozen=True)
-class Recipe:
-    """What all worlds of a vector environment are made by.
-
-    Attributes
-    ----------
-    settings, steps, render_mode, sensors
-        As in `nested_agents.scenarios.box_pushing.environments.Game`.
-    by_wheel
-        Whether observations have a row for every wheel.
-    autoreset
-        When a world that is over starts anew.
-    """
-
-    settings: BoxPushingSettings
-    steps: int
-    render_mode: str | None
-    sensors: bool
-    by_wheel: bool
-    autoreset: AutoresetMode
-
-    def game(self) -> Game:
-        """Return a world."""
-        return Game(self.settings, self.steps, self.render_mode, sensors=self.sensors)
-
-    def seat(self, scenario: BoxPushing) -> Seat | WheelRows:
-        """Return how the worlds are seen."""
-        if self.by_wheel:
-            return WheelRows(scenario)
-        return Seat(scenario, range(len(scenario.agents)))
-
-
-def row_type(game: Game, seat: Seat | WheelRows) -> np.dtype[Any]:
+def row_type(game: Game, seat: Seat) -> np.dtype[Any]:
     """Return the fields of a world's row.
 
     ``told`` says whether the last call wrote into the row, ``final`` whether an episode ended in it
@@ -111,16 +50,29 @@ class Worlds:
 
     Parameters
     ----------
-    recipe
-        What they are made by.
+    settings, steps, render_mode, sensors
+        As in `nested_agents.scenarios.box_pushing.environments.Game`.
+    by_wheel
+        Whether observations have a row for every wheel.
+    autoreset
+        When a world that is over starts anew.
     rows
         A row for each of them, see `row_type`; written to.
     """
 
-    def __init__(self, recipe: Recipe, rows: Any) -> None:
-        self._recipe, self._rows = recipe, rows
-        self._games = [recipe.game() for _ in rows]
-        self._seats = [recipe.seat(game.scenario) for game in self._games]
+    def __init__(
+        self,
+        settings: BoxPushingSettings,
+        steps: int,
+        render_mode: str | None,
+        sensors: bool,
+        by_wheel: bool,
+        autoreset: AutoresetMode,
+        rows: Any,
+    ) -> None:
+        self._autoreset, self._rows = autoreset, rows
+        self._games = [Game(settings, steps, render_mode, sensors=sensors) for _ in rows]
+        self._seats = [Seat.of_all(game.scenario, by_wheel=by_wheel) for game in self._games]
 
     def reset(
         self,
@@ -140,7 +92,7 @@ class Worlds:
             row = self._rows[i]
             over = row["terminated"] or row["truncated"]
             row["told"], row["final"] = True, False
-            if over and self._recipe.autoreset is AutoresetMode.NEXT_STEP:
+            if over and self._autoreset is AutoresetMode.NEXT_STEP:
                 self._begin(i, None, None)
                 continue
             transition, truncated = game.step(row["action"])
@@ -148,7 +100,7 @@ class Worlds:
             row["terminated"], row["truncated"] = transition.terminated, truncated
             self._tell(i, transition.states, transition.info)
             ended = transition.terminated or truncated
-            if ended and self._recipe.autoreset is AutoresetMode.SAME_STEP:
+            if ended and self._autoreset is AutoresetMode.SAME_STEP:
                 row["final"], row["final_observation"] = True, row["observation"]
                 row["final_info"] = row["info"]
                 self._tell(i, game.reset(None, None), game.scenario.measure())

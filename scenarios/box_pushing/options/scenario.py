@@ -25,6 +25,7 @@ from ....core.interface.spaces import ActionSet, StateSpace, Variable
 from ....core.numerics.arrays import FloatArray, IntArray
 from ..config import BoxPushingSettings, BoxTaskSettings
 from ..scenario import MEASURES, BoxPushing
+from ..world.geometry import wrap
 from .config import PushingPointsSettings
 from .pushing import Pushing
 
@@ -139,7 +140,7 @@ class PushingPoints:
         seen = self.world.measure()
         box, goal = seen["box_pose"], seen["goal_pose"]
         course = atan2(goal[1] - box[1], goal[0] - box[0])
-        self._bearing = float((course - box[2] + pi) % (2.0 * pi) - pi)
+        self._bearing = float(wrap(course - box[2]))
 
 
 class PushingPointsPrediction:

@@ -25,9 +25,8 @@ from ....core.agents.team import Team
 from ....core.numerics.arrays import FloatArray
 from ..prediction.prediction import BoxPrediction
 from ..prediction.situation import Situation
-from ..states.view import wrap
 from ..world.boxes import BoxSpec
-from ..world.geometry import surface
+from ..world.geometry import surface, wrap
 from ..world.robots import RobotSpec
 from ..world.starts import place
 

@@ -31,7 +31,7 @@ from matplotlib.transforms import Affine2D
 from ....core.numerics.arrays import FloatArray
 from ...movies import Pixels, film
 from ..world.boxes import BoxSpec, box_for
-from ..world.infrared import InfraredSpec, infrared_readings, sensor_directions
+from ..world.infrared import infrared_readings, sensor_directions
 from ..world.robots import RobotSpec, robot_for
 from ..world.settings import InfraredSettings
 
@@ -75,11 +75,10 @@ class _Stage:
         robots = recording["robot_poses"].shape[1]
         self.box = box_for(str(recording["box"]), robots)
         self.rings = _rings(self.box)
-        self.infrared: InfraredSpec | None = None
+        self.infrared: InfraredSettings | None = None
         if sensors:
             described = str(recording.get("infrared", "{}"))
-            settings = InfraredSettings.model_validate_json(described)
-            self.infrared = InfraredSpec(**settings.model_dump())
+            self.infrared = InfraredSettings.model_validate_json(described)
         self.figure = Figure(figsize=(SIDES[0] / DPI, SIDES[1] / DPI), dpi=DPI)
         self.canvas = FigureCanvasAgg(self.figure)
         self.axes = self.figure.add_axes(AXES)
@@ -177,7 +176,7 @@ class _Stage:
                     *ends.T, "x", color=FAILED_COLOUR, ms=9 * scale, mew=2 * scale
                 )
 
-    def _rays(self, step: int, infrared: InfraredSpec) -> None:
+    def _rays(self, step: int, infrared: InfraredSettings) -> None:
         poses, box = self.recording["robot_poses"][step], self.recording["box_pose"][step]
         outline, radius = self.box.outline, self.robot.radius
         sensors = sensor_directions([self.robot] * len(poses))

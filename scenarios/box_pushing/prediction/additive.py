@@ -18,14 +18,12 @@ has
 
 from __future__ import annotations
 
-from typing import Protocol
+from collections.abc import Callable
 
 import numpy as np
 
 from ....core.numerics.arrays import BoolArray, FloatArray, IntArray
-from ....core.numerics.compiling import njit
-from ..states.view import View
-from ..world.geometry import surface
+from ..world.geometry import gaps as gaps_of
 from .push import PushModel, push
 from .push_lanes import MARGIN
 from .situation import Premises, Situation
@@ -33,33 +31,6 @@ from .wheel_commands import WheelCommands
 
 TOUCH = 0.02
 """Gap [m] now or in the reference below which a robot is among those that may move the box."""
-
-
-class Predicted(Protocol):
-    """What is taken of a `BoxPrediction`, whose members are described there."""
-
-    @property
-    def situation(self) -> Situation: ...  # noqa: D102
-
-    @property
-    def model(self) -> PushModel: ...  # noqa: D102
-
-    @property
-    def premises(self) -> Premises: ...  # noqa: D102
-
-    @property
-    def wheel_commands(self) -> WheelCommands: ...  # noqa: D102
-
-    @property
-    def alike(self) -> IntArray: ...  # noqa: D102
-
-    def robot_of(self, agent: int) -> int: ...  # noqa: D102
-
-    def own_block(self, agent: int) -> tuple[FloatArray, IntArray]: ...  # noqa: D102
-
-    def seen(  # noqa: D102
-        self, robots: FloatArray, box: FloatArray, gaps: FloatArray, seconds: float
-    ) -> View: ...
 
 
 class PushSuperposition:
@@ -70,18 +41,26 @@ class PushSuperposition:
 
     Parameters
     ----------
-    prediction
-        What is approximated.
+    situation, model, premises, commands, alike, own_block
+        Of the `BoxPrediction` that is approximated.
     """
 
-    def __init__(self, prediction: Predicted) -> None:
-        self._prediction = prediction
-        commands = prediction.wheel_commands
+    def __init__(
+        self,
+        situation: Situation,
+        model: PushModel,
+        premises: Premises,
+        commands: WheelCommands,
+        alike: IntArray,
+        own_block: Callable[[int], tuple[FloatArray, IntArray]],
+    ) -> None:
+        self._situation, self._model, self._premises = situation, model, premises
+        self._own_block = own_block
         twists, which = commands.twists, commands.which
         n, n_commands = twists.shape[:2]
         n_indices = which.shape[1]
         self.contributions: FloatArray = np.zeros((n, n_indices, 3))
-        self.alike: IntArray = prediction.alike
+        self.alike = alike
         self._poses: FloatArray = np.zeros((n, n_indices, 3))
         self._gaps: FloatArray = np.zeros((n, n_indices))
         every = np.arange(n)
@@ -112,21 +91,21 @@ class PushSuperposition:
     def _near(self, twists: FloatArray) -> BoolArray:
         """Return which robots ``(M,)`` might touch the box, were it to come as fast as they."""
         speeds = np.hypot(twists[:, :, 0], twists[:, :, 1]).max(axis=1)
-        travel = self._prediction.premises.seconds * (speeds + speeds.max()) + 2.0 * MARGIN
+        travel = self._premises.seconds * (speeds + speeds.max()) + 2.0 * MARGIN
         return self._present_gaps() <= travel
 
     def _present_gaps(self) -> FloatArray:
-        situation, model = self._prediction.situation, self._prediction.model
+        situation, model = self._situation, self._model
         box = situation.box[None]
-        return _gaps(situation.robots, box, model.edges, model.rounding, model.radii)
+        return gaps_of(situation.robots, box, model.edges, model.rounding, model.radii)
 
     def _push(
         self, robots: IntArray, twists: FloatArray, choices: IntArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        situation, model = self._prediction.situation, self._prediction.model
+        situation, model = self._situation, self._model
         found: tuple[FloatArray, FloatArray, FloatArray] = push(
             situation.robots[robots], situation.box, twists[robots], choices,
-            self._prediction.premises.seconds,
+            self._premises.seconds,
             model._replace(radii=model.radii[robots], compliance=model.compliance[robots]),
         )  # fmt: skip
         return found
@@ -135,30 +114,18 @@ class PushSuperposition:
         self, agent: int, local: IntArray, sums: FloatArray, shares: FloatArray
     ) -> FloatArray:
         """Return the next states ``(m, d)`` of `agent`, see above."""
-        prediction, m = self._prediction, len(local)
-        r = prediction.robot_of(agent)
+        model, premises, m = self._model, self._premises, len(local)
+        r = self._situation.places[agent][0]
         box = self._box + sums
         # In memory the situations stand next to each other, as kernels want them.
         robots, gaps = np.empty((len(shares), 3, m)), np.empty((len(shares), m))
         robots[:] = np.einsum("gl,glk->gk", shares, self._poses)[:, :, None]
         robots[r] = self._poses[r, local].T
         gaps[:] = np.einsum("gl,gl->g", shares, self._gaps)[:, None]
-        model = prediction.model
-        gaps[r] = _gaps(robots[r].T, box, model.edges, model.rounding, np.full(m, model.radii[r]))
-        own, which = prediction.own_block(agent)
-        view = prediction.seen(robots.transpose(2, 0, 1), box, gaps.T, prediction.premises.seconds)
-        shared = prediction.premises.space.shared_of(view, [r])[0]
+        gaps[r] = gaps_of(robots[r].T, box, model.edges, model.rounding, np.full(m, model.radii[r]))
+        own, which = self._own_block(agent)
+        view = premises.seen(
+            self._situation, robots.transpose(2, 0, 1), box, gaps.T, premises.seconds
+        )
+        shared = premises.space.shared_of(view, [r])[0]
         return np.concatenate([own[which[local]], shared], axis=1)
-
-
-@njit(cache=True)
-def _gaps(robots, boxes, edges, rounding, radii):  # type: ignore[no-untyped-def]
-    """Return the gaps ``(m,)`` between poses of robots and of the box."""
-    gaps = np.empty(len(robots))
-    for c in range(len(robots)):
-        box = boxes[c % len(boxes)]
-        cos, sin = np.cos(box[2]), np.sin(box[2])
-        dx, dy = robots[c, 0] - box[0], robots[c, 1] - box[1]
-        near = surface(edges, rounding, cos * dx + sin * dy, cos * dy - sin * dx)
-        gaps[c] = near[0] - radii[c]
-    return gaps

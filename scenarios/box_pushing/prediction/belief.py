@@ -53,15 +53,10 @@ class PushBelief(NamedTuple):
         ]
         return cls(model, *parts)
 
-    def believing(self, constants: FloatArray) -> PushModel:
-        """Return the model of constants ``(3,)``."""
-        model: PushModel = believing(self, constants)
-        return model
-
 
 @njit(cache=True)
 def believing(belief, constants):  # type: ignore[no-untyped-def]
-    """Return the push model of constants ``(3,)``: as `PushBelief.believing`."""
+    """Return the `PushModel` of constants ``(3,)``."""
     model, factors = belief.model, np.exp(constants)
     compliance = np.empty_like(belief.ahead)
     for r in range(len(compliance)):
@@ -112,7 +107,11 @@ def outcomes(  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _twist(before, after, seconds, out) -> None:  # type: ignore[no-untyped-def]
-    """Write the constant twist between two poses, as `prediction.mean_twists` does."""
+    """Write the constant twist between two poses, as `prediction.mean_twists` does.
+
+    The last bits of the two differ (a sine here, a sinc there), and published rows of calibration
+    hang on both; a test compares them.
+    """
     half = 0.5 * (after[2] - before[2])
     # The chord of an arc is shorter than the arc by the sinc of half its angle.
     told = min(max(half, -0.5 * pi), 0.5 * pi)

@@ -17,7 +17,6 @@ import numpy as np
 from ....core.interface.prediction import Blocks
 from ....core.numerics.arrays import FloatArray, IntArray
 from ..states.view import View
-from ..world.infrared import expected_reading
 from ..world.reward import reward
 from .additive import PushSuperposition
 from .belief import outcomes
@@ -71,7 +70,7 @@ class BoxPrediction:
             seconds,
             self.model,
         )
-        return self.seen(robots, box, gaps, seconds)
+        return self.premises.seen(self.situation, robots, box, gaps, seconds)
 
     def _view_again(self, choices: IntArray) -> View:
         """Return the view of `choices`: the last one, if they are the same."""
@@ -79,13 +78,6 @@ class BoxPrediction:
         if self._last is None or self._last[0] != told:
             self._last = told, self._view(choices)
         return self._last[1]
-
-    def seen(self, robots: FloatArray, box: FloatArray, gaps: FloatArray, seconds: float) -> View:
-        """Return a view of situations that the present leads to in `seconds`."""
-        return View(
-            robots, box, gaps, self.situation.goal, self.situation.box,
-            seconds / self.premises.hold, self.premises.outline, self.model.friction_radius,
-        )  # fmt: skip
 
     def _choices(self, joint_actions: IntArray) -> IntArray:
         """Return the wheel command ``(m, M)`` of each robot in joint actions ``(m, n)``."""
@@ -129,19 +121,9 @@ class BoxPrediction:
         """The shared blocks ``(M, m, d - n_own)`` in the situations of the table."""
         return self.premises.space.shared_of(self._table[0], range(len(self.situation.groups)))
 
-    def robot_of(self, agent: int) -> int:
-        """Return the robot of an agent."""
-        return self._places[agent][0]
-
-    @cached_property
-    def _places(self) -> list[tuple[int, int]]:
-        """Robot of every agent, and which of its wheels the agent drives."""
-        groups = self.situation.groups
-        return [(r, wheel) for r, group in enumerate(groups) for wheel in range(len(group))]
-
     def blocks(self, agent: int) -> Blocks:
         """Return the next states of `agent` for all joint actions, own block as if alone."""
-        r, _ = self._places[agent]
+        r, _ = self.situation.places[agent]
         row = self._table[1]
         own, which = self.own_block(agent)
         behind = sum(len(group) for group in self.situation.groups[r + 1 :])
@@ -152,7 +134,7 @@ class BoxPrediction:
     def own_block(self, agent: int) -> tuple[FloatArray, IntArray]:
         """Return the own variables that occur, as if alone, and the row of each robot action."""
         if agent not in self._own:
-            self._own[agent] = self._new_own_block(*self._places[agent])
+            self._own[agent] = self._new_own_block(*self.situation.places[agent])
         return self._own[agent]
 
     def _new_own_block(self, r: int, wheel: int) -> tuple[FloatArray, IntArray]:
@@ -167,19 +149,22 @@ class BoxPrediction:
     @cached_property
     def superposition(self) -> PushSuperposition:
         """The prediction to first order in what each robot does."""
-        return PushSuperposition(self)
+        return PushSuperposition(
+            self.situation, self.model, self.premises, self.wheel_commands, self.alike,
+            self.own_block,
+        )  # fmt: skip
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
         choices = self._choices(joint_actions)
         view = self._view_again(choices)
-        shared = self.premises.space.shared_of(view, [self.robot_of(agent)])[0]
+        shared = self.premises.space.shared_of(view, [self.situation.places[agent][0]])[0]
         return np.concatenate([self._own_after(agent, choices, view), shared], axis=1)
 
     def states_of_all(self, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(n, m, d)`` of all agents for joint actions ``(m, n)``."""
         own, shared = self.states_by_group(joint_actions)
-        return np.concatenate([own, shared[[robot for robot, _ in self._places]]], axis=2)
+        return np.concatenate([own, shared[[robot for robot, _ in self.situation.places]]], axis=2)
 
     def states_by_group(self, joint_actions: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return the next own variables of all agents and the shared ones of all robots.
@@ -190,7 +175,7 @@ class BoxPrediction:
         view = self._view_again(choices)
         space = self.premises.space
         shared = space.shared_of(view, range(choices.shape[1]))
-        n, m = len(self._places), len(choices)
+        n, m = len(self.situation.places), len(choices)
         if space.own_needs_pose:
             own = np.array([self._own_after(agent, choices, view) for agent in range(n)])
             return own, shared
@@ -200,7 +185,7 @@ class BoxPrediction:
 
     def _own_after(self, agent: int, choices: IntArray, view: View) -> FloatArray:
         """Return the own variables ``(m, n_own)`` of an agent after wheel commands ``(m, M)``."""
-        r, wheel = self._places[agent]
+        r, wheel = self.situation.places[agent]
         speeds = self.wheel_commands.speeds[r, choices[:, r], wheel]
         return self.premises.space.own(view.robots[:, r], speeds, self.situation.goal)
 
@@ -215,7 +200,7 @@ class BoxPrediction:
             self.situation,
             robots=view.robots[0], box=view.box[0], speeds=self.commands(joint_action),
         )  # fmt: skip
-        return type(self)(reached, self.model, self.premises)
+        return BoxPrediction(reached, self.model, self.premises)
 
     @property
     def groups(self) -> tuple[tuple[int, ...], ...]:
@@ -267,7 +252,7 @@ class BoxPrediction:
             -view.approach,
             view.turn,
             view.gaps < CONTACT_GAP,
-            expected_reading(view.gaps, self.premises.infrared),
+            self.premises.infrared.reading(view.gaps),
         )
         mean: FloatArray = of_parties.mean(axis=1)
         return mean

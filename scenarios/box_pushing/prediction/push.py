@@ -19,8 +19,9 @@ import numpy as np
 
 from ....core.numerics.arrays import FloatArray, IntArray
 from ....core.numerics.compiling import njit
+from ..world.geometry import LANES, nearest_points
 from . import push_lanes as lanes
-from .push_lanes import BODY_SIZE, BOX_SIZE, LANES, MARGIN
+from .push_lanes import BODY_SIZE, BOX_SIZE, MARGIN
 
 SUBSTEPS = 4
 SWEEPS = 4
@@ -132,7 +133,7 @@ def pushed(  # type: ignore[no-untyped-def]
         lanes.head(shared, width)
         for r in range(n):
             lanes.localise(bodies[r], shared, reach[r], width)
-            lanes.approach(model.edges, shared, width)
+            nearest_points(model.edges, shared[lanes.NEAREST :], width)
             for k in range(used):
                 gap = np.sqrt(shared[lanes.SQUARE + k]) * shared[lanes.SIDE + k]
                 out_gaps[r, first + k] = gap - model.rounding - model.radii[r]
@@ -157,7 +158,7 @@ def _substep(bodies, box, near, reach, dt, model, width) -> None:  # type: ignor
         lanes.release(body, width)
         near[r] = False
         if lanes.localise(body, box, reach[r], width) > 0:
-            lanes.approach(model.edges, box, width)
+            nearest_points(model.edges, box[lanes.NEAREST :], width)
             radius, compliance = model.radii[r], model.compliance[r]
             near[r] = lanes.touch(body, box, radius, model.rounding, compliance, dt, width) > 0
             touching = touching or near[r]

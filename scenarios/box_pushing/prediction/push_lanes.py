@@ -4,8 +4,8 @@ Every quantity of a joint action is one row of a scratch array, the joint action
 next to each other in it, and every loop runs over them without a branch: so that the compiler can
 use the vector instructions of the processor. Rows of `body` belong to one robot, rows of `box` to
 the box and to what is passed between functions. All scratch is flat, as a loop over a row at a
-constant offset is what compilers see through. `box_pushing.prediction.push_reference` is the
-readable definition.
+constant offset is what compilers see through. The readable definition, some thousand times slower,
+is the oracle of the tests, `tests/scenarios/box_pushing/push_oracle.py`.
 """
 
 from __future__ import annotations
@@ -13,9 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from ....core.numerics.compiling import njit
-
-LANES = 32
-"""Joint actions side by side."""
+from ..world.geometry import LANES, NEAREST_SIZE
 
 CREEP = 0.002
 """Speed of the box [m/s] below which ground friction is taken as viscous."""
@@ -39,15 +37,16 @@ MARGIN = 0.01
 BODY_SIZE = ACTIVE + LANES
 
 # Those of the box: pose and heading as for a robot, velocity, how readily it moves, the wrench of
-# all contacts on it; and of one robot at a time where it stands relative to the surface.
+# all contacts on it.
 (
     U_X, U_Y, U_W, MOBILITY,
     FORCE_X, FORCE_Y, TORQUE,
-    LOCAL_X, LOCAL_Y,  # the point, in the frame of the box
-    SQUARE, NEAR_X, NEAR_Y, SIDE,
-    EDGE_X, EDGE_Y,  # unit vector along the nearest edge
-) = range(AHEAD, AHEAD + 15 * LANES, LANES)  # fmt: skip
-BOX_SIZE = EDGE_Y + LANES
+    NEAREST,  # rows of `nearest_points`, of one robot at a time in the frame of the box
+) = range(AHEAD, AHEAD + 8 * LANES, LANES)  # fmt: skip
+LOCAL_X, LOCAL_Y, SQUARE, NEAR_X, NEAR_Y, SIDE, EDGE_X, EDGE_Y = range(
+    NEAREST, NEAREST + NEAREST_SIZE, LANES
+)
+BOX_SIZE = NEAREST + NEAREST_SIZE
 
 _EXACT = {"contract", "nsz"}
 """What the compiler may do: multiply and add in one rounding, ignore the sign of zero."""
@@ -97,41 +96,6 @@ def localise(body, box, reach, lanes):  # type: ignore[no-untyped-def]
         box[LOCAL_Y + k] = cos * dy - sin * dx
         within += 1 if dx * dx + dy * dy <= square else 0
     return within
-
-
-@njit(cache=True, fastmath=_EXACT)
-def approach(edges, box, lanes):  # type: ignore[no-untyped-def]
-    """Write the nearest point of an outline without rounding, and which side of it one is on.
-
-    As `box_pushing.world.geometry.surface`.
-    """
-    for k in range(lanes):
-        box[SQUARE + k] = np.inf
-        box[SIDE + k] = 1.0
-    for i in range(len(edges)):
-        x0, y0, x1, y1 = edges[i, 0], edges[i, 1], edges[i, 2], edges[i, 3]
-        dx, dy = x1 - x0, y1 - y0
-        length2 = dx * dx + dy * dy
-        scale = 1.0 / length2 if length2 > 0.0 else 0.0
-        slope = dx / dy if dy != 0.0 else 0.0
-        ex = dx / np.sqrt(length2) if length2 > 0.0 else 0.0
-        ey = dy / np.sqrt(length2) if length2 > 0.0 else 1.0
-        for k in range(lanes):
-            x, y = box[LOCAL_X + k], box[LOCAL_Y + k]
-            t = ((x - x0) * dx + (y - y0) * dy) * scale
-            t = t if t > 0.0 else 0.0
-            t = t if t < 1.0 else 1.0
-            cx, cy = x0 + t * dx, y0 + t * dy
-            square = (x - cx) * (x - cx) + (y - cy) * (y - cy)
-            nearer = square < box[SQUARE + k]
-            box[SQUARE + k] = square if nearer else box[SQUARE + k]
-            box[NEAR_X + k] = cx if nearer else box[NEAR_X + k]
-            box[NEAR_Y + k] = cy if nearer else box[NEAR_Y + k]
-            box[EDGE_X + k] = ex if nearer else box[EDGE_X + k]
-            box[EDGE_Y + k] = ey if nearer else box[EDGE_Y + k]
-            crosses = ((y0 > y) != (y1 > y)) & (x < x0 + (y - y0) * slope)
-            side = box[SIDE + k]
-            box[SIDE + k] = -side if crosses else side
 
 
 @njit(cache=True, fastmath=_EXACT)

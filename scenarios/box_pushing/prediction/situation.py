@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 from ....core.interface.spaces import ActionSet
 from ....core.numerics.arrays import FloatArray
 from ..states.state_spaces import BoxStateSpace
+from ..states.view import View
 from ..world.geometry import Outline
-from ..world.infrared import InfraredSpec
 from ..world.reward import Task
+from ..world.settings import InfraredSettings
 from .belief import PushBelief
 
 
@@ -35,6 +37,11 @@ class Situation:
     speeds: FloatArray
     effects: tuple[FloatArray, ...]
     groups: tuple[tuple[int, ...], ...]
+
+    @cached_property
+    def places(self) -> list[tuple[int, int]]:
+        """Robot of every agent, and which of its wheels the agent drives."""
+        return [(r, wheel) for r, group in enumerate(self.groups) for wheel in range(len(group))]
 
 
 @dataclass(frozen=True)
@@ -63,7 +70,21 @@ class Premises:
     increment: float
     limits: FloatArray
     task: Task
-    infrared: InfraredSpec
+    infrared: InfraredSettings
     outline: Outline
     hold: float
     seconds: float
+
+    def seen(
+        self,
+        situation: Situation,
+        robots: FloatArray,
+        box: FloatArray,
+        gaps: FloatArray,
+        seconds: float,
+    ) -> View:
+        """Return a view of situations that `situation` leads to in `seconds`."""
+        return View(
+            robots, box, gaps, situation.goal, situation.box, seconds / self.hold,
+            self.outline, self.belief.model.friction_radius,
+        )  # fmt: skip

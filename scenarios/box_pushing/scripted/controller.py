@@ -24,9 +24,10 @@ from ..prediction.predictors import push_model
 from ..prediction.push import push
 from ..scenario import BoxPushing
 from ..world.boxes import BoxSpec
+from ..world.geometry import wrap
 from ..world.robots import RobotSpec
 from .crowd import SLOT_GAP, Crowd
-from .driving import CLEARANCE, Drivers, wrap
+from .driving import CLEARANCE, Drivers
 from .routes import paths
 from .sides import SPREAD, Side, behind, is_concave, sides_of
 

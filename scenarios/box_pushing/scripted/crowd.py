@@ -26,8 +26,9 @@ from scipy.optimize import linear_sum_assignment
 from ....core.numerics.arrays import BoolArray, FloatArray, IntArray
 from ..prediction.push import PushModel, push
 from ..world.boxes import BoxSpec
+from ..world.geometry import wrap
 from ..world.robots import RobotSpec
-from .driving import CLEARANCE, Drivers, wrap
+from .driving import CLEARANCE, Drivers
 from .routes import paths
 from .sides import SPREAD, Side
 

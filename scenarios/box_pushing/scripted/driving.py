@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise, product
-from math import log, pi
+from math import log
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from ....core.interface.spaces import ActionSet
 from ....core.numerics.arrays import FloatArray, IntArray
 from ..prediction.push import PushModel
 from ..world.boxes import BoxSpec
+from ..world.geometry import wrap
 from ..world.robots import RobotSpec, nominal_effect
 from .routes import moved, paths
 
@@ -120,11 +121,6 @@ class Drivers:
             arrived = path + 0.06 * turn * np.exp(-path / 0.05)
         assert first is not None
         return int(first[(cost + arrived).argmin()])
-
-
-def wrap(angle: Any) -> Any:
-    """Return angles from -pi to pi."""
-    return (angle + pi) % (2 * pi) - pi
 
 
 def _distinct(speeds: FloatArray) -> Any:

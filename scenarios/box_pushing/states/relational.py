@@ -15,7 +15,8 @@ import numpy as np
 
 from ....core.numerics.arrays import FloatArray
 from ...state_variables import StateFunction, StateVariable, state_variable
-from .view import View, wrap
+from ..world.geometry import wrap
+from .view import View
 
 AWAY = 0.03
 """Gap [m] from which a robot counts as wholly away from the box."""

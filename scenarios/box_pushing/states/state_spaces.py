@@ -1,26 +1,28 @@
 """State spaces of the box-pushing scenario: what a wheel agent perceives.
 
-A state space pairs the description that learners see (`StateSpace`) with two functions that
-compute it: the own block from the pose of the agent's robot and the speed of its wheel, the shared
-block from the whole `View`. Both serve sensing and prediction alike and work on many situations at
-once. A further state space is one `BoxStateSpace` and one line in `STATE_SPACES`; a spec may also
-list state variables by name, one's own among them, see `variables`.
+A state space pairs the description that learners see (`StateSpace`) with what computes it: the own
+block a function of the pose of the agent's robot and the speed of its wheel, the shared block
+variables, each a function of the whole `View`. They serve sensing and prediction alike and work on
+many situations at once. A further state space is one `BoxStateSpace` and one line in
+`STATE_SPACES`; a spec may also list state variables by name, one's own among them, see `variables`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import pi
 
 import numpy as np
 
 from ....core.interface.spaces import StateSpace, Variable
 from ....core.numerics.arrays import FloatArray
-from ...state_variables import found, sensed
+from ...state_variables import StateVariable, find_variable, sensed
+from ..world.geometry import wrap
 from .kernels import COMPILED, Columns
 from .variables import STATE_VARIABLES
-from .view import View, wrap
+from .view import View
 
 
 @dataclass(frozen=True)
@@ -33,87 +35,58 @@ class BoxStateSpace:
         Names, ranges and membership centres.
     own
         ``own(poses (m, 3), speeds (m,), goal (3,)) -> (m, n_own)``.
-    shared
-        ``shared(view, robot) -> (m, d - n_own)`` for the agents of one robot.
     own_needs_pose
         Whether `own` reads the poses; if not, none need be predicted for it.
-    alike
-        Whether the shared block is the same for all robots.
-    listed
-        Shared variables that stand side by side, if the shared block is such a list.
+    functions
+        The shared variables, in order.
+    compiled
+        Which of them have a column of `kernels`.
+    of_users
+        Whether the others are functions of users: of them nothing is known, and what they return
+        is checked.
     """
 
     space: StateSpace
     own: Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
-    shared: Callable[[View, int], FloatArray]
     own_needs_pose: bool
-    alike: bool = False
-    listed: Listed | None = None
+    functions: tuple[StateVariable, ...]
+    compiled: tuple[bool, ...]
+    of_users: bool = True
 
-    def sensed(self, view: View) -> FloatArray:
-        """Return the shared blocks ``(M, m, d - n_own)`` of all robots, by the functions alone."""
-        robots = range(view.robots.shape[1])
-        if self.listed is not None:
-            return self.listed.sensed(view, robots)
-        return self.shared_of(view, robots)
+    @cached_property
+    def _columns(self) -> Columns:
+        names = zip(self.functions, self.compiled, strict=True)
+        return Columns([function.variable.name for function, compiled in names if compiled])
+
+    def shared(self, view: View, robot: int) -> FloatArray:
+        """Return the shared block ``(m, d - n_own)`` of a robot, by the functions alone."""
+        return self.sensed(view, [robot])[0]
+
+    def sensed(self, view: View, robots: Sequence[int]) -> FloatArray:
+        """Return the shared blocks ``(k, m, d - n_own)`` of k robots, by the functions alone."""
+        trusted = [compiled or not self.of_users for compiled in self.compiled]
+        return sensed(self.functions, trusted, view, robots)
 
     def shared_of(self, view: View, robots: Sequence[int]) -> FloatArray:
         """Return the shared blocks ``(k, m, d - n_own)`` of k robots, fast for many situations."""
-        if self.alike:
-            return np.stack([self.shared(view, robots[0])] * len(robots))
-        if self.listed is None:
-            return np.stack([self.shared(view, r) for r in robots])
-        return self.listed.predicted(view, robots)
+        if not self.of_users:
+            return self.sensed(view, robots)
+        compiled = self._columns.of(view, robots)
+        if all(self.compiled):
+            return compiled
+        blocks = np.empty((len(robots), len(view.box), len(self.functions)))
+        blocks[:, :, np.array(self.compiled)] = compiled
+        guarded = view.guarded()
+        # Every robot is asked, so that `check` finds what is wrongly called common.
+        for column in np.flatnonzero(~np.array(self.compiled)):
+            for block, robot in zip(blocks, robots, strict=True):
+                block[:, column] = self.functions[column].checked(guarded, robot)
+        return blocks
 
     def is_own(self, variable: str) -> bool:
         """Return whether a variable is one of the user's own, of which nothing else is known."""
-        own = () if self.listed is None else self.listed.functions
-        return variable in [function.variable.name for function in own]
-
-
-class Listed:
-    """Shared variables in the order in which they are listed.
-
-    Parameters
-    ----------
-    names
-        Of the variables, see `variables.STATE_VARIABLES`. The compiled ones are trusted; what
-        functions of users return is checked.
-
-    Raises
-    ------
-    ValueError
-        If one is unknown; one line.
-    """
-
-    def __init__(self, names: Sequence[str]) -> None:
-        things = [found(STATE_VARIABLES, name) for name in names]
-        is_compiled = np.array([name in COMPILED for name in names], dtype=bool)
-        self.variables = tuple(thing.variable for thing in things)
-        self.common = tuple(thing.variable.name for thing in things if thing.common)
-        self.functions = tuple(thing for thing, c in zip(things, is_compiled, strict=True) if not c)
-        self._things, self._trusted = things, is_compiled.tolist()
-        # The columns of what is compiled, and of functions of users.
-        self._compiled, self._own = np.flatnonzero(is_compiled), np.flatnonzero(~is_compiled)
-        self._columns = Columns([name for name in names if name in COMPILED])
-
-    def sensed(self, view: View, robots: Sequence[int]) -> FloatArray:
-        """Return the shared blocks ``(k, m, variables)`` of robots, by the functions alone."""
-        return sensed(self._things, self._trusted, view, robots)
-
-    def predicted(self, view: View, robots: Sequence[int]) -> FloatArray:
-        """Return the shared blocks ``(k, m, variables)`` of robots, compiled where it can be."""
-        compiled = self._columns.of(view, robots)
-        if not self.functions:
-            return compiled
-        blocks = np.empty((len(robots), len(view.box), len(self._things)))
-        blocks[:, :, self._compiled] = compiled
-        guarded = view.guarded()
-        # Every robot is asked, so that `check` finds what is wrongly called common.
-        for block, robot in zip(blocks, robots, strict=True):
-            for column, function in zip(self._own, self.functions, strict=True):
-                block[:, column] = function.checked(guarded, robot)
-        return blocks
+        shared = zip(self.functions, self.compiled, strict=True)
+        return self.of_users and variable in [f.variable.name for f, c in shared if not c]
 
 
 def _paper_own(poses: FloatArray, speeds: FloatArray, goal: FloatArray) -> FloatArray:
@@ -121,11 +94,6 @@ def _paper_own(poses: FloatArray, speeds: FloatArray, goal: FloatArray) -> Float
     bearing = np.arctan2(ahead[:, 1], ahead[:, 0])
     distance = np.hypot(ahead[:, 0], ahead[:, 1])
     return np.stack([wrap(poses[:, 2]), wrap(bearing - poses[:, 2]), distance, speeds], axis=1)
-
-
-def _paper_shared(view: View, robot: int) -> FloatArray:
-    turned = view.box[:, 2]
-    return np.stack([wrap(turned), wrap(view.course - turned), view.distance], axis=1)
 
 
 _EVEN = tuple(float(c) for c in np.linspace(-pi, pi, 5, endpoint=False))
@@ -153,20 +121,37 @@ def listed(name: str, *shared: str) -> BoxStateSpace:
     ValueError
         If there is none, one is unknown or named twice.
     """
-    variables = Listed(shared)
-    names = [_SPEED.name, *(variable.name for variable in variables.variables)]
-    if not shared or len(set(names)) != len(names):
+    functions = tuple(find_variable(STATE_VARIABLES, one) for one in shared)
+    variables = (_SPEED, *(function.variable for function in functions))
+    if not shared or len({variable.name for variable in variables}) != len(variables):
         raise ValueError(
             f"scenario.state_space = {list(shared)}: variables must be distinct and at least one"
         )
+    common = tuple(function.variable.name for function in functions if function.common)
     return BoxStateSpace(
-        StateSpace(name, (_SPEED, *variables.variables), 1, variables.common),
+        StateSpace(name, variables, 1, common),
         lambda poses, speeds, goal: speeds[:, None],
-        lambda view, robot: variables.sensed(view, [robot])[0],
         own_needs_pose=False,
-        listed=variables,
+        functions=functions,
+        compiled=tuple(one in COMPILED for one in shared),
     )
 
+
+_PAPER = (
+    StateVariable(
+        _angle("box_orientation", _EVEN), lambda view, robot: wrap(view.box[:, 2]), common=True
+    ),
+    StateVariable(
+        _angle("box_goal_bearing", _EVEN),
+        lambda view, robot: wrap(view.course - view.box[:, 2]),
+        common=True,
+    ),
+    StateVariable(
+        Variable("box_distance", "m", 0.0, 1.2, mirrored="same"),
+        lambda view, robot: view.distance,
+        common=True,
+    ),
+)
 
 _PUSHING = (
     "gap",
@@ -210,17 +195,16 @@ STATE_SPACES: dict[str, BoxStateSpace] = {
                 _angle("goal_bearing", _EVEN),
                 Variable("goal_distance", "m", 0.0, 1.5, mirrored="same"),
                 _SPEED,
-                _angle("box_orientation", _EVEN),
-                _angle("box_goal_bearing", _EVEN),
-                Variable("box_distance", "m", 0.0, 1.2, mirrored="same"),
+                *(function.variable for function in _PAPER),
             ),
             n_own=4,
-            common=("box_orientation", "box_goal_bearing", "box_distance"),
+            common=tuple(function.variable.name for function in _PAPER),
         ),
         _paper_own,
-        _paper_shared,
         own_needs_pose=True,
-        alike=True,
+        functions=_PAPER,
+        compiled=(False,) * len(_PAPER),
+        of_users=False,
     ),
     # What matters for bringing the box to the goal, and for turning it into the goal pose besides.
     "relational": listed("relational", *_PUSHING),

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from math import pi
+from typing import Any
 
 import numpy as np
 
 from ....core.numerics.arrays import FloatArray
 from ....core.numerics.compiling import njit
-from ..world.geometry import Outline, surface
+from ..world.geometry import Outline, surface, wrap
 
 CLOSE = 0.02
 """Gap [m] over which the weight of a robot's contact falls to 1/e."""
@@ -61,11 +61,9 @@ class View:
 
     def guarded(self) -> View:
         """Return the same situations, not to be written to."""
-        robots, box, gaps = (_fixed(a.view()) for a in (self.robots, self.box, self.gaps))
-        goal, origin = _fixed(self.goal.view()), _fixed(self.origin.view())
-        return View(
-            robots, box, gaps, goal, origin, self.periods, self.outline, self.friction_radius
-        )
+        names = ("robots", "box", "gaps", "goal", "origin")
+        arrays: dict[str, Any] = {name: _fixed(getattr(self, name).view()) for name in names}
+        return replace(self, **arrays)
 
     @property
     def n_situations(self) -> int:
@@ -169,16 +167,3 @@ def _inward(robots, boxes, edges, rounding):  # type: ignore[no-untyped-def]
         near = surface(edges, rounding, cos * dx + sin * dy, cos * dy - sin * dx)
         directions[c] = boxes[c, 2] + np.arctan2(-near[2], -near[1])
     return directions
-
-
-_TURN = 2.0 * pi
-_TURN_HIGH = 6.283185243606567
-"""The leading 26 bits of a turn: products with a few thousand turns are exact."""
-_TURN_LOW = _TURN - _TURN_HIGH
-
-
-def wrap(angle: FloatArray) -> FloatArray:
-    """Map angles to [-pi, pi): ``(angle + pi) % (2 pi) - pi`` to the last bit, but faster."""
-    shifted = angle + pi
-    turns = np.floor(shifted / _TURN)
-    return shifted - turns * _TURN_HIGH - turns * _TURN_LOW - pi

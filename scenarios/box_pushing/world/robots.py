@@ -10,6 +10,7 @@ robot is one `RobotSpec` and one line in `ROBOTS`.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from math import isfinite, radians
 
@@ -17,7 +18,7 @@ import numpy as np
 
 from ....core.numerics.arrays import FloatArray
 from ....core.plugins.messages import closest
-from .settings import RobotSettings
+from .settings import RobotSettings, WheelSettings
 
 GRAVITY = 9.81
 """Standard acceleration of free fall [m/s2], rounded."""
@@ -27,15 +28,6 @@ E_PUCK_SENSORS = tuple(radians(a) for a in (-17.2, -45.9, -90.0, -151.5, 151.2, 
 
 From the E-puck model of Webots, which follows the real robot's board.
 """
-
-
-@dataclass(frozen=True)
-class Wheel:
-    """A wheel: its name, unique in its robot, and where it stands in the body frame [m]."""
-
-    name: str
-    x: float
-    y: float
 
 
 @dataclass(frozen=True)
@@ -80,7 +72,7 @@ class RobotSpec:
     name: str
     radius: float
     mass: float
-    wheels: tuple[Wheel, ...]
+    wheels: tuple[WheelSettings, ...]
     max_speed: float
     stiffness: float
     lateral_stiffness: float
@@ -171,7 +163,7 @@ def nominal_effect(robot: RobotSpec) -> FloatArray:
     return np.hstack([compliance(robot) @ drive, constant])
 
 
-_AXLE = 0.053
+_LEFT = 0.053 / 2  # half the axle
 _RADIUS = 0.037
 _MASS = 0.15
 _SPEED = 0.13
@@ -180,56 +172,49 @@ _TOTAL_STIFFNESS = 13.0
 _RUBBER = 0.8
 
 
-def _skid_steer(name: str, wheels: tuple[Wheel, ...]) -> RobotSpec:
-    """Return a robot of the e-puck's body and drive, shared by more wheels."""
-    stiffness = _TOTAL_STIFFNESS / len(wheels)
+Places = Mapping[str, tuple[float, float]]
+
+
+def _wheels(places: Places) -> tuple[WheelSettings, ...]:
+    return tuple(WheelSettings(name=name, x=x, y=y) for name, (x, y) in places.items())
+
+
+def _skid_steer(name: str, places: Places) -> RobotSpec:
+    """Return a robot of the e-puck's body and drive, shared by more wheels; not a real one."""
+    stiffness = _TOTAL_STIFFNESS / len(places)
     # A wheel that turns about its contact grips alike in all directions.
-    return RobotSpec(name, _RADIUS, _MASS, wheels, _SPEED, stiffness, stiffness, _RUBBER)
+    return RobotSpec(name, _RADIUS, _MASS, _wheels(places), _SPEED, stiffness, stiffness, _RUBBER)
 
 
 ROBOTS: dict[str, RobotSpec] = {
-    # Radius, axle, speed, mass and sensors: Mondada et al. 2009, The e-puck, a robot designed for
-    # education in engineering.
-    "e-puck": RobotSpec(
-        "e-puck",
-        _RADIUS,
-        _MASS,
-        (Wheel("left", 0.0, _AXLE / 2), Wheel("right", 0.0, -_AXLE / 2)),
-        _SPEED,
-        _TOTAL_STIFFNESS / 2,
-        20.0,
-        _RUBBER,
-    ),
-    # The e-puck's body on more wheels; not real robots.
-    "three-wheel": _skid_steer(
-        "three-wheel",
-        (
-            Wheel("left", 0.01, _AXLE / 2),
-            Wheel("right", 0.01, -_AXLE / 2),
-            Wheel("rear", -0.02, 0.0),
+    robot.name: robot
+    for robot in (
+        # Radius, axle, speed, mass and sensors: Mondada et al. 2009, The e-puck, a robot designed
+        # for education in engineering.
+        RobotSpec(
+            "e-puck", _RADIUS, _MASS, _wheels({"left": (0.0, _LEFT), "right": (0.0, -_LEFT)}),
+            _SPEED, _TOTAL_STIFFNESS / 2, 20.0, _RUBBER,
         ),
-    ),
-    "four-wheel": _skid_steer(
-        "four-wheel",
-        (
-            Wheel("front-left", 0.018, _AXLE / 2),
-            Wheel("front-right", 0.018, -_AXLE / 2),
-            Wheel("rear-left", -0.018, _AXLE / 2),
-            Wheel("rear-right", -0.018, -_AXLE / 2),
+        _skid_steer(
+            "three-wheel", {"left": (0.01, _LEFT), "right": (0.01, -_LEFT), "rear": (-0.02, 0.0)}
         ),
-    ),
-    "six-wheel": _skid_steer(
-        "six-wheel",
-        (
-            Wheel("front-left", 0.022, _AXLE / 2),
-            Wheel("front-right", 0.022, -_AXLE / 2),
-            Wheel("middle-left", 0.0, _AXLE / 2),
-            Wheel("middle-right", 0.0, -_AXLE / 2),
-            Wheel("rear-left", -0.022, _AXLE / 2),
-            Wheel("rear-right", -0.022, -_AXLE / 2),
+        _skid_steer(
+            "four-wheel",
+            {
+                "front-left": (0.018, _LEFT), "front-right": (0.018, -_LEFT),
+                "rear-left": (-0.018, _LEFT), "rear-right": (-0.018, -_LEFT),
+            },
         ),
-    ),
-}
+        _skid_steer(
+            "six-wheel",
+            {
+                "front-left": (0.022, _LEFT), "front-right": (0.022, -_LEFT),
+                "middle-left": (0.0, _LEFT), "middle-right": (0.0, -_LEFT),
+                "rear-left": (-0.022, _LEFT), "rear-right": (-0.022, -_LEFT),
+            },
+        ),
+    )
+}  # fmt: skip
 """Robots by the name that specs use."""
 
 
@@ -252,7 +237,7 @@ def robot_for(robot: str | RobotSettings) -> RobotSpec:
     if isinstance(robot, RobotSettings):
         described = robot.model_dump() | {
             "name": "own",
-            "wheels": tuple(Wheel(w.name, w.x, w.y) for w in robot.wheels),
+            "wheels": robot.wheels,
             "sensors": E_PUCK_SENSORS if robot.sensors is None else robot.sensors,
         }
         return RobotSpec(**described)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, Union
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, Union, get_args
 
+import numpy as np
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
+from ....core.numerics.arrays import FloatArray
 from ....core.plugins.settings import NonNegative, Positive, Settings
 from ...faults.settings import DISCRIMINATOR, KINDS, FailureSettings, Names, befalling
 
@@ -99,7 +101,7 @@ class BoxSettings(Described):
 
 
 class WheelSettings(Settings):
-    """A wheel of a robot of one's own."""
+    """A wheel of a robot: its name, unique in its robot, and where it stands in the body frame."""
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_-]+$")]
     """Name of the wheel; its agent is called ``robot1.NAME``."""
@@ -130,12 +132,21 @@ class RobotSettings(Described):
     """Directions of the infrared sensors [rad]; none: those of the e-Puck."""
 
 
+Normalisation = Literal["exponential", "linear", "binary"]
+
+
 class InfraredSettings(Settings):
-    """How the infrared sensors of all robots read; the default is the e-Puck's."""
+    """How the infrared sensors of all robots read; the default is the e-Puck's.
+
+    Examples
+    --------
+    >>> InfraredSettings().reading(np.array([0.0, 0.015, 0.07])).round(3).tolist()
+    [1.0, 0.368, 0.0]
+    """
 
     reach: Positive = 0.06
     """Distance beyond which they read 0 [m]; the e-Puck's are useful up to about 6 cm."""
-    normalisation: Literal["exponential", "linear", "binary"] = "exponential"
+    normalisation: Normalisation = "exponential"
     """How a distance within reach becomes a reading in [0, 1], 1 when touching: exp(-distance /
     decay), 1 - distance / reach, or 1."""
     decay: Positive = 0.015
@@ -153,6 +164,26 @@ class InfraredSettings(Settings):
                 f"received {self.normalisation!r}"
             )
         return self
+
+    @property
+    def index(self) -> int:
+        """Index of the normalisation, by which kernels know it."""
+        return get_args(Normalisation).index(self.normalisation)
+
+    def reading(self, distance: FloatArray) -> FloatArray:
+        """Return the readings at distances [m] straight ahead; negative distances touch."""
+        distance = np.maximum(distance, 0.0)
+        if self.normalisation == "exponential":
+            near = np.exp(-distance / self.decay)
+        else:
+            near = 1.0 - distance / self.reach if self.normalisation == "linear" else 1.0
+        return np.where(distance < self.reach, near, 0.0)
+
+    def noisy(self, readings: FloatArray, rng: np.random.Generator) -> FloatArray:
+        """Return readings with their error; without noise nothing is drawn."""
+        if not self.noise:
+            return readings
+        return np.clip(readings * (1.0 + self.noise * rng.standard_normal(readings.shape)), 0, 1)
 
 
 def label(thing: str | Settings) -> str:

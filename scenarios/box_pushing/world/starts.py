@@ -16,7 +16,7 @@ import numpy as np
 
 from ....core.numerics.arrays import FloatArray
 from .boxes import BoxSpec
-from .geometry import surface
+from .geometry import surface, wrap
 from .robots import RobotSpec
 
 GOAL = (1.0, 0.0, 0.0)
@@ -115,7 +115,7 @@ def place(
     box_pose = np.array([*(goal[:2] - away), angle])
     local = _around(spec, rng, robots, box) if spec.around else _behind(spec, rng, robots, box)
     turn = np.array([[cos(angle), -sin(angle)], [sin(angle), cos(angle)]])
-    headings = (local[:, 2] + angle + pi) % (2 * pi) - pi
+    headings = wrap(local[:, 2] + angle)
     poses = np.column_stack([box_pose[:2] + local[:, :2] @ turn.T, headings])
     return poses, box_pose, goal
 

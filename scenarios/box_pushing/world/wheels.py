@@ -14,8 +14,7 @@ K and B u being the sums over wheels of the above, and cut to the traction limit
 the wrench of contacts in the last step: what changed the velocity besides the wheels. Without it a
 servo under a steady load would yield the more the longer the step.
 
-Units are those of the caller as long as they are consistent. `wheel_wrenches` is compiled,
-`wheel_wrenches_numpy` is its test oracle.
+Units are those of the caller as long as they are consistent.
 """
 
 from __future__ import annotations
@@ -144,37 +143,3 @@ def wheel_wrenches(  # type: ignore[no-untyped-def]
             f1 += fy
             torque += x * fy - y * fx
         out[r, 0], out[r, 1], out[r, 2] = cos * f0 - sin * f1, sin * f0 + cos * f1, torque
-
-
-def wheel_wrenches_numpy(
-    motion: FloatArray,
-    speeds: FloatArray,
-    dt: float,
-    model: WheelModel,
-    last: FloatArray,
-    out: FloatArray,
-) -> None:
-    """Compute what `wheel_wrenches` computes, by matrix operations per robot."""
-    contact = model.mass * (motion[:, 1:] - last) - dt * out
-    last[:] = motion[:, 1:]
-    for r in range(len(motion)):
-        own = slice(model.first[r], model.first[r + 1])
-        cos, sin = np.cos(motion[r, 0]), np.sin(motion[r, 0])
-        turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-        x, y = model.points[own].T
-        zero, one = np.zeros_like(x), np.ones_like(x)
-        ahead = np.stack([one, zero, -y], axis=1)
-        sideways = np.stack([zero, one, x], axis=1)
-        drive = ahead.T @ (model.ahead[own] * speeds[own])
-        momentum = turn.T @ (model.mass[r] * motion[r, 1:] + contact[r]) + dt * drive
-        twist = model.implicit[r] @ momentum
-        forces = np.stack(
-            [
-                model.ahead[own] * (speeds[own] - ahead @ twist),
-                -model.sideways[own] * (sideways @ twist),
-            ],
-            axis=1,
-        )
-        size = np.linalg.norm(forces, axis=1)
-        forces *= np.minimum(1.0, model.limit[own] / np.maximum(size, 1e-300))[:, None]
-        out[r] = turn @ (ahead.T @ forces[:, 0] + sideways.T @ forces[:, 1])

@@ -27,12 +27,11 @@ import numpy as np
 from Box2D import _Box2D
 
 from ....core.numerics.arrays import FloatArray
-from ....core.numerics.compiling import njit
 from .boxes import BoxSpec
-from .geometry import surface
-from .infrared import InfraredSpec, infrared_readings, sensor_directions
+from .geometry import gaps
+from .infrared import infrared_readings, sensor_directions
 from .robots import RobotSpec
-from .settings import CONTROL_PERIOD
+from .settings import CONTROL_PERIOD, InfraredSettings
 from .wheels import wheel_model, wheel_wrenches
 
 UNIT = 10.0
@@ -116,7 +115,7 @@ class World:
         box: BoxSpec,
         *,
         substeps: int = 4,
-        infrared: InfraredSpec | None = None,
+        infrared: InfraredSettings | None = None,
     ) -> None:
         if not robots:
             raise ValueError("robots: none, must be at least one")
@@ -125,7 +124,7 @@ class World:
         self.robots = tuple(robots)
         self.box = box
         self.substeps = substeps
-        self.sensor = infrared or InfraredSpec()
+        self.sensor = infrared or InfraredSettings()
         self.n_wheels = sum(len(robot.wheels) for robot in robots)
         self.dt = CONTROL_PERIOD / substeps
         self._radii: FloatArray = np.array([robot.radius for robot in robots])
@@ -246,7 +245,7 @@ class World:
         return infrared_readings(
             self.robot_poses, self._radii, self._sensors, self.box_pose,
             outline.edges, outline.rounding, self.sensor.reach, self.sensor.decay,
-            self.sensor.kind,
+            self.sensor.index,
         )  # fmt: skip
 
     def _step(self, speeds: FloatArray) -> None:
@@ -271,7 +270,7 @@ class World:
                 for body, position, _ in self._handles
             ]
         )
-        self.gaps = _gaps(poses, self._radii, outline.edges, outline.rounding)
+        self.gaps = gaps(poses[1:], poses[:1], outline.edges, outline.rounding, self._radii)
         self.contact = self.gaps < TOUCHING
         self.box_pose, self.robot_poses = poses[0], poses[1:]
 
@@ -308,15 +307,3 @@ def _handles(body: Any) -> tuple[Any, Any, Any]:
 def _twist(handles: tuple[Any, Any, Any]) -> tuple[float, float, float]:
     body, _, velocity = handles
     return get_x(velocity) / UNIT, get_y(velocity) / UNIT, get_omega(body)
-
-
-@njit(cache=True)
-def _gaps(poses: FloatArray, radii: FloatArray, edges: FloatArray, rounding: float) -> FloatArray:
-    """Return the gaps ``(M,)`` of robots to the box; poses ``(M + 1, 3)``, the box first."""
-    out = np.empty(len(radii))
-    cos, sin = np.cos(poses[0, 2]), np.sin(poses[0, 2])
-    for r in range(len(radii)):
-        dx, dy = poses[r + 1, 0] - poses[0, 0], poses[r + 1, 1] - poses[0, 1]
-        distance = surface(edges, rounding, cos * dx + sin * dy, cos * dy - sin * dx)[0]
-        out[r] = distance - radii[r]
-    return out

@@ -95,11 +95,11 @@ def numbers(text: str) -> range:
     try:
         parts = [int(part) for part in text.split(":")]
         first, last = parts[0], parts[min(1, len(parts) - 1)]
-        found = range(first, last + 1, *parts[2:])
+        chosen = range(first, last + 1, *parts[2:])
     except (ValueError, TypeError):
-        found = range(0)
-    if not found or found[0] < 1 or found[-1] > MOST_AGENTS:
+        chosen = range(0)
+    if not chosen or chosen[0] < 1 or chosen[-1] > MOST_AGENTS:
         raise ValueError(
             f"agents = {text!r}, allowed: 4, 1:16 or 2:64:2, from 1 to {MOST_AGENTS:,}"
         )
-    return found
+    return chosen

@@ -26,7 +26,7 @@ def command(directory: Path, condition: str | None, seed: int | None, trust: boo
     DIR is where the study is kept. Text and figures go into its folder explain. Training is run
     again for it, which takes seconds, and must give the episodes that are kept.
     """
-    from ...explain import team as explain
+    from ...explain import team
     from ...explain.figures import draw
     from ...explain.text import MOST_AGENTS, text
     from ...presentation.figures import save
@@ -38,16 +38,16 @@ def command(directory: Path, condition: str | None, seed: int | None, trust: boo
     if trust:
         trust_files(directory)
     with Store.open(directory) as store:
-        trial = explain.choose(store, condition, seed)
+        trial = team.choose(store, condition, seed)
         conditions = list(store.columns())
         say(f"training {trial.condition}, seed {trial.seed} again: {trial.lengths}")
-        found = explain.explained(store, trial)
-    folder = explain.folder(directory, trial, conditions)
+        explanation = team.explain(store, trial)
+    folder = team.folder_of(directory, trial, conditions)
     folder.mkdir(parents=True, exist_ok=True)
     written = folder / "explanation.txt"
-    durable.write(written, ("\n".join(text(found)).rstrip() + "\n").encode())
-    figures = save(draw(found), folder)
-    print("\n".join(text(found, MOST_AGENTS)).rstrip() + "\n")
+    durable.write(written, ("\n".join(text(explanation)).rstrip() + "\n").encode())
+    figures = save(draw(explanation), folder)
+    print("\n".join(text(explanation, MOST_AGENTS)).rstrip() + "\n")
     for path in (written, *figures):
         print(path)
     return 0

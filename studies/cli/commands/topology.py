@@ -14,9 +14,28 @@ if TYPE_CHECKING:
     from ....topologies.view import Form
 
 
-@click.command()
-@click.argument("action", type=click.Choice(["list", "show"]), metavar="list|show")
-@click.argument("topology", metavar="[SPEC]", required=False)
+form = click.option(
+    "--format", "form", type=click.Choice(["table", "json"]), default="table", help="How to print."
+)
+
+
+@click.group(no_args_is_help=False)
+def command() -> None:
+    """List the topologies, or show one of them."""
+
+
+@command.command("list")
+@form
+def list_all(form: Form) -> int:
+    """List the topologies, built-in and installed."""
+    from ....topologies.view import kinds
+
+    print(kinds(form))
+    return 0
+
+
+@command.command()
+@click.argument("topology", metavar="SPEC")
 @click.option(
     "--agents",
     type=int,
@@ -43,17 +62,10 @@ if TYPE_CHECKING:
     help="What there is one agent for, as the key agents of a spec says.",
 )
 @click.option("--actions", type=int, metavar="N", default=4, help="Actions of each actuator.")
-@click.option(
-    "--format",
-    "form",
-    type=click.Choice(["table", "json"]),
-    default="table",
-    help="How to print it.",
-)
+@form
 @options.plot
-def command(
-    action: str,
-    topology: str | None,
+def show(
+    topology: str,
     agents: int | None,
     robots: int | None,
     wheels: int | None,
@@ -62,38 +74,26 @@ def command(
     form: Form,
     plot: Path | None,
 ) -> int:
-    """List the topologies, or show one of them: edges, order of decision, who sees whom, cost.
+    """Show a topology: edges, order of decision, who sees whom, cost.
 
     SPEC is a topology as in a spec: chain:reversed, tree:2, file.py:function, graph.json,
     teams.json, ...; or the spec of a study, whose hierarchies are shown over its own agents.
     """
-    from ....topologies.view import kinds, printed, view
+    from ....topologies.view import printed, view
     from ...spec.errors import SpecError
     from ..hierarchies import of_spec
 
     try:
-        if action == "list":
-            if topology is not None:
-                raise SpecError(f"topology list {topology}: takes no SPEC; see topology show")
-            for option, given in (
-                ("--agents", agents), ("--robots", robots), ("--wheels", wheels), ("--plot", plot)
-            ):  # fmt: skip
-                if given is not None:
-                    raise SpecError(f"topology list {option} {given}: is for topology show")
-            print(kinds(form))
-        elif topology is None:
-            raise SpecError("topology show: SPEC is missing; see nested-agents topology list")
-        else:
-            found = of_spec(topology)
-            if found is None:
-                found = [view(topology, agents, robots, wheels, actions, per)]
-            elif agents or robots or wheels or per != "actuator":
-                raise SpecError(f"{topology}: is the spec of a study, which says its own agents")
-            for number, shown in enumerate(found, 1):
-                if plot is not None:
-                    several = f"-{number}" if len(found) > 1 else ""
-                    shown.draw(plot.with_name(f"{plot.stem}{several}{plot.suffix}"))
-                print(printed(shown, form), end="\n\n" if number < len(found) else "\n")
+        views = of_spec(topology)
+        if views is None:
+            views = [view(topology, agents, robots, wheels, actions, per)]
+        elif agents or robots or wheels or per != "actuator":
+            raise SpecError(f"{topology}: is the spec of a study, which says its own agents")
+        for number, shown in enumerate(views, 1):
+            if plot is not None:
+                several = f"-{number}" if len(views) > 1 else ""
+                shown.draw(plot.with_name(f"{plot.stem}{several}{plot.suffix}"))
+            print(printed(shown, form), end="\n\n" if number < len(views) else "\n")
     except ValueError as error:
         raise SpecError(str(error)) from None
     return 0

@@ -100,7 +100,7 @@ def test_another_calibration_goes_on_with_bodies_alike_and_begins_anew_with_othe
         Calibration(settings, 1, other) for other in (levers, 2.0 * levers, np.ones(3))
     )
     for calibration in (alike, longer, more):
-        calibration.take_over(former)
+        calibration.continue_from(former)
     assert alike.constants[0] == former.constants[0]
     assert alike.deviations[0] == former.deviations[0]
     assert longer.constants[0] == more.constants[0] == 0.0

@@ -104,7 +104,7 @@ def test_another_model_goes_on_with_bodies_alike_and_begins_anew_with_others():
         for bodies in ([nominal], [2.0 * nominal], [nominal, nominal])
     )
     for model in (alike, longer, more):
-        model.take_over(former)
+        model.continue_from(former)
     assert (alike.effects[0] == former.effects[0]).all()
     assert (longer.effects[0] == 2.0 * nominal).all()
     assert (more.effects[0] == nominal).all()

@@ -332,7 +332,7 @@ def test_a_team_that_takes_over_goes_on_as_the_former_one_would(name: str, world
     run_episode(former, world, seed=5)
     same = copy.deepcopy(former)
     successor = team_of(name, world, seed=2)
-    successor.take_over(former, carried_rows(world, world, shared=False))
+    successor.continue_from(former, carried_rows(world, world, shared=False))
     assert run_episode(successor, world, seed=6) == run_episode(same, world, seed=6)
     assert (successor.learner.theta == same.learner.theta).all()
 
@@ -347,7 +347,7 @@ def test_a_larger_team_takes_over_by_role(line_world) -> None:
         for world in (small, large)
     )
     run_episode(former, small, seed=5)
-    successor.take_over(former, carried_rows(small, large, shared=True))
+    successor.continue_from(former, carried_rows(small, large, shared=True))
     assert (successor.learner.theta == former.learner.theta).all()
     assert successor.explorer.memory[0] == 0.0  # one episode has been begun
     seen, before = successor.arrays()["seen"], former.arrays()["seen"]
@@ -382,5 +382,5 @@ def test_weights_are_not_carried_where_they_mean_nothing(
 def test_parts_that_cannot_take_over_are_named(part: str, world) -> None:
     former, successor = team_of("batch-td", world), team_of("batch-td", world)
     setattr(successor, part, object())
-    with pytest.raises(ValueError, match=r"learner\..*kind: object has no take_over"):
-        successor.take_over(former, np.arange(4))
+    with pytest.raises(ValueError, match=r"learner\..*kind: object has no continue_from"):
+        successor.continue_from(former, np.arange(4))

@@ -115,14 +115,17 @@ def test_a_plot_is_written(said, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("show",), "SPEC is missing"),
-        (("draw",), "'list|show': 'draw' is not one of 'list', 'show'"),
-        (("list", "chain"), "topology list chain: takes no SPEC"),
-        (("list", "--agents", "3"), "topology list --agents 3: is for topology show"),
+        (("show",), "Missing argument 'SPEC'; see nested-agents topology show --help"),
+        (("draw",), "No such command 'draw'"),
+        (("list", "chain"), "unexpected extra argument (chain); see nested-agents topology list"),
+        (
+            ("list", "--agents", "3"),
+            "No such option '--agents'; see nested-agents topology list",
+        ),
         (("show", "chain:"), "topology 'chain:': order must be written a,b,c, received ''"),
         (("show", "tree:0"), "topology 'tree:0': branching = 0: must be at least 1"),
         (("show", "tree:2", "--agents", "x"), "'--agents': 'x' is not a valid integer"),
-        (("show", "chain", "--plot", ""), "--plot: must not be empty"),
+        (("show", "chain", "--plot", ""), "an argument: must not be empty"),
         (("show", "edges:a>b,b>a"), "topology 'edges': cycle a -> b -> a"),
         (("show", "chian"), "did you mean 'chain'?"),
         (("show", "chain", "--agents", "0"), "agents = 0, allowed: 1 or more"),
@@ -146,6 +149,6 @@ def test_what_the_user_can_mend_is_one_line(said, arguments: tuple[str, ...], me
 
 
 def test_teams_and_numbers() -> None:
-    assert team_of(6, 2, None).groups == ((0, 1, 2), (3, 4, 5))
+    assert team_of(6, 2, None).bodies == ((0, 1, 2), (3, 4, 5))
     assert readable(999_999_999) == "999,999,999"
     assert readable(10**5000) == "1.000e5000"

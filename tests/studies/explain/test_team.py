@@ -131,7 +131,7 @@ def test_another_team_than_the_one_that_was_measured_is_not_explained(study, mon
         kept = explain._kept(store, trial)
         monkeypatch.setattr(explain, "_kept", lambda *_: [*kept[:2], (*kept[2][:-1], 0.0)])
         with pytest.raises(ValueError, match="gives another episode 2 than the one that is kept"):
-            explain.explained(store, trial)
+            explain.explain(store, trial)
 
 
 def test_a_topology_file_that_has_changed_since(tmp_path, capsys):
@@ -164,7 +164,7 @@ def test_folders_of_conditions_differ(tmp_path):
 
     names = ["a/b", "a b", "x", "§"]
     folders = [
-        explain.folder(tmp_path, SimpleNamespace(condition=name, seed=0), names).name
+        explain.folder_of(tmp_path, SimpleNamespace(condition=name, seed=0), names).name
         for name in names
     ]
     assert folders == ["condition1-seed0", "condition2-seed0", "x-seed0", "condition4-seed0"]

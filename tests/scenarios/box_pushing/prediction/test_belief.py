@@ -60,12 +60,12 @@ def test_believed_are_the_worlds_own_constants_times_the_factors():
 def test_constants_are_factors_of_what_is_believed(robot):
     world = scenario(robot=robot)
     belief = world._belief
-    same = belief.believing(np.zeros(3))
+    same = believing(belief, np.zeros(3))
     np.testing.assert_allclose(same.compliance, world._model.compliance, rtol=1e-12, atol=1e-15)
-    twice = belief.believing(np.log([2.0, 2.0, 3.0]))
+    twice = believing(belief, np.log([2.0, 2.0, 3.0]))
     np.testing.assert_allclose(twice.compliance, 2.0 * same.compliance, rtol=1e-12, atol=1e-15)
     assert twice.contact_friction == pytest.approx(3.0 * same.contact_friction)
-    ahead = belief.believing(np.log([2.0, 1.0, 1.0])).compliance
+    ahead = believing(belief, np.log([2.0, 1.0, 1.0])).compliance
     assert ahead[0, 0, 0] == pytest.approx(2.0 * same.compliance[0, 0, 0])
     assert ahead[0, 1, 1] == pytest.approx(same.compliance[0, 1, 1])
 
@@ -76,7 +76,7 @@ def test_only_ratios_of_forces_can_be_told_by_moving():
     heavier = scenario(belief={"load": 3.0})
     constants = np.log([3.0, 3.0, 1.0])
     np.testing.assert_allclose(
-        pushed(heavier._model), pushed(usual._belief.believing(constants)), atol=1e-12
+        pushed(heavier._model), pushed(believing(usual._belief, constants)), atol=1e-12
     )
     assert abs(pushed(heavier._model) - pushed(usual._model)).max() > 0.005
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from push_oracle import push_one
 
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.prediction.push import PushModel, push
@@ -15,7 +16,6 @@ from nested_agents.scenarios.box_pushing.prediction.push_lanes import (
     SIN,
     head,
 )
-from nested_agents.scenarios.box_pushing.prediction.push_reference import push_one
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS, compliance

@@ -20,9 +20,10 @@ from nested_agents.scenarios.box_pushing.states.state_spaces import (
     state_space_for,
 )
 from nested_agents.scenarios.box_pushing.states.variables import STATE_VARIABLES
-from nested_agents.scenarios.box_pushing.states.view import View, wrap
+from nested_agents.scenarios.box_pushing.states.view import View
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
-from nested_agents.scenarios.state_variables import StateVariable, found, sensed
+from nested_agents.scenarios.box_pushing.world.geometry import wrap
+from nested_agents.scenarios.state_variables import StateVariable, find_variable, sensed
 
 GOAL = np.array([1.0, 0.0, 0.0])
 SQUARE = BOXES["square"].outline
@@ -216,7 +217,7 @@ def test_a_state_space_may_be_listed() -> None:
 
 def test_columns_are_those_of_names_that_the_kernel_knows() -> None:
     assert set(COMPILED) == set(STATE_VARIABLES.built_in)
-    assert all(found(STATE_VARIABLES, name).variable.name == name for name in COMPILED)
+    assert all(find_variable(STATE_VARIABLES, name).variable.name == name for name in COMPILED)
     with pytest.raises(AssertionError, match="not all of them are compiled"):
         Columns(["gap", "_COURSE"])
 
@@ -280,7 +281,9 @@ def test_all_robots_sense_what_each_does_alone(space: BoxStateSpace) -> None:
     rng = np.random.default_rng(0)
     poses, gaps = rng.normal(size=(1, 4, 3)), np.abs(rng.normal(size=(1, 4)))
     seen = View(poses, poses[:, 0] + 0.3, gaps, GOAL, ORIGIN, 1.0, SQUARE, 0.08)
-    np.testing.assert_array_equal(space.sensed(seen), [space.shared(seen, r) for r in range(4)])
+    np.testing.assert_array_equal(
+        space.sensed(seen, range(4)), [space.shared(seen, r) for r in range(4)]
+    )
 
 
 def test_what_is_common_is_sensed_once() -> None:
@@ -309,7 +312,7 @@ def gap(view, robot):
     with Sources(texts={"mine.py": text}).active():
         space = listed("own", "mine.py:gap")
     with pytest.raises(ValueError, match="state variable 'gap': shape"):
-        space.sensed(view([[-0.2, 0, 0]], [0, 0, 0], [0.06]))
+        space.sensed(view([[-0.2, 0, 0]], [0, 0, 0], [0.06]), [0])
 
 
 @pytest.mark.parametrize(

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from world_oracles import ray_numpy, surface_numpy
 
 from nested_agents.core.numerics.arrays import FloatArray
+from nested_agents.scenarios.box_pushing.world import geometry
 from nested_agents.scenarios.box_pushing.world.geometry import (
     Outline,
     ray,
-    ray_numpy,
     ring_edges,
     surface,
-    surface_numpy,
 )
 
 L_SHAPE = ring_edges(np.array([[-0.1, -0.1], [0.1, -0.1], [0.1, 0], [0, 0], [0, 0.1], [-0.1, 0.1]]))
@@ -69,6 +69,21 @@ def test_surface_equals_its_reference(x: float, y: float, which: int) -> None:
         # The point is its nearest surface point plus the distance along the normal. (The two may
         # choose another one of two nearest points.)
         np.testing.assert_allclose([px + distance * nx, py + distance * ny], [x, y], atol=1e-11)
+
+
+@pytest.mark.parametrize("edges", [PLATE, SQUARE, DISC])
+def test_nearest_points_side_by_side_are_those_of_the_surface(edges: FloatArray) -> None:
+    rows = np.zeros(geometry.NEAREST_SIZE)
+    block = rows.reshape(-1, geometry.LANES)
+    block[:2] = np.random.default_rng(0).uniform(-0.25, 0.25, block[:2].shape)
+    block[:2, 0] = edges[0, :2] + 0.25 * (edges[0, 2:] - edges[0, :2])  # on the surface
+    geometry.nearest_points(edges, rows, geometry.LANES)
+    for x, y, square, px, py, side, ex, ey in block.T:
+        expected = surface(edges, 0.0, x, y)
+        got = side * np.sqrt(square), px, py
+        np.testing.assert_allclose(got, (expected[0], *expected[3:]), atol=1e-14)
+        if square <= geometry.ON_SURFACE**2:
+            np.testing.assert_allclose((ey, -ex), expected[1:3], atol=1e-14)
 
 
 @given(

@@ -7,10 +7,10 @@ import pytest
 
 from nested_agents.scenarios.box_pushing.world.robots import (
     ROBOTS,
-    Wheel,
     compliance,
     nominal_effect,
 )
+from nested_agents.scenarios.box_pushing.world.settings import WheelSettings
 
 
 def test_two_wheels_are_a_differential_drive() -> None:
@@ -50,15 +50,19 @@ def test_every_robot(name: str) -> None:
     assert len(robot.wheels) * robot.wheel_limit > 0.785
 
 
+def wheel(name: str, x: float, y: float) -> WheelSettings:
+    return WheelSettings(name=name, x=x, y=y)
+
+
 @pytest.mark.parametrize(
     ("change", "word"),
     [
         ({"radius": 0.0}, "radius = 0.0"),
         ({"mass": float("nan")}, "mass"),
         ({"wheels": ()}, "at least one"),
-        ({"wheels": (Wheel("a", 0, 0.02), Wheel("a", 0, -0.02))}, "different names"),
-        ({"wheels": (Wheel("a", 0, 0.05), Wheel("b", 0, -0.02))}, "within the body"),
-        ({"wheels": (Wheel("a", 0, 0.02),)}, "cannot resist turning"),
+        ({"wheels": (wheel("a", 0, 0.02), wheel("a", 0, -0.02))}, "different names"),
+        ({"wheels": (wheel("a", 0, 0.05), wheel("b", 0, -0.02))}, "within the body"),
+        ({"wheels": (wheel("a", 0, 0.02),)}, "cannot resist turning"),
         ({"sensors": (float("inf"),)}, "sensors"),
     ],
 )

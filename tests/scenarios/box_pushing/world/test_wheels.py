@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from world_oracles import wheel_wrenches_numpy
 
 from nested_agents.scenarios.box_pushing.world.robots import (
     ROBOTS,
@@ -11,7 +12,6 @@ from nested_agents.scenarios.box_pushing.world.robots import (
 from nested_agents.scenarios.box_pushing.world.wheels import (
     wheel_model,
     wheel_wrenches,
-    wheel_wrenches_numpy,
 )
 
 DT = 0.016

@@ -18,7 +18,7 @@ def name(request: pytest.FixtureRequest) -> str:
 def followed(former: Learner, name: str, rows: np.ndarray, goes_on: list[int]):
     """A learner for agents of these rows that takes over from `former`."""
     learner = learner_of(name, rows)
-    learner.take_over(former, np.array(goes_on))
+    learner.continue_from(former, np.array(goes_on))
     return learner
 
 
@@ -71,7 +71,7 @@ def test_batch_td_regresses_on_all_experience_of_teams_of_any_size() -> None:
     for before, after in zip([None, *teams], teams, strict=False):
         n = len(after.members[0])
         if before is not None:
-            after.take_over(before, np.array([0]))
+            after.continue_from(before, np.array([0]))
         feed(after, states[:, :n], rewards[:, :n])
     met = [i for n in (1, 3, 2) for i in range(n)]
     x = rules.features(np.concatenate([states[:, i] for i in met]))
@@ -83,5 +83,5 @@ def test_batch_td_regresses_on_all_experience_of_teams_of_any_size() -> None:
 def test_weights_that_never_learn_are_handed_on() -> None:
     former, successor = (Frozen(rules_of("batch-td"), rows) for rows in (ROLES, np.array([1, 0])))
     former.theta[:] = [[1.0], [2.0]]
-    successor.take_over(former, np.array([1, 0]))
+    successor.continue_from(former, np.array([1, 0]))
     assert successor.theta[:, 0].tolist() == [2.0, 1.0]

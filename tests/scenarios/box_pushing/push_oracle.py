@@ -1,6 +1,6 @@
-"""The push of one joint action in plain Python: what `box_pushing.prediction.push` computes.
+"""The push of one joint action in plain Python: the oracle of `box_pushing.prediction.push`.
 
-The readable definition and the test oracle of the compiled lanes; some thousand times slower.
+It says readably what the compiled lanes compute side by side, some thousand times slower.
 """
 
 from __future__ import annotations
@@ -8,11 +8,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from world_oracles import surface_numpy
 
-from ....core.numerics.arrays import FloatArray, IntArray
-from ..world.geometry import surface_numpy
-from .push import SUBSTEPS, SWEEPS, PushModel
-from .push_lanes import CREEP, MARGIN, START_SPEED
+from nested_agents.core.numerics.arrays import FloatArray, IntArray
+from nested_agents.scenarios.box_pushing.prediction.push import SUBSTEPS, SWEEPS, PushModel
+from nested_agents.scenarios.box_pushing.prediction.push_lanes import CREEP, MARGIN, START_SPEED
 
 
 @dataclass

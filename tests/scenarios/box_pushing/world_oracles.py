@@ -1,0 +1,116 @@
+"""The world's formulas without loops over edges, rays or wheels: oracles of its kernels."""
+
+import numpy as np
+
+from nested_agents.core.numerics.arrays import FloatArray
+from nested_agents.scenarios.box_pushing.world.geometry import ON_SURFACE, Outline
+from nested_agents.scenarios.box_pushing.world.settings import InfraredSettings
+from nested_agents.scenarios.box_pushing.world.wheels import WheelModel
+
+
+def surface_numpy(
+    edges: FloatArray, rounding: float, x: float, y: float
+) -> tuple[float, float, float, float, float]:
+    """Return what `surface` returns, by array operations on all edges at once."""
+    point = np.array([x, y])
+    start, along = edges[:, :2], edges[:, 2:] - edges[:, :2]
+    length2 = (along**2).sum(axis=1)
+    dots = ((point - start) * along).sum(axis=1)
+    t = np.clip(np.divide(dots, length2, out=np.zeros_like(dots), where=length2 > 0), 0, 1)
+    closest = start + t[:, None] * along
+    squares = ((point - closest) ** 2).sum(axis=1)
+    i = int(squares.argmin())
+    end_y = start[:, 1] + along[:, 1]
+    spans = (start[:, 1] > y) != (end_y > y)
+    slope = np.divide(along[:, 0], along[:, 1], out=np.zeros_like(dots), where=spans)
+    inside = bool((spans & (x < start[:, 0] + (y - start[:, 1]) * slope)).sum() % 2)
+    side = -1.0 if inside else 1.0
+    distance = float(np.sqrt(squares[i]))
+    normal = np.array([1.0, 0.0])
+    if distance > ON_SURFACE:
+        normal = side * (point - closest[i]) / distance
+    elif length2[i] > 0:
+        normal = np.array([along[i, 1], -along[i, 0]]) / np.sqrt(length2[i])
+    px, py = closest[i] + rounding * normal
+    return side * distance - rounding, float(normal[0]), float(normal[1]), float(px), float(py)
+
+
+def ray_numpy(
+    edges: FloatArray, rounding: float, x: float, y: float, dx: float, dy: float, reach: float
+) -> float:
+    """Return what `ray` returns, by marching the signed distance of `surface_numpy`.
+
+    A step as long as the distance to the surface never passes through it, so the march converges
+    on the first hit; a grazing ray may take many steps and is given up after 2000.
+    """
+    travelled = 0.0
+    for _ in range(2000):
+        distance = surface_numpy(edges, rounding, x + travelled * dx, y + travelled * dy)[0]
+        if distance <= 1e-10:
+            break
+        travelled += distance
+        if travelled >= reach:
+            return reach
+    return travelled
+
+
+def infrared_readings_numpy(
+    robots: FloatArray,
+    radii: FloatArray,
+    sensors: FloatArray,
+    box: FloatArray,
+    outline: Outline,
+    spec: InfraredSettings,
+) -> FloatArray:
+    """Return what `infrared_readings` returns, every ray by `ray_numpy`."""
+    out = np.zeros((2, *sensors.shape))
+    turn = np.array([[np.cos(box[2]), np.sin(box[2])], [-np.sin(box[2]), np.cos(box[2])]])
+    for r, k in np.ndindex(sensors.shape):
+        angle = robots[r, 2] + sensors[r, k]
+        along = np.array([np.cos(angle), np.sin(angle)])
+        eye = robots[r, :2] + radii[r] * along
+        (x, y), (dx, dy) = turn @ (eye - box[:2]), turn @ along
+        hit = ray_numpy(outline.edges, outline.rounding, x, y, dx, dy, spec.reach)
+        out[0, r, k] = spec.reading(np.array(hit))
+        point = np.zeros((1, 4))
+        hits = [
+            ray_numpy(point, radius, x, y, along[0], along[1], spec.reach)
+            for o, (radius, (x, y)) in enumerate(zip(radii, eye - robots[:, :2], strict=True))
+            if o != r
+        ]
+        out[1, r, k] = spec.reading(np.array(min(hits, default=spec.reach)))
+    return out
+
+
+def wheel_wrenches_numpy(
+    motion: FloatArray,
+    speeds: FloatArray,
+    dt: float,
+    model: WheelModel,
+    last: FloatArray,
+    out: FloatArray,
+) -> None:
+    """Compute what `wheel_wrenches` computes, by matrix operations per robot."""
+    contact = model.mass * (motion[:, 1:] - last) - dt * out
+    last[:] = motion[:, 1:]
+    for r in range(len(motion)):
+        own = slice(model.first[r], model.first[r + 1])
+        cos, sin = np.cos(motion[r, 0]), np.sin(motion[r, 0])
+        turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+        x, y = model.points[own].T
+        zero, one = np.zeros_like(x), np.ones_like(x)
+        ahead = np.stack([one, zero, -y], axis=1)
+        sideways = np.stack([zero, one, x], axis=1)
+        drive = ahead.T @ (model.ahead[own] * speeds[own])
+        momentum = turn.T @ (model.mass[r] * motion[r, 1:] + contact[r]) + dt * drive
+        twist = model.implicit[r] @ momentum
+        forces = np.stack(
+            [
+                model.ahead[own] * (speeds[own] - ahead @ twist),
+                -model.sideways[own] * (sideways @ twist),
+            ],
+            axis=1,
+        )
+        size = np.linalg.norm(forces, axis=1)
+        forces *= np.minimum(1.0, model.limit[own] / np.maximum(size, 1e-300))[:, None]
+        out[r] = turn @ (ahead.T @ forces[:, 0] + sideways.T @ forces[:, 1])
