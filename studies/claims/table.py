@@ -10,7 +10,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from ..presentation.tables import escaped
+from ..presentation.tables import escaped, tabular
 from .claims import Finding
 from .measures import Measured
 
@@ -80,18 +80,13 @@ def markdown(findings: Sequence[Finding]) -> str:
 
 def latex(findings: Sequence[Finding]) -> str:
     """Return the table for LaTeX, which needs the packages booktabs and tabularx."""
-    lines = [
-        "% needs \\usepackage{booktabs,tabularx}; 95 % intervals in brackets",
-        r"\begin{tabularx}{\textwidth}{XXll}",
-        r"\toprule",
-        r"claim & measure, criterion & result & verdict \\",
-        r"\midrule",
-    ]
+    lines = [["claim", "measure, criterion", "result", "verdict"]]
     for finding in findings:
         c = finding.claim
         cells = (f"{c.text} ({c.place})", f"{c.measure}: {c.criterion.text}", result(finding))
-        lines.append(" & ".join(map(escaped, (*cells, finding.verdict))) + r" \\")
-    return "\n".join([*lines, r"\bottomrule", r"\end{tabularx}"])
+        lines.append([escaped(cell) for cell in (*cells, finding.verdict)])
+    needs = "{booktabs,tabularx}; 95 % intervals in brackets"
+    return tabular(needs, r"{\textwidth}{XXll}", lines, "tabularx")
 
 
 def _ends(measured: Measured) -> tuple[float, float, float]:

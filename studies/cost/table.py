@@ -15,6 +15,7 @@ from typing import Any, Literal
 
 from ...topologies.view import aligned, readable
 from ..presentation.csv_text import write_csv
+from ..presentation.tables import escaped, tabular
 from ..results.statistics import Estimate
 from .cost import PAPER, RULES, CostRow, StepCost, exponent, fitted
 
@@ -182,26 +183,19 @@ def _latex(rows: Sequence[CostRow]) -> str:
     """Return a tabular of the formulas and, if anything was measured, a second one of that."""
     titles = ["nested (18)", "closed form (19)", "asymptotic (21)", "single agent (23)", "ratio"]
     formulas = [[scientific(getattr(row, name)) for name, _ in FORMULAS] for row in rows]
-    lines = _tabular(rows, titles, formulas)
+    tables = [_tabular(rows, titles, formulas)]
     if any(row.measured is not None for row in rows):
-        lines += ["", *_tabular(rows, MEASURED, [_measured_cells(row.measured) for row in rows])]
-    return "\n".join(lines)
+        cells = [_measured_cells(row.measured) for row in rows]
+        tables.append(_tabular(rows, MEASURED, cells))
+    return "\n\n".join(tables)
 
 
-def _tabular(
-    rows: Sequence[CostRow], titles: Sequence[str], cells: Sequence[Sequence[str]]
-) -> list[str]:
-    lines = [
-        "% needs \\usepackage{booktabs}",
-        rf"\begin{{tabular}}{{rl{'r' * len(titles)}}}",
-        r"\toprule",
-        " & ".join(["$n$", "topology", *titles]) + r" \\",
-        r"\midrule",
-    ]
+def _tabular(rows: Sequence[CostRow], titles: Sequence[str], cells: Sequence[Sequence[str]]) -> str:
+    lines = [["$n$", "topology", *titles]]
     for row, values in zip(rows, cells, strict=True):
-        topology = row.topology.replace("_", r"\_").replace("#", r"\#").replace(">", "$>$")
-        lines.append(" & ".join([str(row.agents), topology, *map(_latex_cell, values)]) + r" \\")
-    return [*lines, r"\bottomrule", r"\end{tabular}"]
+        topology = escaped(row.topology).replace(">", "$>$")
+        lines.append([str(row.agents), topology, *map(_latex_cell, values)])
+    return tabular("{booktabs}", f"{{rl{'r' * len(titles)}}}", lines)
 
 
 def _latex_cell(text: str) -> str:

@@ -149,19 +149,45 @@ def _markdown(titles: Sequence[str], rows: Sequence[Row]) -> str:
 
 
 def _latex(titles: Sequence[str], rows: Sequence[Row]) -> str:
-    lines = [
-        "% needs \\usepackage{booktabs}; 95 % intervals in brackets",
-        rf"\begin{{tabular}}{{lr{'r' * len(titles)}}}",
-        r"\toprule",
-        " & ".join(["condition", "seeds", *map(escaped, titles)]) + r" \\",
-        r"\midrule",
-    ]
+    lines = [["condition", "seeds", *map(escaped, titles)]]
     for condition, seeds, cells in rows:
         # After a line's end LaTeX would take a leading bracket for an option.
         name = "{}" * condition.startswith(("[", "*")) + escaped(condition)
         numbers = (f"${c.bracketed(MATHS_SPACE)}$" if c else "--" for c in cells)
-        lines.append(" & ".join([name, str(seeds), *numbers]) + r" \\")
-    return "\n".join([*lines, r"\bottomrule", r"\end{tabular}"]) + "\n"
+        lines.append([name, str(seeds), *numbers])
+    note = "{booktabs}; 95 % intervals in brackets"
+    return tabular(note, f"{{lr{'r' * len(titles)}}}", lines) + "\n"
+
+
+def tabular(
+    needs: str, columns: str, rows: Sequence[Sequence[str]], environment: str = "tabular"
+) -> str:
+    """Return rows of LaTeX as a table; the first one is its head.
+
+    Parameters
+    ----------
+    needs
+        The packages in braces, and what a comment above the table says besides.
+    columns
+        Arguments of the environment: how columns are aligned.
+    rows
+        Cells, line by line.
+    environment
+        Which one.
+    """
+    head, *lines = (" & ".join(row) + r" \\" for row in rows)
+    return "\n".join(
+        [
+            rf"% needs \usepackage{needs}",
+            rf"\begin{{{environment}}}{columns}",
+            r"\toprule",
+            head,
+            r"\midrule",
+            *lines,
+            r"\bottomrule",
+            rf"\end{{{environment}}}",
+        ]
+    )
 
 
 def escaped(text: str) -> str:
