@@ -52,7 +52,7 @@ from nested_agents.studies.trials.keeping import open_to_run, pending, spec_of
 from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import Trial, TrialResult, trials_of
 from nested_agents.studies.workers.runner import save
-from nested_agents.studies.workers.worker import Arrival, RunTrial
+from nested_agents.studies.workers.worker import Outcome, RunTrial
 
 SPEC = Spec.of(
     {"seeds": 5, "episodes": 2, "steps": 10, "evaluation": 1,
@@ -154,13 +154,13 @@ class Here:
         self.adversary = adversary
 
     def arrivals(
-        self, trials: Sequence[Trial], run_trial: RunTrial, started: Callable[[Trial], None]
-    ) -> Generator[Arrival]:
-        """See `nested_agents.studies.workers.workers.Workers.arrivals`."""
+        self, trials: Sequence[Trial], run_trial: RunTrial, started: Callable[[str], None]
+    ) -> Generator[Outcome]:
+        """See `nested_agents.studies.workers.arrivals.Workers.arrivals`."""
         for trial in trials:
-            started(trial)
+            started(trial.identity)
             time.sleep(0.08)
-            yield Arrival(trial, self.adversary.result(trial), None, 1.0)
+            yield Outcome(trial, None, 1.0, self.adversary.result(trial))
 
 
 def kills(number: int, rng: random.Random, folder: Path) -> Counter[str]:

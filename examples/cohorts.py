@@ -11,9 +11,9 @@ not see each other, but every wheel of the robots below.
 from itertools import pairwise, product
 
 
-def cohorts(agents, groups):
+def cohorts(agents, bodies):
     """Put every wheel of a robot above every wheel of the next one."""
     pairs = []
-    for robot, following in pairwise(groups):
+    for robot, following in pairwise(bodies):
         pairs.extend(product(robot, following))
     return pairs

@@ -14,11 +14,11 @@ import nested_agents as na
 from nested_agents.core.agents.cost import below_counts
 
 agents = na.BoxPushingSettings(robots=3).build().agents
-groups = [(0, 1), (2, 3), (4, 5)]
+bodies = [(0, 1), (2, 3), (4, 5)]
 
 figure, axes = plt.subplots(1, 4, figsize=(10, 2.8), layout="constrained")
 for ax, name in zip(axes, ("chain", "teams", "tree:2", "star"), strict=True):
-    hierarchy = na.build_hierarchy(na.parse_topology(name), agents, groups)
+    hierarchy = na.build_hierarchy(na.parse_topology(name), agents, bodies)
     graph = nx.DiGraph(hierarchy.edges)
     for layer, level in enumerate(nx.topological_generations(graph)):
         nx.set_node_attributes(graph, dict.fromkeys(level, -layer), "layer")

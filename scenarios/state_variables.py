@@ -4,34 +4,21 @@ A state variable is a function of a view and of the number of a body (a robot, a
 over the situations that the view holds; the same function serves sensing, where there is one
 situation, and prediction, where there are many. It must depend on nothing else: ``nested-agents
 check`` finds out where it means two things. What a view is, and which variables are built in, is
-the scenario's business: each has a registry and a view of its own.
+the scenario's business: each has a registry and a view of its own, which tells `n_situations`, how
+many it holds, and gives by ``guarded()`` the same situations, not to be written to.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import numpy as np
 
 from ..core.interface.spaces import Variable
 from ..core.numerics.arrays import FloatArray
 from ..core.plugins.registry import Registry
-
-
-class Situations(Protocol):
-    """What any view tells."""
-
-    @property
-    def n_situations(self) -> int:
-        """How many situations it holds."""
-        ...
-
-    def guarded(self) -> Situations:
-        """Return the same situations, not to be written to."""
-        ...
-
 
 StateFunction = Callable[[Any, int], FloatArray]
 """The values ``(m,)`` of a variable for one body in the ``m`` situations of a view."""
@@ -59,7 +46,7 @@ class StateVariable:
         """Return the values ``(m,)`` for a body."""
         return self.function(view, body)
 
-    def checked(self, view: Situations, body: int) -> FloatArray:
+    def checked(self, view: Any, body: int) -> FloatArray:
         """Return the values ``(m,)`` of a function that is not known to be sound.
 
         Raises
@@ -67,22 +54,22 @@ class StateVariable:
         ValueError
             If it returns anything but one finite number per situation.
         """
-        found: FloatArray = np.asarray(self.function(view, body))
+        values: FloatArray = np.asarray(self.function(view, body))
         name, m = self.variable.name, view.n_situations
-        if found.shape != (m,):
+        if values.shape != (m,):
             raise ValueError(
-                f"state variable {name!r}: shape {found.shape}, must be {(m,)}: one value for each "
-                "situation of the view"
+                f"state variable {name!r}: shape {values.shape}, must be {(m,)}: one value for "
+                "each situation of the view"
             )
-        if found.dtype.kind not in "fiu" or not np.isfinite(found).all():
+        if values.dtype.kind not in "fiu" or not np.isfinite(values).all():
             raise ValueError(f"state variable {name!r}: not all of its values are finite numbers")
-        return found
+        return values
 
 
 def sensed(
     things: Sequence[StateVariable],
     trusted: Sequence[bool],
-    view: Situations,
+    view: Any,
     bodies: Sequence[int],
 ) -> FloatArray:
     """Return state variables ``(len(bodies), m, variables)`` of bodies, by the functions alone.
@@ -90,17 +77,17 @@ def sensed(
     Those that are the same for all bodies are computed once; what functions that are not trusted
     return is checked.
     """
-    found = np.empty((len(bodies), view.n_situations, len(things)))
+    values = np.empty((len(bodies), view.n_situations, len(things)))
     guarded = view if all(trusted) else view.guarded()
     for column, (thing, is_trusted) in enumerate(zip(things, trusted, strict=True)):
         for k, body in enumerate(bodies):
             if k and thing.common:
-                found[k, :, column] = found[0, :, column]
+                values[k, :, column] = values[0, :, column]
             elif is_trusted:
-                found[k, :, column] = thing(view, body)
+                values[k, :, column] = thing(view, body)
             else:
-                found[k, :, column] = thing.checked(guarded, body)
-    return found
+                values[k, :, column] = thing.checked(guarded, body)
+    return values
 
 
 def state_variable(
@@ -138,7 +125,7 @@ def state_variable(
     return described
 
 
-def found(registry: Registry, name: str) -> StateVariable:
+def find_variable(registry: Registry, name: str) -> StateVariable:
     """Return a state variable of a registry by name, or by where it is.
 
     Raises

@@ -136,7 +136,7 @@ Topology = Annotated[TopologySettings, Plugged(TOPOLOGIES, parse)]
 def build(
     settings: TopologySettings | str | Mapping[str, Any],
     agents: Sequence[str],
-    groups: Sequence[Sequence[int]] | None = None,
+    bodies: Sequence[Sequence[int]] | None = None,
 ) -> Hierarchy:
     """Build the hierarchy of `settings` over named agents.
 
@@ -146,13 +146,13 @@ def build(
         Any topology's settings; or a text or a table for `parse`.
     agents
         Distinct names, in agent order.
-    groups
+    bodies
         Agent indices, from 0, by body (robot), each once; none: every agent is a body of its own.
 
     Raises
     ------
     ValueError
-        If the settings or the groups do not fit the agents, or the settings do not make a
+        If the settings or the bodies do not fit the agents, or the settings do not make a
         hierarchy. One line; it names the culprit.
 
     Examples
@@ -168,11 +168,11 @@ def build(
     try:
         if not agents:
             raise ValueError("no agents")
-        bodies = [(a,) for a in agents] if groups is None else _named(agents, groups)
+        named = [(a,) for a in agents] if bodies is None else _named(agents, bodies)
         if settings.kind in TOPOLOGIES.built_in:
-            graph = settings.build(agents, bodies)
+            graph = settings.build(agents, named)
         else:
-            graph = files.call(settings.build, title.rpartition(":")[2], agents, bodies)
+            graph = files.call(settings.build, title.rpartition(":")[2], agents, named)
             graph = from_networkx(graph, agents, neighbours=True)
         directed = graph.is_directed()
         return Hierarchy(agents, graph.edges if directed else (), () if directed else graph.edges)
@@ -213,18 +213,18 @@ def read(path: str) -> nx.DiGraph | TopologySettings:
         raise ValueError(f"{path}: {error}") from None
 
 
-def _named(agents: Names, groups: Sequence[Any]) -> Bodies:
+def _named(agents: Names, bodies: Sequence[Any]) -> Bodies:
     """Return the names of agents given by index, by body; refuse what is no index."""
     named = []
-    for group in groups:
-        if isinstance(group, str) or not isinstance(group, Iterable):
-            raise ValueError(f"groups: {group!r} is no group, allowed: a sequence of agent indices")
-        for i in group:
+    for body in bodies:
+        if isinstance(body, str) or not isinstance(body, Iterable):
+            raise ValueError(f"bodies: {body!r} is no body, allowed: a sequence of agent indices")
+        for i in body:
             if not isinstance(i, int | np.integer) or not 0 <= i < len(agents):
                 last = len(agents) - 1
-                raise ValueError(f"groups: {i!r} is no agent index, allowed: 0 to {last}")
-        named.append([agents[i] for i in group])
-    check_names(names_of(named), agents, "groups")
+                raise ValueError(f"bodies: {i!r} is no agent index, allowed: 0 to {last}")
+        named.append([agents[i] for i in body])
+    check_names(names_of(named), agents, "bodies")
     return named
 
 

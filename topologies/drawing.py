@@ -30,14 +30,14 @@ ACROSS, DOWN = 1.7, 0.44
 MOST_IMPLIED = 40
 """Edges implied by others that are still drawn: more would only darken the picture."""
 COLOURS = ("#cfe2f3", "#fde5cd", "#d9ead3", "#ead1dc", "#fff2cc", "#d0e0e3", "#e6d5c3", "#d9d2e9")
-"""Fill of the agents by group, again from the start when they run out."""
+"""Fill of the agents by body, again from the start when they run out."""
 
 
 def draw(
     hierarchy: Hierarchy,
     path: Path | str,
     *,
-    groups: Sequence[Sequence[int]] | None = None,
+    bodies: Sequence[Sequence[int]] | None = None,
     title: str = "",
 ) -> None:
     """Write a picture of a hierarchy: SVG, PNG or PDF by the suffix of `path`.
@@ -48,7 +48,7 @@ def draw(
         What to draw.
     path
         The file to write.
-    groups
+    bodies
         Agent indices by robot: one colour each. None: one colour.
     title
         Stands above the picture.
@@ -73,13 +73,13 @@ def draw(
     axes.set_xlim(centre - width / 2, centre + width / 2)
     axes.set_ylim(-high[1] - HEIGHT / 2 - 0.45, -low[1] + HEIGHT / 2 + 0.65)
     _arrows(axes, hierarchy, places)
-    _agents(axes, hierarchy, places, groups)
+    _agents(axes, hierarchy, places, bodies)
     top, bottom = axes.get_ylim()[1], axes.get_ylim()[0]
     axes.text(centre, top - 0.27, title, ha="center", va="center", fontsize=10)
     axes.text(
         centre,
         bottom + 0.17,
-        _note(hierarchy, groups),
+        _note(hierarchy, bodies),
         ha="center",
         va="center",
         fontsize=7.5,
@@ -179,15 +179,15 @@ def _implied(hierarchy: Hierarchy) -> set[tuple[int, int]]:
     return set(hierarchy.edges) - set(nx.transitive_reduction(nx.DiGraph(hierarchy.edges)).edges)
 
 
-def _note(hierarchy: Hierarchy, groups: Sequence[Sequence[int]] | None) -> str:
+def _note(hierarchy: Hierarchy, bodies: Sequence[Sequence[int]] | None) -> str:
     if hierarchy.neighbours:
         return "lines: neighbours, who decide at the same time"
     implied = len(_implied(hierarchy))
     grey = "grey arrows: implied by the others"
     hidden = f"{implied} edges implied by the others are not shown"
     notes = ["numbers: order of decision"]
-    if groups and max(map(len, groups)) > 1:
-        notes.append("colours: robots")
+    if bodies and max(map(len, bodies)) > 1:
+        notes.append("colours: bodies")
     if implied:
         notes.append(hidden if implied > MOST_IMPLIED else grey)
     return "; ".join(notes)
@@ -231,10 +231,10 @@ def _route(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray, float]
     return a + edge, b - edge, 0.12 if abs(across) > 1.5 * ACROSS else 0.0
 
 
-def _agents(axes, hierarchy: Hierarchy, places: FloatArray, groups) -> None:  # type: ignore[no-untyped-def]
+def _agents(axes, hierarchy: Hierarchy, places: FloatArray, bodies) -> None:  # type: ignore[no-untyped-def]
     from matplotlib.patches import FancyBboxPatch
 
-    group_of = {i: g for g, members in enumerate(groups or []) for i in members}
+    body_of = {i: g for g, members in enumerate(bodies or []) for i in members}
     for rank, i in enumerate(hierarchy.order):
         x, y = places[i][0], -places[i][1]
         axes.add_patch(
@@ -243,7 +243,7 @@ def _agents(axes, hierarchy: Hierarchy, places: FloatArray, groups) -> None:  # 
                 WIDTH - 0.1,
                 HEIGHT - 0.1,
                 boxstyle="round,pad=0.05",
-                facecolor=COLOURS[group_of.get(i, 0) % len(COLOURS)],
+                facecolor=COLOURS[body_of.get(i, 0) % len(COLOURS)],
                 edgecolor="#666666",
                 linewidth=0.8,
                 zorder=3,

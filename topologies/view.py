@@ -28,10 +28,10 @@ MOST_AGENTS = 1000
 
 @dataclass(frozen=True)
 class Crew:
-    """Agents by name, and their groups: what a topology is built over."""
+    """Agents by name, and their bodies: what a topology is built over."""
 
     agents: tuple[str, ...]
-    groups: tuple[tuple[int, ...], ...]
+    bodies: tuple[tuple[int, ...], ...]
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class HierarchyView:
     ----------
     text
         The topology as the user wrote it.
-    hierarchy, groups
+    hierarchy, bodies
         What it makes, and its agents by body.
     tries
         Joint actions that each agent tries per step, in agent order.
@@ -50,7 +50,7 @@ class HierarchyView:
 
     text: str
     hierarchy: Hierarchy
-    groups: tuple[tuple[int, ...], ...]
+    bodies: tuple[tuple[int, ...], ...]
     tries: tuple[int, ...]
 
     @property
@@ -65,7 +65,7 @@ class HierarchyView:
         """Write a picture."""
         from .drawing import draw
 
-        draw(self.hierarchy, path, groups=self.groups, title=self.title)
+        draw(self.hierarchy, path, bodies=self.bodies, title=self.title)
 
 
 def view(
@@ -90,12 +90,12 @@ def view(
     settings = parse(text)
     named = named_by(settings) if per == "actuator" else ()
     team = team_of(agents, robots, wheels, named)
-    names, blocks = joint_blocks(team.agents, team.groups, actions, per)
-    groups = team.groups if per == "actuator" else tuple((i,) for i in range(len(names)))
-    hierarchy = build(settings, names, groups)
+    names, blocks = joint_blocks(team.agents, team.bodies, actions, per)
+    bodies = team.bodies if per == "actuator" else tuple((i,) for i in range(len(names)))
+    hierarchy = build(settings, names, bodies)
     own = actions ** len(blocks[0])
     tries = tuple(own ** (1 + count) for count in below_counts(hierarchy))
-    return HierarchyView(text, hierarchy, groups, tries)
+    return HierarchyView(text, hierarchy, bodies, tries)
 
 
 def named_by(settings: TopologySettings) -> tuple[str, ...]:
@@ -115,7 +115,7 @@ def named_by(settings: TopologySettings) -> tuple[str, ...]:
 def team_of(
     agents: int | None, robots: int | None, wheels: int | None, named: Sequence[str] = ()
 ) -> Crew:
-    """Return agents and groups for the numbers asked for.
+    """Return agents and bodies for the numbers asked for.
 
     Agents are named ``robot1.left``, ``robot1.right`` for two wheels, ``robot1.wheel1`` for more,
     ``agent1`` for one; but as in `named` if the topology names others.
@@ -147,12 +147,12 @@ def team_of(
     own = tuple(f"robot{r + 1}.{name}" for r in range(robots) for name in names)
     if wheels == 1:
         own = tuple(f"agent{i + 1}" for i in range(n))
-    groups = tuple(tuple(range(r * wheels, (r + 1) * wheels)) for r in range(robots))
+    bodies = tuple(tuple(range(r * wheels, (r + 1) * wheels)) for r in range(robots))
     if named and not set(named) <= set(own):
         if len(named) != n:
             raise ValueError(f"the topology names {len(named)} agents, {n} are asked for")
         own = tuple(named)
-    return Crew(own, groups)
+    return Crew(own, bodies)
 
 
 def kinds(form: Form) -> str:

@@ -53,18 +53,18 @@ def carried_rows(former: Scenario, scenario: Scenario, *, shared: bool) -> IntAr
     trained, acting = (
         f"{len(s.agents)} agents over {s.state_space.name!r}" for s in (former, scenario)
     )
-    said = f"a team trained with {trained} cannot act with {acting}"
+    problem = f"a team trained with {trained} cannot act with {acting}"
     if former.state_space != scenario.state_space:
-        raise ValueError(f"{said}: the state spaces differ")
+        raise ValueError(f"{problem}: the state spaces differ")
     if former.action_set != scenario.action_set:
-        raise ValueError(f"{said}: the actions differ")
+        raise ValueError(f"{problem}: the actions differ")
     owners, others = (
         list(dict.fromkeys(roles_of(s) if shared else s.agents)) for s in (former, scenario)
     )
     if set(owners) != set(others):
         raise ValueError(
-            f"{said}: their roles are {', '.join(owners)}, and {', '.join(others)}"
+            f"{problem}: their roles are {', '.join(owners)}, and {', '.join(others)}"
             if shared
-            else f"{said}: learner.weights = 'own'; with 'role', agents of a role share theirs"
+            else f"{problem}: learner.weights = 'own'; with 'role', agents of a role share theirs"
         )
     return np.array([owners.index(owner) for owner in others])

@@ -20,7 +20,7 @@ import numpy as np
 from ...core.interface.spaces import StateSpace, Variable
 from ...core.numerics.arrays import FloatArray
 from ...core.plugins.registry import Registry
-from ..state_variables import found, sensed
+from ..state_variables import find_variable, sensed
 from .kernels import COMPILED, columns
 from .view import ChainView
 
@@ -50,7 +50,7 @@ class ChainStates:
     """
 
     def __init__(self, names: Sequence[str]) -> None:
-        self._things = [found(CHAIN_VARIABLES, name) for name in names]
+        self._things = [find_variable(CHAIN_VARIABLES, name) for name in names]
         variables = tuple(thing.variable for thing in self._things)
         distinct = {"speed", *(variable.name for variable in variables)}
         if not names or len(distinct) <= len(names):

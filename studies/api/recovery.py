@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -32,17 +32,12 @@ REGAINED = 0.9
 """Share of what was lost just after the onset that counts as recovered when it is back."""
 
 
-class Policy(Protocol):
-    """What may act: a function of an observation, or of observations by agent.
+Policy = Callable[[Any], Any]
+"""What may act: a function of an observation, or of observations by agent, that returns the action.
 
-    A model of stable-baselines3 will do, whose ``predict`` is asked without exploration. Whoever
-    has ``begin(seed)`` is told that a run begins, with or without faults; whoever has ``observe``
-    is told reward, observation, terminated and truncated after every step, and may learn.
-    """
-
-    def __call__(self, observation: Any) -> Any:
-        """Return the action."""
-        ...
+A model of stable-baselines3 will do, whose ``predict`` is asked without exploration. Whoever has
+``begin(seed)`` is told that a run begins, with or without faults; whoever has ``observe`` is told
+reward, observation, terminated and truncated after every step, and may learn."""
 
 
 class RandomPolicy:

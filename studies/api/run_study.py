@@ -5,10 +5,9 @@ Nothing is printed here: who wants to see how it goes passes an `Observer`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import Protocol
 
 from ...core.interface.measures import Measure
 from ...core.plugins.sources import is_reference
@@ -19,40 +18,9 @@ from ..trials.arrangement import check
 from ..trials.keeping import open_to_run, pending
 from ..trials.trial import trials_of
 from ..workers.loggers import logged, make
-from ..workers.runner import Outcome, run_trials
+from ..workers.runner import Observer, run_trials
 from ..workers.worker import RunTrial
 from ..workers.workers import Backend, start_workers
-
-
-class Observer(Protocol):
-    """Who is told how a study goes."""
-
-    def announce(self, spec: Spec, directory: Path, processes: int) -> None:
-        """Learn what is about to be run, if anything is left to run."""
-        ...
-
-    def note(self, line: str) -> None:
-        """Learn of something out of the ordinary, in one line."""
-        ...
-
-    def follow(self, outcomes: Iterable[Outcome], total: int, done: int) -> None:
-        """Consume the outcomes, which runs the trials; `done` of `total` were run before."""
-        ...
-
-
-class Silent:
-    """An observer that tells nobody."""
-
-    def announce(self, spec: Spec, directory: Path, processes: int) -> None:
-        """See `Observer.announce`."""
-
-    def note(self, line: str) -> None:
-        """See `Observer.note`."""
-
-    def follow(self, outcomes: Iterable[Outcome], total: int, done: int) -> None:
-        """See `Observer.follow`."""
-        for _ in outcomes:
-            pass
 
 
 @contextmanager
@@ -99,7 +67,7 @@ def run_study(
     KeyboardInterrupt
         If it is interrupted. What has finished is kept; the same call continues.
     """
-    observer = Silent() if observer is None else observer
+    observer = observer or Observer()
     measures, trials = examine(spec), trials_of(spec)
     with (
         start_workers(backend, jobs, address, len(trials)) as workers,

@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
     from ..spec.spec import Spec
-    from .run_study import Observer
+    from ..workers.runner import Observer
 
 Place = str | PathLike[str]
 """Of a directory or a file."""
@@ -312,7 +312,7 @@ def run(
     progress
         Whether to show how it goes.
     observer
-        Who is told how it goes instead, see `nested_agents.studies.api.run_study.Observer`.
+        Who is told how it goes instead, see `nested_agents.studies.workers.runner.Observer`.
 
     Warns
     -----
@@ -325,11 +325,12 @@ def run(
         If the study cannot be run or continued; one line says why.
     """
     from ..spec.spec import Spec
-    from .run_study import Silent, run_study
+    from ..workers.runner import Observer
+    from .run_study import run_study
 
     out = Path(out)
     spec = Spec.meant(spec, study=out)
-    told = observer or (Terminal() if progress else Silent())
+    told = observer or (Terminal() if progress else Observer())
     with run_study(
         spec, out, jobs=jobs, backend=backend, address=address, retry_failed=retry_failed,
         accept_code=accept_code, observer=told, loggers=loggers,

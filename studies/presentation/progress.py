@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..spec.outline import Outline
-from ..workers.runner import Outcome
+from ..workers.runner import Observer
+from ..workers.worker import Outcome
 from .words import count, duration
 
 if TYPE_CHECKING:
@@ -25,8 +26,8 @@ def say(line: str) -> None:
     print(line, file=sys.stderr, flush=True)
 
 
-class Terminal:
-    """Shows how a study goes, see `nested_agents.studies.api.run_study.Observer`.
+class Terminal(Observer):
+    """Shows how a study goes.
 
     On standard error; in a notebook as a bar below the cell.
     """

@@ -19,7 +19,7 @@ def damage(path: Path) -> str | None:
     Raises
     ------
     SpecError
-        If it cannot be read for another reason, or is sound but no study's.
+        If it cannot be read for another reason, is of a newer version, or is no study's.
     """
     if bereft(path):
         return "its log is there without it"
@@ -59,10 +59,16 @@ def fault(path: Path, db: sqlite3.Connection) -> str | None:
             return "it has no tables" if pages > 1 else None
         if not tables & {"meta", "trials", *OF_A_TRIAL}:
             raise SpecError(f"{path}: is a database, but no study; use another directory")
-        (said,) = db.execute("PRAGMA integrity_check(1)").fetchone()
-        if said != "ok":
-            return " ".join(str(said).replace("*** in database main ***", "").split())
+        (answer,) = db.execute("PRAGMA integrity_check(1)").fetchone()
+        if answer != "ok":
+            return " ".join(str(answer).replace("*** in database main ***", "").split())
         noted = dict(db.execute("SELECT key, value FROM meta").fetchall())
+        version = str(noted.get("results_version"))
+        if version.isdecimal() and int(version) > RESULTS_VERSION:  # its checksums may be others
+            raise SpecError(
+                f"{path}: holds results of version {version}, this is version {RESULTS_VERSION}; "
+                "a newer nested-agents reads it"
+            )
         if "planned" not in tables and noted.get("results_version") != str(RESULTS_VERSION):
             return None  # of a version that kept less; what it holds is not read
         # Studies begun before there were checksums have none.

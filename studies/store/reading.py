@@ -99,8 +99,8 @@ class Reading:
         return {name: (text, tree) for name, (text, tree) in self._table("code").items()}
 
     def noted(self) -> Noted:
-        """Return what the study is, but for its measures and trials."""
-        return Noted(self.spec(), self.settings(), self.columns(), self.sources())
+        """Return what the study is, but for its trials and code."""
+        return Noted(self.spec(), self.settings(), self.columns(), self.sources(), self.measures())
 
     def other_version(self) -> str | None:
         """Return of which version the results are, in one line, if they are not of this one."""

@@ -13,7 +13,6 @@ import json
 import os
 import threading
 import time
-from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
@@ -70,33 +69,23 @@ class Running:
             os.replace(temporary, self._path)
 
 
-@dataclass(frozen=True)
-class Mark:
-    """What a mark says.
+def look(directory: Path) -> tuple[int, dict[str, float]] | None:
+    """Return what is running in the directory of a study; None if nothing is.
 
-    Attributes
-    ----------
-    processes
-        How many trials run at a time.
-    seconds
-        How long each running trial has been running so far [s], by identity.
+    Returns
+    -------
+    tuple
+        How many trials run at a time, and by identity how long each has been running so far [s].
     """
-
-    processes: int
-    seconds: dict[str, float]
-
-
-def look(directory: Path) -> Mark | None:
-    """Return what is running in the directory of a study; None if nothing is."""
     if not _locked(directory / LOCK):
         return None
     try:
-        found = json.loads((directory / MARK).read_text())
+        mark = json.loads((directory / MARK).read_text())
         now = time.time()
-        seconds = {identity: max(now - begun, 0.0) for identity, begun in found["begun"].items()}
-        return Mark(found["processes"], seconds)
+        seconds = {identity: max(now - begun, 0.0) for identity, begun in mark["begun"].items()}
+        return mark["processes"], seconds
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        return Mark(1, {})  # begins or ends just now
+        return 1, {}  # begins or ends just now
 
 
 def _locked(path: Path) -> bool:

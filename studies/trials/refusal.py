@@ -100,21 +100,7 @@ def _of_study(store: Reading, spec: Spec, noted: Noted, accept_code: bool) -> st
             f"{copy}: is not the spec of the study beside it: {found}; if you did not edit it, it "
             f"is damaged: nested-agents retry {store.directory} goes on by the database"
         )
-    if found is not None:
-        return f"{store.directory}: holds another study: {found}"
-    return _other_measures(store, noted.measures)
-
-
-def _other_measures(store: Reading, measures: Sequence[Measure]) -> str | None:
-    """Return in one line that episodes are measured otherwise here; None if they are not."""
-    kept = store.measures()
-    if list(map(column_of, kept)) == list(map(column_of, measures)):
-        return None
-    there, here = (", ".join(m.name for m in group) for group in (kept, measures))
-    return (
-        f"{store.directory}: holds episodes measured by {there}; its scenarios now declare "
-        f"{here}, or mean something else by it; use another directory"
-    )
+    return f"{store.directory}: holds another study: {found}" if found else None
 
 
 def difference(old: Noted, new: Noted) -> str | None:
@@ -150,6 +136,9 @@ def _differences(old: Noted, new: Noted) -> Iterator[str]:
     # What tells conditions apart are the columns of every table.
     keys, new_keys = (list(next(iter(noted.columns.values()))) for noted in (old, new))
     yield from _unequal("columns", keys, new_keys)
+    if old.measures and [*map(column_of, old.measures)] != [*map(column_of, new.measures)]:
+        there, here = (", ".join(m.name for m in noted.measures) for noted in (old, new))
+        yield f"episodes are measured by {there} there, {here} here, or these mean something else"
     for label in [label for label in new.conditions if label in old.conditions]:
         before, after = (dict(flat(noted.conditions[label])) for noted in (old, new))
         for key in sorted(before.keys() | after.keys()):

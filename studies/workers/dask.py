@@ -10,18 +10,17 @@ from __future__ import annotations
 import logging
 import time
 import warnings
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from itertools import islice
-from queue import Empty, SimpleQueue
 
 from distributed import CancelledError, Client, Future, KilledWorker, LocalCluster
 from distributed.comm.core import CommClosedError
 
 from ..errors import SpecError
 from ..trials.trial import Trial
-from .interrupts import deaf
-from .worker import ONE_THREAD, Arrival, RunTrial, UnlikeWorkerError, attempt_alike, versions
+from .arrivals import Workers
+from .interrupts import ignore_interrupts
+from .worker import ONE_THREAD, Outcome, RunTrial, UnlikeWorkerError, attempt_alike, versions
 
 CONNECT = 10.0
 """How long to try to reach a scheduler [s]."""
@@ -29,11 +28,8 @@ CONNECT = 10.0
 PATIENCE = 60.0
 """How long to wait for the first worker, or for another one when all are gone [s]."""
 
-POLL = 1.0
-"""How often to look for workers while no trial finishes [s]."""
 
-
-class DaskWorkers:
+class DaskWorkers(Workers):
     """Workers of a Dask cluster; see `Workers`. Use `DaskWorkers.local` or `DaskWorkers.at`.
 
     Parameters
@@ -48,13 +44,14 @@ class DaskWorkers:
 
     def __init__(self, client: Client, most: int | None, name: str) -> None:
         self._client, self._most, self._name = client, most, name
+        self._alone_since: float | None = None  # when there was no worker any more
 
     @classmethod
     @contextmanager
     def local(cls, jobs: int) -> Iterator[DaskWorkers]:
         """Start a cluster of `jobs` workers on this machine; it ends with the context."""
         with _quiet():
-            with deaf():
+            with ignore_interrupts():
                 cluster = LocalCluster(
                     n_workers=jobs,
                     threads_per_worker=1,
@@ -93,63 +90,43 @@ class DaskWorkers:
             found = len(self._client.nthreads())
         except (OSError, ValueError) as error:
             raise self._gone() from error
+        now = time.monotonic()
+        if found:
+            self._alone_since = None
+        elif self._alone_since is None:
+            self._alone_since = now
+        elif now - self._alone_since > PATIENCE:
+            raise SpecError(
+                f"{self._name} has had no worker for {PATIENCE:.0f} s; what has finished "
+                "is kept, the same command continues"
+            )
         return found if self._most is None else min(found, self._most)
 
-    def arrivals(
-        self, trials: Sequence[Trial], run_trial: RunTrial, started: Callable[[str], None]
-    ) -> Generator[Arrival]:
-        """See `Workers.arrivals`."""
-        waiting, expected = iter(trials), versions()
-        running: dict[Future, Trial] = {}
-        finished: SimpleQueue[Future] = SimpleQueue()
-        seen = time.monotonic()
-        left = len(trials)
-        try:
-            while left:
-                processes = self.processes
-                for trial in islice(waiting, max(processes - len(running), 0)):
-                    future = self._client.submit(
-                        attempt_alike, expected, run_trial, trial, pure=False
-                    )
-                    running[future] = trial
-                    started(trial.identity)
-                    future.add_done_callback(finished.put)
-                if processes:
-                    seen = time.monotonic()
-                elif time.monotonic() - seen > PATIENCE:
-                    raise SpecError(
-                        f"{self._name} has had no worker for {PATIENCE:.0f} s; what has finished "
-                        "is kept, the same command continues"
-                    )
-                try:
-                    future = finished.get(timeout=POLL)
-                except Empty:
-                    continue
-                try:
-                    arrival = self._fetch(future, running[future])
-                except TimeoutError:
-                    # The worker that held the result died, and the trial runs once more.
-                    future.add_done_callback(finished.put)
-                    continue
-                del running[future]
-                left -= 1
-                yield arrival
-        finally:
-            with suppress(OSError, ValueError, CancelledError):
-                self._client.cancel(list(running), force=True)
+    def submit(self, run_trial: RunTrial, trial: Trial) -> Future:
+        """See `Workers.submit`."""
+        return self._client.submit(attempt_alike, versions(), run_trial, trial, pure=False)
 
-    def _fetch(self, future: Future, trial: Trial) -> Arrival:
+    def fetch(self, future: Future, trial: Trial) -> Outcome | None:
+        """See `Workers.fetch`."""
         try:
-            arrival: Arrival = future.result(timeout=CONNECT)
+            outcome: Outcome = future.result(timeout=CONNECT)
+        except TimeoutError:
+            return None  # the worker that held the result died
         except KilledWorker:
-            return Arrival(trial, None, f"killed, in {self._name}", 0.0, lost=True)
+            self._alone_since = None
+            return Outcome(trial, f"killed, in {self._name}", 0.0, lost=True)
         except UnlikeWorkerError as error:
             raise SpecError(f"{self._name}: {error}") from None
         except (CancelledError, CommClosedError):
             raise self._gone() from None
         except ImportError as error:
             raise SpecError(f"{self._name}: a worker cannot begin: {error}") from None
-        return arrival
+        return outcome
+
+    def stop(self, futures: Sequence[Future]) -> None:
+        """See `Workers.stop`."""
+        with suppress(OSError, ValueError, CancelledError):
+            self._client.cancel(list(futures), force=True)
 
     def _gone(self) -> SpecError:
         return SpecError(

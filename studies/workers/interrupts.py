@@ -20,7 +20,7 @@ def undisturbed() -> Iterator[None]:
 
 
 @contextmanager
-def deaf() -> Iterator[None]:
+def ignore_interrupts() -> Iterator[None]:
     """Ignore Ctrl-C, as the processes started meanwhile will do for ever: it is for the parent."""
     with _handling(signal.SIG_IGN):
         yield

@@ -17,7 +17,7 @@ from ...core.plugins.registry import Registry
 from ..errors import SpecError
 from ..spec.spec import Spec
 from ..trials.trial import Trial, TrialResult
-from .runner import Outcome
+from .worker import Outcome
 
 LOGGERS = Registry("logger", {})
 """Loggers by name."""

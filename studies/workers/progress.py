@@ -61,13 +61,13 @@ def progress(store: Store) -> Progress:
             damaged=tuple(store.notes),
             refusal=refusal,
         )
-    mark = look(store.directory)
-    begun = {} if mark is None else mark.seconds
+    now = look(store.directory)
+    begun = {} if now is None else now[1]
     pending = [trial for trial in trials if trial.identity not in states]
     running = [trial for trial in pending if trial.identity in begun]
     left = [trial for trial in pending if trial.identity not in begun]
     usual = cores() if left else 0
-    processes = usual if mark is None else mark.processes
+    processes = usual if now is None else now[0]
     seconds = _estimate(
         store.mean_seconds(),
         [trial.condition for trial in left],

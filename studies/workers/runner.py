@@ -5,44 +5,38 @@ A trial whose worker died is run again when the others are done, alone, up to `A
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterable, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..store.running import Running
 from ..store.store import Store
+from .arrivals import Workers
 from .interrupts import undisturbed
-from .worker import Arrival, RunTrial
-from .workers import Workers
+from .worker import Outcome, RunTrial
 
 if TYPE_CHECKING:
+    from ..spec.spec import Spec
     from ..trials.trial import Trial, TrialResult
 
 ATTEMPTS = 2
 """How often a trial is run alone whose worker has died."""
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """What became of a trial: its result is in the store already.
+class Observer:
+    """Is told how a study goes; this one tells nobody."""
 
-    Attributes
-    ----------
-    trial
-        The trial.
-    error
-        The traceback, if it failed.
-    seconds
-        How long it took.
-    result
-        What it measured, if it did not fail.
-    """
+    def announce(self, spec: Spec, directory: Path, processes: int) -> None:
+        """Learn what is about to be run, if anything is left to run."""
 
-    trial: Trial
-    error: str | None
-    seconds: float
-    result: TrialResult | None = None
+    def note(self, line: str) -> None:
+        """Learn of something out of the ordinary, in one line."""
+
+    def follow(self, outcomes: Iterable[Outcome], total: int, done: int) -> None:
+        """Consume the outcomes, which runs the trials; `done` of `total` were run before."""
+        for _ in outcomes:
+            pass
 
 
 def run_trials(
@@ -66,34 +60,35 @@ def run_trials(
     lost: list[Trial] = []
     with Running(store.directory, workers.processes) as running:
         with closing(workers.arrivals(trials, run_trial, running.begin)) as arriving:
-            for arrival in arriving:
-                running.end(arrival.trial.identity)
-                if arrival.lost:
-                    lost.append(arrival.trial)
+            for outcome in arriving:
+                running.end(outcome.trial.identity)
+                if outcome.lost:
+                    lost.append(outcome.trial)
                 else:
-                    yield _keep(store, arrival)
+                    _keep(store, outcome)
+                    yield outcome
         for trial in lost:
-            arrival = _alone(trial, run_trial, workers, running)
+            outcome = _alone(trial, run_trial, workers, running)
             running.end(trial.identity)
-            yield _keep(store, arrival)
+            _keep(store, outcome)
+            yield outcome
 
 
-def _alone(trial: Trial, run_trial: RunTrial, workers: Workers, running: Running) -> Arrival:
+def _alone(trial: Trial, run_trial: RunTrial, workers: Workers, running: Running) -> Outcome:
     for _ in range(ATTEMPTS):
         with closing(workers.arrivals([trial], run_trial, running.begin)) as arriving:
-            (arrival,) = arriving
-        if not arrival.lost:
-            return arrival
-    return arrival._replace(error=f"its worker died {ATTEMPTS} times: {arrival.error}")
+            (outcome,) = arriving
+        if not outcome.lost:
+            return outcome
+    return outcome._replace(error=f"its worker died {ATTEMPTS} times: {outcome.error}")
 
 
-def _keep(store: Store, arrival: Arrival) -> Outcome:
+def _keep(store: Store, outcome: Outcome) -> None:
     with undisturbed():
-        if arrival.result is None:
-            store.fail(arrival.trial.planned, arrival.error or "")
+        if outcome.result is None:
+            store.fail(outcome.trial.planned, outcome.error or "")
         else:
-            save(store, arrival.trial, arrival.result, arrival.seconds)
-    return Outcome(arrival.trial, arrival.error, arrival.seconds, arrival.result)
+            save(store, outcome.trial, outcome.result, outcome.seconds)
 
 
 def save(store: Store, trial: Trial, result: TrialResult, total: float) -> None:

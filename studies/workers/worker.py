@@ -37,28 +37,18 @@ def cores() -> int:
     return int(cpu_count())
 
 
-class Arrival(NamedTuple):
-    """What comes back from a worker.
-
-    Attributes
-    ----------
-    trial
-        The trial.
-    result
-        What it measured, if it came to an end.
-    error
-        Its traceback if it failed; how its worker died if it is `lost`.
-    seconds
-        How long it took.
-    lost
-        Whether its worker died while it ran: perhaps its fault, perhaps not.
-    """
+class Outcome(NamedTuple):
+    """What became of a trial."""
 
     trial: Trial
-    result: TrialResult | None
     error: str | None
+    """Its traceback if it failed; how its worker died if it is `lost`."""
     seconds: float
+    """How long it took."""
+    result: TrialResult | None = None
+    """What it measured, if it came to an end."""
     lost: bool = False
+    """Whether its worker died while it ran: perhaps its fault, perhaps not."""
 
 
 class UnlikeWorkerError(Exception):
@@ -76,7 +66,7 @@ def begin(parent: int) -> None:
     threading.Thread(target=watch, daemon=True).start()
 
 
-def attempt(run_trial: RunTrial, trial: Trial) -> Arrival:
+def attempt(run_trial: RunTrial, trial: Trial) -> Outcome:
     """Run one trial; what goes wrong is returned as text.
 
     A scenario that calls ``sys.exit``, or raises KeyboardInterrupt, has failed like any other: a
@@ -88,8 +78,8 @@ def attempt(run_trial: RunTrial, trial: Trial) -> Arrival:
             result = run_trial(trial)
     except BaseException:
         error = storable(traceback.format_exc())
-        return Arrival(trial, None, error, time.perf_counter() - begin)
-    return Arrival(trial, result, None, time.perf_counter() - begin)
+        return Outcome(trial, error, time.perf_counter() - begin)
+    return Outcome(trial, None, time.perf_counter() - begin, result)
 
 
 def storable(error: str) -> str:
@@ -110,7 +100,7 @@ def storable(error: str) -> str:
     return f"{text[:half]}\n[... {left_out} characters left out ...]\n{text[-half:]}"
 
 
-def attempt_alike(expected: dict[str, str], run_trial: RunTrial, trial: Trial) -> Arrival:
+def attempt_alike(expected: dict[str, str], run_trial: RunTrial, trial: Trial) -> Outcome:
     """Run one trial on a worker that somebody else started, if it is as `expected`.
 
     Raises

@@ -6,43 +6,16 @@ trial, its bits are the same: each trial has a process to itself, linear algebra
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import Literal
 
 from ..errors import SpecError
-from .worker import Arrival, RunTrial, cores
-
-if TYPE_CHECKING:
-    from ..trials.trial import Trial
+from .arrivals import Workers
+from .worker import cores
 
 Backend = Literal["loky", "dask"]
 """``loky``: processes of this machine. ``dask``: workers of a Dask cluster."""
-
-
-class Workers(Protocol):
-    """Processes that run trials."""
-
-    @property
-    def processes(self) -> int:
-        """How many trials run at a time."""
-        ...
-
-    def arrivals(
-        self, trials: Sequence[Trial], run_trial: RunTrial, started: Callable[[str], None]
-    ) -> Generator[Arrival]:
-        """Run trials and yield what becomes of each, in whatever order; closing stops them.
-
-        Parameters
-        ----------
-        trials
-            The trials.
-        run_trial
-            Runs one of them; a module-level function, since workers import it by name.
-        started
-            Called with the identity of each trial when it is handed to a worker, by any thread.
-        """
-        ...
 
 
 def check_jobs(jobs: int) -> None:

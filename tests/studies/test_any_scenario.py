@@ -16,7 +16,7 @@ from nested_agents.scenarios.line_up import LineUp, LineUpSettings
 from nested_agents.studies.api.study import load
 from nested_agents.studies.catalogue import scaling
 from nested_agents.studies.catalogue.study import load_study
-from nested_agents.studies.cli import running
+from nested_agents.studies.cli import display
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.presentation.tables import tabulate
 from nested_agents.studies.report.replays import replays
@@ -193,7 +193,7 @@ def test_shapes_leaves_out_contact(carts):
 def test_what_is_not_recorded_is_not_replayed(study, capsys):
     with Store.open(study) as store:
         (remark,) = replays(store, trials_of(SPEC)).remarks
-    assert running._replays(load(study), SPEC.episodes) == []
+    assert list(display._replays(load(study))) == []
     assert remark == "Not shown, as the scenario records no episodes: 1; 2: seeds 0, 1."
     assert "no replay: Carts does not draw its episodes" in capsys.readouterr().err
 

@@ -87,8 +87,8 @@ def test_claims_are_written_for_latex_with_the_packages_they_need() -> None:
 
 def test_colours_of_a_drawn_hierarchy_are_explained(tmp_path) -> None:
     path = tmp_path / "teams.svg"
-    draw(Hierarchy("abcd", [("a", "b"), ("a", "c"), ("c", "d")]), path, groups=[(0, 1), (2, 3)])
-    assert "colours: robots" in path.read_text()
+    draw(Hierarchy("abcd", [("a", "b"), ("a", "c"), ("c", "d")]), path, bodies=[(0, 1), (2, 3)])
+    assert "colours: bodies" in path.read_text()
 
 
 def test_a_failure_after_the_last_episode_is_refused(tmp_path, capsys) -> None:

@@ -35,7 +35,7 @@ def test_agents_keep_apart(text: str, n: int) -> None:
 def test_a_picture_of_32_agents_names_all_and_fits_a_page(text: str, tmp_path: Path) -> None:
     hierarchy, groups = hierarchy_of(text, 32)
     path = tmp_path / "picture.svg"
-    draw(hierarchy, path, groups=groups, title=text)
+    draw(hierarchy, path, bodies=groups, title=text)
     root = ElementTree.parse(path).getroot()
     words = {"".join(element.itertext()).strip() for element in root.iter() if
              element.tag.endswith("text")}  # fmt: skip

@@ -26,9 +26,9 @@ ROBOTS = ((0, 1), (2, 3))
 ADAPTER = TypeAdapter(Topology)
 
 
-def edges(text: str, agents=AGENTS, groups=ROBOTS) -> set[str]:
+def edges(text: str, agents=AGENTS, bodies=ROBOTS) -> set[str]:
     """The edges that a string makes, as ``{"ab", ...}``."""
-    hierarchy = build(parse(text), agents, groups)
+    hierarchy = build(parse(text), agents, bodies)
     return {hierarchy.agents[a] + hierarchy.agents[b] for a, b in hierarchy.edges}
 
 
@@ -178,31 +178,31 @@ def test_a_graph_with_a_cycle_is_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    ("groups", "message"),
+    ("bodies", "message"),
     [
-        ([["a"], ["b"], ["c"], ["d"]], "groups: 'a' is no agent index, allowed: 0 to 3"),
-        ([(0, 1), (2, 9)], "groups: 9 is no agent index, allowed: 0 to 3"),
-        ([(0, 1), (2, -1)], "groups: -1 is no agent index, allowed: 0 to 3"),
-        ([(0, 1), (2, 3.0)], "groups: 3.0 is no agent index, allowed: 0 to 3"),
-        ([0, 1, 2, 3], "groups: 0 is no group, allowed: a sequence of agent indices"),
-        (["ab", "cd"], "groups: 'ab' is no group, allowed: a sequence of agent indices"),
-        ([(0, 1), (1, 2, 3)], "agent 'b' occurs more than once in groups"),
-        ([(0, 1), (2,)], "agent 'd' is missing from groups"),
+        ([["a"], ["b"], ["c"], ["d"]], "bodies: 'a' is no agent index, allowed: 0 to 3"),
+        ([(0, 1), (2, 9)], "bodies: 9 is no agent index, allowed: 0 to 3"),
+        ([(0, 1), (2, -1)], "bodies: -1 is no agent index, allowed: 0 to 3"),
+        ([(0, 1), (2, 3.0)], "bodies: 3.0 is no agent index, allowed: 0 to 3"),
+        ([0, 1, 2, 3], "bodies: 0 is no body, allowed: a sequence of agent indices"),
+        (["ab", "cd"], "bodies: 'ab' is no body, allowed: a sequence of agent indices"),
+        ([(0, 1), (1, 2, 3)], "agent 'b' occurs more than once in bodies"),
+        ([(0, 1), (2,)], "agent 'd' is missing from bodies"),
     ],
 )
 @pytest.mark.parametrize("text", ["tree:2", "chain:interleaved", "teams"])
 def test_groups_that_are_not_the_agents_indices_are_refused(
-    text: str, groups: list, message: str
+    text: str, bodies: list, message: str
 ) -> None:
     with pytest.raises(ValueError, match=r".") as refusal:
-        build(parse(text), AGENTS, groups)
+        build(parse(text), AGENTS, bodies)
     assert str(refusal.value) == f"topology {text.partition(':')[0]!r}: {message}"
 
 
 def test_groups_may_be_arrays() -> None:
-    groups = list(np.arange(4).reshape(2, 2))
+    bodies = list(np.arange(4).reshape(2, 2))
     assert (
-        build(parse("teams"), AGENTS, groups).edges == build(parse("teams"), AGENTS, ROBOTS).edges
+        build(parse("teams"), AGENTS, bodies).edges == build(parse("teams"), AGENTS, ROBOTS).edges
     )
 
 

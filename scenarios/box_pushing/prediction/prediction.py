@@ -200,7 +200,7 @@ class BoxPrediction:
             self.situation,
             robots=view.robots[0], box=view.box[0], speeds=self.commands(joint_action),
         )  # fmt: skip
-        return type(self)(reached, self.model, self.premises)
+        return BoxPrediction(reached, self.model, self.premises)
 
     @property
     def groups(self) -> tuple[tuple[int, ...], ...]:

@@ -18,7 +18,7 @@ import numpy as np
 
 from ....core.interface.spaces import StateSpace, Variable
 from ....core.numerics.arrays import FloatArray
-from ...state_variables import StateVariable, found, sensed
+from ...state_variables import StateVariable, find_variable, sensed
 from ..world.geometry import wrap
 from .kernels import COMPILED, Columns
 from .variables import STATE_VARIABLES
@@ -121,7 +121,7 @@ def listed(name: str, *shared: str) -> BoxStateSpace:
     ValueError
         If there is none, one is unknown or named twice.
     """
-    functions = tuple(found(STATE_VARIABLES, one) for one in shared)
+    functions = tuple(find_variable(STATE_VARIABLES, one) for one in shared)
     variables = (_SPEED, *(function.variable for function in functions))
     if not shared or len({variable.name for variable in variables}) != len(variables):
         raise ValueError(

@@ -149,6 +149,6 @@ def test_what_the_user_can_mend_is_one_line(said, arguments: tuple[str, ...], me
 
 
 def test_teams_and_numbers() -> None:
-    assert team_of(6, 2, None).groups == ((0, 1, 2), (3, 4, 5))
+    assert team_of(6, 2, None).bodies == ((0, 1, 2), (3, 4, 5))
     assert readable(999_999_999) == "999,999,999"
     assert readable(10**5000) == "1.000e5000"

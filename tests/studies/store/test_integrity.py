@@ -344,3 +344,15 @@ def test_a_damaged_copy_of_the_spec_is_no_other_study(study, before, after, caps
     assert error.count("\n") == 1
     assert f"{path}" in error
     assert f"it is damaged: nested-agents retry {study} goes on by the database" in error
+
+
+def test_a_study_of_a_newer_version_is_refused_and_left_as_it_is(study, capsys):
+    change(study, "UPDATE meta SET value = '99' WHERE key = 'results_version'")
+    before = (study / DATABASE).read_bytes()
+    with pytest.raises(SpecError, match="holds results of version 99, this is version"):
+        finish(study)
+    for command in ("results", "table", "status"):
+        assert main([command, str(study)]) == 2
+        assert "holds results of version 99" in capsys.readouterr().err
+    assert (study / DATABASE).read_bytes() == before
+    assert not list(study.glob("*.damaged-*"))

@@ -42,7 +42,8 @@ class Cluster:
         self.address = json.loads((folder / "scheduler.json").read_text())["address"]
 
     def start(self, *arguments):
-        environment = {**os.environ, "PYTHONPATH": str(Path(made_up.__file__).parent),
+        places = [str(Path(made_up.__file__).parent), os.environ.get("PYTHONPATH", "")]
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, places)),
                        "MADE_UP_MARK": str(self.mark)}  # fmt: skip
         process = subprocess.Popen(
             [DASK, *map(str, arguments)], env=environment, cwd=self.folder,
@@ -101,7 +102,8 @@ def test_a_worker_killed_in_a_cluster_costs_its_running_trial_only(cluster, tmp_
         assert content(store) == expected
     runs = Counter(line.split()[1] for line in cluster.mark.read_text().splitlines())
     assert set(runs) == {trial.identity for trial in trials}
-    assert sum(runs.values()) <= len(trials) + 1
+    # What it was running; and, if this test is slow, what it had run and nobody had fetched yet.
+    assert sum(runs.values()) <= len(trials) + 2
 
 
 def test_a_local_cluster_and_a_trial_that_kills_every_worker(tmp_path, expected):

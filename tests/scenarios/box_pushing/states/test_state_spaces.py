@@ -23,7 +23,7 @@ from nested_agents.scenarios.box_pushing.states.variables import STATE_VARIABLES
 from nested_agents.scenarios.box_pushing.states.view import View
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.geometry import wrap
-from nested_agents.scenarios.state_variables import StateVariable, found, sensed
+from nested_agents.scenarios.state_variables import StateVariable, find_variable, sensed
 
 GOAL = np.array([1.0, 0.0, 0.0])
 SQUARE = BOXES["square"].outline
@@ -217,7 +217,7 @@ def test_a_state_space_may_be_listed() -> None:
 
 def test_columns_are_those_of_names_that_the_kernel_knows() -> None:
     assert set(COMPILED) == set(STATE_VARIABLES.built_in)
-    assert all(found(STATE_VARIABLES, name).variable.name == name for name in COMPILED)
+    assert all(find_variable(STATE_VARIABLES, name).variable.name == name for name in COMPILED)
     with pytest.raises(AssertionError, match="not all of them are compiled"):
         Columns(["gap", "_COURSE"])
 
