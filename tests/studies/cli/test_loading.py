@@ -1,4 +1,4 @@
-"""Results are read without running again, watched and logged: the commands, with made-up results."""
+"""Results are read, watched and logged without running again: commands, with made-up results."""
 
 import shutil
 import sqlite3
