@@ -41,7 +41,7 @@ from nested_agents.scenarios.box_pushing.world.boxes import BoxSpec
 from nested_agents.studies.api import run_study as studies_run
 from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli.main import main as command_line
-from nested_agents.studies.spec.errors import SpecError
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.spec.toml import dumps
 from nested_agents.studies.store import durable

@@ -53,8 +53,8 @@ def heading_errors(robots: int, seed: int, episodes: int) -> FloatArray:
 def counts(robots: int, name: str, phase: str, condition: str) -> list[str]:
     """Return by bin how many of how many episodes succeeded."""
     results = published.load(claims.PUBLISHED / f"{name}.json").results
-    successes = results.phases[phase][condition]["success"]
-    errors = [heading_errors(robots, seed, successes.shape[1]) for seed in results.seeds[condition]]
+    successes = results.success(condition, phase)
+    errors = [heading_errors(robots, seed, successes.shape[1]) for seed in results.seeds(condition)]
     which = np.digitize(errors, EDGES[1:-1])
     return [
         f"{successes[which == k].sum():.0f} of {(which == k).sum()}" for k in range(len(EDGES) - 1)

@@ -17,10 +17,10 @@ from nested_agents.scenarios.box_pushing.states.variables import STATE_VARIABLES
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
 from nested_agents.scenarios.kinematic_chain.variables import CHAIN_VARIABLES
-from nested_agents.studies.api.frames import EPISODE_COLUMNS, TRIAL_COLUMNS
 from nested_agents.studies.cli.main import COMMANDS
 from nested_agents.studies.cli.main import nested_agents as program
 from nested_agents.studies.results.numbers import NUMBERS
+from nested_agents.studies.results.results import EPISODE_COLUMNS, TRIAL_COLUMNS
 from nested_agents.studies.spec.keys import tables
 from nested_agents.studies.spec.presets import PRESETS
 from nested_agents.studies.spec.toml import dumps
@@ -86,12 +86,13 @@ MODULES = {
         "state_variables", "checking.checker",
     )),
     "studies": ("What is measured, compared and drawn.", (
-        "api.study", "api.planning", "api.costs", "api.comparison", "api.recovery", "api.frames",
+        "api.study", "api.planning", "api.costs", "api.comparison", "api.recovery",
         "api.run_study",
         "errors", "spec.spec", "spec.keys", "spec.presets", "trials.trial",
         "trials.arrangement", "trials.session",
-        "store.store", "results.results", "results.statistics", "results.comparison",
-        "results.power", "results.summary", "catalogue.study", "cost.cost", "claims.claims",
+        "store.store", "results.results", "results.analysis", "results.statistics",
+        "results.comparison", "results.power", "results.summary", "catalogue.study", "cost.cost",
+        "claims.claims",
     )),
 }  # fmt: skip
 """The public modules of each package, by what the package is for."""

@@ -34,8 +34,8 @@ if __name__ == "__main__":
         results = read(store)
 
     figure, ax = plt.subplots(figsize=(6, 3), layout="constrained")
-    for style, (label, arrays) in zip(("-", "--"), results.training.items(), strict=True):
-        spread = arrays["final_spread_m"].mean(axis=0)
+    for style, label in zip(("-", "--"), results.conditions, strict=True):
+        spread = results.values(label, "final_spread_m").mean(axis=0)
         ax.plot(range(1, 1 + len(spread)), spread, style, label=label)
     ax.set(xlabel="episode", ylabel="mean final spread [m]")
     ax.legend()

@@ -22,6 +22,7 @@ __version__: str
 
 _PLACES = {
     "ActionSet": ("core.interface.spaces", "ActionSet"),
+    "Analysis": ("studies.results.analysis", "Analysis"),
     "AnovaTDSettings": ("core.learners.anova", "AnovaTDSettings"),
     "BatchTDSettings": ("core.learners.batch", "BatchTDSettings"),
     "Blocks": ("core.interface.prediction", "Blocks"),

@@ -88,7 +88,7 @@ figure.get_layout_engine().set(w_pad=0.3, h_pad=0.2)
 for ax, game in zip(axes, ("climbing", "penalty:-100"), strict=True):
     for row, one in enumerate(reversed(teams)):
         (label,) = (c for c in study.conditions if c.startswith(one["name"]) and c.endswith(game))
-        share = na.rate(study.results.evaluation[label]["success"])
+        share = na.rate(study.results.success(label, "evaluation"))
         colour = COLOURS[0] if one["name"] == "nested, maximum" else "0.7"
         ax.barh(row, share.value, color=colour)
         ax.plot([share.low, share.high], [row, row], "k", linewidth=3)

@@ -23,8 +23,8 @@ from textwrap import fill
 from typing import Any, Literal, NoReturn
 
 from nested_agents.core.plugins.messages import closest
+from nested_agents.studies.errors import SpecError, show
 from nested_agents.studies.presentation.csv_text import write_csv
-from nested_agents.studies.spec.errors import SpecError, show
 
 from labs import LABS, Lab
 

@@ -60,7 +60,7 @@ figure, ax = plt.subplots(figsize=(16, 9), layout="constrained")
 figure.get_layout_engine().set(w_pad=0.3, h_pad=0.2)
 marks = zip(study.conditions, hierarchies, COLOURS, "osD", strict=False)
 for label, name, colour, marker in marks:
-    found = na.rate(study.results.evaluation[label]["success"])
+    found = na.rate(study.results.success(label, "evaluation"))
     ax.plot([costs[name]] * 2, [found.low, found.high], color=colour, linewidth=4)
     ax.plot(costs[name], found.value, marker, color=colour, markersize=20, label=name)
 ax.set(xscale="log", ylim=(-0.02, 1.02), xlim=(10, 1000))

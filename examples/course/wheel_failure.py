@@ -51,13 +51,12 @@ figure, ax = plt.subplots(figsize=(16, 9), layout="constrained")
 figure.get_layout_engine().set(w_pad=0.3, h_pad=0.2)
 without, with_model = study.conditions
 lines = {
-    "weights and self-model": (study.results.training[with_model], 0),
-    "weights alone": (study.results.training[without], 0),
-    "nothing adapts": (study.results.phases["weights kept"][without], FAILS),
+    "weights and self-model": (study.results.success(with_model), 0),
+    "weights alone": (study.results.success(without), 0),
+    "nothing adapts": (study.results.success(without, "weights kept"), FAILS),
 }
-for number, (name, (measures, first)) in enumerate(lines.items()):
-    success = measures["success"].mean(axis=0)
-    smooth = np.convolve(success, np.ones(3) / 3, mode="valid")
+for number, (name, (success, first)) in enumerate(lines.items()):
+    smooth = np.convolve(success.mean(axis=0), np.ones(3) / 3, mode="valid")
     ax.plot(
         first + 1 + np.arange(len(smooth)), smooth, color=COLOURS[number], marker="os^"[number],
         linestyle=STYLES[number], linewidth=4, markersize=12, label=name,

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...core.plugins.messages import closest
 from ...core.plugins.sources import Sources
-from ..catalogue.study import analysed, load_study
+from ..catalogue.study import analysed, drawn, load_study
 from ..errors import SpecError
 from ..presentation.progress import Terminal
 from ..presentation.tables import SummaryTable, tabulate
@@ -33,15 +33,14 @@ from ..results import published
 from ..results.contrasts import contrasts
 from ..results.power import SMALLEST, USUAL_DEVIATION
 from ..results.results import Results, read
-from ..results.selection import Where, selected, together
+from ..results.selection import Where, chosen, together
 from ..results.verdicts import power_text
 from ..spec.outline import Outline, sources_of
 from ..store import durable
 from ..store.store import Store
 from ..workers.workers import Backend
-from . import frames, replay
+from . import replay
 from .comparison import Comparison
-from .frames import Part
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -65,7 +64,7 @@ class StudyResults:
     outline
         What the study consists of.
     results
-        Its measures as arrays, by condition.
+        Its frames, and arrays of what they hold.
     failed
         Condition, seed and traceback of every failed trial.
     remarks
@@ -78,29 +77,29 @@ class StudyResults:
     remarks: tuple[str, ...] = ()
     _sources: Sources = field(default_factory=Sources, repr=False)
     _settings: Mapping[str, Any] = field(default_factory=dict, repr=False)
-    _parts: tuple[Part, ...] = ()
+    _directories: tuple[Path, ...] = ()
     _is_whole: bool = True
 
     @property
     def conditions(self) -> tuple[str, ...]:
         """Labels of the conditions of which any trial has finished."""
-        return tuple(self.results.seeds)
+        return self.results.conditions
 
     @property
     def trials(self) -> DataFrame:
-        """One row per trial: seconds [s] and numbers of the whole trial; needs pandas.
+        """One row per trial: its state, seconds [s] and numbers of the whole trial.
 
         What its columns are stands in ``trials.attrs["columns"]``.
         """
-        return frames.trials(self._kept_rows(), self._keeps_any)
+        return self.results.trials
 
     @property
     def episodes(self) -> DataFrame:
-        """One row per episode, counted from 0, and a column per measure; needs pandas.
+        """One row per episode, counted from 0, and a column per measure.
 
         What its columns are, and their units, stands in ``episodes.attrs["columns"]``.
         """
-        return frames.episodes(self._kept_rows(), self._keeps)
+        return self.results.episodes
 
     def table(self, columns: Sequence[str] = ()) -> SummaryTable:
         """Return conditions against estimates with their 95 % intervals.
@@ -123,7 +122,7 @@ class StudyResults:
         comparisons = len(self.conditions) - 1
         if comparisons < 1:
             return ()
-        seeds = min(map(len, self.results.seeds.values()))
+        seeds = min(len(self.results.seeds(condition)) for condition in self.conditions)
         return tuple(power_text(seeds, comparisons, USUAL_DEVIATION, SMALLEST))
 
     @cached_property
@@ -163,16 +162,10 @@ class StudyResults:
 
     def where(self, choice: str) -> StudyResults:
         """Return the trials of a choice, such as ``"robots == 8 and seed < 5"``; see `Where`."""
-        chosen = Where(choice)
-
-        def keep(condition: str, seed: int) -> bool:
-            settings = self._settings.get(condition, {})
-            return chosen(condition, seed, settings, self.results.columns.get(condition, {}))
-
-        found = selected(self.results, keep)
-        if not found.seeds:
+        part = chosen(self.results, Where(choice), self._settings)
+        if not part.conditions:
             raise SpecError(f"where = {choice!r}: no finished trial is so")
-        return replace(self, results=found, failed=(), _is_whole=False)
+        return replace(self, results=part, failed=(), _is_whole=False)
 
     def as_study(self, name: str) -> StudyResults:
         """Return the same trials as another study analyses them, one of your own included.
@@ -191,7 +184,7 @@ class StudyResults:
         """The figures of the study by name."""
         with self._sources.active():
             study = load_study(self.outline.study)
-            return study.draw(self.analysis) if self.analysis.table else {}
+            return drawn(study, self.analysis)
 
     def figure(self, name: str | None = None) -> Figure:
         """Return a figure of the study as matplotlib has it; the first unless named.
@@ -201,12 +194,12 @@ class StudyResults:
         SpecError
             If there is no such figure.
         """
-        drawn = self.figures
-        if not drawn:
+        figures = self.figures
+        if not figures:
             raise SpecError(f"study = {self.outline.study!r}: has no figure of these results")
-        if name is not None and name not in drawn:
-            raise SpecError(f"figure = {name!r}: {closest(name, drawn)}")
-        return drawn[next(iter(drawn)) if name is None else name]
+        if name is not None and name not in figures:
+            raise SpecError(f"figure = {name!r}: {closest(name, figures)}")
+        return figures[next(iter(figures)) if name is None else name]
 
     def replay(
         self,
@@ -266,23 +259,12 @@ class StudyResults:
         SpecError
             If these are the results of several studies, or of a published file.
         """
-        if len(self._parts) != 1:
+        if len(self._directories) != 1:
             raise SpecError("these are not the results of one study that is kept in a directory")
-        return self._parts[0].directory
+        return self._directories[0]
 
     def _repr_html_(self) -> str:
         return f"<h4>{self.outline.study}</h4>{self.table().html}"
-
-    def _kept_rows(self) -> tuple[Part, ...]:
-        if not self._parts:
-            raise SpecError("published results have no rows, only a table")
-        return self._parts
-
-    def _keeps(self, condition: str, seed: int) -> bool:
-        return seed in self.results.seeds.get(condition, ())
-
-    def _keeps_any(self, condition: str, seed: int) -> bool:
-        return self._is_whole or self._keeps(condition, seed)
 
 
 def run(
@@ -372,16 +354,14 @@ def load(*places: Place) -> StudyResults:
     settings = {
         new[c]: own for s, new in zip(found, labels, strict=True) for c, own in s._settings.items()
     }
-    parts = [
-        Part(part.directory, new) for s, new in zip(found, labels, strict=True) for part in s._parts
-    ]
     failed = [
         (new[c], *rest) for s, new in zip(found, labels, strict=True) for c, *rest in s.failed
     ]
     outline = replace(found[0].outline, columns=results.columns)
     return StudyResults(
         outline, results, tuple(failed), tuple(r for s in found for r in s.remarks),  # type: ignore[arg-type]
-        found[0]._sources, settings, tuple(parts), _is_whole=False,
+        found[0]._sources, settings, tuple(d for s in found for d in s._directories),
+        _is_whole=False,
     )  # fmt: skip
 
 
@@ -405,13 +385,7 @@ def _loaded(path: Path) -> StudyResults:
 
 def _of(store: Store) -> StudyResults:
     outline = Outline.kept(store)
-    part = Part(store.directory, {label: label for label in outline.columns})
     return StudyResults(
-        outline,
-        read(store),
-        tuple(store.failed()),
-        (),
-        sources_of(store),
-        store.settings(),
-        (part,),
-    )
+        outline, read(store), tuple(store.failed()), (), sources_of(store), store.settings(),
+        (store.directory,),
+    )  # fmt: skip

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
+from ..errors import SpecError
 from ..results.results import Results
-from ..spec.errors import SpecError
 from ..spec.studies import STUDIES
 
 if TYPE_CHECKING:
@@ -35,8 +35,8 @@ class Study(Protocol):
     def analyse(self, results: Results) -> Any:
         """Turn results into estimates; its attribute `table` holds the `Summary` lines.
 
-        An attribute `notes`, if there is one, holds lines that are printed below the table; an
-        attribute `headline` the title of the estimate that a report speaks of first.
+        Further attributes are those of `nested_agents.studies.results.analysis.Analysis`, each of
+        which may be missing.
         """
         ...
 
@@ -62,6 +62,21 @@ def load_study(name: str) -> Study:
     if missing:
         raise SpecError(f"study = {name!r}: has no {missing[0]}, needs {', '.join(PARTS)}")
     return cast(Study, study)
+
+
+def run_training(trial: Trial) -> TrialResult:
+    """Run a trial that is measured by its episodes alone."""
+    from ..trials.session import run_trial  # who only reads results needs nothing that learns
+
+    return run_trial(trial)
+
+
+def check_evaluated(spec: Spec) -> None:
+    """Raise `SpecError` unless trained teams are evaluated."""
+    if spec.evaluation < 1:
+        raise SpecError(
+            f"evaluation = 0: {spec.study} compares evaluation success, needs 1 or more"
+        )
 
 
 def check_rule_bases(spec: Spec, why: str) -> None:
@@ -101,14 +116,21 @@ def analysed(name: str, results: Results) -> Any:
     """
     study = load_study(name)
     for needed in getattr(study, "NUMBERS", ()):
-        for condition in results.seeds:
-            here = (results.numbers.get(condition, {}), results.usage.get(condition, {}))
-            if not any(needed in numbers for numbers in here):
+        for condition in results.conditions:
+            if needed not in results.numbers(condition):
                 raise SpecError(
                     f"study = {name!r}: needs {needed} of every trial, which those of "
                     f"{condition!r} have not measured"
                 )
     return study.analyse(results)
+
+
+def drawn(study: Study, analysis: Any) -> dict[str, Figure]:
+    """Return the figures of an analysis by name, as all figures look; none of an empty table."""
+    from ..presentation.figures import styled  # matplotlib takes its time
+
+    with styled():
+        return study.draw(analysis) if analysis.table else {}
 
 
 def measured(trial: Trial) -> TrialResult:

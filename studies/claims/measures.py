@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core.agents.cost import Problem
-from ..catalogue.chain_order.analysis import analyse as analyse_orders
-from ..catalogue.shapes.analysis import least_ratio, ratios_of
-from ..catalogue.wheel_failure.analysis import courses_of
+from ..catalogue.chain_order import compare_orders
+from ..catalogue.shapes import least_ratio, ratios_of
+from ..catalogue.wheel_failure import courses_of
 from ..results.comparison import difference, paired, ratio
 from ..results.results import Results
 from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
@@ -22,6 +22,7 @@ from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
 Compute = Callable[[Results], "Measured | None"]
 """Computes what a claim is about from the results of a study."""
 
+CONTACT = "contact_fraction"
 LAST = slice(-5, None)
 FIRST = slice(None, 5)
 UNREWARDED = ("frozen", "random")
@@ -64,12 +65,12 @@ def learned(name: str = "", known: tuple[str, ...] = UNREWARDED) -> Compute:
     """
 
     def outcomes(r: Results, condition: str) -> np.ndarray:
-        return np.asarray(r.training[condition]["success"][:, LAST])
+        return r.success(condition)[:, LAST]
 
     def compute(results: Results) -> Measured | None:
-        controls = [c for c in known if c in results.training]
+        controls = [c for c in known if results.has(c, "training")]
         condition = name or learner_of(results)
-        if condition not in results.training or not controls:
+        if not results.has(condition, "training") or not controls:
             return None
         best = max(controls, key=lambda c: float(outcomes(results, c).mean()))
         base, own = paired(results, best, condition, outcomes)
@@ -82,13 +83,13 @@ def learned(name: str = "", known: tuple[str, ...] = UNREWARDED) -> Compute:
 
 def learner_of(results: Results) -> str:
     """Return the condition by which claims are judged."""
-    return LEARNER if LEARNER in results.training else "default"
+    return LEARNER if results.has(LEARNER, "training") else "default"
 
 
 def sooner_than_planned(results: Results) -> Measured | None:
     """Measure the learner's decisions in an evaluation episode over the planner's, by seed."""
     learner = learner_of(results)
-    if not {learner, PLANNER} <= results.evaluation.keys():
+    if not {learner, PLANNER} <= {*results.of_phase("evaluation")}:
         return None
     base, own = paired(results, PLANNER, learner, _evaluation_steps)
     return Measured(bootstrap(own / base, bounds=NOT_NEGATIVE), len(own)) if len(own) else None
@@ -99,9 +100,9 @@ def success(episodes: slice) -> Compute:
 
     def compute(results: Results) -> Measured | None:
         learner = learner_of(results)
-        if learner not in results.training:
+        if not results.has(learner, "training"):
             return None
-        outcomes = results.training[learner]["success"][:, episodes]
+        outcomes = results.success(learner)[:, episodes]
         return Measured(rate(outcomes), len(outcomes)) if outcomes.size else None
 
     return compute
@@ -109,9 +110,9 @@ def success(episodes: slice) -> Compute:
 
 def oriented(results: Results) -> Measured | None:
     """Measure how often preset pose, which asks for it, brings the box to the goal pose."""
-    if "pose" not in results.training:
+    if not results.has("pose", "training"):
         return None
-    outcomes = results.training["pose"]["success"][:, LAST]
+    outcomes = results.success("pose")[:, LAST]
     return Measured(rate(outcomes), len(outcomes), note="preset pose")
 
 
@@ -122,12 +123,11 @@ def contact_gained(results: Results) -> Measured | None:
     """
 
     def gained(r: Results, name: str) -> np.ndarray:
-        contact = r.training[name]["contact_fraction"]
+        contact = r.values(name, CONTACT)
         return np.asarray(contact[:, LAST].mean(axis=1) - contact[:, FIRST].mean(axis=1))
 
-    known = [c for c, arrays in results.training.items() if "contact_fraction" in arrays]
     learner = learner_of(results)
-    if not {learner, PLANNER} <= set(known):
+    if not all(results.has(name, "training", CONTACT) for name in (learner, PLANNER)):
         return None
     base, own = paired(results, PLANNER, learner, gained)
     return Measured(bootstrap(own - base), len(own)) if len(own) else None
@@ -160,15 +160,15 @@ def optimal(system: str) -> Compute:
     def compute(results: Results) -> Measured | None:
         found = {
             ", ".join(str(v) for k, v in columns.items() if k != "name"): rate(
-                results.evaluation[condition]["success"]
+                results.success(condition, "evaluation")
             )
             for condition, columns in results.columns.items()
-            if columns.get("name") == system and condition in results.evaluation
+            if columns.get("name") == system and results.has(condition, "evaluation")
         }
         if not found:
             return None
         worst = min(found, key=lambda game: float(found[game].value))
-        seeds = len(next(iter(results.evaluation.values()))["success"])
+        seeds = len(results.seeds(results.conditions[0]))
         return Measured(found[worst], seeds, note=worst)
 
     return compute
@@ -179,10 +179,10 @@ def order_matters(results: Results) -> Measured | None:
 
     Intervals of the differences are simultaneous (Bonferroni); p is that of Friedman's test.
     """
-    found = [c for c in analyse_orders(results).comparisons if c.title.startswith("evaluation")]
+    found = [c for c in compare_orders(results) if c.title.startswith("evaluation")]
     if not found:
         return None
-    first, *others = (arrays["success"] for arrays in results.evaluation.values())
+    first, *others = (results.success(c, "evaluation") for c in results.of_phase("evaluation"))
     level = 1.0 - 0.05 / len(others)
     shifts = [difference(other, first, level) for other in others]
     most = max(shifts, key=lambda e: abs(float(e.value)))
@@ -193,23 +193,21 @@ def order_matters(results: Results) -> Measured | None:
 
 def _sizes(results: Results) -> dict[int, list[str]]:
     """Return the conditions by number of robots."""
-    found: dict[int, list[str]] = {}
-    for condition, numbers in results.numbers.items():
-        if "robots" in numbers:
-            found.setdefault(int(numbers["robots"][0]), []).append(condition)
-    return found
+    sizes: dict[int, list[str]] = {}
+    for condition in results.conditions:
+        if (robots := results.numbers(condition).get("robots")) is not None:
+            sizes.setdefault(int(robots[0]), []).append(condition)
+    return sizes
 
 
 def decision_share(results: Results) -> Measured | None:
     """Measure what share of its period a decision takes with most robots, fastest evaluator."""
     sizes = _sizes(results)
-    if not sizes or any("period_s" not in numbers for numbers in results.numbers.values()):
+    if not sizes or any("period_s" not in results.numbers(c) for c in results.conditions):
         return None
     most = max(sizes)
-    shares = [
-        results.usage[condition]["decision_median"] / results.numbers[condition]["period_s"]
-        for condition in sizes[most]
-    ]
+    numbers = [results.numbers(condition) for condition in sizes[most]]
+    shares = [of["decision_median"] / of["period_s"] for of in numbers]
     fastest = min(shares, key=lambda share: float(share.mean()))
     return Measured(bootstrap(fastest, bounds=NOT_NEGATIVE), len(fastest), note=f"{most} robots")
 
@@ -217,7 +215,7 @@ def decision_share(results: Results) -> Measured | None:
 def success_by_size(results: Results) -> Measured | None:
     """Measure the success of most robots relative to fewest, each by its best evaluator."""
     sizes = {
-        robots: [c for c in conditions if c in results.evaluation]
+        robots: [c for c in conditions if results.has(c, "evaluation")]
         for robots, conditions in _sizes(results).items()
     }
     if len(sizes) < 2 or not all(sizes.values()):
@@ -233,11 +231,11 @@ def success_by_size(results: Results) -> Measured | None:
 
 
 def _evaluation_steps(results: Results, condition: str) -> np.ndarray:
-    return np.asarray(results.evaluation[condition]["steps"].mean(axis=1))
+    return np.asarray(results.values(condition, "steps", "evaluation").mean(axis=1))
 
 
 def _evaluation_success(results: Results, condition: str) -> np.ndarray:
-    return np.asarray(results.evaluation[condition]["success"])
+    return results.success(condition, "evaluation")
 
 
 FAULTS = ("4 wheels, seized", "4 wheels, reversed")
@@ -278,7 +276,7 @@ def without(condition: str) -> Compute:
     """Return what measures the evaluation success of a condition relative to the default's."""
 
     def compute(results: Results) -> Measured | None:
-        if not {condition, "default"} <= results.evaluation.keys():
+        if not {condition, "default"} <= {*results.of_phase("evaluation")}:
             return None
         base, own = paired(results, "default", condition, _evaluation_success)
         return Measured(ratio(own, base), len(own)) if len(own) else None

@@ -85,8 +85,8 @@ def show_results(
 
 def _replays(study: StudyResults) -> Iterator[Path]:
     """Draw once what is recorded of the first trial, if its scenario knows how."""
+    from ..errors import SpecError
     from ..presentation.progress import say
-    from ..spec.errors import SpecError
 
     folder = study.directory / "replay"
     folder.mkdir(exist_ok=True)

@@ -16,7 +16,7 @@ from importlib import import_module
 import click
 
 from ...core.plugins.messages import closest
-from ..spec.errors import SpecError
+from ..errors import SpecError
 from .options import complete
 
 PROGRAM = "nested-agents"

@@ -13,7 +13,7 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from ..results.results import Results, read
+from ..results.results import Results, from_arrays, read
 from ..store.store import Store
 from ..workers.progress import Progress, progress
 from .standing import describe, warnings
@@ -50,7 +50,7 @@ def frame(directory: Path) -> tuple[Group, bool]:
         now = progress(store)
         lines = Text("\n".join([*describe(store, now), *warnings(now)]))
         is_whole = not now.damaged and store.other_version() is None
-        results = read(store) if is_whole else Results({}, {})
+        results = read(store) if is_whole else from_arrays({})
         failed = store.failed()
         planned = Counter(trial.condition for trial in store.planned())
     shown = [f"failed: {c}, seed {s}: {(e.strip() or '-').splitlines()[-1]}" for c, s, e in failed]
@@ -70,11 +70,11 @@ def _conditions(results: Results, planned: Mapping[str, int], now: Progress) -> 
         table.add_column(heading, justify="right")
     table.add_column("success, episode by episode", no_wrap=True)
     for condition, total in list(planned.items())[:MOST_CONDITIONS]:
-        done = len(results.seeds.get(condition, ()))
+        done = len(results.seeds(condition))
         running = sum(c == condition for c, _, _ in now.running)
         shown, last = "", ""
-        if condition in results.training:
-            rates = results.training[condition]["success"].mean(axis=0)
+        if results.has(condition, "training"):
+            rates = results.success(condition).mean(axis=0)
             shown, last = curve(rates), f"{rates[-5:].mean():.2f}"
         table.add_row(escape(condition), f"{done} of {total}", str(running or ""), last, shown)
     if len(planned) > MOST_CONDITIONS:

@@ -40,7 +40,6 @@ from ...core.rules.settings import RuleBaseSettings
 from ...scenarios.line_up import LineUp, LineUpSettings
 from ...topologies import build, parse
 from ...topologies.view import team_of
-from ..results.distributions import t_quantile
 from ..results.statistics import Estimate
 
 if TYPE_CHECKING:
@@ -237,7 +236,7 @@ def exponent(
         return None
     x, y = zip(*points, strict=True)
     fit = stats.linregress(x, y)
-    half = float(t_quantile(len(points) - 2, 0.5 + level / 2)) * fit.stderr
+    half = float(stats.t.ppf(0.5 + level / 2, len(points) - 2)) * fit.stderr
     value, low, high = (np.asarray(v) for v in (fit.slope, fit.slope - half, fit.slope + half))
     return Estimate(value, low, high)
 

@@ -23,7 +23,7 @@ from ...core.interface.spaces import Variable
 from ...core.learners import LearnerSettings
 from ...core.plugins.messages import closest
 from ...core.rules.rule_base import RuleBase
-from ..spec.errors import SpecError
+from ..errors import SpecError
 from ..store.schema import STAGE, columns
 from ..store.store import Store
 from ..trials.keeping import spec_of

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.ticker import NullLocator
 
-from ..results.statistics import Estimate
-from .figures import COLOURS, MARKERS, STYLES
+from ..results.statistics import Estimate, stacked
+from .figures import add_legend, handle, look, marker
 
 APART = 0.06
 """How far neighbouring lines stand apart, in doublings of the number of robots."""
@@ -20,11 +18,7 @@ APART = 0.06
 
 def style(index: int) -> dict[str, Any]:
     """Return how a line looks: lines differ in colour, marker and dashes."""
-    return {
-        "color": COLOURS[index % len(COLOURS)], "marker": MARKERS[index % len(MARKERS)],
-        "linestyle": STYLES[index % len(STYLES)],
-        "markersize": 4, "linewidth": 1.2,
-    }  # fmt: skip
+    return look(index) | {"marker": marker(index), "markersize": 4, "linewidth": 1.2}
 
 
 def draw_line(
@@ -33,12 +27,9 @@ def draw_line(
     """Draw estimates with their intervals: line `index` of so many lines, beside the others."""
     beside = 2.0 ** (APART * (index - (lines - 1) / 2))
     places = [beside * n for n in robots]
-    value, low, high = np.array(
-        [[float(getattr(e, end)) for e in estimates] for end in ("value", "low", "high")]
-    )
-    look = style(index)
-    axes.vlines(places, low, high, color=look["color"], linewidth=1.2)
-    axes.plot(places, value, **look)
+    all_of_them = stacked(estimates)
+    axes.vlines(places, all_of_them.low, all_of_them.high, color=look(index)["color"], lw=1.2)
+    axes.plot(places, all_of_them.value, **style(index))
 
 
 def scale_axis(axes: Axes, robots: Sequence[int]) -> None:
@@ -49,7 +40,6 @@ def scale_axis(axes: Axes, robots: Sequence[int]) -> None:
     axes.grid(alpha=0.25)
 
 
-def add_legend(figure: Figure, labels: Sequence[str], title: str) -> None:
+def name_lines(figure: Figure, labels: Sequence[str], title: str) -> None:
     """Name the lines above the panels."""
-    handles = [Line2D([], [], label=label, **style(i)) for i, label in enumerate(labels)]
-    figure.legend(handles=handles, title=title, loc="outside upper center", ncols=4, frameon=False)
+    add_legend(figure, [handle(label, **style(i)) for i, label in enumerate(labels)], title)

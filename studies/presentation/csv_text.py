@@ -9,7 +9,10 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterable, Sequence
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, BinaryIO, TextIO
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """With what a spreadsheet's formula begins, if the spaces before it are left out."""
@@ -20,6 +23,19 @@ def write_csv(file: TextIO, names: Sequence[str], rows: Iterable[Sequence[Any]])
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(map(harmless, names))
     writer.writerows(map(harmless, row) for row in rows)
+
+
+def write_frame(frame: DataFrame, file: BinaryIO) -> None:
+    """Write a frame with a header; truth values are 0 and 1, what is missing is an empty cell."""
+    columns = {}
+    for name, column in frame.items():
+        if column.dtype in ("bool", "boolean"):
+            columns[harmless(name)] = column.astype("Int64")
+        elif column.dtype.kind in "if":
+            columns[harmless(name)] = column
+        else:
+            columns[harmless(name)] = column.map(harmless, na_action="ignore")
+    type(frame)(columns).to_csv(file, index=False, lineterminator="\n", mode="wb")
 
 
 def harmless(value: Any) -> Any:

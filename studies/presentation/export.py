@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-import io
-from collections.abc import Callable, Sequence, Set
+from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Literal
 
+from ..errors import SpecError
 from ..results import published
 from ..results.results import read
-from ..spec.errors import SpecError
 from ..spec.outline import Outline
 from ..store.durable import replacing
-from ..store.reading import NamesAndRows
 from ..store.store import Store
-from .csv_text import write_csv
+from .csv_text import write_frame
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 Form = Literal["csv", "parquet", "json"]
 
@@ -62,55 +64,32 @@ def export(store: Store, folder: Path, form: Form, *, overwrite: bool = False) -
 
 def _writers(store: Store, form: Form) -> dict[str, Callable[[Path], None]]:
     """Return what writes each file, by its name."""
+    results = read(store)
     if form == "json":
         version = int(store.meta("results_version"))
         return {
-            "results": lambda path: published.write(path, Outline.kept(store), read(store), version)
+            "results": lambda path: published.write(path, Outline.kept(store), results, version)
         }
-    rates = {measure.name for measure in store.measures() if measure.is_rate}
-    write_table = _write_csv if form == "csv" else _parquet_writer(rates)
+    if form == "parquet" and not find_spec("pyarrow"):
+        raise SpecError(
+            "--format parquet: pyarrow is not installed; pip install 'nested-agents[parquet]'"
+        )
+    write = _write_csv if form == "csv" else _write_parquet
     return {
-        "episodes": lambda path: write_table(store.episodes(), path),
-        "trials": lambda path: write_table(store.trials(), path),
+        "episodes": lambda path: write(results.episodes, path),
+        "trials": lambda path: write(results.trials, path),
     }
 
 
-def _write_csv(table: NamesAndRows, path: Path) -> None:
-    names, rows = table
+def _write_csv(frame: DataFrame, path: Path) -> None:
+    """Write a frame as CSV: truth values as 0 and 1, texts as they may stand in a spreadsheet."""
     with replacing(path) as file:
-        text = io.TextIOWrapper(file, encoding="utf-8", newline="", write_through=True)
-        write_csv(text, names, rows)
-        text.detach()
+        write_frame(frame, file)
 
 
-def _parquet_writer(rates: Set[str]) -> Any:
-    """Return what writes a table as Parquet, columns named in `rates` as truth values."""
-    try:
-        import pyarrow
-        import pyarrow.parquet
-    except ModuleNotFoundError as error:
-        raise SpecError(
-            f"--format parquet: {error.name} is not installed; pip install 'nested-agents[parquet]'"
-        ) from None
-
-    def write(table: NamesAndRows, path: Path) -> None:
-        names, rows = table[0], list(table[1])
-        columns = {
-            n: _column([row[i] for row in rows], is_rate=n in rates) for i, n in enumerate(names)
-        }
-        with replacing(path) as file:
-            pyarrow.parquet.write_table(pyarrow.table(columns), file)
-
-    return write
-
-
-def _column(values: Sequence[Any], *, is_rate: bool) -> list[Any]:
-    """Return values of one type: numbers if all are, else text; what is missing stays missing."""
-    if is_rate:
-        return [None if value is None else bool(value) for value in values]
-    types = {type(value) for value in values if value is not None}
-    if len(types) <= 1:
-        return list(values)
-    if types == {int, float}:
-        return [None if value is None else float(value) for value in values]
-    return [None if value is None else str(value) for value in values]
+def _write_parquet(frame: DataFrame, path: Path) -> None:
+    """Write a frame as Parquet; a column of numbers and texts is one of texts."""
+    mixed = [n for n in frame if frame[n].dtype == object]
+    texts = {n: frame[n].map(str, na_action="ignore") for n in mixed}
+    with replacing(path) as file:
+        frame.assign(**texts).to_parquet(file, index=False)

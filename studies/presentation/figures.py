@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Literal
 
@@ -10,8 +11,11 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+from numpy.typing import ArrayLike
 
+from ..results.statistics import Estimate
 from ..store.durable import replacing
 
 SUFFIXES = (".svg", ".png", ".pdf")
@@ -35,6 +39,81 @@ SETTINGS: dict[str, Any] = {
     "svg.hashsalt": "nested-agents",
     "svg.fonttype": "none",
 }
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """Let figures that are made within look as all do."""
+    with mpl.rc_context(SETTINGS):  # type: ignore[arg-type]
+        yield
+
+
+def panels(
+    rows: int, columns: int, size: tuple[float, float], **sharing: Any
+) -> tuple[Figure, Any]:
+    """Return a figure of a size [inches] and its axes ``(rows, columns)``."""
+    figure = Figure(figsize=size, layout="constrained")
+    return figure, figure.subplots(rows, columns, squeeze=False, **sharing)
+
+
+def look(index: int) -> dict[str, Any]:
+    """Return colour and dashes of a line, by which lines differ."""
+    return {"color": COLOURS[index % len(COLOURS)], "ls": STYLES[index % len(STYLES)]}
+
+
+def marker(index: int) -> str:
+    """Return the marker that goes with a `look`."""
+    return MARKERS[index % len(MARKERS)]
+
+
+def draw_curve(
+    axes: Axes, x: ArrayLike, estimate: Estimate, index: int, *, alpha: float = 0.12, **kwargs: Any
+) -> None:
+    """Draw estimates ``(n,)`` over `x` as a line, with a band for their intervals."""
+    axes.fill_between(
+        np.asarray(x), estimate.low, estimate.high, color=look(index)["color"], alpha=alpha, lw=0
+    )
+    axes.plot(np.asarray(x), estimate.value, **look(index), lw=1.6, **kwargs)
+
+
+def draw_row(
+    axes: Axes, row: float, estimate: Estimate, colour: str, marker: str = "o", **kwargs: Any
+) -> None:
+    """Draw an estimate as a point with its interval, on a row of a chart."""
+    if np.isfinite([estimate.low, estimate.high]).all():
+        axes.plot([float(estimate.low), float(estimate.high)], [row, row], color=colour)
+    axes.plot(float(estimate.value), row, marker, color=colour, **kwargs)
+
+
+def name_rows(axes: Axes, names: Sequence[str]) -> None:
+    """Name the rows of a chart, the first one on top."""
+    axes.set_yticks(range(len(names)), names)
+    axes.set_ylim(len(names) - 0.5, -0.5)
+
+
+def as_rates(axes: Axes, which: Literal["x", "y"] = "y") -> None:
+    """Let an axis show rates, from 0 to 1."""
+    axes.set(**{f"{which}lim": (-0.03, 1.03)})
+
+
+def as_episodes(axes: Axes) -> None:
+    """Let the horizontal axis count episodes."""
+    axes.set_xlabel("episode")
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1, steps=[1, 2, 5, 10]))
+    axes.tick_params(labelbottom=True)
+
+
+def handle(label: str, **kwargs: Any) -> Line2D:
+    """Return an entry of a legend."""
+    return Line2D([], [], label=label, **kwargs)
+
+
+def add_legend(figure: Figure, handles: Sequence[Line2D], title: str = "", ncols: int = 4) -> None:
+    """Name what is drawn, above the panels."""
+    figure.legend(
+        handles=handles, title=title or None, loc="outside upper center", ncols=ncols,
+        frameon=False,
+    )  # fmt: skip
 
 
 def save(figures: Mapping[str, Figure], folder: Path, formats: Sequence[str] = USUAL) -> list[Path]:

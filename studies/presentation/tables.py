@@ -10,9 +10,9 @@ from html import escape
 import numpy as np
 
 from ...core.plugins.messages import near
+from ..errors import SpecError
 from ..results.statistics import FEW, Estimate
 from ..results.summary import Summary
-from ..spec.errors import SpecError
 from .cells import Cell, Row, ends
 from .csv_text import write_csv
 from .terminal_tables import text_of

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from ...core.interface.scenario import can_draw
-from ..spec.errors import SpecError
+from ..errors import SpecError
 from ..store.store import Planned, Store
 from ..trials.keeping import spec_of
 from ..trials.trial import Trial, trials_of

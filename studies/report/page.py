@@ -8,7 +8,7 @@ from pathlib import Path
 import jinja2
 from markupsafe import Markup
 
-from ..catalogue.study import analysed, load_study
+from ..catalogue.study import analysed, drawn, load_study
 from ..claims.claims import judge
 from ..claims.table import result
 from ..presentation.tables import tabulate
@@ -46,7 +46,7 @@ def page(directory: Path) -> str:
         sources = sources_of(store)
     with sources.active():
         analysis = analysed(outline.study, results)
-        drawn = load_study(outline.study).draw(analysis) if analysis.table else {}
+        figures = drawn(load_study(outline.study), analysis)
     return _template().render(
         study=outline.study,
         extent=words.extent(outline),
@@ -61,7 +61,7 @@ def page(directory: Path) -> str:
             for finding in judge({outline.study: results})
             if finding.claim.study == outline.study and finding.measured is not None
         ],
-        pictures=pictures(drawn),
+        pictures=pictures(figures),
         replays=packed,
         failed=failed,
         seeds=words.runs(outline.seeds),

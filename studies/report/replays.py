@@ -16,7 +16,7 @@ from typing import Any
 
 from ...core.plugins.deferred import located
 from ...scenarios import SCENARIOS
-from ..spec.errors import SpecError
+from ..errors import SpecError
 from ..store.durable import NotRecordedError, Recording
 from ..store.store import Planned, Store
 from .films import Film, films

@@ -79,40 +79,50 @@ def _p(value: float, name: str = "p ") -> str:
     return f"{name}{'= ' if name else ''}{value:.2g}"
 
 
-def adjusted(found: Sequence[Difference]) -> tuple[Difference, ...]:
+def adjusted(differences: Sequence[Difference]) -> tuple[Difference, ...]:
     """Return differences with p adjusted over all of them by Holm's method."""
-    ps = holm([d.raw for d in found])
-    return tuple(replace(d, p=float(p)) for d, p in zip(found, ps, strict=True))
+    ps = holm([d.raw for d in differences])
+    return tuple(replace(d, p=float(p)) for d, p in zip(differences, ps, strict=True))
+
+
+def mean_success(phase: str) -> Callable[[Results, str], Array]:
+    """Return what gives the success rate of each seed of a condition ``(n_seeds,)`` in a phase."""
+    return lambda results, condition: results.success(condition, phase).mean(axis=1)
 
 
 def differences(
     results: Results,
-    reference: str,
-    conditions: Sequence[str],
+    pairs: Sequence[tuple[str, str, str]],
     measures: Mapping[str, Callable[[Results, str], ArrayLike]],
     *,
     of_rates: bool = True,
 ) -> tuple[Difference, ...]:
-    """Compare conditions with a reference by several measures at once.
+    """Compare conditions with their references by some measures at once.
 
     Parameters
     ----------
     results
         Of the study.
-    reference, conditions
-        Labels; conditions that share fewer than two seeds with the reference are left out.
+    pairs
+        What a comparison is called, the condition's label and the reference's. Those that share
+        fewer than two seeds are left out.
     measures
         By title, what gives the values ``(n_seeds,)`` of a condition.
     of_rates
-        Whether these are success rates.
+        Whether these are rates.
     """
-    found = []
+    made = []
     for title, values in measures.items():
-        for condition in conditions:
-            base, other = paired(results, reference, condition, values)
+        for name, condition, reference in pairs:
+            own, base = aligned(results, (condition, reference), values)
             if len(base) >= 2:
-                found.append(Difference.between(condition, title, other, base, of_rates=of_rates))
-    return adjusted(found)
+                made.append(Difference.between(name, title, own, base, of_rates=of_rates))
+    return adjusted(made)
+
+
+def with_first(conditions: Sequence[str]) -> list[tuple[str, str, str]]:
+    """Return the pairs of all other conditions with the first one, see `differences`."""
+    return [(condition, condition, conditions[0]) for condition in conditions[1:]]
 
 
 def paired_difference(own: Array, base: Array, *, of_rates: bool) -> Estimate:
@@ -141,7 +151,7 @@ def aligned(
     results: Results, conditions: Sequence[str], values: Callable[[Results, str], ArrayLike]
 ) -> list[Array]:
     """Return the values ``(n_seeds, ...)`` of conditions for the seeds that all of them have."""
-    seeds = [results.seeds.get(condition, ()) for condition in conditions]
+    seeds = [results.seeds(condition) for condition in conditions]
     if not all(seeds):
         return [np.zeros(0) for _ in conditions]
     return of_shared_seeds(seeds, [values(results, condition) for condition in conditions])

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from textwrap import wrap
 
 import numpy as np
 
 from ...core.interface.measures import Measure
 from ...core.plugins.messages import closest
-from ..spec.errors import SpecError
+from ..errors import SpecError
 from ..spec.labels import label
-from .comparison import Array, Difference, adjusted, aligned
+from .comparison import Array, Difference, differences
 from .numbers import shown
 from .paired_tests import LEVEL
-from .results import Results
+from .results import SECONDS, Results
 from .statistics import bootstrap, rate
 from .summary import Summary
-from .verdicts import WIDTH, WORDS, power_lines, told
+from .verdicts import WIDTH, WORDS, power_lines, verdict_lines
 
 EPISODES = (
     Measure("steps", "steps", "1", better="lower", least=0.0),
@@ -105,7 +105,7 @@ class Contrasts:
                 where = f"{group.setting}: " if group.setting else ""
                 text = f"{where}{self.title}, less that of {group.reference}:"
                 yield from wrap(text, WIDTH, break_on_hyphens=False)
-                yield from told(group.differences, words)
+                yield from verdict_lines(group.differences, words)
         counted = f"{len(found)} comparison{'s' * (len(found) > 1)}"
         yield f"p: permutation of signs over seeds, adjusted over {counted} (Holm)."
         yield from power_lines(found, of_rates=self.measure.is_rate)
@@ -140,28 +140,25 @@ def contrasts(
         If the results have no such measure, phase, key or reference.
     """
     if phase is None:
-        evaluated = all(c in results.evaluation for c in results.training)
-        phase = "evaluation" if evaluated and results.evaluation else "training"
-    told_by, values, phase = _values(results, measure, phase)
+        evaluated = {*results.of_phase("evaluation")}
+        is_whole = evaluated and evaluated >= {*results.of_phase("training")}
+        phase = "evaluation" if is_whole else "training"
+    shown_as, values, phase = _values(results, measure, phase)
     groups = _groups([c for c in results.columns if c in values], results.columns, by, reference)
-    found: list[list[Difference]] = []
-    for _, members in groups:
-        own = []
-        (_, base), *others = members
-        for name, condition in others:
-            ours, theirs = aligned(results, (condition, base), lambda _, c: values[c])
-            if len(ours) >= 2:
-                own.append(
-                    Difference.between(name, measure, ours, theirs, of_rates=told_by.is_rate)
-                )
-        found.append(own)
-    every = iter(adjusted([d for own in found for d in own]))
+    names = {condition: name for _, members in groups for name, condition in members}
+    pairs = [(c, c, members[0][1]) for _, members in groups for _, c in members[1:]]
+    compared = {
+        d.condition: replace(d, condition=names[d.condition])
+        for d in differences(
+            results, pairs, {measure: lambda _, c: values[c]}, of_rates=shown_as.is_rate
+        )
+    }
     made = []
-    for (setting, members), own in zip(groups, found, strict=True):
-        differences = tuple(next(every) for _ in own)
-        lines = _lines(results, told_by, phase, setting, members, values, differences)
-        made.append(Group(setting, members[0][0], differences, lines))
-    return Contrasts(told_by, phase, tuple(made))
+    for setting, members in groups:
+        own = tuple(compared[c] for _, c in members if c in compared)
+        lines = _lines(results, shown_as, phase, setting, members, values, own)
+        made.append(Group(setting, members[0][0], own, lines))
+    return Contrasts(shown_as, phase, tuple(made))
 
 
 Members = list[tuple[str, str]]
@@ -171,19 +168,19 @@ Members = list[tuple[str, str]]
 def _values(results: Results, name: str, phase: str) -> tuple[Measure, dict[str, Array], str]:
     """Return a measure, its means by condition ``(n_seeds,)``, and the phase that they are of."""
     measures = {m.name: m for m in (*results.measures, *EPISODES)}
-    whole = {n for by in (results.numbers, results.usage) for named in by.values() for n in named}
     if name in measures:
         if phase not in results.phases:
             raise SpecError(f"phase = {phase!r}: {closest(phase, results.phases)}")
-        arrays = results.phases[phase]
-        found = {c: a[name].mean(axis=1) for c, a in arrays.items() if name in a}
-        return measures[name], found, phase
-    if name not in whole:
-        raise SpecError(f"measure = {name!r}: {closest(name, {*measures, *whole})}")
-    both = (results.numbers, results.usage)
-    found = {c: by[c][name] for by in both for c in by if name in by[c]}
+        of_phase = (c for c in results.of_phase(phase) if results.has(c, phase, name))
+        means = {c: results.values(c, name, phase).mean(axis=1) for c in of_phase}
+        return measures[name], means, phase
+    numbers = {c: results.numbers(c) for c in results.conditions}
+    known = {n.removeprefix(SECONDS): n for own in numbers.values() for n in own}
+    if name not in known:
+        raise SpecError(f"measure = {name!r}: {closest(name, {*measures, *known})}")
     measure, factor = shown(name)
-    return measure, {c: factor * values for c, values in found.items()}, ""
+    column = known[name]
+    return measure, {c: factor * own[column] for c, own in numbers.items() if column in own}, ""
 
 
 def _groups(
@@ -201,16 +198,16 @@ def _groups(
         raise SpecError(f"by = {by!r}: {closest(by, keys)}")
     found: dict[str, Members] = {}
     for c in conditions:
-        level = _told(key, columns[c][key])
-        rest = ", ".join(_told(k, v) for k, v in columns[c].items() if k != key and v != "")
+        level = _level(key, columns[c][key])
+        rest = ", ".join(_level(k, v) for k, v in columns[c].items() if k != key and v != "")
         found.setdefault(rest, []).append((level, c))
     return [(setting, _led(members, reference, "reference")) for setting, members in found.items()]
 
 
-def _told(key: str, value: object) -> str:
+def _level(key: str, value: object) -> str:
     """Return a value of a column as a label: a name stands for itself.
 
-    >>> _told("scenario.robots", 8), _told("topology", "chain")
+    >>> _level("scenario.robots", 8), _level("topology", "chain")
     ('robots=8', 'chain')
     """
     return value if isinstance(value, str) else f"{key.rpartition('.')[2]}={label({key: value})}"
@@ -241,7 +238,7 @@ def _lines(
     for name, condition in members:
         own = values[condition]
         estimates = {
-            measure.heading: rate(results.phases[phase][condition][measure.name])
+            measure.heading: rate(results.values(condition, measure.name, phase))
             if phase and measure.is_rate
             else bootstrap(np.asarray(own, dtype=float), bounds=measure.bounds)
         }

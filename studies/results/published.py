@@ -8,18 +8,19 @@ by results in this form, so the committed files give the table that the run gave
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...core.interface.measures import SUCCESS, Measure
-from ..spec.errors import SpecError
+from ..errors import SpecError
 from ..spec.outline import Outline
 from ..store import durable
 from ..store.schema import RESULTS_VERSION, measures_from, tables
-from .results import Arrays, Results
+from ..store.schema import SECONDS as PARTS
+from .results import SECONDS, Results, from_arrays
 
 SUCCESS_ALONE = ("ablation", "chain-order", "games", "hierarchies", "scaling", "wheel-failure")
 """Studies whose analysis asks for no other measure of an episode: of them no other is kept."""
@@ -33,26 +34,27 @@ FEW = 100
 def dumps(outline: Outline, results: Results, version: int = RESULTS_VERSION) -> str:
     """Return results, their spec and the version that they are of as JSON text."""
     measures = _kept(outline.study, results)
-    rates = {measure.name: measure.is_rate for measure in measures} | {"steps": False}
+    rates = {"steps": False} | {measure.name: measure.is_rate for measure in measures}
+    usage = () if outline.study in UNTIMED else results.usage
     content = {
         "results_version": version,
         "spec": outline.table,
         "columns": results.columns,
         "measures": tables(measures),
-        "seeds": {c: _counted(found) for c, found in results.seeds.items()},
+        "seeds": {c: _counted(results.seeds(c)) for c in results.conditions},
         "phases": {
             phase: {
                 condition: {
-                    name: _packed(values, is_rate=rates[name])
-                    for name, values in arrays.items()
-                    if name in rates
+                    name: _packed(results.values(condition, name, phase), is_rate=is_rate)
+                    for name, is_rate in rates.items()
+                    if results.has(condition, phase, name)
                 }
-                for condition, arrays in by_condition.items()
+                for condition in results.of_phase(phase)
             }
-            for phase, by_condition in results.phases.items()
+            for phase in results.phases
         },
-        "numbers": _rounded(results.numbers),
-        "usage": {} if outline.study in UNTIMED else _rounded(results.usage),
+        "numbers": _rounded(results, lambda name: name not in results.usage),
+        "usage": _rounded(results, lambda name: name in usage),
     }
     lines = [f"{json.dumps(key)}: {json.dumps(value)}" for key, value in content.items()]
     return "{\n" + ",\n".join(lines) + "\n}\n"
@@ -88,21 +90,23 @@ def loads(text: str) -> Published:
         for phase, by_condition in content["phases"].items()
     }
     seeds = {
-        condition: tuple(range(found) if isinstance(found, int) else found)
-        for condition, found in content["seeds"].items()
+        condition: tuple(range(seeds) if isinstance(seeds, int) else seeds)
+        for condition, seeds in content["seeds"].items()
     }
     numbers, usage = (
         {
-            c: {n: _unpacked(v, is_rate=False) for n, v in named.items()}
+            c: {prefix(n): _unpacked(v, is_rate=False) for n, v in named.items()}
             for c, named in content[key].items()
         }
-        for key in ("numbers", "usage")
+        for key, prefix in (("numbers", str), ("usage", _prefixed))
     )
-    training, evaluation = phases.get("training", {}), phases.get("evaluation", {})
     columns = content["columns"]
-    outline = Outline.noted(content["spec"], columns)
-    results = Results(training, evaluation, phases, seeds, numbers, usage, columns, measures)
-    return Published(outline, results, int(content["results_version"]))
+    results = from_arrays(
+        phases, seeds=seeds, numbers=numbers, usage=usage, columns=columns, measures=measures
+    )
+    return Published(
+        Outline.noted(content["spec"], columns), results, int(content["results_version"])
+    )
 
 
 def write(path: Path, outline: Outline, results: Results, version: int = RESULTS_VERSION) -> None:
@@ -139,13 +143,7 @@ def load(path: Path) -> Published:
 def _kept(study: str, results: Results) -> tuple[Measure, ...]:
     """Return the measures of which there is anything to be kept."""
     wanted = {SUCCESS.name} if study in SUCCESS_ALONE else {m.name for m in results.measures}
-    held = {
-        name
-        for by_condition in results.phases.values()
-        for arrays in by_condition.values()
-        for name in arrays
-    }
-    return tuple(m for m in results.measures if m.name in wanted & held)
+    return tuple(m for m in results.measures if m.name in wanted & {*results.episodes.columns})
 
 
 def _counted(seeds: tuple[int, ...]) -> int | list[int]:
@@ -185,11 +183,17 @@ def _constant(values: np.ndarray) -> dict[str, Any] | None:
     return {"all": values.flat[0].item(), "shape": list(values.shape)}
 
 
-def _rounded(named: Mapping[str, Arrays]) -> dict[str, dict[str, Packed]]:
+def _rounded(results: Results, wanted: Callable[[str], bool]) -> dict[str, dict[str, Packed]]:
+    """Return by condition the numbers of the wanted names; seconds by their part alone."""
     return {
         condition: {
-            name: _constant(values) or [float(f"{v:.5g}") for v in values]
-            for name, values in arrays.items()
+            name.removeprefix(SECONDS): _constant(values) or [float(f"{v:.5g}") for v in values]
+            for name, values in numbers.items()
         }
-        for condition, arrays in named.items()
+        for condition in results.conditions
+        if (numbers := {n: v for n, v in results.numbers(condition).items() if wanted(n)})
     }
+
+
+def _prefixed(name: str) -> str:
+    return f"{SECONDS}{name}" if name in PARTS else name

@@ -1,114 +1,337 @@
-"""The rows of a study as arrays: by condition, one row per seed and one column per episode."""
+"""What the finished trials of a study measured, as two tidy frames: episodes and trials.
+
+Tables, comparisons, figures, reports and exported files are functions of these frames. A column's
+unit and meaning stand in ``frame.attrs["columns"]`` by its name.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ...core.interface.measures import SUCCESS, Measure
-from ..store.schema import AFTER, ELSEWHERE
+from ...core.plugins.deferred import Deferred
+from ..store.reading import NamesAndRows
+from ..store.schema import ELSEWHERE
 from ..store.store import Store
+from .numbers import NUMBERS
 
-Arrays = dict[str, NDArray[Any]]
+if TYPE_CHECKING:
+    import pandas as pd
+    from pandas import DataFrame
+else:
+    pd = Deferred("pandas")  # workers and quick commands import this module, not pandas
+
+Array = NDArray[Any]
+
+SECONDS = "seconds."
+"""With what the columns of the seconds of a trial's parts begin."""
+DONE = "done"
+"""State of a trial that has finished."""
+EPISODE_COLUMNS = {
+    "condition": ("", "label of the condition"),
+    "seed": ("1", "seed of the trial"),
+    "phase": ("", "training, evaluation, training:STAGE or evaluation:NAME"),
+    "episode": ("1", "number of the episode in its phase, from 0"),
+    "steps": ("1", "decisions until the episode ended"),
+    "return": ("1", "sum of the rewards, not discounted; mean over agents"),
+}
+"""Units and meaning of the columns of episodes that every scenario has."""
+TRIAL_COLUMNS = {
+    "condition": ("", "label of the condition"),
+    "seed": ("1", "seed of the trial"),
+    "state": ("", "done or failed"),
+    "identity": ("", "hash of all that the trial consists of"),
+    "error": ("", "last line of the traceback, if it failed"),
+}
+"""The same of trials."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Results:
-    """What the finished trials of a study measured.
+    """The frames of a study, or of several together, and arrays of what they hold.
 
     Attributes
     ----------
-    training, evaluation
-        By condition, in the order of the spec, then by ``steps``, the name of a measure, or
-        ``return``: arrays ``(n_seeds, n_episodes)``. Conditions without a finished trial are
-        absent, and measures that a condition's scenario has not.
+    episodes
+        A row for each episode of the finished trials, by condition in the order of the spec, seed,
+        phase and number of the episode; a column for each swept key and measure.
+    trials
+        A row for each trial, failed ones included: its state, the seconds of its parts, and the
+        numbers of `TrialResult.numbers` and `TrialResult.usage` by their names.
     phases
-        The same of every phase by name, training and evaluation included.
-    seeds
-        By condition, the finished seeds, in the order of the arrays' rows.
-    numbers
-        By condition and name ``(n_seeds,)`` numbers of whole trials, see `TrialResult.numbers`.
-    usage
-        The same of what differs from run to run: ``decision``, ``learning`` and further parts [s]
-        as in `TrialResult.seconds`, and `TrialResult.usage`.
+        The phases of the episodes: training, evaluation, then others.
     columns
         By condition, what tells it from the others, see
         `nested_agents.studies.spec.conditions.Condition`.
     measures
-        What episodes are told by, of all conditions; success first.
+        What is measured of an episode, of any condition; success first.
+    usage
+        Names of the numbers that differ from run to run, times first.
     """
 
-    training: dict[str, Arrays]
-    evaluation: dict[str, Arrays]
-    phases: dict[str, dict[str, Arrays]] = field(default_factory=dict)
-    seeds: dict[str, tuple[int, ...]] = field(default_factory=dict)
-    numbers: dict[str, Arrays] = field(default_factory=dict)
-    usage: dict[str, Arrays] = field(default_factory=dict)
+    episodes: DataFrame
+    trials: DataFrame
+    phases: tuple[str, ...] = ()
     columns: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     measures: tuple[Measure, ...] = (SUCCESS,)
+    usage: tuple[str, ...] = ()
 
-    def elsewhere(self, condition: str) -> dict[str, Arrays]:
-        """Return what the evaluations of a condition beside its own gave, by their names."""
+    @cached_property
+    def conditions(self) -> tuple[str, ...]:
+        """Labels of the conditions of which any trial has finished."""
+        return tuple(self._finished)
+
+    def seeds(self, condition: str) -> tuple[int, ...]:
+        """Return the finished seeds of a condition, in the order of the rows of its arrays."""
+        return tuple(self._finished[condition]["seed"].tolist()) if self.has(condition) else ()
+
+    def numbers(self, condition: str) -> dict[str, Array]:
+        """Return the numbers of whole trials that a condition has, ``(n_seeds,)`` by name."""
+        numbers = self._finished[condition][list(self._numbers)]
+        return {name: column.to_numpy() for name, column in numbers.items() if column.notna().all()}
+
+    def has(self, condition: str, phase: str = "", measure: str = "") -> bool:
+        """Tell whether a condition has finished trials, episodes of a phase, a measure of them."""
+        rows = self._rows.get((phase, condition))
+        if rows is None or not measure:
+            return rows is not None if phase else condition in self._finished
+        return measure in self.episodes and not np.isnan(self._column(measure)[rows]).any()
+
+    def of_phase(self, phase: str) -> tuple[str, ...]:
+        """Return the conditions that have episodes of a phase."""
+        return tuple(condition for own, condition in self._rows if own == phase)
+
+    def values(self, condition: str, measure: str, phase: str = "training") -> Array:
+        """Return what was measured of a condition's episodes, ``(n_seeds, n_episodes)``.
+
+        Parameters
+        ----------
+        condition
+            Its label.
+        measure
+            Name of a measure, ``steps`` or ``return``.
+        phase
+            Of the episodes.
+
+        Raises
+        ------
+        KeyError
+            If there are no such episodes.
+        """
+        rows = self._rows[phase, condition]
+        values = self._column(measure)[rows]
+        if measure in self._whole:
+            values = values.astype(int)
+        return values.reshape(len(np.unique(self.episodes["seed"].to_numpy()[rows])), -1)
+
+    def success(self, condition: str, phase: str = "training") -> Array:
+        """Return the `values` of success."""
+        return self.values(condition, SUCCESS.name, phase)
+
+    def other_evaluations(self, condition: str) -> dict[str, str]:
+        """Return the phases of a condition's evaluations beside its own, by their names."""
         return {
-            phase.removeprefix(ELSEWHERE): arrays[condition]
-            for phase, arrays in self.phases.items()
-            if phase.startswith(ELSEWHERE) and condition in arrays
+            phase.removeprefix(ELSEWHERE): phase
+            for phase in self.phases
+            if phase.startswith(ELSEWHERE) and self.has(condition, phase)
         }
+
+    @cached_property
+    def _rows(self) -> dict[tuple[str, str], NDArray[np.intp]]:
+        """Numbers of the rows of episodes, by phase and condition."""
+        return dict(self.episodes.groupby(["phase", "condition"], sort=False).indices)
+
+    @cached_property
+    def _finished(self) -> dict[str, DataFrame]:
+        done = self.trials[self.trials["state"] == DONE]
+        return dict(iter(done.groupby("condition", sort=False)))
+
+    @cached_property
+    def _numbers(self) -> tuple[str, ...]:
+        swept = {key for row in self.columns.values() for key in row}
+        return tuple(n for n in self.trials.columns if n not in TRIAL_COLUMNS and n not in swept)
+
+    @cached_property
+    def _whole(self) -> frozenset[str]:
+        return frozenset(("steps", *(m.name for m in self.measures if m.is_rate)))
+
+    @cached_property
+    def _columns(self) -> dict[str, Array]:
+        return {}
+
+    def _column(self, measure: str) -> Array:
+        if measure not in self._columns:
+            values = self.episodes[measure].to_numpy(dtype=float, na_value=np.nan)
+            self._columns[measure] = values
+        return self._columns[measure]
 
 
 def read(store: Store) -> Results:
-    """Read all that has finished."""
-    names, timed = store.seconds()
-    seconds = [
-        (row[0], row[1], name, value)
-        for row in timed
-        for name, value in zip(names[2:], row[2:], strict=True)
-    ]
-    seeds: dict[str, list[int]] = {}
-    for row in timed:
-        seeds.setdefault(row[0], []).append(row[1])
-    numbers = store.numbers()
-    measures = store.measures()
-    columns = ("steps", *(measure.name for measure in measures), *AFTER)
-    phases = {phase: _arrays(store, phase, columns) for phase in store.phases()}
+    """Read all that has been run; what has failed is in the frame of trials alone."""
+    measures, columns = store.measures(), store.columns()
+    usage = tuple(dict.fromkeys(row[2] for row in store.numbers() if not row[4]))
+    swept = tuple(next(iter(columns.values()), ()))
+    episodes = _frame(store.episodes()).drop(columns="position", errors="ignore")
+    trials = _frame(store.trials())
+    seconds = tuple(name for name in trials.columns if name.startswith(SECONDS))
     return Results(
-        phases.get("training", {}),
-        phases.get("evaluation", {}),
-        phases,
-        {condition: tuple(found) for condition, found in seeds.items()},
-        _by_name(row[:4] for row in numbers if row[4]),
-        _by_name([*seconds, *(row[:4] for row in numbers if not row[4])]),
-        store.columns(),
-        measures,
-    )
+        _described_episodes(episodes, measures, swept), _described_trials(trials, swept),
+        tuple(store.phases()), columns, measures, seconds + usage,
+    )  # fmt: skip
 
 
-def _by_name(rows: Iterable[tuple[str, int, str, float]]) -> dict[str, Arrays]:
-    found: dict[str, dict[str, list[float]]] = {}
-    for condition, _, name, value in rows:
-        found.setdefault(condition, {}).setdefault(name, []).append(value)
-    return {
-        condition: {name: np.array(values) for name, values in by_name.items()}
-        for condition, by_name in found.items()
+def _frame(table: NamesAndRows) -> DataFrame:
+    names, rows = table
+    return pd.DataFrame(list(rows), columns=names)
+
+
+def _described_episodes(
+    frame: DataFrame, measures: Iterable[Measure], swept: Iterable[str]
+) -> DataFrame:
+    """Return a frame of episodes whose rates are truth values, and whose columns are described."""
+    known = {key: ("", "a swept key") for key in swept}
+    for measure in measures:
+        known[measure.name] = measure.unit, f"{measure.title}, {measure.gathering} of its steps"
+        if measure.is_rate:
+            is_whole = frame[measure.name].notna().all()
+            frame[measure.name] = frame[measure.name].astype(bool if is_whole else "boolean")
+    return _described(frame, known | EPISODE_COLUMNS)
+
+
+def _described_trials(frame: DataFrame, swept: Iterable[str]) -> DataFrame:
+    known: dict[str, tuple[str, str]] = {key: ("", "a swept key") for key in swept}
+    for name in frame.columns:
+        if name.startswith(SECONDS):
+            known[name] = "s", "time spent"
+        elif name in NUMBERS:
+            known[name] = NUMBERS[name]
+    return _described(frame, known | TRIAL_COLUMNS)
+
+
+def _described(frame: DataFrame, known: Mapping[str, tuple[str, str]]) -> DataFrame:
+    of_studies = "1", "a number of the study's own"
+    frame.attrs["columns"] = {
+        name: dict(zip(("unit", "meaning"), known.get(name, of_studies), strict=True))
+        for name in frame.columns
     }
+    return frame
 
 
-def _arrays(store: Store, phase: str, columns: Sequence[str]) -> dict[str, Arrays]:
-    names, rows = store.rows(phase)
-    condition, seed = names.index("condition"), names.index("seed")
-    runs: dict[str, dict[int, list[tuple[Any, ...]]]] = {}
-    for row in rows:
-        runs.setdefault(row[condition], {}).setdefault(row[seed], []).append(row)
-    at = {name: names.index(name) for name in columns}
-    return {
-        condition: {
-            name: np.array([[row[i] for row in run] for run in by_seed.values()])
-            for name, i in at.items()
-            if all(row[i] is not None for run in by_seed.values() for row in run)
-        }
-        for condition, by_seed in runs.items()
-    }
+def from_arrays(
+    phases: Mapping[str, Mapping[str, Mapping[str, ArrayLike]]],
+    *,
+    seeds: Mapping[str, Sequence[int]] | None = None,
+    numbers: Mapping[str, Mapping[str, ArrayLike]] | None = None,
+    usage: Mapping[str, Mapping[str, ArrayLike]] | None = None,
+    columns: Mapping[str, Mapping[str, Any]] | None = None,
+    measures: tuple[Measure, ...] = (SUCCESS,),
+) -> Results:
+    """Return results as frames, given as arrays.
+
+    Parameters
+    ----------
+    phases
+        By phase, condition and name of a measure, ``steps`` or ``return``, the values
+        ``(n_seeds, n_episodes)``.
+    seeds
+        By condition; from 0 on unless said otherwise.
+    numbers, usage
+        By condition and name, numbers of whole trials ``(n_seeds,)``; usage differs from run to
+        run.
+    columns
+        By condition, what tells it from the others.
+    measures
+        What is measured of an episode.
+    """
+    numbers, usage, columns = numbers or {}, usage or {}, columns or {}
+    conditions = dict.fromkeys(c for of in (*phases.values(), numbers, usage) for c in of)
+    known = {c: tuple((seeds or {}).get(c, ())) or _counted(c, phases, numbers) for c in conditions}
+    names = ["steps", *(m.name for m in measures), "return"]
+    swept = tuple(dict.fromkeys(key for row in columns.values() for key in row))
+    episodes, trials = [], []
+    for condition, own in known.items():
+        told = {"condition": condition, **columns.get(condition, {})}
+        for phase, by_condition in phases.items():
+            arrays = {n: np.asarray(a) for n, a in by_condition.get(condition, {}).items()}
+            if arrays:
+                count = next(iter(arrays.values())).shape[1]
+                where = {"seed": np.repeat(own, count), "phase": phase}
+                where["episode"] = np.tile(np.arange(count), len(own))
+                values = {n: arrays[n].ravel() for n in names if n in arrays}
+                episodes.append(pd.DataFrame({**told, **where, **values}))
+        kept = {**numbers.get(condition, {}), **usage.get(condition, {})}
+        trials.append(pd.DataFrame({**told, "seed": own, "state": DONE, **kept}))
+    columns_of_episodes = ["condition", *swept, "seed", "phase", "episode", *names]
+    return Results(
+        _described_episodes(_joined(episodes, columns_of_episodes), measures, swept),
+        _described_trials(_joined(trials, ["condition", *swept, "seed", "state"]), swept),
+        tuple(phases), columns, measures,
+        tuple(dict.fromkeys(name for own in usage.values() for name in own)),
+    )  # fmt: skip
+
+
+def _counted(condition: str, *given: Mapping[str, Any]) -> tuple[int, ...]:
+    """Return the seeds of a condition, from 0 on, by the length of its arrays."""
+    phases, numbers = given
+    arrays = (a for by in (*phases.values(), numbers) for a in by.get(condition, {}).values())
+    return tuple(range(len(next(arrays, ()))))
+
+
+def _joined(frames: Sequence[DataFrame], names: Sequence[str]) -> DataFrame:
+    """Return frames below each other, with columns of these names first."""
+    whole = pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=[*names])
+    return whole.reindex(columns=[*names, *(n for n in whole.columns if n not in names)])
+
+
+def select(results: Results, keep: NDArray[np.bool_]) -> Results:
+    """Return the results of those trials, of the rows of the frame `trials`, that are kept."""
+    keys = ["condition", "seed"]
+    trials = results.trials[keep].reset_index(drop=True)
+    chosen = pd.MultiIndex.from_frame(trials[keys])
+    episodes = results.episodes[pd.MultiIndex.from_frame(results.episodes[keys]).isin(chosen)]
+    left = set(trials["condition"])
+    columns = {c: row for c, row in results.columns.items() if c in left}
+    return Results(
+        episodes.reset_index(drop=True), trials, results.phases, columns, results.measures,
+        results.usage,
+    )  # fmt: skip
+
+
+def join(
+    parts: Sequence[Results],
+    labels: Sequence[Mapping[str, str]],
+    columns: Mapping[str, Mapping[str, Any]],
+    measures: tuple[Measure, ...],
+) -> Results:
+    """Return results below each other.
+
+    Parameters
+    ----------
+    parts
+        The results.
+    labels
+        For each of them, what its conditions are called in the whole.
+    columns, measures
+        Of the whole, see `Results`.
+    """
+    swept = dict.fromkeys(key for row in columns.values() for key in row)
+    frames: dict[str, list[DataFrame]] = {"episodes": [], "trials": []}
+    for part, new in zip(parts, labels, strict=True):
+        for name, kept in frames.items():
+            frame = getattr(part, name)
+            condition = frame["condition"].map(new)
+            told = {key: condition.map(lambda c, k=key: columns[c][k]) for key in swept}
+            kept.append(frame.assign(condition=condition, **told))
+    episodes, trials = (_joined(kept, ["condition", *swept]) for kept in frames.values())
+    phases = dict.fromkeys(phase for part in parts for phase in part.phases)
+    usage = dict.fromkeys(name for part in parts for name in part.usage)
+    return Results(
+        _described_episodes(episodes, measures, swept), _described_trials(trials, swept),
+        tuple(phases), columns, measures, tuple(usage),
+    )  # fmt: skip

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import ast
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from ...core.plugins.messages import near
-from ..spec.errors import SpecError
+from ..errors import SpecError
 from ..spec.overlay import flat
 from ..trials.measures import joined as joined_measures
-from .results import Arrays, Results
+from .results import Results, join, select
 
 COMPARISONS: dict[type[ast.cmpop], Callable[[Any, Any], bool]] = {
     ast.Eq: lambda a, b: a == b,
@@ -131,31 +133,21 @@ class Where:
         return SpecError(f"where = {self.text!r}: {ast.unparse(node)!r} {why}")
 
 
-def selected(results: Results, keep: Callable[[str, int], bool]) -> Results:
-    """Return the results of the trials, by condition and seed, that are to be kept."""
-    places = {
-        condition: [i for i, seed in enumerate(seeds) if keep(condition, seed)]
-        for condition, seeds in results.seeds.items()
-    }
-    places = {condition: found for condition, found in places.items() if found}
+def chosen(results: Results, where: Where, settings: Mapping[str, Any]) -> Results:
+    """Return the results of the trials of a choice.
 
-    def part(by_condition: Mapping[str, Arrays]) -> dict[str, Arrays]:
-        return {
-            c: {name: values[places[c]] for name, values in arrays.items()}
-            for c, arrays in by_condition.items()
-            if c in places
-        }
-
-    return replace(
-        results,
-        training=part(results.training),
-        evaluation=part(results.evaluation),
-        phases={phase: part(found) for phase, found in results.phases.items()},
-        seeds={c: tuple(results.seeds[c][i] for i in found) for c, found in places.items()},
-        numbers=part(results.numbers),
-        usage=part(results.usage),
-        columns={c: row for c, row in results.columns.items() if c in places},
-    )
+    Parameters
+    ----------
+    results
+        Of any studies.
+    where
+        The choice.
+    settings
+        By condition, as tables.
+    """
+    trials = zip(results.trials["condition"], results.trials["seed"].tolist(), strict=True)
+    keep = [where(c, s, settings.get(c, {}), results.columns.get(c, {})) for c, s in trials]
+    return select(results, np.array(keep, dtype=bool))
 
 
 def relabelled(results: Results, name: str, taken: Iterable[str]) -> dict[str, str]:
@@ -175,29 +167,22 @@ def together(studies: Sequence[tuple[str, Results]]) -> tuple[Results, list[dict
     SpecError
         If two studies mean different things by the name of a measure.
     """
-    times: dict[str, int] = {}
-    for _, results in studies:
-        for condition in results.columns:
-            times[condition] = times.get(condition, 0) + 1
+    times = Counter(condition for _, results in studies for condition in results.columns)
     several = [condition for condition, count in times.items() if count > 1]
     labels = [relabelled(results, name, several) for name, results in studies]
     keys = dict.fromkeys(k for _, r in studies for row in r.columns.values() for k in row)
-    whole = Results({}, {}, measures=joined_measures(r.measures for _, r in studies))
-    columns: dict[str, dict[str, Any]] = {}
-    for (name, results), new in zip(studies, labels, strict=True):
-        for condition, row in results.columns.items():
-            full = {key: row.get(key, "") for key in keys}
-            columns[new[condition]] = {**full, DIRECTORY: name}
-        for there, here in (
-            (results.training, whole.training),
-            (results.evaluation, whole.evaluation),
-            (results.numbers, whole.numbers),
-            (results.usage, whole.usage),
-            *((found, whole.phases.setdefault(p, {})) for p, found in results.phases.items()),
-        ):
-            here.update({new[c]: arrays for c, arrays in there.items()})
-        whole.seeds.update({new[c]: seeds for c, seeds in results.seeds.items()})
-    return replace(whole, columns=columns), labels
+    columns = {
+        new[condition]: {**{key: row.get(key, "") for key in keys}, DIRECTORY: name}
+        for (name, results), new in zip(studies, labels, strict=True)
+        for condition, row in results.columns.items()
+    }
+    whole = join(
+        [results for _, results in studies],
+        labels,
+        columns,
+        joined_measures(results.measures for _, results in studies),
+    )
+    return whole, labels
 
 
 def _plain(value: Any) -> Any:

@@ -8,7 +8,7 @@ few different values: below `FEW` seeds intervals of means are Student's.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -17,12 +17,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.plugins.deferred import Deferred
-from .distributions import normal_cdf, normal_quantile, t_quantile
 
 if TYPE_CHECKING:
-    from scipy import stats
+    from scipy import special, stats
 else:
-    stats = Deferred("scipy.stats")
+    special, stats = Deferred("scipy.special"), Deferred("scipy.stats")
 
 Array = NDArray[np.float64]
 
@@ -168,7 +167,7 @@ def _bounded(
     least, greatest = bounds
     low, high = np.clip(low, *bounds), np.clip(high, *bounds)
     if np.isfinite(greatest - least):
-        z = normal_quantile(0.5 + level / 2.0)
+        z = float(special.ndtri(0.5 + level / 2.0))
         reach = (greatest - least) * z**2 / (n_runs + z**2)
         low = np.where(value >= greatest, np.minimum(low, greatest - reach), low)
         high = np.where(value <= least, np.maximum(high, least + reach), high)
@@ -184,13 +183,13 @@ def _student(strata: list[Array], level: float) -> Array:
     shares = np.divide(parts, variance, out=np.zeros_like(parts), where=variance > 0)
     # Where nothing varies the interval has no width, with any degrees of freedom.
     degrees = 1.0 / np.maximum((shares**2 / freedom).sum(axis=0), 1e-300)
-    return t_quantile(degrees, 0.5 + level / 2.0) * np.sqrt(variance)
+    return special.stdtrit(degrees, 0.5 + level / 2.0) * np.sqrt(variance)
 
 
 def _tail(level: float, n_runs: int) -> float:
     """Return the share of resamples beyond either end of an interval."""
-    quantile = float(t_quantile(n_runs - 1, 0.5 + level / 2.0))
-    return normal_cdf(-quantile * math.sqrt(n_runs / (n_runs - 1)))
+    quantile = float(special.stdtrit(n_runs - 1, 0.5 + level / 2.0))
+    return special.ndtr(-quantile * math.sqrt(n_runs / (n_runs - 1)))
 
 
 def rate(outcomes: ArrayLike, level: float = 0.95) -> Estimate:
@@ -228,7 +227,7 @@ def rate(outcomes: ArrayLike, level: float = 0.95) -> Estimate:
         alike = (np.clip(effect, 1.0, n_episodes) - 1.0) / (n_episodes - 1)
     alike = (ALIKE + rarer * alike) / (ALIKE + rarer)
     n = array.size / (1.0 + (n_episodes - 1) * alike)
-    z = normal_quantile(0.5 + level / 2.0)
+    z = float(special.ndtri(0.5 + level / 2.0))
     centre = (p + z**2 / (2.0 * n)) / (1.0 + z**2 / n)
     half = z / (1.0 + z**2 / n) * np.sqrt(p * (1.0 - p) / n + z**2 / (4.0 * n**2))
     low, high = np.clip([centre - half, centre + half], 0.0, 1.0)
@@ -238,6 +237,10 @@ def rate(outcomes: ArrayLike, level: float = 0.95) -> Estimate:
 
 def rates(outcomes: ArrayLike, level: float = 0.95) -> Estimate:
     """Return `rate` of each column of ``(n_runs, n_points)`` outcomes on its own."""
-    found = [rate(column[:, None], level) for column in np.asarray(outcomes).T]
-    value, low, high = np.array([(e.value, e.low, e.high) for e in found]).T
+    return stacked([rate(column[:, None], level) for column in np.asarray(outcomes).T])
+
+
+def stacked(estimates: Sequence[Estimate]) -> Estimate:
+    """Return estimates of no dimension as one ``(n,)``."""
+    value, low, high = np.array([(e.value, e.low, e.high) for e in estimates], dtype=float).T
     return Estimate(value, low, high)

@@ -39,11 +39,11 @@ def evaluated(results: Results, condition: str) -> dict[str, Estimate]:
 
     Those of `[evaluations]` are called ``success, NAME``.
     """
-    if condition not in results.evaluation:
+    if not results.has(condition, "evaluation"):
         return {}
-    elsewhere = {f"success, {n}": arrays for n, arrays in results.elsewhere(condition).items()}
-    evaluations = {EVALUATED: results.evaluation[condition], **elsewhere}
-    return {title: rate(arrays["success"]) for title, arrays in evaluations.items()}
+    others = results.other_evaluations(condition).items()
+    phases = {EVALUATED: "evaluation", **{f"success, {name}": phase for name, phase in others}}
+    return {title: rate(results.success(condition, phase)) for title, phase in phases.items()}
 
 
 def two_figures(value: float) -> str:

@@ -18,12 +18,14 @@ WORDS = ("worse", "better")
 """What a significantly lower and a higher success rate are called."""
 
 
-def told(found: Sequence[Difference], words: tuple[str, str] = WORDS) -> Iterator[str]:
+def verdict_lines(
+    differences: Sequence[Difference], words: tuple[str, str] = WORDS
+) -> Iterator[str]:
     """Yield a line for every difference of one measure: the significant ones first, sorted.
 
     `words` are what lower and higher values are called.
     """
-    ranked = sorted(found, key=lambda d: float(d.estimate.value))
+    ranked = sorted(differences, key=lambda d: float(d.estimate.value))
     for word, sign in zip(words, (-1, 1), strict=True):
         for d in ranked:
             if d.p < LEVEL and d.estimate.value * sign > 0:
@@ -39,25 +41,25 @@ def _line(verdict: str, d: Difference) -> list[str]:
 
 
 def power_lines(
-    found: Sequence[Difference], *, of_rates: bool = True, smallest: float | None = None
+    differences: Sequence[Difference], *, of_rates: bool = True, smallest: float | None = None
 ) -> list[str]:
     """Return lines on which differences the comparisons could find, and how many seeds it takes.
 
     Parameters
     ----------
-    found
+    differences
         All that were adjusted together, of one unit.
     of_rates
         Whether they are differences of success rates.
     smallest
         The smallest difference of interest; of rates `SMALLEST` unless said otherwise.
     """
-    if not found:
+    if not differences:
         return []
-    seeds = min(d.seeds for d in found)
-    deviation = deviation_of([d.sample for d in found], of_rates=of_rates)
+    seeds = min(d.seeds for d in differences)
+    deviation = deviation_of([d.sample for d in differences], of_rates=of_rates)
     return power_text(
-        seeds, len(found), deviation, SMALLEST if of_rates and smallest is None else smallest
+        seeds, len(differences), deviation, SMALLEST if of_rates and smallest is None else smallest
     )
 
 
@@ -75,11 +77,11 @@ def power_text(
     Power: with 20 seeds, a difference of .17 is found with probability .80. For a
       difference of .20 it takes about 15 seeds.
     """
-    text = f"Power: {power_told(seeds, comparisons, deviation, smallest)}"
+    text = f"Power: {power_sentence(seeds, comparisons, deviation, smallest)}"
     return wrap(text, WIDTH, subsequent_indent="  ", break_on_hyphens=False)
 
 
-def power_told(
+def power_sentence(
     seeds: int, comparisons: int, deviation: float | None, smallest: float | None
 ) -> str:
     """Return the same in one piece, without its head."""

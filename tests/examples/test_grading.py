@@ -11,7 +11,7 @@ import pytest
 
 import nested_agents as na
 from nested_agents.core.agents.cost import Problem, below_counts
-from nested_agents.studies.spec.errors import SpecError
+from nested_agents.studies.errors import SpecError
 
 import grade as program
 import labs

@@ -8,7 +8,7 @@ import pytest
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.checking.predictions import MOST_JOINT_ACTIONS
 from nested_agents.studies.cli.main import main
-from nested_agents.studies.spec.errors import SpecError
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import check
 

@@ -1,13 +1,39 @@
 """Results of studies whose answer is known, made without a simulation."""
 
-from dataclasses import replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from nested_agents.core.interface.measures import SUCCESS
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
-from nested_agents.studies.results.results import Results
+from nested_agents.studies.results.results import Results, from_arrays
 
 SEEDS = 20
+
+
+@dataclass
+class Arrays:
+    """What `from_arrays` makes frames of, fit to be changed by a test."""
+
+    training: dict = field(default_factory=dict)
+    evaluation: dict = field(default_factory=dict)
+    phases: dict = field(default_factory=dict)
+    seeds: dict = field(default_factory=dict)
+    numbers: dict = field(default_factory=dict)
+    usage: dict = field(default_factory=dict)
+    columns: dict = field(default_factory=dict)
+    measures: tuple = (SUCCESS,)
+
+    def frames(self) -> Results:
+        own = {"training": self.training, "evaluation": self.evaluation}
+        phases = {phase: arrays for phase, arrays in (own | self.phases).items() if arrays}
+        return from_arrays(
+            phases, seeds=self.seeds, numbers=self.numbers, usage=self.usage,
+            columns=self.columns, measures=self.measures,
+        )  # fmt: skip
+
+
+NOTHING = Arrays().frames()
 
 
 def arrays(chances: np.ndarray, rng: np.random.Generator, seeds: int = SEEDS) -> dict:
@@ -25,17 +51,16 @@ def arrays(chances: np.ndarray, rng: np.random.Generator, seeds: int = SEEDS) ->
     }
 
 
-def ablation(chances: dict[str, float], seeds: int = SEEDS) -> Results:
+def ablation(chances: dict[str, float], seeds: int = SEEDS) -> Arrays:
     """Every condition succeeds with its chance, in training and greedy."""
     rng = np.random.default_rng(1)
     training = {c: arrays(np.full(20, p), rng, seeds) for c, p in chances.items()}
     evaluation = {c: arrays(np.full(10, p), rng, seeds) for c, p in chances.items()}
-    phases = {"training": training, "evaluation": evaluation}
-    found = dict.fromkeys(chances, tuple(range(seeds)))
-    return Results(training, evaluation, phases, found, measures=MEASURES)
+    numbered = dict.fromkeys(chances, tuple(range(seeds)))
+    return Arrays(training, evaluation, seeds=numbered, measures=MEASURES)
 
 
-def shapes(chances: dict[str, float], trained: float = 0.95, seeds: int = SEEDS) -> Results:
+def shapes(chances: dict[str, float], trained: float = 0.95, seeds: int = SEEDS) -> Arrays:
     """A team trained with success `trained`, and its success with other boxes."""
     base = ablation({"own-value": trained}, seeds)
     rng = np.random.default_rng(2)
@@ -49,7 +74,7 @@ def shapes(chances: dict[str, float], trained: float = 0.95, seeds: int = SEEDS)
     return base
 
 
-def related(kept: tuple[float, float], seeds: int = SEEDS) -> Results:
+def related(kept: tuple[float, float], seeds: int = SEEDS) -> Arrays:
     """Agents on wheels and a team by pushing points, and what success they keep with the star."""
     systems = ("nested", "pushing points, team")
     base = ablation(dict.fromkeys(systems, 0.95), seeds)
@@ -61,7 +86,7 @@ def related(kept: tuple[float, float], seeds: int = SEEDS) -> Results:
     return base
 
 
-def games(systems: dict[str, float], by_game: dict[str, float] | None = None) -> Results:
+def games(systems: dict[str, float], by_game: dict[str, float] | None = None) -> Arrays:
     """Systems that find the optimum of games with a chance, or one of each game."""
     conditions = {
         f"{system}, game={game}": (system, game, chance if by_game is None else by_game[game])
@@ -70,15 +95,16 @@ def games(systems: dict[str, float], by_game: dict[str, float] | None = None) ->
     }
     base = ablation({c: chance for c, (_, _, chance) in conditions.items()})
     columns = {c: {"name": s, "scenario.game": game} for c, (s, game, _) in conditions.items()}
-    return replace(base, columns=columns)
+    base.columns.update(columns)
+    return base
 
 
 def wheel_failure(
     ends: dict[str, dict[str, float]], onset: int = 20, episodes: int = 40, seeds: int = SEEDS
-) -> Results:
+) -> Arrays:
     """By fault and what adapts, the level that is reached ten episodes after the failure."""
     rng = np.random.default_rng(3)
-    base = Results({}, {}, {"training": {}, "weights kept": {}}, measures=MEASURES)
+    base = Arrays(phases={"weights kept": {}}, measures=MEASURES)
     before = np.minimum(0.95, np.linspace(0.0, 2.0, onset))
     for fault, by_case in ends.items():
         for enabled, cases in (
@@ -91,15 +117,15 @@ def wheel_failure(
                 whole = arrays(np.concatenate([before, after]), rng, seeds)
                 if phase == "weights kept":
                     whole = {name: values[:, onset:] for name, values in whole.items()}
-                base.phases[phase][condition] = whole
+                kept = base.training if phase == "training" else base.phases[phase]
+                kept[condition] = whole
             base.columns[condition] = {"name": fault, "learner.self_model.enabled": enabled}
             base.seeds[condition] = tuple(range(seeds))
             base.numbers[condition] = {"onset": np.full(seeds, float(onset))}
-    base.training.update(base.phases["training"])
     return base
 
 
-def scaling(success: dict[int, float], seconds_per_agent: float = 1e-4) -> Results:
+def scaling(success: dict[int, float], seconds_per_agent: float = 1e-4) -> Arrays:
     """Two evaluators: one whose decisions take time in proportion to agents, one to agents^2."""
     rng = np.random.default_rng(4)
     chances = {
@@ -123,16 +149,16 @@ def scaling(success: dict[int, float], seconds_per_agent: float = 1e-4) -> Resul
         }
         base.usage[condition] = {
             "decision_median": seconds_per_agent * agents**power * spread,
-            "learning": 1e-5 * agents * steps,
-            "physics": 1e-5 * agents * steps,
-            "sensors": 1e-5 * agents * steps,
+            "seconds.learning": 1e-5 * agents * steps,
+            "seconds.physics": 1e-5 * agents * steps,
+            "seconds.sensors": 1e-5 * agents * steps,
             "step_bytes": 1e4 * agents * spread,
             "process_bytes": 2e8 * spread,
         }
     return base
 
 
-def hierarchies(chances: dict[tuple[str, str, int], float], seeds: int = SEEDS) -> Results:
+def hierarchies(chances: dict[tuple[str, str, int], float], seeds: int = SEEDS) -> Arrays:
     """By hierarchy, whose value decides and number of robots, the chance of success."""
     by_label = {f"topology={t}, value_of={of}, robots={n}": (t, of, n) for t, of, n in chances}
     base = ablation(dict(zip(by_label, chances.values(), strict=True)), seeds)

@@ -18,11 +18,11 @@ from nested_agents.studies.catalogue import scaling
 from nested_agents.studies.catalogue.study import load_study
 from nested_agents.studies.cli import display
 from nested_agents.studies.cli.main import main
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.tables import tabulate
 from nested_agents.studies.report.replays import replays
 from nested_agents.studies.results import published
 from nested_agents.studies.results.results import read
-from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.outline import Outline
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store import reading
@@ -96,12 +96,11 @@ def test_a_study_knows_its_measures_without_its_scenarios(study, monkeypatch):
         assert store.measures() == (SUCCESS, SPREAD, LEVEL, ODD)
         results = read(store)
     assert results.measures == (SUCCESS, SPREAD, LEVEL, ODD)
-    assert list(results.training["1"]) == ["steps", "success", "return"]
-    assert list(results.training["2"]) == [
-        "steps", "success", "spread_m", "level", 'far "off"', "return",
-    ]  # fmt: skip
-    assert results.training["2"]["spread_m"].shape == (2, 3)
-    assert results.evaluation["2"]["level"].dtype == int
+    names = ["steps", "success", "spread_m", "level", 'far "off"', "return"]
+    assert [n for n in names if results.has("1", "training", n)] == ["steps", "success", "return"]
+    assert all(results.has("2", "training", name) for name in names)
+    assert results.values("2", "spread_m").shape == (2, 3)
+    assert results.values("2", "level", "evaluation").dtype == int
 
 
 def test_rows_in_every_form(study, monkeypatch):
@@ -153,7 +152,7 @@ def test_the_learning_curve_and_its_publication(study):
     shown = [axes.get_title(loc="left") for axes in figure.axes if axes.get_visible()]
     assert shown == ["success", "greatest spread of the carts [m]", "distance [m]"]
     assert again.measures == results.measures
-    assert (again.training["2"]["level"] == results.training["2"]["level"]).all()
+    assert (again.values("2", "level") == results.values("2", "level")).all()
     for once, twice in zip(analysis.table, learning.analyse(again).table, strict=True):
         assert once.estimates.keys() == twice.estimates.keys()
         for title, estimate in once.estimates.items():  # publication keeps three decimals

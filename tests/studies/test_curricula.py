@@ -69,9 +69,9 @@ def test_stages_are_kept_in_the_order_in_which_they_were_trained(study):
 def test_learning_curves_are_of_the_condition_itself_and_tables_tell_all_evaluations(study):
     with Store.open(study) as store:
         results = read(store)
-    (condition,) = results.training
-    assert results.training[condition]["success"].shape == (2, 3)
-    assert list(results.elsewhere(condition)) == ["six", "eight"]
+    (condition,) = results.conditions
+    assert results.success(condition).shape == (2, 3)
+    assert list(results.other_evaluations(condition)) == ["six", "eight"]
     analysis = load_study("learning-curve").analyse(results)
     titles = tabulate(analysis.table).titles
     assert titles[1:4] == ("evaluation success", "success, six", "success, eight")

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from nested_agents.studies.catalogue.games.analysis import analyse
+from nested_agents.studies.catalogue.games import analyse
 from nested_agents.studies.claims import claims
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.results import published
-from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import check
 

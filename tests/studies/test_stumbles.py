@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 import nested_agents as na
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.interface.measures import SUCCESS
-from nested_agents.studies.catalogue.learning_curve.analysis import metrics_of
+from nested_agents.studies.catalogue.learning_curve import metrics_of
 from nested_agents.studies.catalogue.scaling import analyse as analyse_scaling
 from nested_agents.studies.catalogue.wheel_failure import analyse as analyse_failures
 from nested_agents.studies.catalogue.wheel_failure import draw as draw_failures
@@ -21,7 +21,7 @@ from nested_agents.topologies.drawing import draw
 
 
 def test_a_verdict_on_sizes_compares_within_a_size() -> None:
-    said = words.verdicts(analyse_scaling(scaling({2: 0.9, 8: 0.4})))
+    said = words.verdicts(analyse_scaling(scaling({2: 0.9, 8: 0.4}).frames()))
     assert said.startswith("2 robots: ")
     assert " 8 robots: " in said
     assert said.count("highest is") == 2
@@ -32,7 +32,7 @@ def test_every_failure_is_marked() -> None:
                                         "self-model": 0.6}})  # fmt: skip
     for numbers in results.numbers.values():
         numbers["onset.2"] = np.full(20, 30.0)
-    axes = draw_failures(analyse_failures(results))["wheel-failure"].axes[0]
+    axes = draw_failures(analyse_failures(results.frames()))["wheel-failure"].axes[0]
     marks = {line.get_xdata()[0] for line in axes.lines if len(set(line.get_xdata())) == 1}
     assert marks == {19.5, 29.5}
 
@@ -161,4 +161,6 @@ def test_hierarchies_say_how_small_a_difference_they_could_find() -> None:
     from nested_agents.studies.catalogue.hierarchies import analyse
 
     chances = {("chain", "team", 2): 0.9, ("star", "team", 2): 0.8}
-    assert any("Power: with 20 seeds" in note for note in analyse(hierarchies(chances)).notes)
+    assert any(
+        "Power: with 20 seeds" in note for note in analyse(hierarchies(chances).frames()).notes
+    )

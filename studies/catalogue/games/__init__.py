@@ -1,20 +1,177 @@
-"""What nesting buys in repeated games, and what it does not."""
+"""The games study: how often learners of all kinds find the optimum of a repeated game.
+
+A step is a play. After the first episode of training, and after the last one, nothing is explored
+or learned for a while: the last play of that while is optimal or it is not. Ties between equally
+good actions are broken at random at every play, so that agents who cannot agree on one of two
+optima miss it about every second time. The first of the two evaluations leaves the team and its
+random numbers as they were.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from math import ceil
+from string import ascii_uppercase
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
-from .analysis import Games, analyse, check, measure
+from ...results.analysis import Analysis
+from ...results.results import Results
+from ...results.statistics import Estimate, rate
+from ...results.summary import Summary, two_figures
+from ...results.verdicts import WIDTH
+from ...store.schema import ELSEWHERE
+from ...trials.session import Session
+from ...trials.trial import Trial, TrialResult
+from ..study import check_evaluated as check
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+AFTER_ONE = f"{ELSEWHERE}after one episode"
+"""Phase of the evaluation after the first episode of training."""
+COLUMNS = 3
+"""Panels of the figure that stand beside each other."""
+APART = 0.2
+"""How far the points of one system stand apart, in rows."""
 
-def draw(analysis: Games) -> dict[str, Figure]:
-    """Return the figures of an analysis by name."""
-    from .figure import figure_of  # workers import this package, and matplotlib takes its time
 
-    return {"games": figure_of(analysis)} if analysis.cases else {}
+def measure(trial: Trial) -> TrialResult:
+    """Train, and evaluate after the first and the last episode; imported by name in workers."""
+    session = Session(trial)
+    session.train(1)
+    generator = session.team.rng.bit_generator
+    state = generator.state
+    session.evaluate(phase=AFTER_ONE)
+    generator.state = state
+    session.train(trial.episodes - 1, first=1)
+    session.evaluate()
+    session.evaluate_elsewhere()
+    return session.result()
+
+
+@dataclass(frozen=True)
+class Case:
+    """One condition.
+
+    Attributes
+    ----------
+    system
+        Name of its override: what learns and decides.
+    setting
+        What it is compared in: the game, the exploration.
+    optimal
+        By number of plays, the probability of the optimal joint action.
+    """
+
+    system: str
+    setting: tuple[str, ...]
+    optimal: Mapping[int, Estimate]
+
+
+def analyse(results: Results) -> Analysis:
+    """Estimate; 95 % Wilson intervals, seeds as the unit of sampling."""
+    cases, table = [], []
+    for condition in results.of_phase("evaluation"):
+        columns = results.columns.get(condition, {"name": condition})
+        setting = tuple(str(v) for k, v in columns.items() if k != "name" and v != "")
+        steps = results.values(condition, "steps")
+        optimal = {}
+        if results.has(condition, AFTER_ONE) and steps.shape[1] > 1:
+            optimal[int(steps[0, 0])] = rate(results.success(condition, AFTER_ONE))
+        optimal[int(steps[0].sum())] = rate(results.success(condition, "evaluation"))
+        cases.append(Case(str(columns.get("name", condition)), setting, optimal))
+        estimates = {titled(plays): estimate for plays, estimate in optimal.items()}
+        table.append(Summary(condition, len(steps), estimates))
+    headline = titled(max((max(case.optimal) for case in cases), default=0))
+    return Analysis(tuple(table), tuple(_side_by_side(cases)), cases, headline=headline)
+
+
+def titled(plays: int) -> str:
+    """Return the title of an estimate.
+
+    >>> titled(5000)
+    'optimal, 5,000 plays'
+    """
+    return f"optimal, {plays:,} plays"
+
+
+def _side_by_side(cases: Sequence[Case]) -> Iterator[str]:
+    """Yield the systems as columns, the settings as rows, for each number of plays."""
+    systems = list(dict.fromkeys(case.system for case in cases))
+    settings = list(dict.fromkeys(case.setting for case in cases))
+    letters = dict(zip(systems, ascii_uppercase, strict=False))
+    if len(letters) < 2 or len(letters) < len(systems):
+        return
+    by_place = {(case.setting, case.system): case.optimal for case in cases}
+    widest = max(len(", ".join(setting)) for setting in settings)
+    legend = "; ".join(f"{letter} {system}" for system, letter in letters.items())
+    yield from ("", *wrap(legend, WIDTH))
+    for plays in dict.fromkeys(plays for case in cases for plays in case.optimal):
+        yield f"\nProbability of the optimal joint action after {plays:,} plays"
+        yield " " * widest + "".join(f"{letter:>4}" for letter in letters.values())
+        for setting in settings:
+            cells = (by_place.get((setting, system), {}).get(plays) for system in systems)
+            shown = "".join(f"{two_figures(float(e.value)) if e else '-':>4}" for e in cells)
+            yield f"{', '.join(setting):{widest}}{shown}"
+
+
+def draw(analysis: Analysis) -> dict[str, Figure]:
+    """Return the figure: probabilities of the optimum with their 95 % intervals.
+
+    A panel for each game (the first thing that settings differ in), the systems one below the
+    other, a colour and a marker for the rest of the setting; what is filled has been measured after
+    all plays.
+    """
+    from ...presentation import figures as f  # matplotlib takes its time
+
+    cases = analysis.cases
+    if not cases:
+        return {}
+    systems = list(dict.fromkeys(case.system for case in cases))
+    games = list(dict.fromkeys(case.setting[:1] for case in cases))
+    rests = list(dict.fromkeys(case.setting[1:] for case in cases))
+    plays = sorted({count for case in cases for count in case.optimal})
+    looks = [(rest, count) for rest in rests for count in plays]
+    rows, columns = ceil(len(games) / COLUMNS), min(COLUMNS, len(games))
+    size = (1.8 + 2.3 * columns, 0.9 + rows * (0.5 + 0.24 * len(systems)))
+    figure, panels = f.panels(rows, columns, size, sharex=True, sharey=True)
+
+    def colours(rest: tuple[str, ...], count: int) -> dict[str, str]:
+        colour = f.look(rests.index(rest))["color"]
+        return {"color": colour, "markerfacecolor": colour if count == plays[-1] else "white"}
+
+    for axes, game in zip(panels.flat, games, strict=False):
+        axes.set_title(", ".join(game), loc="left")
+        for case in (case for case in cases if case.setting[:1] == game):
+            rest = case.setting[1:]
+            for count, estimate in case.optimal.items():
+                beside = looks.index((rest, count)) - (len(looks) - 1) / 2
+                row = systems.index(case.system) + APART * beside
+                own, marker = colours(rest, count), f.marker(rests.index(rest))
+                face = own["markerfacecolor"]
+                f.draw_row(
+                    axes, row, estimate, own["color"], marker, markerfacecolor=face, markersize=3.5
+                )
+        f.as_rates(axes, "x")
+        axes.grid(axis="x", alpha=0.25)
+        for line in range(len(systems) - 1):
+            axes.axhline(line + 0.5, color="#e4e4e4", linewidth=0.6, zorder=0)
+    f.name_rows(panels[0, 0], systems)
+    for axes in panels.flat[len(games) :]:
+        axes.set_axis_off()
+    for axes in panels[-1]:
+        axes.set_xlabel("P(optimal joint action)")
+    handles = [
+        f.handle(
+            ", ".join((*rest, f"{count:,} plays")), marker=f.marker(rests.index(rest)),
+            **colours(rest, count),
+        )
+        for rest, count in looks
+    ]  # fmt: skip
+    f.add_legend(figure, handles, "bars: 95 % intervals", ncols=2)
+    return {"games": figure}
 
 
 __all__ = ["analyse", "check", "draw", "measure"]

@@ -1,24 +1,313 @@
-"""Which hierarchy it takes, at which size, at what cost."""
+"""The hierarchies study: which hierarchy it takes, at which size, at what cost.
+
+Conditions are topologies, crossed with whose value decides and with the number of robots; all meet
+the same worlds, seed by seed. One measure was fixed beforehand: evaluation success. For each number
+of robots and each choice of whose value decides, every hierarchy is compared with the chain (with
+the first hierarchy if there is no chain) by permutation of signs; p is adjusted by Holm's method
+over all of these comparisons. Few seeds cannot give a small p whatever the outcome: what they
+leave undecided is called so, and how many seeds it takes is said.
+
+A trial is measured as one of the scaling study, messages included: one for every edge of the
+hierarchy's transitive closure. Decisions to the goal are those of successful episodes alone: a
+hierarchy that succeeds only where it is easy looks quick.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
-from ..scaling.analysis import measure
-from .analysis import Hierarchies, analyse, check
+import numpy as np
+
+from ...errors import SpecError
+from ...results.analysis import Analysis
+from ...results.comparison import Array, Difference, adjusted, aligned, difference
+from ...results.paired_tests import LEVEL
+from ...results.power import seeds_needed
+from ...results.results import Results
+from ...results.statistics import Estimate, bootstrap, rate
+from ...results.summary import EVALUATED, Summary, two_figures
+from ...results.verdicts import WIDTH, power_lines
+from ...spec.labels import label_but
+from ...spec.spec import Spec
+from ..scaling import NUMBERS, measure
+from ..study import check_evaluated
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-NUMBERS = ("robots", "messages", "decision_median")
-"""What of whole trials the analysis rests on."""
+VALUE_OF = "learner.decision.value_of"
+"""What is swept to vary whose value decides."""
+REFERENCE = "chain"
+"""The hierarchy that others are compared with, if it is there."""
+DECIDING, MESSAGES = "decide [ms]", "messages"
+"""Titles of what a decision costs."""
+UNBROKEN = "\N{NO-BREAK SPACE}"
 
 
-def draw(analysis: Hierarchies) -> dict[str, Figure]:
-    """Return the figures of an analysis by name."""
-    from .figure import figure_of  # workers import this package, and matplotlib takes its time
+def check(spec: Spec) -> None:
+    """Raise `SpecError` unless there are hierarchies to compare and episodes to compare them by."""
+    check_evaluated(spec)
+    settings = [condition.settings for condition in spec.conditions()]
+    if len({(one.agents, one.topology.model_dump_json()) for one in settings}) < 2:
+        raise SpecError(
+            f"topology = {settings[0].topology.title!r} in every condition: hierarchies needs two "
+            "or more, sweep topology"
+        )
 
-    return {"hierarchies": figure_of(analysis)} if analysis.cases else {}
+
+@dataclass(frozen=True)
+class Case:
+    """One condition.
+
+    Attributes
+    ----------
+    condition
+        Its label.
+    hierarchy
+        Its label without the number of robots and whose value decides.
+    value_of
+        Whose value decides; empty if that is not swept.
+    robots
+        Their number.
+    values
+        Estimates by title.
+    """
+
+    condition: str
+    hierarchy: str
+    value_of: str
+    robots: int
+    values: dict[str, Estimate]
+
+    @property
+    def setting(self) -> str:
+        """What it has in common with those that it is compared with."""
+        counted = f"{self.robots} robot{'s' * (self.robots != 1)}"
+        return f"{counted}, {self.value_of}" if self.value_of else counted
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether the hierarchy matters, given the number of robots and whose value decides.
+
+    Attributes
+    ----------
+    setting
+        Those two.
+    reference
+        The hierarchy that the others are compared with.
+    comparisons
+        Every other hierarchy less the reference, by evaluation success.
+    among
+        How many comparisons of the study p is adjusted over.
+    """
+
+    setting: str
+    reference: str
+    comparisons: tuple[Difference, ...]
+    among: int
+
+    @property
+    def different(self) -> tuple[Difference, ...]:
+        """Those that differ significantly."""
+        return tuple(d for d in self.comparisons if d.p < LEVEL)
+
+    @property
+    def undecided(self) -> tuple[Difference, ...]:
+        """Those of too few seeds, and those whose interval leaves out 0 though p is too large."""
+        needed = seeds_needed(self.among)
+        return tuple(
+            d
+            for d in self.comparisons
+            if d.p >= LEVEL and (d.seeds < needed or not d.estimate.low <= 0.0 <= d.estimate.high)
+        )
+
+    @property
+    def alike(self) -> tuple[Difference, ...]:
+        """Those in which no difference was found, though there are seeds enough to find one."""
+        rest = (*self.different, *self.undecided)
+        return tuple(d for d in self.comparisons if d not in rest)
+
+
+def analyse(results: Results) -> Analysis:
+    """Estimate and compare; 95 % intervals, seeds as the unit of sampling.
+
+    Cases are sorted by number of robots, whose value decides, and hierarchy. Times are of one
+    decision of the whole team.
+    """
+    cases = _cases(results)
+    table = [
+        Summary(f"{c.setting}, {c.hierarchy}", len(results.seeds(c.condition)), c.values)
+        for c in cases
+    ]
+    verdicts = verdicts_of(results, cases)
+    compared = tuple(d for verdict in verdicts for d in verdict.comparisons)
+    notes = (*_legend(cases), *_verdict_lines(verdicts), *_highest(cases))
+    return Analysis(tuple(table), notes, cases, compared, EVALUATED)
+
+
+def _cases(results: Results) -> tuple[Case, ...]:
+    conditions = results.of_phase("evaluation")
+    robots = {c: int(results.numbers(c)["robots"][0]) for c in conditions}
+    apart = (VALUE_OF, *_sizes(results.columns, robots))
+    cases = []
+    for condition in conditions:
+        columns = results.columns.get(condition, {"name": condition})
+        hierarchy, value_of = label_but(columns, apart), str(columns.get(VALUE_OF, ""))
+        values = _estimates(results, condition)
+        cases.append(Case(condition, hierarchy, value_of, robots[condition], values))
+    whose = list(dict.fromkeys(case.value_of for case in cases))
+    return tuple(sorted(cases, key=lambda case: (case.robots, whose.index(case.value_of))))
+
+
+def _sizes(columns: Mapping[str, Mapping[str, object]], robots: Mapping[str, int]) -> list[str]:
+    """Return the swept keys that are the number of robots, whatever the scenario calls it."""
+    keys = dict.fromkeys(key for swept in columns.values() for key in swept)
+    return [
+        key
+        for key in keys
+        if all(str(columns.get(c, {}).get(key)) == str(count) for c, count in robots.items())
+    ]
+
+
+def _estimates(results: Results, condition: str) -> dict[str, Estimate]:
+    success = results.success(condition, "evaluation")
+    numbers = results.numbers(condition)
+    values = {EVALUATED: rate(success)}
+    decisions = to_the_goal(success, results.values(condition, "steps", "evaluation"))
+    if len(decisions):
+        values["decisions to goal"] = bootstrap(decisions)
+    values[DECIDING] = bootstrap(1e3 * numbers["decision_median"])
+    unknown = np.asarray(np.nan)  # a count has no interval
+    values[MESSAGES] = Estimate(numbers["messages"][0], unknown, unknown)
+    return values
+
+
+def to_the_goal(success: Array, steps: Array) -> Array:
+    """Return the mean decisions of successful episodes, of each seed that has any.
+
+    Examples
+    --------
+    >>> to_the_goal(np.array([[1, 0], [0, 0]]), np.array([[30, 200]] * 2))
+    array([30.])
+    """
+    runs = zip(success.astype(bool), steps, strict=True)
+    return np.array([run[reached].mean() for reached, run in runs if reached.any()])
+
+
+def verdicts_of(results: Results, cases: Sequence[Case]) -> tuple[Verdict, ...]:
+    """Return where the hierarchy matters: the comparisons of each setting, p adjusted over all.
+
+    Intervals are those of independent rates, which have a width even if all runs ended alike.
+    """
+    hierarchies = list(dict.fromkeys(case.hierarchy for case in cases))
+    reference = REFERENCE if REFERENCE in hierarchies else next(iter(hierarchies), "")
+    bases = {case.setting: case.condition for case in cases if case.hierarchy == reference}
+    compared: list[tuple[str, Difference]] = []
+    for case in cases:
+        base = bases.get(case.setting, case.condition)
+        own, other = aligned(results, (case.condition, base), _outcomes)
+        if base != case.condition and len(own) >= 2:
+            runs, estimate = (own.mean(axis=1), other.mean(axis=1)), difference(own, other)
+            compared.append(
+                (case.setting, Difference.of(case.hierarchy, EVALUATED, *runs, estimate))
+            )
+    settings = [setting for setting, _ in compared]
+    every = tuple(zip(settings, adjusted([d for _, d in compared]), strict=True))
+    return tuple(
+        Verdict(setting, reference, tuple(d for s, d in every if s == setting), len(every))
+        for setting in dict.fromkeys(settings)
+    )
+
+
+def _outcomes(results: Results, condition: str) -> Array:
+    return results.success(condition, "evaluation").astype(float)
+
+
+def _legend(cases: Sequence[Case]) -> Iterator[str]:
+    if any(case.value_of for case in cases):
+        yield "Rows: number of robots, whose value decides, hierarchy."
+
+
+def _verdict_lines(verdicts: Sequence[Verdict]) -> Iterator[str]:
+    """Yield lines that say where the hierarchy matters, and where that is undecided."""
+    if not verdicts:
+        return
+    reference, among = verdicts[0].reference, verdicts[0].among
+    text = (
+        f"Does the hierarchy matter? Evaluation success less that of {reference}, seed by seed; p "
+        f"is adjusted over {among} comparisons, so fewer than {seeds_needed(among)} seeds cannot "
+        "tell."
+    )
+    yield from ("", *wrap(text, WIDTH, break_on_hyphens=False))
+    for verdict in verdicts:
+        count = f"{len(verdict.different)} of {len(verdict.comparisons)}"
+        yield f"{verdict.setting}: {count} found to differ"
+        yield from (f"  {d.condition} differs by {d.shown}" for d in verdict.different)
+        yield from _listed("no difference found", verdict.alike)
+        yield from _listed("cannot be told", verdict.undecided)
+    yield from power_lines([d for verdict in verdicts for d in verdict.comparisons])
+
+
+def _listed(what: str, comparisons: Sequence[Difference]) -> Iterator[str]:
+    """Yield differences with their intervals as lines, none of which is broken in two."""
+    if comparisons:
+        shown = [f"{d.condition} {d.shown.rpartition(', ')[0]}" for d in comparisons]
+        text = f"  {what}: " + ", ".join(one.replace(" ", UNBROKEN) for one in shown)
+        lines = wrap(text, WIDTH, subsequent_indent="    ", break_on_hyphens=False)
+        yield from (line.replace(UNBROKEN, " ") for line in lines)
+
+
+def _highest(cases: Sequence[Case]) -> Iterator[str]:
+    """Yield a line for every number of robots: the highest success, and what it costs."""
+    if cases:
+        yield "\nHighest evaluation success, the quickest of equals; what a decision costs:"
+    for robots in dict.fromkeys(case.robots for case in cases):
+        best = min(
+            (case for case in cases if case.robots == robots),
+            key=lambda case: (-case.values[EVALUATED].value, case.values[DECIDING].value),
+        )
+        success, time = (two_figures(float(best.values[t].value)) for t in (EVALUATED, DECIDING))
+        passed = f"{best.values[MESSAGES].value:,.0f}"
+        yield f"{best.setting}, {best.hierarchy}: {success}; {time} ms, messages {passed}"
+
+
+def draw(analysis: Analysis) -> dict[str, Figure]:
+    """Return the figure: success and time of a decision by number of robots.
+
+    There is a column of panels for each choice of whose value decides. Points are means over seeds,
+    bars their 95 % intervals; hierarchies differ by colour and marker, and stand a little beside
+    each other.
+    """
+    from ...presentation import by_robots, figures  # matplotlib takes its time
+
+    cases = analysis.cases
+    if not cases:
+        return {}
+    hierarchies = list(dict.fromkeys(case.hierarchy for case in cases))
+    whose = list(dict.fromkeys(case.value_of for case in cases))
+    size = (max(5.6, 0.6 + 2.8 * len(whose)), 5.2)
+    figure, panels = figures.panels(2, len(whose), size, sharex=True, sharey="row")
+    for column, value_of in zip(panels.T, whose, strict=True):
+        for index, hierarchy in enumerate(hierarchies):
+            own = [c for c in cases if (c.hierarchy, c.value_of) == (hierarchy, value_of)]
+            for axes, title in zip(column, (EVALUATED, DECIDING), strict=True):
+                robots, values = [c.robots for c in own], [c.values[title] for c in own]
+                if own:
+                    by_robots.draw_line(axes, robots, values, index, len(hierarchies))
+        column[0].set_title(f"value of: {value_of}" if value_of else "", loc="left")
+        column[1].set_xlabel("robots")
+    for axes in panels.flat:
+        by_robots.scale_axis(axes, sorted({case.robots for case in cases}))
+    figures.as_rates(panels[0, 0])
+    figures.log_axis(panels[1, 0])
+    for axes, title in zip(panels[:, 0], (EVALUATED, "deciding [ms]"), strict=True):
+        axes.set_ylabel(title)
+    by_robots.name_lines(figure, hierarchies, "means over seeds, bars: 95 % intervals")
+    return {"hierarchies": figure}
 
 
 __all__ = ["NUMBERS", "analyse", "check", "draw", "measure"]

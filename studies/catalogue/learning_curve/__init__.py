@@ -1,17 +1,33 @@
-"""How the agents fare from episode to episode."""
+"""The learning-curve study: how the agents fare from episode to episode (Fig. 5 and 6).
+
+Every claim of learning needs its controls beside it: one whose weights stay frozen tells learning
+from luck, one that has the reward function tells it from what the predictor alone achieves.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
 
-from ...spec.errors import SpecError
-from .analysis import LearningCurves, analyse
+from ....core.interface.measures import SUCCESS, Measure
+from ...errors import SpecError
+from ...results.analysis import Analysis
+from ...results.results import Array, Results
+from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, rates
+from ...results.summary import EVALUATED, Summary, evaluated
+from ..study import run_training as measure
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from ...spec.spec import Spec
-    from ...trials.trial import Trial, TrialResult
+
+BLOCK = 5
+"""Episodes at each end of training that the table averages over."""
+COLUMNS = 2
+"""Panels of the figure that stand beside each other."""
 
 
 def check(spec: Spec) -> None:
@@ -26,18 +42,151 @@ def check(spec: Spec) -> None:
                 )
 
 
-def measure(trial: Trial) -> TrialResult:
-    """Run a trial."""
-    from ...trials.session import run_trial  # who only reads results needs nothing that learns
+@dataclass(frozen=True)
+class Metric:
+    """A column of the table.
 
-    return run_trial(trial)
+    Attributes
+    ----------
+    title
+        Its heading.
+    measure
+        Which measurement: a measure of `Results.measures`, or ``steps``.
+    block
+        Which episodes: the first or the last `BLOCK` of training, or those of the evaluation.
+    is_rate
+        Whether each episode is a success or not.
+    bounds
+        The least and the greatest value that there can be.
+    """
+
+    title: str
+    measure: str
+    block: Literal["first", "last", "evaluation"]
+    is_rate: bool = False
+    bounds: tuple[float, float] = NOT_NEGATIVE
+
+    def estimate(self, values: Array) -> Estimate:
+        """Return the mean over the block of values ``(n_seeds, n_episodes)``."""
+        if self.block != "evaluation":
+            values = values[:, :BLOCK] if self.block == "first" else values[:, -BLOCK:]
+        return rate(values) if self.is_rate else bootstrap(values.mean(axis=1), bounds=self.bounds)
 
 
-def draw(analysis: LearningCurves) -> dict[str, Figure]:
-    """Return the figures of an analysis by name."""
-    from .figure import figure_of  # workers import this package, and matplotlib takes its time
+def metrics_of(measures: Sequence[Measure], episodes: int) -> tuple[Metric, ...]:
+    """Return the columns of the table, given what is measured of an episode, and their number.
 
-    return {"learning-curves": figure_of(analysis)} if analysis.table else {}
+    Success as it begins, as it ends and when evaluated; how the evaluation fares by other rates
+    and how many steps it takes; and every other measure at the end of training. Where training is
+    no longer than a block, its begin is its end.
+    """
+    others = [m for m in measures if m.name != SUCCESS.name]
+    begin = [Metric(f"success first {BLOCK}", SUCCESS.name, "first", is_rate=True)]
+    return (
+        *(begin if episodes > BLOCK else ()),
+        Metric(f"success last {BLOCK}", SUCCESS.name, "last", is_rate=True),
+        Metric(EVALUATED, SUCCESS.name, "evaluation", is_rate=True),
+        *(
+            Metric(f"{m.title}, evaluation", m.name, "evaluation", is_rate=True)
+            for m in others
+            if m.is_rate
+        ),
+        Metric("evaluation steps", "steps", "evaluation"),
+        *(Metric(m.heading, m.name, "last", bounds=m.bounds) for m in others if not m.is_rate),
+    )
+
+
+@dataclass(frozen=True)
+class Followed:
+    """A measure that is followed from episode to episode: success, or one that is no rate.
+
+    Attributes
+    ----------
+    measure
+        Which.
+    training
+        By condition, what was measured ``(n_seeds, n_episodes)``.
+    """
+
+    measure: Measure
+    training: Mapping[str, Array]
+
+    @property
+    def curves(self) -> dict[str, Estimate]:
+        """Estimates ``(n_episodes,)`` over seeds; of thousands of seeds they take seconds."""
+        if self.measure.is_rate:
+            return {condition: rates(values) for condition, values in self.training.items()}
+        bounds = self.measure.bounds
+        return {c: bootstrap(values, bounds=bounds) for c, values in self.training.items()}
+
+
+def analyse(results: Results) -> Analysis:
+    """Estimate the table and what the curves need; seeds are the unit of sampling."""
+    conditions, table = results.of_phase("training"), []
+    for condition in conditions:
+        estimates: dict[str, Estimate] = {}
+        episodes = results.success(condition).shape[1]
+        for metric in metrics_of(results.measures, episodes):
+            phase = "evaluation" if metric.block == "evaluation" else "training"
+            if results.has(condition, phase, metric.measure):  # published results keep a part
+                values = results.values(condition, metric.measure, phase)
+                estimates[metric.title] = metric.estimate(values)
+            if metric.title == EVALUATED:
+                estimates |= evaluated(results, condition)
+        table.append(Summary(condition, len(results.seeds(condition)), estimates))
+    followed = []
+    for m in results.measures:
+        own = [c for c in conditions if results.has(c, "training", m.name)]
+        if own and (m.name == SUCCESS.name or not m.is_rate):
+            followed.append(Followed(m, {c: results.values(c, m.name) for c in own}))
+    titles = {title for line in table for title in line.estimates}
+    headline = EVALUATED if EVALUATED in titles else f"success last {BLOCK}"
+    return Analysis(tuple(table), cases=followed, headline=headline)
+
+
+def draw(analysis: Analysis) -> dict[str, Figure]:
+    """Return the figure, a panel for every measure that is followed.
+
+    Lines are means over seeds, bands their 95 % intervals. A condition has a colour and a style of
+    line of its own, so that lines upon each other are distinguished.
+    """
+    from ...presentation import figures as f  # matplotlib takes its time
+
+    if not analysis.table:
+        return {}
+    followed = analysis.cases
+    columns = min(COLUMNS, len(followed))
+    rows = -(-len(followed) // columns)
+    figure, panels = f.panels(rows, columns, (3.6 * COLUMNS, 1.2 + 2.1 * rows), sharex=True)
+    for axes, own in zip(panels.flat, followed, strict=False):
+        _panel(axes, own, [line.condition for line in analysis.table])
+    for axes in panels.flat[len(followed) :]:
+        axes.set_visible(False)
+    for axes in panels.flat[len(followed) - columns : len(followed)]:
+        f.as_episodes(axes)
+    seeds = {line.condition: line.seeds for line in analysis.table}
+    same = len(set(seeds.values())) == 1
+    labels = [c if same else f"{c} ({n} seeds)" for c, n in seeds.items()]
+    note = f"mean over {next(iter(seeds.values()))} seeds" if same else "mean over seeds"
+    handles = [f.handle(label, **f.look(i), lw=1.6) for i, label in enumerate(labels)]
+    ncols = max(1, min(len(labels), 90 // (max(map(len, seeds)) + 8)))
+    f.add_legend(figure, handles, f"{note}, band: 95 % interval", ncols=ncols)
+    return {"learning-curves": figure}
+
+
+def _panel(axes: Axes, followed: Followed, conditions: Sequence[str]) -> None:
+    from ...presentation.figures import as_rates, draw_curve
+
+    for condition, curve in followed.curves.items():
+        episodes = range(len(curve.value))  # counted from 0, as in rows and specs
+        marker = "o" if len(curve.value) == 1 else None
+        draw_curve(axes, episodes, curve, conditions.index(condition), marker=marker)
+    axes.set_title(followed.measure.heading, loc="left")
+    if followed.measure.is_rate:
+        as_rates(axes)
+    else:
+        axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
+    axes.grid(axis="y", alpha=0.25)
 
 
 __all__ = ["analyse", "check", "draw", "measure"]

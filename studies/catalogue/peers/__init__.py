@@ -1,20 +1,154 @@
-"""Ours beside learners of other libraries: success against experience and against time."""
+"""The peers study: how ours compares with learners of other libraries, and with planners.
+
+Training stops at some shares of its episodes, `CHECKPOINTS`, for an evaluation without exploration,
+on the same worlds every time. Success stands against the decisions experienced until then, and
+against the CPU seconds that training took, physics included, evaluations not. The first condition
+is compared with all others at the end, paired by seed.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from time import process_time
 from typing import TYPE_CHECKING
 
-from .analysis import Peers, analyse, check, measure
+import numpy as np
+
+from ...results.analysis import Analysis
+from ...results.comparison import Array, differences, mean_success, with_first
+from ...results.results import Results
+from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, stacked
+from ...results.summary import EVALUATED, Summary, evaluated
+from ...results.verdicts import power_lines
+from ...trials.session import Session
+from ...trials.trial import Trial, TrialResult
+from ..study import check_evaluated as check
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+CHECKPOINTS = (0.01, 0.03, 0.1, 0.3)
+"""Shares of the episodes after which training stops for an evaluation, before the last one."""
+AFTER = "after "
+"""With what the phase of such an evaluation begins; the number of episodes follows."""
+CPU = "cpu."
+"""With what the name of the CPU seconds until then begins; the number of episodes follows."""
 
-def draw(analysis: Peers) -> dict[str, Figure]:
-    """Return the figures of an analysis by name."""
-    from .figure import figure_of  # workers import this package, and matplotlib takes its time
 
-    return {"peers": figure_of(analysis)} if analysis.courses else {}
+def stops(episodes: int) -> list[int]:
+    """Return after how many episodes there is an evaluation, the last one left out.
+
+    >>> stops(200), stops(20)
+    ([2, 6, 20, 60], [1, 2, 6])
+    """
+    counts = {max(1, round(share * episodes)) for share in CHECKPOINTS}
+    return sorted(count for count in counts if count < episodes)
+
+
+def measure(trial: Trial) -> TrialResult:
+    """Train, with evaluations on the way; imported by name in workers."""
+    session = Session.compiled(trial)
+    generator = session.team.rng.bit_generator
+    done, seconds, usage = 0, 0.0, {}
+    for count in (*stops(trial.episodes), trial.episodes):
+        begin = process_time()
+        session.train(count - done, done)
+        seconds += process_time() - begin
+        done, usage[f"{CPU}{count}"] = count, seconds
+        if count < trial.episodes:
+            state = generator.state
+            session.evaluate(phase=f"{AFTER}{count}")
+            generator.state = state
+    session.evaluate()
+    session.evaluate_elsewhere()
+    return session.result(usage=usage)
+
+
+@dataclass(frozen=True)
+class Course:
+    """How one condition fares with experience.
+
+    Attributes
+    ----------
+    condition
+        Its label.
+    decisions, seconds
+        ``(k,)`` decisions experienced and CPU seconds spent until each evaluation, means over
+        seeds.
+    success
+        The evaluations' success rates.
+    """
+
+    condition: str
+    decisions: Array
+    seconds: Array
+    success: tuple[Estimate, ...]
+
+
+def analyse(results: Results) -> Analysis:
+    """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
+    conditions = results.of_phase("evaluation")
+    table, courses = [], []
+    for condition in conditions:
+        steps = results.values(condition, "steps").astype(float)
+        numbers = results.numbers(condition)
+        earlier = {
+            int(phase.removeprefix(AFTER)): results.success(condition, phase)
+            for phase in results.phases
+            if phase.startswith(AFTER) and results.has(condition, phase)
+        }
+        before = dict(sorted(earlier.items()))
+        every = {**before, steps.shape[1]: results.success(condition, "evaluation")}
+        cpu = [numbers.get(f"{CPU}{count}") for count in every]
+        estimates = {f"success, {count}": rate(s) for count, s in before.items()}
+        estimates |= evaluated(results, condition)
+        estimates["decisions"] = bootstrap(steps.sum(axis=1), bounds=NOT_NEGATIVE)
+        if cpu[-1] is not None:
+            estimates["CPU [s]"] = bootstrap(cpu[-1], bounds=NOT_NEGATIVE)
+        table.append(Summary(condition, len(steps), estimates))
+        courses.append(
+            Course(
+                condition,
+                np.array([steps[:, :count].sum(axis=1).mean() for count in every]),
+                np.array([np.nan if s is None else float(np.mean(s)) for s in cpu]),
+                tuple(rate(success) for success in every.values()),
+            )
+        )
+    compared = differences(results, with_first(conditions), {EVALUATED: mean_success("evaluation")})
+    notes = ["success, N: when evaluated after N episodes of training."] if courses else []
+    if compared:
+        notes.append(f"\nsuccess against that of {conditions[0]} (p adjusted):")
+    notes += [f"  {other.condition}: {other.shown}" for other in compared]
+    notes += power_lines(compared)
+    return Analysis(tuple(table), tuple(notes), courses, compared, EVALUATED)
+
+
+def draw(analysis: Analysis) -> dict[str, Figure]:
+    """Return the figure: evaluation success against experience and against time.
+
+    A line per condition, bands its 95 % intervals.
+    """
+    from ...presentation import figures as f  # matplotlib takes its time
+
+    if not analysis.cases:
+        return {}
+    figure, panels = f.panels(1, 2, (7.2, 3.4), sharey=True)
+    for i, course in enumerate(analysis.cases):
+        for axes, spent in zip(panels[0], (course.decisions, course.seconds), strict=True):
+            success = stacked(course.success)
+            f.draw_curve(axes, spent, success, i, alpha=0.08, marker="o", markersize=3.5)
+    for axes, title in zip(panels[0], ("decisions", "CPU time of training [s]"), strict=True):
+        f.log_axis(axes, "x")
+        axes.set_xlabel(title)
+        f.as_rates(axes)
+        axes.grid(axis="y", alpha=0.25)
+    panels[0, 0].set_ylabel(EVALUATED)
+    handles = [
+        f.handle(course.condition, **f.look(i), lw=1.6, marker="o", markersize=3.5)
+        for i, course in enumerate(analysis.cases)
+    ]
+    f.add_legend(figure, handles)
+    return {"peers": figure}
 
 
 __all__ = ["analyse", "check", "draw", "measure"]

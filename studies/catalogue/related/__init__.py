@@ -1,23 +1,189 @@
-"""The nested agents beside the systems that the paper measures itself against (Section X)."""
+"""The related study: what each way to coordinate agents achieves, and what it asks for.
+
+The nested agents stand beside the systems that the paper measures itself against (Section X). A
+system is an override; worlds are what is swept. Of every trained team it is measured how often
+it succeeds when evaluated, and after how many decisions; and of a decision of all its agents
+
+- its time;
+- the memory of all that is learned;
+- messages: the actions that agents tell one another. A superior tells each agent below it what it
+  has decided. Neighbours tell each other what they have done, or in a coordination graph what would
+  be best; max-plus does so in every round, of which one is counted;
+- operations: joint actions tried times the rules that value each, by the formula of the topology
+  (sum over agents of ``|A| ** (1 + |below|)``, times |S|) and as counted in the running system.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
-from .analysis import Related, analyse, check, measure
+import numpy as np
+
+from ....core.agents.team import of_fuzzy_agents
+from ...results.analysis import Analysis
+from ...results.results import Results
+from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap
+from ...results.summary import EVALUATED, Summary, evaluated
+from ...spec.spec import Spec
+from ...trials.session import Session
+from ...trials.trial import Trial, TrialResult
+from ..scaling import messages
+from ..study import check_evaluated, check_rule_bases
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-NUMBERS = ("agents", "memory", "messages", "formula", "counted")
+TITLES = {
+    "memory": "memory [kB]",
+    "messages": "messages",
+    "formula": "formula",
+    "counted": "counted",
+}
+"""Titles of the numbers of whole trials."""
+NUMBERS = ("agents", *TITLES)
 """What of whole trials the analysis rests on."""
+NOTES = (
+    "decisions, time: of an evaluation episode, failures included; ms: of a decision of all",
+    "agents in training; formula, counted: joint actions tried times rules, per decision.",
+)
+PANELS = {
+    EVALUATED: "success",
+    "ms": "time of a decision [ms]",
+    "memory [kB]": "memory [kB]",
+    "counted": "operations of a decision",
+}
+"""Titles of panels by title of estimate."""
+LEAST = {"ms": 0.01, "memory [kB]": 0.01, "counted": 1.0}
+"""Where logarithmic axes begin; below, they are linear and hold 0."""
+MOST_TICKS = 5
+APART = 0.2
+"""How far the points of one system stand apart, in rows."""
 
 
-def draw(analysis: Related) -> dict[str, Figure]:
-    """Return the figures of an analysis by name."""
-    from .figure import figure_of  # workers import this package, and matplotlib takes its time
+def check(spec: Spec) -> None:
+    """Raise `SpecError` unless trained teams of agents with rule bases are evaluated."""
+    check_evaluated(spec)
+    check_rule_bases(spec, "whose weights and messages it counts")
 
-    return {"related": figure_of(analysis)} if analysis.cases else {}
+
+def measure(trial: Trial) -> TrialResult:
+    """Train and evaluate a team, and count what it takes; imported by name in workers."""
+    session = Session.compiled(trial)
+    session.train(trial.episodes)
+    team = of_fuzzy_agents(session.team)
+    hierarchy, n_rules = team.hierarchy, team.learner.theta.shape[1]
+    tried = 0 if team.evaluator is None else hierarchy.joint_actions(len(team.action_set))
+    counted = 0 if team.evaluator is None else team.evaluator.counts.rule_evaluations
+    numbers = {
+        "agents": float(len(hierarchy)),
+        "memory": 1e-3 * team.learner.theta.nbytes,
+        "messages": float(messages(hierarchy.below(i) for i in range(len(hierarchy)))),
+        "formula": float(tried * n_rules),
+        "counted": counted / len(session.deciding),
+    }
+    period = getattr(trial.settings.scenario, "period", None)
+    if period is not None:
+        numbers["period"] = float(period)
+    session.evaluate()
+    session.evaluate_elsewhere()
+    return session.result(numbers, {"decision_median": float(np.median(session.deciding))})
+
+
+@dataclass(frozen=True)
+class Case:
+    """One condition.
+
+    Attributes
+    ----------
+    system
+        Name of its override: how agents coordinate.
+    world
+        What else it differs in, such as the number of robots.
+    values
+        Estimates by title, see `analyse`.
+    """
+
+    system: str
+    world: str
+    values: Mapping[str, Estimate]
+
+
+def analyse(results: Results) -> Analysis:
+    """Estimate; 95 % intervals, seeds as the unit of sampling."""
+    table, cases = [], []
+    for condition in results.of_phase("evaluation"):
+        numbers = results.numbers(condition)
+        steps = results.values(condition, "steps", "evaluation").mean(axis=1)
+        costs = {"decisions": steps}
+        if "period" in numbers:
+            costs["time [s]"] = steps * numbers["period"]
+        costs["ms"] = 1e3 * numbers["decision_median"]
+        costs |= {title: numbers[name] for name, title in TITLES.items()}
+        values = evaluated(results, condition)
+        values |= {title: bootstrap(cost, bounds=NOT_NEGATIVE) for title, cost in costs.items()}
+        columns = results.columns.get(condition, {})
+        cases.append(Case(str(columns.get("name", condition)), _world(columns), values))
+        table.append(Summary(condition, len(steps), values))
+    return Analysis(tuple(table), NOTES, cases, headline=EVALUATED)
+
+
+def _world(columns: Mapping[str, Any]) -> str:
+    """Return what a condition differs in beside its system.
+
+    >>> _world({"name": "nested", "scenario.robots": 8, "scenario.start": ""})
+    '8 robots'
+    """
+    swept = {k.rpartition(".")[2]: v for k, v in columns.items() if k != "name" and v != ""}
+    return ", ".join(f"{v} {k}" if isinstance(v, int) else str(v) for k, v in swept.items())
+
+
+def draw(analysis: Analysis) -> dict[str, Figure]:
+    """Return the figure: the systems one below the other, a colour for each world.
+
+    Bars are 95 % intervals. Hollow marks are operations by formula, where they differ from those
+    counted.
+    """
+    from matplotlib.ticker import SymmetricalLogLocator  # matplotlib takes its time
+
+    from ...presentation import figures as f
+
+    cases = analysis.cases
+    if not cases:
+        return {}
+    systems = list(dict.fromkeys(case.system for case in cases))
+    worlds = list(dict.fromkeys(case.world for case in cases))
+    size = (2.2 + 2.0 * len(PANELS), 1.1 + 0.26 * len(systems))
+    figure, (panels,) = f.panels(1, len(PANELS), size, sharey=True)
+    for axes, (name, title) in zip(panels, PANELS.items(), strict=True):
+        for case in cases:
+            which = worlds.index(case.world)
+            colour = f.look(which)["color"]
+            row = systems.index(case.system) + APART * (which - (len(worlds) - 1) / 2)
+            formula = case.values["formula"].value
+            if name == "counted" and formula > 0:
+                axes.plot(
+                    float(formula), row, "o", color=colour, markerfacecolor="white", markersize=4
+                )
+            f.draw_row(axes, row, case.values[name], colour, markersize=3)
+        axes.set_title(title, loc="left")
+        axes.grid(axis="x", alpha=0.25)
+        if name in LEAST:
+            axes.set_xscale("symlog", linthresh=LEAST[name])
+            axes.set_xlim(left=0.0)
+            locator = SymmetricalLogLocator(base=10.0, linthresh=LEAST[name])
+            locator.set_params(numticks=MOST_TICKS)
+            axes.xaxis.set_major_locator(locator)
+    f.as_rates(panels[0], "x")
+    f.name_rows(panels[0], systems)
+    handles = [
+        f.handle(world or "all", color=f.look(i)["color"], marker="o")
+        for i, world in enumerate(worlds)
+    ]
+    hollow = {"color": "black", "marker": "o", "markerfacecolor": "white", "linewidth": 0}
+    f.add_legend(figure, [*handles, f.handle("by formula", **hollow)], ncols=5)
+    return {"related": figure}
 
 
 __all__ = ["NUMBERS", "analyse", "check", "draw", "measure"]

@@ -1,23 +1,351 @@
-"""How the number of robots bears on success, time, memory and messages."""
+"""The scaling study: how the number of robots bears on success, time, memory and messages.
+
+Conditions differ in the number of robots and in how joint actions are evaluated; those of a spec of
+one's own may differ in anything. Of every trial it keeps, besides the episodes: numbers that are a
+function of it, and what it took, which is not.
+
+Messages of a step are counted as Section V has agents talk: every agent passes the action it has
+decided to each agent below it, so there is one message for every edge of the hierarchy's transitive
+closure; n (n - 1) / 2 in a chain of n agents.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import re
+import tracemalloc
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from .analysis import Scaling, analyse, check, measure
+import numpy as np
+
+from ....core.agents.team import of_fuzzy_agents
+from ....core.interface.scenario import groups_of
+from ...presentation.words import count
+from ...results.analysis import Analysis
+from ...results.comparison import Array, of_shared_seeds
+from ...results.results import Results
+from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
+from ...results.summary import EVALUATED, Summary, evaluated
+from ...spec.spec import Spec
+from ...trials.session import Session
+from ...trials.trial import Trial, TrialResult
+from ..contact import ContactShares
+from ..study import check_rule_bases
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 NUMBERS = ("robots", "agents", "messages", "team_bytes", "decision_median", "step_bytes")
 """What of whole trials the analysis rests on."""
+TIMES = {"deciding": "decide [ms]", "learning": "learn [ms]"}
+"""Times whose growth with the number of agents is estimated, by what they are of."""
+COLUMNS = (
+    "success", "all touch", "decide [ms]", "learn [ms]", "team [MB]", "process [MB]",
+)  # fmt: skip
+"""What the table shows, and after the first of them the evaluations."""
+PANELS = (
+    (EVALUATED, EVALUATED, False),
+    ("decide [ms]", "deciding, per step [ms]", True),
+    ("learn [ms]", "learning, per step [ms]", True),
+    ("team [MB]", "arrays of the team [MB]", True),
+    ("process [MB]", "process, peak [MB]", False),
+)
+"""What the figure shows, its titles, and whether the axis is logarithmic."""
+MEMORY = Path("/proc/self/status")
+CLEAR = Path("/proc/self/clear_refs")
 
 
-def draw(analysis: Scaling) -> dict[str, Figure]:
-    """Return the figures of an analysis by name."""
-    from .figure import figure_of  # workers import this package, and matplotlib takes its time
+def check(spec: Spec) -> None:
+    """Raise `SpecError` unless all agents have rule bases."""
+    check_rule_bases(spec, "whose weights and messages it counts")
 
-    return {"scaling": figure_of(analysis)} if analysis.points else {}
+
+def measure(trial: Trial) -> TrialResult:
+    """Train and evaluate a team, and note what it takes; imported by name in workers."""
+    session = Session.compiled(trial)
+    _forget_peak()
+    session.train(trial.episodes)
+    peak = _peak()
+    team = of_fuzzy_agents(session.team)
+    hierarchy = team.hierarchy
+    tried = team.evaluator.counts.joint_actions if team.evaluator is not None else 0
+    numbers = {
+        "robots": float(len(groups_of(session.world))),
+        "agents": float(len(hierarchy)),
+        "messages": float(messages(hierarchy.below(i) for i in range(len(hierarchy)))),
+        "joint_actions": tried / len(session.deciding),
+        "team_bytes": float(sum(array.nbytes for array in team.arrays().values())),
+        "weight_bytes": float(team.learner.theta.nbytes),
+    }
+    period = getattr(trial.settings.scenario, "period", None)
+    if period is not None:
+        numbers["period_s"] = period
+    contact = ContactShares()
+    session.evaluate(contact)
+    session.evaluate_elsewhere()
+    shares = contact.shares
+    if len(shares):
+        numbers["least_touching"] = float(shares.min(axis=1).mean())
+        numbers["all_touching"] = float((shares.min(axis=1) >= 0.5).mean())
+    usage = {
+        "decision_median": float(np.median(session.deciding)),
+        "decision_99": float(np.quantile(session.deciding, 0.99)),
+        "step_bytes": float(_of_a_step(session)),
+    }
+    if peak is not None:
+        usage["process_bytes"] = float(peak)
+    return session.result(numbers, usage)
+
+
+def messages(below: Iterable[tuple[int, ...]]) -> int:
+    """Return how many decided actions are passed down in a step, given whom each agent sees.
+
+    Examples
+    --------
+    A chain of four agents, and a leader with three subordinates:
+
+    >>> messages([(1, 2, 3), (2, 3), (3,), ()]), messages([(1, 2, 3), (), (), ()])
+    (6, 3)
+    """
+    return sum(map(len, below))
+
+
+def _of_a_step(session: Session) -> int:
+    """Return the most memory that one decision holds beside what is held already [bytes]."""
+    prediction = session.team.predict(session.scenario)
+    tracemalloc.start()
+    try:
+        session.team.act(prediction, explore=False)
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def _forget_peak() -> None:
+    """Let the peak of this process's memory be counted from now on, where Linux allows."""
+    if CLEAR.exists():
+        CLEAR.write_text("5")
+
+
+def _peak() -> int | None:
+    """Return the peak of this process's resident memory [bytes], where Linux tells it."""
+    match = re.search(r"VmHWM:\s+(\d+) kB", MEMORY.read_text()) if MEMORY.exists() else None
+    return None if match is None else 1024 * int(match[1])
+
+
+@dataclass(frozen=True)
+class Point:
+    """One condition.
+
+    Attributes
+    ----------
+    evaluator
+        Its label without the number of robots: the evaluator, and whatever else differs.
+    bodies
+        What is counted: ``robots``, or what a spec sweeps in place of them.
+    robots, agents, messages
+        Sizes.
+    period
+        What a decision may take to keep up with the robots [s]; none: the scenario has no hurry.
+    seeds
+        Those that have finished.
+    values
+        Estimates by title, see `analyse`.
+    times
+        By title, times of single seeds ``(n_seeds,)``.
+    """
+
+    evaluator: str
+    bodies: str
+    robots: int
+    agents: int
+    messages: int
+    period: float | None
+    seeds: tuple[int, ...]
+    values: dict[str, Estimate]
+    times: dict[str, Array]
+
+
+def analyse(results: Results) -> Analysis:
+    """Estimate; 95 % intervals, seeds as the unit of sampling. Times are per step."""
+    conditions = results.of_phase("training")
+    sizes = {c: int(results.numbers(c)["robots"][0]) for c in conditions}
+    bodies = counted_bodies(results.columns, sizes)
+    points = [_point(results, c, sizes, bodies) for c in conditions]
+    table: list[Summary] = []
+    groups: dict[str, list[Summary]] = {}
+    for condition, point in zip(conditions, points, strict=True):
+        evaluations = evaluated(results, condition)
+        titles = (*COLUMNS[:1], *evaluations, *COLUMNS[1:])
+        shown = {title: point.values[title] for title in titles if title in point.values}
+        label = condition if condition != str(point.robots) else _counted(point.robots, bodies)
+        line = Summary(label, len(point.seeds), shown)
+        table.append(line)
+        groups.setdefault(_counted(point.robots, "robots"), []).append(line)
+    notes = [
+        f"\n{evaluator}, time with n agents: "
+        + ", ".join(f"{what} n^{_exponent_text(power)}" for what, power in by_what.items())
+        for evaluator, by_what in exponents_of(points).items()
+    ]
+    notes += _messages_by_size(points, bodies)
+    return Analysis(tuple(table), tuple(notes), points, groups=groups)
+
+
+def _point(results: Results, condition: str, sizes: Mapping[str, int], bodies: str) -> Point:
+    numbers = results.numbers(condition)
+    steps = results.values(condition, "steps").sum(axis=1)
+    costs = {
+        "decide [ms]": 1e3 * numbers["decision_median"],
+        "learn [ms]": 1e3 * numbers["seconds.learning"] / steps,
+        "world [ms]": 1e3 * (numbers["seconds.physics"] + numbers["seconds.sensors"]) / steps,
+        "team [MB]": 1e-6 * numbers["team_bytes"],
+        "step [MB]": 1e-6 * numbers["step_bytes"],
+    }
+    if "process_bytes" in numbers:
+        costs["process [MB]"] = 1e-6 * numbers["process_bytes"]
+    values = {"success": rate(results.success(condition)[:, -5:])} | evaluated(results, condition)
+    values |= {title: bootstrap(cost, bounds=NOT_NEGATIVE) for title, cost in costs.items()}
+    if "all_touching" in numbers:
+        values["all touch"] = bootstrap(numbers["all_touching"], bounds=(0, 1))
+    return Point(
+        _without_size(condition, sizes, bodies), bodies, sizes[condition],
+        int(numbers["agents"][0]), int(numbers["messages"][0]),
+        float(numbers["period_s"][0]) if "period_s" in numbers else None,
+        results.seeds(condition), values, {title: costs[title] for title in TIMES.values()},
+    )  # fmt: skip
+
+
+def counted_bodies(columns: Mapping[str, Mapping[str, Any]], sizes: Mapping[str, int]) -> str:
+    """Return what a spec sweeps for the number of bodies; robots if it is not known.
+
+    >>> counted_bodies({"2": {"scenario.joints": 2}, "8": {"scenario.joints": 8}}, {"2": 2, "8": 8})
+    'joints'
+    """
+    keys = dict.fromkeys(key for own in columns.values() for key in own)
+    swept = (
+        key.removeprefix("scenario.")
+        for key in keys
+        if key.startswith("scenario.")
+        and all(columns.get(c, {}).get(key) == size for c, size in sizes.items())
+    )
+    return next(swept, "robots")
+
+
+def _counted(size: int, bodies: str) -> str:
+    """Return a number of bodies in words.
+
+    >>> _counted(8, "robots"), _counted(1, "joints")
+    ('8 robots', '1 joint')
+    """
+    return count(size, bodies.removesuffix("s"))
+
+
+def _without_size(condition: str, sizes: Mapping[str, int], bodies: str) -> str:
+    """Return a condition's label without its number of bodies, which may be all it says."""
+    if all(label == str(size) for label, size in sizes.items()):
+        return "default"
+    parts = condition.split(", ")
+    return ", ".join(part for part in parts if part != f"{bodies}={sizes[condition]}")
+
+
+def _messages_by_size(points: Sequence[Point], bodies: str) -> list[str]:
+    """Return lines that say how many messages are passed, one per number where all agree."""
+    lines = []
+    for robots in dict.fromkeys(p.robots for p in points):
+        labels: dict[tuple[int, int], list[str]] = {}
+        for p in points:
+            if p.robots == robots:
+                labels.setdefault((p.agents, p.messages), []).append(p.evaluator)
+        for (agents, passed), own in labels.items():
+            whose = f" ({'; '.join(own)})" if len(labels) > 1 else ""
+            lines.append(
+                f"{robots} {bodies}{whose}: {agents} agents, {count(passed, 'message')} a step"
+            )
+    return lines
+
+
+def _exponent_text(estimate: Estimate) -> str:
+    """Return an exponent with its interval, if there is one."""
+    e = estimate
+    return f"{e.value:.2f}" + (f" [{e.low:.2f}, {e.high:.2f}]" if np.isfinite(e.low) else "")
+
+
+def exponents_of(points: Sequence[Point]) -> dict[str, dict[str, Estimate]]:
+    """Return by evaluator the exponent of each of `TIMES` in the number of agents.
+
+    A line through the logarithms is fitted for each seed that ran at all sizes.
+    """
+    exponents: dict[str, dict[str, Estimate]] = {}
+    for evaluator in dict.fromkeys(p.evaluator for p in points):
+        own = [p for p in points if p.evaluator == evaluator]
+        if len({p.agents for p in own}) < 2 or not set.intersection(*(set(p.seeds) for p in own)):
+            continue
+        sizes = np.log([p.agents for p in own])
+        exponents[evaluator] = {}
+        for what, title in TIMES.items():
+            times = of_shared_seeds([p.seeds for p in own], [p.times[title] for p in own])
+            exponents[evaluator][what] = bootstrap(np.polyfit(sizes, np.log(times), 1)[0])
+    return exponents
+
+
+def draw(analysis: Analysis) -> dict[str, Figure]:
+    """Return the figure.
+
+    Points are means over seeds, bars their 95 % intervals; evaluators differ by colour and marker,
+    and stand a little beside each other.
+    Messages are one black line if all evaluators pass as many.
+    """
+    from ...presentation import by_robots, figures  # matplotlib takes its time
+
+    points = analysis.cases
+    if not points:
+        return {}
+    evaluators = list(dict.fromkeys(p.evaluator for p in points))
+    figure, panels = figures.panels(2, 3, (8.4, 5.2), sharex=True)
+    for axes, (name, title, logarithmic) in zip(panels.flat, PANELS, strict=False):
+        for index, evaluator in enumerate(evaluators):
+            own = [p for p in points if p.evaluator == evaluator and name in p.values]
+            if own:
+                robots, values = [p.robots for p in own], [p.values[name] for p in own]
+                by_robots.draw_line(axes, robots, values, index, len(evaluators))
+        axes.set_title(title, loc="left")
+        if logarithmic:
+            figures.log_axis(axes)
+        else:
+            axes.set_ylim(0.0, 1.1 * axes.get_ylim()[1])
+    figures.as_rates(panels[0, 0])
+    for period in {p.period for p in points if p.period is not None}:
+        panels[0, 1].axhline(1e3 * period, color="#888888", linewidth=0.8, ls=":")
+    draw_messages(panels[1, 2], points)
+    for axes in panels.flat:
+        by_robots.scale_axis(axes, sorted({p.robots for p in points}))
+    for axes in panels[-1]:
+        axes.set_xlabel(points[0].bodies)
+    title = "means over seeds, bars: 95 % intervals; dotted: the decision period"
+    by_robots.name_lines(figure, evaluators, title)
+    return {"scaling": figure}
+
+
+def draw_messages(axes: Axes, points: Sequence[Point]) -> None:
+    """Draw a black line if all evaluators agree, as one topology's do, else a line of each."""
+    from ...presentation import by_robots, figures
+
+    counts = {(p.robots, p.messages) for p in points}
+    if len(counts) == len({robots for robots, _ in counts}):
+        axes.plot(*zip(*sorted(counts), strict=True), "k.-", linewidth=1.2)
+    else:
+        for index, evaluator in enumerate(dict.fromkeys(p.evaluator for p in points)):
+            own = sorted((p.robots, p.messages) for p in points if p.evaluator == evaluator)
+            axes.plot(*zip(*own, strict=True), **by_robots.style(index))
+    if min(passed for _, passed in counts):
+        figures.log_axis(axes)
+    else:  # agents that see nobody pass nothing
+        axes.set_yscale("symlog", linthresh=1.0)
+        axes.set_ylim(bottom=-0.2)
+    axes.set_title("messages passed down, per step", loc="left")
 
 
 __all__ = ["NUMBERS", "analyse", "check", "draw", "measure"]

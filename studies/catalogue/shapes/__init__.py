@@ -1,22 +1,140 @@
-"""Whether the shape of the box is indifferent."""
+"""The shapes study: whether the shape of the box is indifferent, as the paper has it.
+
+A team is trained with one box, and then acts greedily, without any further learning, with every box
+that the spec lists under ``[evaluations]``, on the same worlds. What is reported of each box is its
+success rate, the ratio to the rate with the box of training, and how much of the time in which any
+robot pushes each of them does. The agents' state holds nothing of the shape; the predictor by which
+they look ahead is given it (see docs/predictors.md).
+"""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .analysis import Shapes, analyse, check, measure
+import numpy as np
+
+from ...errors import SpecError
+from ...results.analysis import Analysis
+from ...results.comparison import Difference, adjusted, ratio
+from ...results.results import Results
+from ...results.statistics import Estimate, bootstrap, rate
+from ...results.summary import Summary
+from ...results.verdicts import power_lines
+from ...spec.spec import Spec
+from ...trials.session import Session
+from ...trials.trial import Trial, TrialResult
+from ..contact import ContactShares
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+TRAINED = "trained on"
+"""How the box of training is called among the others."""
 
-def draw(analysis: Shapes) -> dict[str, Figure]:
+
+def check(spec: Spec) -> None:
+    """Raise `SpecError` unless there is another box to compare with."""
+    if not spec.evaluations:
+        raise SpecError('evaluations: missing; shapes needs one at least, as circle.box = "circle"')
+
+
+def measure(trial: Trial) -> TrialResult:
+    """Train a team with its own box, evaluate it with all; imported by name in workers."""
+    session = Session(trial)
+    session.train(trial.episodes)
+    contacts = {name: ContactShares() for name in (TRAINED, *dict(trial.evaluations))}
+    session.evaluate(contacts[TRAINED])
+    session.evaluate_elsewhere(contacts)
+    numbers = {
+        f"touching.{name}.robot{r + 1}": float(share)
+        for name, contact in contacts.items()
+        if len(contact.shares)
+        for r, share in enumerate(contact.shares.mean(axis=0))
+    }
+    return session.result(numbers)
+
+
+def analyse(results: Results) -> Analysis:
+    """Estimate and compare; 95 % intervals, seeds as the unit of sampling.
+
+    Ratios are the cases: by condition, p of no difference, adjusted over its boxes.
+    """
+    conditions = results.of_phase("evaluation")
+    ratios = [(condition, ratios_of(results, condition)) for condition in conditions]
+    table, notes = [], []
+    for condition, compared in ratios:
+        by_box = {d.condition: d.estimate for d in compared}
+        own = 1.0 if results.success(condition, "evaluation").any() else np.nan
+        boxes = {TRAINED: "evaluation"} | results.other_evaluations(condition)
+        for box, phase in boxes.items():
+            label = box if len(ratios) == 1 else f"{condition}: {box}"
+            success = results.success(condition, phase)
+            estimates = {"success": rate(success), "ratio": by_box.get(box, bootstrap([own]))}
+            estimates |= _further(results, condition, phase, box)
+            table.append(Summary(label, len(success), estimates))
+        if compared:
+            notes += [f"\n{condition}, ratio to the box of training:", *map(_line, compared)]
+            notes += power_lines(compared)
+    return Analysis(tuple(table), tuple(notes), ratios)
+
+
+def ratios_of(results: Results, condition: str) -> tuple[Difference, ...]:
+    """Return the ratios of a condition, box by box; none if it has not been evaluated."""
+    if not results.has(condition, "evaluation"):
+        return ()
+    base = results.success(condition, "evaluation")
+    others = {
+        box: results.success(condition, phase)
+        for box, phase in results.other_evaluations(condition).items()
+    }
+    runs = base.mean(axis=1)
+    return adjusted(
+        [
+            Difference.of(box, "ratio", outcomes.mean(axis=1), runs, ratio(outcomes, base))
+            for box, outcomes in others.items()
+        ]
+    )
+
+
+def _further(results: Results, condition: str, phase: str, box: str) -> dict[str, Estimate]:
+    """Return how the box was left, and how long it and each robot were in contact."""
+    estimates = {}
+    if results.has(condition, phase, "stopped_at_goal"):
+        estimates["stopped"] = rate(results.values(condition, "stopped_at_goal", phase))
+    shares = {}
+    if results.has(condition, phase, "contact_fraction"):
+        shares["contact"] = results.values(condition, "contact_fraction", phase).mean(axis=1)
+    start = f"touching.{box}.robot"
+    for name, values in results.numbers(condition).items():
+        if name.startswith(start):
+            shares[f"touches {name.removeprefix(start)}"] = values
+    return estimates | {title: bootstrap(v, bounds=(0, 1)) for title, v in shares.items()}
+
+
+def least_ratio(compared: tuple[Difference, ...]) -> Difference:
+    """Return the ratio of the box that comes off worst.
+
+    Raises
+    ------
+    ValueError
+        If there is none.
+    """
+    if not compared:
+        raise ValueError("shapes: no further box has been evaluated")
+    return min(compared, key=lambda d: float(np.nan_to_num(d.estimate.value)))
+
+
+def _line(d: Difference) -> str:
+    e = d.estimate
+    return f"  {d.condition}: {e.value:.2f} [{e.low:.2f}, {e.high:.2f}], p = {d.p:.2g} (adjusted)"
+
+
+def draw(analysis: Analysis) -> dict[str, Figure]:
     """Return the figures of an analysis by name."""
-    from ...presentation.forest import Panel
-    from ...presentation.forest import draw as forest
+    from ...presentation import forest
 
-    panels = [Panel(condition, found, null=1.0) for condition, found in analysis.ratios.items()]
-    figure = forest(panels, "success over that with the box of training")
+    panels = [forest.Panel(condition, ratios, null=1.0) for condition, ratios in analysis.cases]
+    figure = forest.draw(panels, "success over that with the box of training")
     return {} if figure is None else {"shapes": figure}
 
 

@@ -1,23 +1,319 @@
-"""What a failing wheel costs, and how a team comes back."""
+"""The wheel-failure study: what a failing wheel costs, and how a team comes back.
+
+Training goes on through the failure. At its onset the team is also copied: the copy meets the same
+worlds under the same exploration with its weights kept as they are. Conditions that are swept over
+``learner.self_model.enabled`` give all four cases, by what adapts: nothing, the weights, the
+self-model (by which predictions know the wheel has changed), or both.
+
+Levels are success rates over `BLOCK` episodes: before the failure, just after it, and at the end
+of training. A seed has recovered at the first episode from which on `BLOCK` episodes reach
+`REGAINED` of the level before (its mean over seeds); seeds that never do count with the episodes
+and steps that were run, so that those columns are lower bounds. The cumulative loss is the sum of
+what the episodes after the onset fall short of the level before, in episodes.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from textwrap import wrap
+from typing import TYPE_CHECKING, Any
 
-from .analysis import WheelFailures, analyse, check, measure
+import numpy as np
+
+from ....core.agents.team import Team
+from ....core.learners.frozen import FrozenSettings
+from ....core.learners.learner import LearnerSettings
+from ...errors import SpecError
+from ...results.analysis import Analysis
+from ...results.comparison import Array, Difference, adjusted, of_shared_seeds
+from ...results.results import Results
+from ...results.statistics import NOT_NEGATIVE, bootstrap, rate
+from ...results.summary import Summary
+from ...results.verdicts import power_lines
+from ...spec.labels import label_but
+from ...spec.spec import Spec
+from ...trials.arrangement import build
+from ...trials.session import Session
+from ...trials.trial import Trial, TrialResult
+from ..study import check_rule_bases
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 NUMBERS = ("onset",)
 """What of whole trials the analysis rests on."""
+BLOCK = 5
+"""Episodes that a level is measured over."""
+REGAINED = 0.9
+"""Share of the level before that counts as recovered."""
+KEPT = "weights kept"
+"""The phase of the copied team."""
+SWEPT = "learner.self_model.enabled"
+"""What is swept to have every condition with a self-model and without."""
+ADAPTS = {
+    ("false", KEPT): "nothing",
+    ("false", "training"): "weights",
+    ("true", KEPT): "self-model",
+    ("true", "training"): "both",
+}
+"""What adapts, by whether the self-model is enabled, and phase."""
+COLUMNS = 3
+"""Panels of the figure that stand beside each other."""
+SMOOTHED = 3
+"""Episodes that a point of a curve averages over."""
 
 
-def draw(analysis: WheelFailures) -> dict[str, Figure]:
-    """Return the figures of an analysis by name."""
-    from .figure import figure_of  # workers import this package, and matplotlib takes its time
+def measure(trial: Trial) -> TrialResult:
+    """Train a team through a failure, and a copy that keeps its weights from there on."""
+    onset = trial.settings.scenario.onset
+    assert onset is not None, "see check"
+    session = Session(trial)
+    session.train(onset)
+    kept = _keeping_weights(session)
+    session.train(trial.episodes - onset, onset)
+    session.train(trial.episodes - onset, onset, phase=KEPT, team=kept)
+    session.evaluate()
+    session.evaluate_elsewhere()
+    begun = sorted({f.episode for f in getattr(trial.settings.scenario, "failures", ())} - {onset})
+    later = {f"onset.{k}": float(episode) for k, episode in enumerate(begun, 2)}
+    return session.result({"onset": float(onset), **later})
 
-    return {"wheel-failure": figure_of(analysis)} if analysis.courses else {}
+
+def check(spec: Spec) -> None:
+    """Raise `SpecError` unless a wheel fails in every condition, after and before some training."""
+    check_rule_bases(spec, "of which a copy keeps its weights")
+    for condition in spec.conditions():
+        onset = condition.settings.scenario.onset
+        if onset is None:
+            raise SpecError(
+                f"scenario.failures = []: wheel-failure needs one (condition {condition.label!r})"
+            )
+        if spec.episodes < 2 * BLOCK:
+            raise SpecError(
+                f"episodes = {spec.episodes}: wheel-failure needs {2 * BLOCK} or more, {BLOCK} "
+                f"before the failure and {BLOCK} with it"
+            )
+        if not BLOCK <= onset <= spec.episodes - BLOCK:
+            raise SpecError(
+                f"scenario.failures: the first begins in episode {onset}, allowed {BLOCK} to "
+                f"{spec.episodes - BLOCK} of {spec.episodes} episodes "
+                f"(condition {condition.label!r})"
+            )
+
+
+def _keeping_weights(session: Session) -> Team:
+    """Return a copy of the session's team that explores and models itself but keeps its weights."""
+    settings = session.trial.settings
+    common = {
+        name: getattr(settings.learner, name)
+        for name in LearnerSettings.model_fields
+        if name != "kind"
+    }
+    frozen = settings.model_copy(update={"learner": FrozenSettings(**common)})
+    _, team = build(frozen, session.trial.seed)
+    arrays = session.team.arrays()
+    team.restore({name: arrays[name] for name in team.arrays()})
+    return team
+
+
+@dataclass(frozen=True)
+class Course:
+    """One case: what happened to a fault, given what adapts.
+
+    Attributes
+    ----------
+    fault
+        Label of the condition but for `SWEPT`.
+    adapts
+        What does, see `ADAPTS`; `training` or `weights kept` if self-models were not swept.
+    onset
+        Episode in which the first wheel fails.
+    onsets
+        Episodes in which any does.
+    success
+        ``(n_seeds, n_episodes)`` from the start of training.
+    seeds
+        The seeds, in that order.
+    """
+
+    fault: str
+    adapts: str
+    onset: int
+    onsets: tuple[int, ...]
+    success: Array
+    steps: Array
+    seeds: tuple[int, ...]
+
+    @property
+    def before(self) -> Array:
+        """Outcomes ``(n_seeds, BLOCK)`` of the last episodes before the failure."""
+        return self.success[:, self.onset - BLOCK : self.onset]
+
+    @property
+    def after(self) -> Array:
+        """Outcomes of the first episodes with the failure."""
+        return self.success[:, self.onset : self.onset + BLOCK]
+
+    @property
+    def end(self) -> Array:
+        """Outcomes of the last episodes."""
+        return self.success[:, -BLOCK:]
+
+    @property
+    def lost(self) -> Array:
+        """Cumulative loss ``(n_seeds,)`` [episodes]."""
+        short = self.before.mean() - self.success[:, self.onset :]
+        return np.asarray(short.sum(axis=1))
+
+    def recovery(self) -> tuple[Array, Array, Array]:
+        """Return per seed whether it recovered, after how many episodes and steps."""
+        level = REGAINED * self.before.mean()
+        followed = np.lib.stride_tricks.sliding_window_view(
+            self.success[:, self.onset :], BLOCK, axis=1
+        ).mean(axis=2)
+        regained = followed >= level - 1e-12
+        recovered = regained.any(axis=1)
+        ran = self.success.shape[1] - self.onset
+        episodes = np.where(recovered, regained.argmax(axis=1), ran)
+        steps = [
+            run[self.onset : self.onset + count].sum()
+            for run, count in zip(self.steps, episodes, strict=True)
+        ]
+        return recovered.astype(float), episodes.astype(float), np.array(steps, dtype=float)
+
+
+def analyse(results: Results) -> Analysis:
+    """Estimate and compare; 95 % intervals, seeds as the unit of sampling.
+
+    Differences are success at the end of every case over that of the same fault when nothing
+    adapts.
+    """
+    courses = courses_of(results)
+    gains = _gains(courses)
+    notes = ["Named after the colon is what adapts to the failure."] if courses else []
+    notes += ["\nsuccess at the end against nothing adapting (p adjusted):"] if gains else []
+    notes += [f"  {gain.condition}: {gain.shown}" for gain in gains] + power_lines(gains)
+    return Analysis(tuple(map(_summary, courses)), tuple(notes), courses, gains, "end")
+
+
+def courses_of(results: Results) -> list[Course]:
+    """Return the cases of all conditions, fault by fault."""
+    courses = []
+    for condition in results.of_phase(KEPT):
+        numbers = results.numbers(condition)
+        onset = int(numbers["onset"][0])
+        onsets = tuple(int(v[0]) for name, v in numbers.items() if name.startswith("onset"))
+        fault, enabled = _counterpart(condition, results.columns.get(condition, {}))
+        for phase in (KEPT, "training"):
+            success, steps = (
+                results.values(condition, name).astype(float) for name in ("success", "steps")
+            )
+            if phase == KEPT:
+                success[:, onset:] = results.values(condition, "success", KEPT)
+                steps[:, onset:] = results.values(condition, "steps", KEPT)
+            adapts, seeds = ADAPTS.get((enabled, phase), phase), results.seeds(condition)
+            courses.append(Course(fault, adapts, onset, onsets, success, steps, seeds))
+    order = {adapts: i for i, adapts in enumerate(ADAPTS.values())}
+    faults = list(dict.fromkeys(course.fault for course in courses))
+    return sorted(courses, key=lambda c: (faults.index(c.fault), order.get(c.adapts, 0)))
+
+
+def _counterpart(condition: str, columns: Mapping[str, Any]) -> tuple[str, str]:
+    """Return what a condition has in common with its counterpart, as a label, and which it is."""
+    enabled = str(columns.get(SWEPT, ""))
+    if not enabled:
+        return condition, ""
+    return label_but(columns, [SWEPT]) or "the failure", enabled
+
+
+def _summary(course: Course) -> Summary:
+    recovered, episodes, steps = course.recovery()
+    estimates = {
+        "before": rate(course.before),
+        "just after": rate(course.after),
+        "end": rate(course.end),
+    }
+    if course.before.any():  # else there is nothing to lose or to come back to
+        estimates |= {
+            "recovered": rate(recovered[:, None]),
+            "episodes": bootstrap(episodes, bounds=NOT_NEGATIVE),
+            "steps": bootstrap(steps, bounds=NOT_NEGATIVE),
+            "cumulative loss": bootstrap(course.lost),
+        }
+    return Summary(f"{course.fault}: {course.adapts}", len(course.success), estimates)
+
+
+def _gains(courses: Sequence[Course]) -> tuple[Difference, ...]:
+    bases = {course.fault: course for course in courses if course.adapts == "nothing"}
+    gains = []
+    for course in courses:
+        base = bases.get(course.fault)
+        if base is None or base is course:
+            continue
+        both = (course, base)
+        own, other = of_shared_seeds([c.seeds for c in both], [c.end.mean(axis=1) for c in both])
+        if len(own) >= 2:
+            named = f"{course.fault}, {course.adapts}"
+            gains.append(Difference.between(named, "end", own, other, of_rates=True))
+    return adjusted(gains)
+
+
+def draw(analysis: Analysis) -> dict[str, Figure]:
+    """Return the figure: success from episode to episode, fault by fault.
+
+    A panel for every fault, a line for what adapts; running means over seeds and episodes, bands
+    their 95 % intervals. Wheels fail at grey lines.
+    """
+    from ...presentation import figures as f  # matplotlib takes its time
+
+    courses = analysis.cases
+    if not courses:
+        return {}
+    faults = list(dict.fromkeys(course.fault for course in courses))
+    cases = list(dict.fromkeys(course.adapts for course in courses))
+    columns = min(COLUMNS, len(faults))
+    rows = -(-len(faults) // columns)
+    size = (max(5.6, 1.0 + 2.6 * columns), 1.2 + 2.1 * rows)
+    figure, panels = f.panels(rows, columns, size, sharex=True, sharey=True)
+    for axes, fault in zip(panels.flat, faults, strict=False):
+        for course in (c for c in courses if c.fault == fault):
+            _draw_course(axes, course, cases.index(course.adapts))
+        axes.set_title("\n".join(wrap(fault, round(60 / columns))), loc="left")
+        f.as_rates(axes)
+        axes.grid(axis="y", alpha=0.25)
+    for axes in list(panels.flat)[len(faults) :]:
+        axes.set_visible(False)
+    for axes in panels[:, 0]:
+        axes.set_ylabel("success")
+    for axes in list(panels.flat)[max(0, len(faults) - columns) : len(faults)]:
+        f.as_episodes(axes)
+    handles = [f.handle(case, **f.look(i)) for i, case in enumerate(cases)]
+    seeds = sorted({len(course.success) for course in courses})
+    counted = f"{seeds[0]}" if len(seeds) == 1 else f"{seeds[0]} to {seeds[-1]}"
+    title = f"what adapts\nmeans over {counted} seeds and {SMOOTHED} episodes, 95 % bands"
+    f.add_legend(figure, handles, title, ncols=len(cases))
+    return {"wheel-failure": figure}
+
+
+def _draw_course(axes: Axes, course: Course, index: int) -> None:
+    from ...presentation.figures import draw_curve
+
+    for onset in course.onsets:
+        axes.axvline(onset - 0.5, color="#888888", linewidth=0.8)
+    runs = _smoothed(course.success, course.onset)
+    episodes = np.arange(runs.shape[1])  # counted from 0, as in rows and specs
+    draw_curve(axes, episodes, bootstrap(runs, bounds=(0, 1)), index, alpha=0.1)
+
+
+def _smoothed(success: np.ndarray, onset: int) -> np.ndarray:
+    """Return means over the episode and those before it, but not across the onset."""
+    means = [
+        success[:, max(0 if e < onset else onset, e - SMOOTHED + 1) : e + 1].mean(axis=1)
+        for e in range(success.shape[1])
+    ]
+    return np.stack(means, axis=1)
 
 
 __all__ = ["NUMBERS", "analyse", "check", "draw", "measure"]

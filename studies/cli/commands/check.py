@@ -31,7 +31,7 @@ def command(source: str, steps: int, changes: tuple[str, ...]) -> int:
     file that makes a scenario of one's own.
     """
     from ....scenarios.checking.checker import ScenarioError, check_scenario
-    from ...spec.errors import SpecError
+    from ...errors import SpecError
     from ..display import print_wrapped
 
     faults = 0
@@ -51,7 +51,7 @@ def command(source: str, steps: int, changes: tuple[str, ...]) -> int:
 def _cases(source: str, changes: tuple[str, ...]) -> Iterator[Case]:
     """Yield what is to be checked, each scenario of a spec once."""
     from ....core.plugins.sources import active
-    from ...spec.errors import SpecError
+    from ...errors import SpecError
     from ...spec.spec import Spec
 
     if ".py:" in source or source.endswith(".py"):

@@ -42,9 +42,9 @@ def command(out: Path | None, quick: bool, jobs: int | None, form: Format) -> in
     """
     from ...claims import claims
     from ...claims.table import print_claims
+    from ...errors import SpecError
     from ...presentation.progress import say
     from ...results import published
-    from ...spec.errors import SpecError
 
     if out is not None:
         results = _run(out, quick=quick, jobs=jobs)
@@ -70,10 +70,10 @@ def _run(out: Path, *, quick: bool, jobs: int | None) -> dict[str, Published]:
     """Run the studies of the claims, or what is left of them; return the results by study."""
     from ...api.run_study import run_study
     from ...claims import claims
+    from ...errors import SpecError
     from ...presentation.progress import Terminal
     from ...results import published
     from ...results.results import read
-    from ...spec.errors import SpecError
     from ...spec.outline import Outline
     from ...spec.spec import Spec
 

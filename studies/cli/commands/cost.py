@@ -63,8 +63,8 @@ def command(
     from ...api.costs import cost_table
     from ...cost.cost import MOST_OPERATIONS
     from ...cost.table import written
+    from ...errors import SpecError
     from ...presentation.progress import say
-    from ...spec.errors import SpecError
 
     try:
         problem = Problem(rules, actions, iterations)

@@ -14,7 +14,7 @@ def command(prefix: str | None) -> int:
 
     PREFIX is a table or a key, such as learner.rule_base or scenario.box.mass.
     """
-    from ...spec.errors import SpecError
+    from ...errors import SpecError
     from ...spec.keys import keys_below, nearest
     from ..display import print_wrapped
 

@@ -37,8 +37,8 @@ def command(directory: Path, form: Format, phase: str) -> int:
     import sys
 
     from ....core.plugins.messages import closest
+    from ...errors import SpecError
     from ...presentation.row_formats import write_rows
-    from ...spec.errors import SpecError
     from ...store.store import Store
 
     with Store.open(directory) as store:

@@ -54,8 +54,8 @@ def command(
     SPEC.toml says what to run; `nested-agents demo --print-spec` prints an example.
     """
     from ...api.study import run
+    from ...errors import SpecError
     from ...presentation.progress import Terminal
-    from ...spec.errors import SpecError
     from ...spec.spec import Spec
     from ...store.store import DATABASE, SPEC_FILE
     from ..display import show_results

@@ -16,21 +16,14 @@ def command(directory: Path) -> int:
 
     DIR is where the study is kept.
     """
-    from ...results.power import SMALLEST, USUAL_DEVIATION
-    from ...results.verdicts import power_told
-    from ...spec.outline import Outline
     from ...store.store import Store
     from ...workers.progress import progress
-    from ..display import print_wrapped
     from ..standing import describe, warnings
 
     with Store.open(directory) as store:
         now = progress(store)
         print(*describe(store, now), sep="\n")
-        outline, failed = Outline.kept(store), store.failed()
-    if len(outline.columns) > 1:
-        power = power_told(len(outline.seeds), len(outline.columns) - 1, USUAL_DEVIATION, SMALLEST)
-        print_wrapped(power, "power    ", 9)
+        failed = store.failed()
     for line in warnings(now):
         print(line)
     for condition, seed, error in failed:

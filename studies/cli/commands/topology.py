@@ -80,7 +80,7 @@ def show(
     teams.json, ...; or the spec of a study, whose hierarchies are shown over its own agents.
     """
     from ....topologies.view import printed, view
-    from ...spec.errors import SpecError
+    from ...errors import SpecError
     from ..hierarchies import of_spec
 
     try:

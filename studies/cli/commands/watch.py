@@ -29,7 +29,7 @@ def command(directory: Path, every: float, once: bool) -> int:
     from rich.console import Console
     from rich.live import Live
 
-    from ...spec.errors import SpecError
+    from ...errors import SpecError
     from ..watching import frame
 
     if not LEAST_SECONDS <= every < inf:

@@ -11,7 +11,7 @@ from nested_agents.core.learners import LEARNERS
 from nested_agents.core.policies.inputs import FARTHEST, Inputs, RewardScale
 from nested_agents.core.policies.seen import Seen, SeenScenario
 from nested_agents.scenarios.line_up import LineUpSettings
-from nested_agents.studies.spec.errors import SpecError
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import check
 from nested_agents.studies.trials.session import Session, run_trial
@@ -167,7 +167,7 @@ def test_dqn_needs_one_agent() -> None:
 def test_what_needs_rule_bases_says_so() -> None:
     pytest.importorskip("stable_baselines3", reason="extra [peers]")
     (trial,) = trials_of(spec_of("ppo", study="scaling"))
-    from nested_agents.studies.catalogue.scaling.analysis import measure
+    from nested_agents.studies.catalogue.scaling import measure
 
     with pytest.raises(ValueError, match="acts for all by itself; this needs agents with rule"):
         measure(trial)

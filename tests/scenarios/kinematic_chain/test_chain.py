@@ -12,7 +12,7 @@ from nested_agents.scenarios.kinematic_chain.config import KinematicChainSetting
 from nested_agents.scenarios.kinematic_chain.kernels import COMPILED
 from nested_agents.scenarios.kinematic_chain.scenario import KinematicChain
 from nested_agents.scenarios.kinematic_chain.view import ChainView
-from nested_agents.studies.spec.errors import SpecError
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import check
 from nested_agents.studies.trials.trial import trials_of

@@ -49,7 +49,7 @@ def test_what_is_tried_is_on_a_seed_that_no_study_reports() -> None:
     ("options", "complaint"),
     [
         (["--deviation", "0"], "--deviation 0: must be above 0 and at most 1"),
-        (["--smallest", "x"], "--smallest x: must be a number"),
+        (["--smallest", "x"], "'--smallest': 'x' is not a valid float"),
         (["--jobs", "0"], "--jobs 0: must be at least 1"),
     ],
 )

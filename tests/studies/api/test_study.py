@@ -7,7 +7,6 @@ import made_up
 import pytest
 
 import nested_agents as na
-from nested_agents.studies.api import frames
 from nested_agents.studies.api import run_study as studies_run
 from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.presentation import progress
@@ -44,7 +43,6 @@ def test_a_study_tells_its_conditions_table_and_notes(study) -> None:
 
 
 def test_rows_are_data_frames_whose_columns_are_told(study) -> None:
-    pytest.importorskip("pandas", reason="extra [pandas]")
     trials, episodes = study.trials, study.episodes
     assert len(trials) == 6
     assert len(episodes) == 6 * (4 + 2)
@@ -57,12 +55,6 @@ def test_rows_are_data_frames_whose_columns_are_told(study) -> None:
     part = study.where("seed < 2 and condition == frozen")
     assert set(part.episodes["seed"]) == {0, 1}
     assert len(part.trials) == 2
-
-
-def test_without_pandas_one_line_says_how_to_get_it(study, monkeypatch) -> None:
-    monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(na.SpecError, match=r"pip install 'nested-agents\[pandas\]'"):
-        frames._pandas()
 
 
 def test_conditions_are_compared(study) -> None:

@@ -1,19 +1,17 @@
 from pathlib import Path
 
-from made_up_results import ablation
+from made_up_results import NOTHING, ablation
 
-from nested_agents.studies.catalogue.ablation import analysis as module
-from nested_agents.studies.catalogue.ablation import draw
-from nested_agents.studies.catalogue.ablation.analysis import analyse
+from nested_agents.studies.catalogue import ablation as module
+from nested_agents.studies.catalogue.ablation import analyse, draw
 from nested_agents.studies.presentation.figures import save
-from nested_agents.studies.results.results import Results
 from nested_agents.studies.spec.spec import Spec
 
 CHANCES = {"default": 0.8, "no replay": 0.2, "no termination radius": 0.8, "more of it": 1.0}
 
 
 def test_what_matters_is_named_and_what_does_not_is_not() -> None:
-    analysis = analyse(ablation(CHANCES))
+    analysis = analyse(ablation(CHANCES).frames())
     text = "\n".join(analysis.notes)
     assert "worse: no replay" in text
     assert "better: more of it" in text
@@ -26,9 +24,9 @@ def test_what_matters_is_named_and_what_does_not_is_not() -> None:
 
 
 def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
-    paths = save(draw(analyse(ablation(CHANCES))), tmp_path)
+    paths = save(draw(analyse(ablation(CHANCES).frames())), tmp_path)
     assert [path.name for path in paths] == ["ablation.png", "ablation.svg"]
-    assert draw(analyse(Results({}, {}))) == {}
+    assert draw(analyse(NOTHING)) == {}
 
 
 def test_the_spec_compares_one_change_at_a_time_over_twenty_seeds() -> None:

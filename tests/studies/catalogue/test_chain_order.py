@@ -6,19 +6,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_up_results import NOTHING, Arrays
 
-from nested_agents.studies.catalogue.chain_order import analysis as chain_order
-from nested_agents.studies.catalogue.chain_order import draw
-from nested_agents.studies.catalogue.chain_order.analysis import analyse
+from nested_agents.studies.catalogue import chain_order as chain_order
+from nested_agents.studies.catalogue.chain_order import analyse, draw
 from nested_agents.studies.presentation.figures import save
-from nested_agents.studies.results.results import Results
 from nested_agents.studies.spec.spec import Spec
 
 STUDIES = Path(chain_order.__file__).parent
 ORDERS = ["chain:" + ",".join(order) for order in permutations(("r1.a", "r1.b", "r2.a"))]
 
 
-def made_up(chances: list[float], seeds: int = 20) -> Results:
+def made_up(chances: list[float], seeds: int = 20) -> Arrays:
     """Results of orders that succeed with these chances."""
     rng = np.random.default_rng(1)
 
@@ -29,19 +28,19 @@ def made_up(chances: list[float], seeds: int = 20) -> Results:
         }
 
     numbered = dict.fromkeys(ORDERS, tuple(range(seeds)))
-    return Results(training=outcomes(15), evaluation=outcomes(10), seeds=numbered)
+    return Arrays(outcomes(15), outcomes(10), seeds=numbered)
 
 
 def test_equal_orders_are_not_told_apart() -> None:
-    analysis = analyse(made_up([0.7] * 6))
-    assert [c.p > 0.05 for c in analysis.comparisons] == [True, True]
-    assert all((c.against_first > 0.05).all() for c in analysis.comparisons)
+    analysis = analyse(made_up([0.7] * 6).frames())
+    assert [c.p > 0.05 for c in analysis.cases] == [True, True]
+    assert all((c.against_first > 0.05).all() for c in analysis.cases)
     assert "6 orders do not differ significantly" in analysis.notes[0]
 
 
 def test_one_bad_order_is_found_and_named() -> None:
-    analysis = analyse(made_up([0.7, 0.7, 0.7, 0.3, 0.7, 0.7]))
-    for comparison in analysis.comparisons:
+    analysis = analyse(made_up([0.7, 0.7, 0.7, 0.3, 0.7, 0.7]).frames())
+    for comparison in analysis.cases:
         assert comparison.p < 0.001
         assert (comparison.against_first < 0.05).tolist() == [False, False, True, False, False]
     assert "6 orders differ" in analysis.notes[0]
@@ -49,7 +48,7 @@ def test_one_bad_order_is_found_and_named() -> None:
 
 
 def test_agents_are_numbered_in_the_first_order() -> None:
-    analysis = analyse(made_up([0.5] * 6))
+    analysis = analyse(made_up([0.5] * 6).frames())
     assert [line.condition for line in analysis.table] == [
         "1 2 3", "1 3 2", "2 1 3", "2 3 1", "3 1 2", "3 2 1",
     ]  # fmt: skip
@@ -63,7 +62,7 @@ def test_orders_are_compared_on_the_seeds_that_all_have_finished() -> None:
         seeds = tuple(seed for seed in range(20) if seed != k)
         results.seeds[order] = seeds
         results.training[order]["success"] = whole[list(seeds)]
-    (comparison,) = analyse(replace(results, evaluation={})).comparisons
+    (comparison,) = analyse(replace(results, evaluation={}).frames()).cases
     assert comparison.values.tolist() == [[m] * 6 for m in whole[6:].mean(axis=1)]
     assert comparison.p == 1.0
 
@@ -71,18 +70,19 @@ def test_orders_are_compared_on_the_seeds_that_all_have_finished() -> None:
 def test_what_no_two_seeds_have_finished_is_not_compared() -> None:
     results = made_up([0.5] * 6)
     results.seeds[ORDERS[2]] = (19,)
-    results.training[ORDERS[2]]["success"] = results.training[ORDERS[2]]["success"][-1:]
+    for arrays in (results.training, results.evaluation):
+        arrays[ORDERS[2]]["success"] = arrays[ORDERS[2]]["success"][-1:]
     results.evaluation.pop(ORDERS[0])
-    analysis = analyse(results)
-    assert analysis.comparisons == ()
+    analysis = analyse(results.frames())
+    assert not analysis.cases
     assert len(analysis.table) == 6
 
 
 def test_the_figure_is_drawn(tmp_path: Path) -> None:
-    paths = save(draw(analyse(made_up([0.5] * 6))), tmp_path)
+    paths = save(draw(analyse(made_up([0.5] * 6).frames())), tmp_path)
     assert [path.name for path in paths] == ["chain-order.png", "chain-order.svg"]
     assert all(path.stat().st_size > 0 for path in paths)
-    assert draw(analyse(Results({}, {}))) == {}
+    assert draw(analyse(NOTHING)) == {}
 
 
 @pytest.mark.parametrize(("name", "orders"), [("chain_order", 24), ("chain_order_8", 4)])

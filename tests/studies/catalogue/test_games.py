@@ -2,13 +2,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_up_results import NOTHING, Arrays
 
-from nested_agents.studies.catalogue.games import analysis as module
-from nested_agents.studies.catalogue.games import check, draw
-from nested_agents.studies.catalogue.games.analysis import AFTER_ONE, analyse, measure
+from nested_agents.studies.catalogue import games as module
+from nested_agents.studies.catalogue.games import AFTER_ONE, analyse, check, draw, measure
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
-from nested_agents.studies.results.results import Results
-from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.trial import trials_of
 
@@ -16,7 +15,7 @@ SPEC = Path(module.__file__).parent / "games.toml"
 SEEDS = 40
 
 
-def made_up(chances: dict[tuple[str, str], float]) -> Results:
+def made_up(chances: dict[tuple[str, str], float]) -> Arrays:
     """Systems that find the optimum of games with these chances, after 1,000 plays by half."""
     rng = np.random.default_rng(0)
 
@@ -28,15 +27,14 @@ def made_up(chances: dict[tuple[str, str], float]) -> Results:
     first = {labels[key]: found(p / 2) for key, p in chances.items()}
     training = {label: {"steps": np.full((SEEDS, 5), 1000)} for label in last}
     columns = {labels[key]: {"name": key[0], "scenario.game": key[1]} for key in chances}
-    phases = {"evaluation": last, AFTER_ONE: first}
-    return Results(training, last, phases, columns=columns)
+    return Arrays(training, last, {AFTER_ONE: first}, columns=columns)
 
 
 CHANCES = {("JAL", "climbing"): 0.0, ("nested", "climbing"): 1.0, ("JAL", "penalty:-1"): 0.6}
 
 
 def test_systems_stand_side_by_side(tmp_path: Path) -> None:
-    analysis = analyse(made_up(CHANCES))
+    analysis = analyse(made_up(CHANCES).frames())
     assert [line.seeds for line in analysis.table] == [SEEDS] * 3
     nested = analysis.table[1].estimates["optimal, 5,000 plays"]
     assert nested.value == 1.0
@@ -47,7 +45,7 @@ def test_systems_stand_side_by_side(tmp_path: Path) -> None:
     assert max(map(len, notes.splitlines())) <= 80
     paths = save(draw(analysis), tmp_path)
     assert [path.name for path in paths] == ["games.png", "games.svg"]
-    assert draw(analyse(Results({}, {}))) == {}
+    assert draw(analyse(NOTHING)) == {}
 
 
 def test_without_evaluation_it_is_refused() -> None:

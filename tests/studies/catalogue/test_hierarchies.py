@@ -4,15 +4,22 @@ from pathlib import Path
 
 import made_up
 import pytest
-from made_up_results import hierarchies
+from made_up_results import NOTHING, Arrays, hierarchies
 
-from nested_agents.studies.catalogue.hierarchies import analysis as module
-from nested_agents.studies.catalogue.hierarchies import check, draw, measure
-from nested_agents.studies.catalogue.hierarchies.analysis import analyse, seeds_needed
+from nested_agents.studies.catalogue import hierarchies as module
+from nested_agents.studies.catalogue.hierarchies import (
+    Verdict,
+    analyse,
+    check,
+    draw,
+    measure,
+    seeds_needed,
+    verdicts_of,
+)
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.presentation.tables import tabulate
-from nested_agents.studies.results.results import Results, read
-from nested_agents.studies.spec.errors import SpecError
+from nested_agents.studies.results.results import read
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import check as measures_of
 from nested_agents.studies.trials.trial import trials_of
@@ -26,13 +33,19 @@ CHANCES = {
 }
 
 
+def verdicts(results: Arrays) -> tuple[Verdict, ...]:
+    frames = results.frames()
+    return verdicts_of(frames, analyse(frames).cases)
+
+
 def test_where_a_hierarchy_matters_is_told_and_where_not() -> None:
-    analysis = analyse(hierarchies(CHANCES))
-    assert [verdict.setting for verdict in analysis.verdicts] == [
+    analysis = analyse(hierarchies(CHANCES).frames())
+    own = verdicts(hierarchies(CHANCES))
+    assert [verdict.setting for verdict in own] == [
         "2 robots, own", "2 robots, team", "8 robots, own", "8 robots, team",
     ]  # fmt: skip
-    assert {(verdict.reference, verdict.among) for verdict in analysis.verdicts} == {("chain", 8)}
-    *others, last = analysis.verdicts
+    assert {(verdict.reference, verdict.among) for verdict in own} == {("chain", 8)}
+    *others, last = own
     assert all(not verdict.different and not verdict.undecided for verdict in others)
     (star,) = last.different
     assert (star.condition, star.seeds) == ("star", 20)
@@ -45,8 +58,9 @@ def test_where_a_hierarchy_matters_is_told_and_where_not() -> None:
 
 
 def test_with_few_seeds_nothing_can_be_told() -> None:
-    analysis = analyse(hierarchies(CHANCES, seeds=5))
-    assert all(len(verdict.undecided) == 2 for verdict in analysis.verdicts)
+    analysis = analyse(hierarchies(CHANCES, seeds=5).frames())
+    own = verdicts(hierarchies(CHANCES, seeds=5))
+    assert all(len(verdict.undecided) == 2 for verdict in own)
     text = "\n".join(analysis.notes)
     assert "adjusted over 8 comparisons, so fewer than 9 seeds cannot tell." in text
     assert "differs by" not in text
@@ -61,10 +75,10 @@ def test_the_seeds_needed_are_the_fewest_whose_least_p_is_small_enough(compariso
 
 def test_an_interval_without_zero_is_not_called_no_difference() -> None:
     found = hierarchies({("chain", "own", 4): 0.9, ("star", "own", 4): 0.9}, seeds=12)
-    one, other = (found.evaluation[c]["success"] for c in found.evaluation)
+    one, other = (arrays["success"] for arrays in found.evaluation.values())
     one[:], other[:] = 1, 1
     other[:5] = 0  # p of five seeds that differ in one direction is 1/16
-    (verdict,) = analyse(found).verdicts
+    (verdict,) = verdicts(found)
     (star,) = verdict.undecided
     assert (star.p, star.estimate.value) == (0.0625, pytest.approx(-5 / 12))
     assert star.estimate.high < 0.0
@@ -72,21 +86,22 @@ def test_an_interval_without_zero_is_not_called_no_difference() -> None:
 
 def test_the_first_hierarchy_is_the_reference_where_there_is_no_chain() -> None:
     chances = {key: chance for key, chance in CHANCES.items() if key[0] != "chain"}
-    assert {verdict.reference for verdict in analyse(hierarchies(chances)).verdicts} == {"star"}
+    assert {verdict.reference for verdict in verdicts(hierarchies(chances))} == {"star"}
 
 
 def test_what_the_reference_has_not_finished_is_not_compared() -> None:
     results = hierarchies(CHANCES)
     for arrays in (results.training, results.evaluation):
         arrays.pop("topology=chain, value_of=team, robots=8")
-    results.seeds["topology=chain, value_of=own, robots=8"] = (40,)
-    analysis = analyse(results)
-    assert [verdict.setting for verdict in analysis.verdicts] == ["2 robots, own", "2 robots, team"]
+    results.seeds["topology=chain, value_of=own, robots=8"] = tuple(range(40, 60))
+    analysis = analyse(results.frames())
+    own = verdicts(results)
+    assert [verdict.setting for verdict in own] == ["2 robots, own", "2 robots, team"]
     assert len(analysis.table) == 11
 
 
 def test_costs_stand_beside_success() -> None:
-    analysis = analyse(hierarchies(CHANCES))
+    analysis = analyse(hierarchies(CHANCES).frames())
     by_name = {line.condition: line.estimates for line in analysis.table}
     assert list(by_name)[:3] == [
         "2 robots, own, star", "2 robots, own, chain", "2 robots, own, tree:2",
@@ -100,13 +115,13 @@ def test_costs_stand_beside_success() -> None:
 
 
 def test_the_highest_success_is_told_with_its_cost() -> None:
-    analysis = analyse(hierarchies({("star", "own", 8): 0.1, ("chain", "own", 8): 1.0}))
+    analysis = analyse(hierarchies({("star", "own", 8): 0.1, ("chain", "own", 8): 1.0}).frames())
     assert analysis.notes[-1] == "8 robots, own, chain: 1.0; 1.6 ms, messages 120"
 
 
 def test_who_never_succeeds_has_no_decisions_to_the_goal() -> None:
     results = hierarchies({("chain", "own", 2): 0.0, ("star", "own", 2): 0.0})
-    for line in analyse(results).table:
+    for line in analyse(results.frames()).table:
         assert "decisions to goal" not in line.estimates
 
 
@@ -114,7 +129,7 @@ def test_hierarchies_may_be_overrides_and_value_of_need_not_be_swept() -> None:
     results = hierarchies({("chain", "own", 2): 0.9, ("star", "own", 2): 0.9})
     for condition, columns in results.columns.items():
         results.columns[condition] = {"name": columns["topology"], "scenario.carts": 2}
-    assert [line.condition for line in analyse(results).table] == [
+    assert [line.condition for line in analyse(results.frames()).table] == [
         "2 robots, chain", "2 robots, star",
     ]  # fmt: skip
 
@@ -122,11 +137,11 @@ def test_hierarchies_may_be_overrides_and_value_of_need_not_be_swept() -> None:
 def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
     partly = {key: chance for key, chance in CHANCES.items() if key[:2] != ("star", "own")}
     for chances, columns in ((CHANCES, 2), (partly, 2)):
-        (figure,) = draw(analyse(hierarchies(chances))).values()
+        (figure,) = draw(analyse(hierarchies(chances).frames())).values()
         assert len(figure.axes) == 2 * columns
     paths = save({"hierarchies": figure}, tmp_path)
     assert all(path.stat().st_size > 0 for path in paths)
-    assert draw(analyse(Results({}, {}))) == {}
+    assert draw(analyse(NOTHING)) == {}
 
 
 @pytest.mark.parametrize(
@@ -158,7 +173,8 @@ def test_a_tiny_study_is_run_and_read(tmp_path: Path) -> None:
     with made_up.opened(tmp_path, spec, measures_of(spec)) as store:
         for trial in trials_of(spec):
             runner.save(store, trial, measure(trial), 1.0)
-        analysis = analyse(read(store))
+        results = read(store)
+    analysis = analyse(results)
     assert [line.condition for line in analysis.table[:5]] == [
         "1 robot, own, chain", "1 robot, own, chain of robots",
         "1 robot, team, chain", "1 robot, team, chain of robots",
@@ -166,7 +182,7 @@ def test_a_tiny_study_is_run_and_read(tmp_path: Path) -> None:
     ]  # fmt: skip
     messages = [float(line.estimates["messages"].value) for line in analysis.table]
     assert messages == [1.0, 0.0, 1.0, 0.0, 6.0, 1.0, 6.0, 1.0]
-    assert len(analysis.verdicts) == 4
+    assert len(verdicts_of(results, analysis.cases)) == 4
 
 
 def test_the_spec_crosses_hierarchies_whose_value_and_sizes_over_seeds_enough() -> None:

@@ -2,14 +2,13 @@ import io
 
 import numpy as np
 import pytest
+from made_up_results import Arrays
 
 from nested_agents.core.interface.measures import SUCCESS, Measure
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
-from nested_agents.studies.catalogue.learning_curve import draw
-from nested_agents.studies.catalogue.learning_curve.analysis import analyse, metrics_of
+from nested_agents.studies.catalogue.learning_curve import analyse, draw, metrics_of
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.presentation.row_formats import write_rows
-from nested_agents.studies.results.results import Results
 from nested_agents.studies.results.statistics import Estimate
 from nested_agents.studies.results.summary import interval, two_figures
 
@@ -25,11 +24,11 @@ def made_up(seeds=4, episodes=12):
     learns = arrays(seeds, episodes, np.arange(episodes) >= 6)
     never = arrays(seeds, episodes, 0)
     greedy = {"learns": arrays(seeds, 3, 1), "never": arrays(seeds, 3, 0)}
-    return Results({"learns": learns, "never": never}, greedy, measures=MEASURES)
+    return Arrays({"learns": learns, "never": never}, greedy, measures=MEASURES)
 
 
 def test_the_table_takes_the_ends_of_training_and_the_evaluation():
-    learns, never = analyse(made_up()).table
+    learns, never = analyse(made_up().frames()).table
     assert (learns.condition, learns.seeds) == ("learns", 4)
     values = {title: float(e.value) for title, e in learns.estimates.items()}
     assert values["success first 5"] == 0.0
@@ -45,38 +44,40 @@ def test_the_table_takes_the_ends_of_training_and_the_evaluation():
 
 
 def test_curves_have_a_point_for_every_episode():
-    curves = analyse(made_up()).curves
-    assert curves["learns"]["final_distance_m"].value.tolist() == list(range(12))
-    assert curves["never"]["success"].value.tolist() == [0.0] * 12
-    assert (curves["never"]["success"].high > 0.3).all()
+    curves = {f.measure.name: f.curves for f in analyse(made_up().frames()).cases}
+    assert curves["final_distance_m"]["learns"].value.tolist() == list(range(12))
+    assert curves["success"]["never"].value.tolist() == [0.0] * 12
+    assert (curves["success"]["never"].high > 0.3).all()
 
 
 def test_few_episodes_no_evaluation_and_one_seed_are_no_trouble(tmp_path):
-    results = Results({"alone": arrays(1, 2, 1)}, {}, measures=MEASURES)
-    analysis = analyse(results)
+    results = Arrays({"alone": arrays(1, 2, 1)}, {}, measures=MEASURES)
+    analysis = analyse(results.frames())
+    (success, *_) = analysis.cases
     assert "evaluation success" not in analysis.table[0].estimates
-    assert np.isnan(analysis.curves["alone"]["success"].low).all()
+    assert np.isnan(success.curves["alone"].low).all()
     assert len(save(draw(analysis), tmp_path)) == 2
 
 
 def test_conditions_may_have_unequal_numbers_of_seeds(tmp_path):
     results = made_up()
     results.training["never"] = arrays(2, 12, 0)
-    analysis = analyse(results)
+    results.evaluation.pop("never")
+    analysis = analyse(results.frames())
     assert [line.seeds for line in analysis.table] == [4, 2]
     _, svg = save(draw(analysis), tmp_path)
     assert "never (2 seeds)" in svg.read_text()
 
 
 def test_equal_results_give_equal_figures(tmp_path):
-    once = [path.read_bytes() for path in save(draw(analyse(made_up())), tmp_path)]
-    again = [path.read_bytes() for path in save(draw(analyse(made_up())), tmp_path)]
+    once = [path.read_bytes() for path in save(draw(analyse(made_up().frames())), tmp_path)]
+    again = [path.read_bytes() for path in save(draw(analyse(made_up().frames())), tmp_path)]
     assert once == again
 
 
 def test_every_condition_is_in_the_legend(tmp_path):
     many = {f"condition {i}": arrays(2, 3, i % 2) for i in range(13)}
-    _, svg = save(draw(analyse(Results(many, {}))), tmp_path)
+    _, svg = save(draw(analyse(Arrays(many).frames())), tmp_path)
     text = svg.read_text()
     assert all(f">{name}<" in text for name in many)
 
@@ -101,11 +102,16 @@ def test_there_is_a_panel_for_every_number(further, tmp_path):
     numbers = [Measure(f"x{k}", f"quantity {k}", "m") for k in range(further)]
     measures = (SUCCESS, *numbers, Measure("calm", "calm", is_rate=True))
     training = {"only": {m.name: np.ones((2, 3)) for m in measures}}
-    analysis = analyse(Results(training, {}, measures=measures))
-    assert [m.name for m in analysis.followed] == ["success", *(m.name for m in numbers)]
+    analysis = analyse(Arrays(training, {}, measures=measures).frames())
+    assert [followed.measure.name for followed in analysis.cases] == [
+        "success",
+        *(m.name for m in numbers),
+    ]
     figure = draw(analysis)["learning-curves"]
     shown = [axes for axes in figure.axes if axes.get_visible()]
-    assert [axes.get_title(loc="left") for axes in shown] == [m.heading for m in analysis.followed]
+    assert [axes.get_title(loc="left") for axes in shown] == [
+        followed.measure.heading for followed in analysis.cases
+    ]
     assert sum(bool(axes.get_xlabel()) for axes in shown) == min(2, len(shown))
 
 

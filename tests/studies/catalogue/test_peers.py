@@ -7,14 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_up_results import NOTHING, Arrays
 
 from nested_agents.studies.catalogue import wheel_failure
-from nested_agents.studies.catalogue.peers import analyse, check, draw, measure
-from nested_agents.studies.catalogue.peers.analysis import stops
+from nested_agents.studies.catalogue.peers import analyse, check, draw, measure, stops
 from nested_agents.studies.catalogue.study import load_study
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
-from nested_agents.studies.results.results import Results
-from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import trials_of
@@ -23,7 +22,7 @@ SPECS = sorted(Path(wheel_failure.__file__).parents[1].glob("peers/*.toml"))
 SEEDS = 10
 
 
-def made_up() -> Results:
+def made_up() -> Arrays:
     """Ours succeeds from the second evaluation on, and PPO half as often at the end."""
     rng = np.random.default_rng(0)
 
@@ -42,12 +41,12 @@ def made_up() -> Results:
         c: {f"cpu.{n}": np.full(SEEDS, rate * n) for n in (2, 10, 20)}
         for c, rate in {"ours": 0.5, "PPO": 2.0}.items()
     }
-    return Results(training, last, {"evaluation": last, **phases}, seeds=seeds, usage=usage)
+    return Arrays(training, last, phases, seeds=seeds, usage=usage)
 
 
 def test_success_against_experience_and_time(tmp_path: Path) -> None:
-    analysis = analyse(made_up())
-    ours, ppo = analysis.courses
+    analysis = analyse(made_up().frames())
+    ours, ppo = analysis.cases
     assert ours.decisions.tolist() == [100, 500, 1000]
     assert ppo.seconds.tolist() == [4, 20, 40]
     assert [float(e.value) for e in ours.success] == [0, 1, 1]
@@ -60,7 +59,7 @@ def test_success_against_experience_and_time(tmp_path: Path) -> None:
     assert max(len(line) for note in analysis.notes for line in note.splitlines()) <= 80
     paths = save(draw(analysis), tmp_path)
     assert [path.name for path in paths] == ["peers.png", "peers.svg"]
-    assert draw(analyse(Results({}, {}))) == {}
+    assert draw(analyse(NOTHING)) == {}
 
 
 def test_evaluations_on_the_way_leave_no_trace() -> None:

@@ -1,14 +1,14 @@
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from made_up_results import NOTHING, Arrays
 
+from nested_agents.studies.catalogue import related as module
 from nested_agents.studies.catalogue.related import analyse, check, draw, measure
-from nested_agents.studies.catalogue.related import analysis as module
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.results.results import Results
-from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.trial import trials_of
 
@@ -19,20 +19,21 @@ CHANGES = ["seeds=2", "episodes=1", "steps=20", "evaluation=1"]
 @pytest.fixture(scope="module")
 def results() -> Results:
     """All systems on the climbing game, two seeds of a few plays."""
-    found = Results({}, {})
+    found = Arrays()
     for trial in trials_of(Spec.load(CATALOGUE / "climbing.toml", CHANGES)):
         result, name = measure(trial), trial.condition
         (last,) = (row for row in result.rows if row.phase == "evaluation")
         for kept, values in (
-            (found.evaluation, {"success": [last.measures["success"]], "steps": [last.steps]}),
+            (found.evaluation, {"success": [[last.measures["success"]]], "steps": [[last.steps]]}),
             (found.numbers, result.numbers),
             (found.usage, {**result.seconds, **result.usage}),
         ):
             own = kept.setdefault(name, {})
             for key, value in values.items():
                 before = [own[key]] if key in own else []
-                own[key] = np.concatenate([*before, np.array([value])])
-    return replace(found, columns={name: {"name": name} for name in found.evaluation})
+                own[key] = np.concatenate([*before, np.atleast_1d(np.asarray(value))])
+    found.columns.update({name: {"name": name} for name in found.evaluation})
+    return found.frames()
 
 
 def test_what_is_counted_is_what_the_formulas_say(results: Results) -> None:
@@ -58,7 +59,7 @@ def test_it_is_tabulated_and_drawn(results: Results, tmp_path: Path) -> None:
     assert list(analysis.table[0].estimates)[:3] == ["evaluation success", "decisions", "ms"]
     paths = save(draw(analysis), tmp_path)
     assert [path.name for path in paths] == ["related.png", "related.svg"]
-    assert draw(analyse(Results({}, {}))) == {}
+    assert draw(analyse(NOTHING)) == {}
 
 
 @pytest.mark.parametrize("name", ["climbing", "arms", "boxes"])

@@ -1,15 +1,12 @@
 from pathlib import Path
 
 import pytest
-from made_up_results import scaling
+from made_up_results import NOTHING, Arrays, scaling
 from matplotlib.figure import Figure
 
-from nested_agents.studies.catalogue.scaling import analysis as module
-from nested_agents.studies.catalogue.scaling import draw
-from nested_agents.studies.catalogue.scaling import figure as scaling_figure
-from nested_agents.studies.catalogue.scaling.analysis import analyse, measure, messages
+from nested_agents.studies.catalogue import scaling as module
+from nested_agents.studies.catalogue.scaling import analyse, draw, exponents_of, measure, messages
 from nested_agents.studies.presentation.figures import save
-from nested_agents.studies.results.results import Results
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import build, check
 from nested_agents.studies.trials.session import run_trial
@@ -19,19 +16,20 @@ SIZES = {2: 0.9, 8: 0.9, 64: 0.5}
 
 
 def test_exponents_and_messages() -> None:
-    analysis = analyse(scaling(SIZES))
-    assert analysis.exponents["sums"]["deciding"].value == pytest.approx(1.0, abs=0.02)
-    assert analysis.exponents["sampling"]["deciding"].value == pytest.approx(2.0, abs=0.02)
-    assert analysis.exponents["sums"]["deciding"].low > 0.95
+    analysis = analyse(scaling(SIZES).frames())
+    exponents = exponents_of(analysis.cases)
+    assert exponents["sums"]["deciding"].value == pytest.approx(1.0, abs=0.02)
+    assert exponents["sampling"]["deciding"].value == pytest.approx(2.0, abs=0.02)
+    assert exponents["sums"]["deciding"].low > 0.95
     assert analysis.notes[0].startswith("\nsums, time with n agents: deciding n^")
-    assert [p.messages for p in analysis.points[:3]] == [6, 120, 8128]
-    assert [p.evaluator for p in analysis.points] == ["sums"] * 3 + ["sampling"] * 3
+    assert [p.messages for p in analysis.cases[:3]] == [6, 120, 8128]
+    assert [p.evaluator for p in analysis.cases] == ["sums"] * 3 + ["sampling"] * 3
     assert "64 robots: 128 agents, 8128 messages a step" in analysis.notes
 
 
-def by_topology(passed: dict[str, dict[int, int]], first: str = "topology") -> Results:
+def by_topology(passed: dict[str, dict[int, int]], first: str = "topology") -> Arrays:
     """Results of topologies that pass so many messages, by number of robots."""
-    base = Results({}, {})
+    base = Arrays()
     for name, counts in passed.items():
         made = scaling(dict.fromkeys(counts, 0.9))
         for robots, count in counts.items():
@@ -53,8 +51,8 @@ PASSED = {"chain": {2: 6, 4: 28}, "star": {2: 3, 4: 7}, "independent": {2: 0, 4:
 
 @pytest.mark.parametrize("first", ["topology", "robots"])
 def test_messages_are_told_by_topology_where_they_differ(first: str) -> None:
-    analysis = analyse(by_topology(PASSED, first))
-    assert list(dict.fromkeys(p.evaluator for p in analysis.points)) == [
+    analysis = analyse(by_topology(PASSED, first).frames())
+    assert list(dict.fromkeys(p.evaluator for p in analysis.cases)) == [
         f"topology={name}" for name in PASSED
     ]
     told = [note for note in analysis.notes if "messages" in note]
@@ -71,7 +69,7 @@ def test_messages_are_told_by_topology_where_they_differ(first: str) -> None:
 def test_as_many_agents_of_fewer_robots_have_a_line_of_their_own() -> None:
     results = by_topology({"two wheels": {2: 6, 4: 28}, "four wheels": {2: 28}})
     results.numbers["topology=four wheels, robots=2"]["agents"][:] = 8
-    told = [note for note in analyse(results).notes if "messages" in note]
+    told = [note for note in analyse(results.frames()).notes if "messages" in note]
     assert told == [
         "2 robots (topology=two wheels): 4 agents, 6 messages a step",
         "2 robots (topology=four wheels): 8 agents, 28 messages a step",
@@ -83,26 +81,25 @@ def test_robots_alone_make_one_line() -> None:
     made = scaling(SIZES)
     parts = [made.training, made.evaluation, made.numbers, made.usage]
     own = [{str(n): part[f"sums, robots={n}"] for n in SIZES} for part in parts]
-    analysis = analyse(Results(*own[:2], numbers=own[2], usage=own[3]))
-    assert {p.evaluator for p in analysis.points} == {"default"}
-    assert analysis.exponents["default"]["deciding"].value == pytest.approx(1.0, abs=0.02)
+    analysis = analyse(Arrays(*own[:2], numbers=own[2], usage=own[3]).frames())
+    assert {p.evaluator for p in analysis.cases} == {"default"}
+    assert exponents_of(analysis.cases)["default"]["deciding"].value == pytest.approx(1.0, abs=0.02)
 
 
 @pytest.mark.parametrize(("made", "lines"), [(scaling(SIZES), 1), (by_topology(PASSED), 3)])
-def test_the_figure_has_a_line_of_messages_by_topology(made: Results, lines: int) -> None:
-    analysis = analyse(made)
+def test_the_figure_has_a_line_of_messages_by_topology(made: Arrays, lines: int) -> None:
+    analysis = analyse(made.frames())
     axes = Figure().subplots()
-    evaluators = list(dict.fromkeys(p.evaluator for p in analysis.points))
-    scaling_figure._messages(axes, analysis, evaluators)
+    module.draw_messages(axes, analysis.cases)
     drawn = [list(line.get_ydata()) for line in axes.get_lines()]
     counts = [[6, 120, 8128]] if lines == 1 else [list(c.values()) for c in PASSED.values()]
     assert drawn == counts
 
 
 def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
-    paths = save(draw(analyse(scaling(SIZES))), tmp_path)
+    paths = save(draw(analyse(scaling(SIZES).frames())), tmp_path)
     assert [path.name for path in paths] == ["scaling.png", "scaling.svg"]
-    assert draw(analyse(Results({}, {}))) == {}
+    assert draw(analyse(NOTHING)) == {}
 
 
 @pytest.mark.parametrize(("topology", "count"), [("chain", 6), ("star", 3), ("independent", 0)])

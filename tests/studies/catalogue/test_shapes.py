@@ -1,14 +1,12 @@
 from pathlib import Path
 
 import pytest
-from made_up_results import shapes
+from made_up_results import NOTHING, shapes
 
-from nested_agents.studies.catalogue.shapes import analysis as module
-from nested_agents.studies.catalogue.shapes import check, draw
-from nested_agents.studies.catalogue.shapes.analysis import analyse, least_ratio, measure
+from nested_agents.studies.catalogue import shapes as module
+from nested_agents.studies.catalogue.shapes import analyse, check, draw, least_ratio, measure
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
-from nested_agents.studies.results.results import Results
-from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import trials_of
@@ -17,8 +15,8 @@ CHANCES = {"circle": 0.95, "hexagon": 0.9, "L": 0.3}
 
 
 def test_ratios_to_the_box_of_training() -> None:
-    analysis = analyse(shapes(CHANCES))
-    (ratios,) = analysis.ratios.values()
+    analysis = analyse(shapes(CHANCES).frames())
+    ((_, ratios),) = analysis.cases
     assert [d.condition for d in ratios] == list(CHANCES)
     assert least_ratio(ratios).condition == "L"
     assert ratios[2].estimate.high < 0.5
@@ -30,9 +28,9 @@ def test_ratios_to_the_box_of_training() -> None:
 
 
 def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
-    paths = save(draw(analyse(shapes(CHANCES))), tmp_path)
+    paths = save(draw(analyse(shapes(CHANCES).frames())), tmp_path)
     assert [path.name for path in paths] == ["shapes.png", "shapes.svg"]
-    assert draw(analyse(Results({}, {}))) == {}
+    assert draw(analyse(NOTHING)) == {}
 
 
 def test_a_spec_without_another_box_is_refused() -> None:

@@ -3,19 +3,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_up_results import wheel_failure
+from made_up_results import NOTHING, wheel_failure
 
-from nested_agents.studies.catalogue.wheel_failure import analysis as module
-from nested_agents.studies.catalogue.wheel_failure import check, draw
-from nested_agents.studies.catalogue.wheel_failure.analysis import (
+from nested_agents.studies.catalogue import wheel_failure as module
+from nested_agents.studies.catalogue.wheel_failure import (
     KEPT,
     Course,
     analyse,
+    check,
+    draw,
     measure,
 )
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
-from nested_agents.studies.results.results import Results
-from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import Session, run_trial
 from nested_agents.studies.trials.trial import trials_of
@@ -44,14 +44,14 @@ def test_levels_recovery_and_area_by_hand() -> None:
 
 
 def test_cases_are_told_apart_by_what_adapts() -> None:
-    analysis = analyse(wheel_failure(ENDS))
+    analysis = analyse(wheel_failure(ENDS).frames())
     assert [line.condition.rpartition(": ")[2] for line in analysis.table] == [
         "nothing", "weights", "self-model", "both",
     ] * 2  # fmt: skip
     ends = {line.condition: float(line.estimates["end"].value) for line in analysis.table}
     assert ends["4 wheels, seized: both"] > 0.85
     assert ends["4 wheels, seized: nothing"] < 0.2
-    gains = {gain.condition: gain for gain in analysis.gains}
+    gains = {gain.condition: gain for gain in analysis.differences}
     assert len(gains) == 6
     assert gains["4 wheels, seized, both"].p < 0.001
     assert gains["2 wheels, seized, both"].p == 1.0
@@ -59,10 +59,10 @@ def test_cases_are_told_apart_by_what_adapts() -> None:
 
 def test_what_never_succeeded_has_nothing_to_recover() -> None:
     results = wheel_failure({"fault": dict.fromkeys(ENDS["4 wheels, seized"], 0.0)})
-    for phase in results.phases.values():
+    for phase in (results.training, results.phases[KEPT]):
         for arrays in phase.values():
             arrays["success"][:] = 0
-    for line in analyse(results).table:
+    for line in analyse(results.frames()).table:
         assert list(line.estimates) == ["before", "just after", "end"]
 
 
@@ -86,22 +86,22 @@ def test_twins_are_found_by_what_is_swept(columns: dict, faults: list | None) ->
         results.columns[condition] = {
             k: v.format(enabled) if v == "{}" else v for k, v in columns.items()
         }
-    analysis = analyse(results)
+    analysis = analyse(results.frames())
     found = [tuple(line.condition.split(": ")) for line in analysis.table]
     if faults is None:  # nothing is said of self-models
         assert {adapts for _, adapts in found} == {"training", KEPT}
         assert {fault for fault, _ in found} == set(results.training)
-        assert analysis.gains == ()
+        assert analysis.differences == ()
     else:
         cases = ("nothing", "weights", "self-model", "both")
         assert found == [(fault, adapts) for fault in faults for adapts in cases]
-        assert len(analysis.gains) == 3
+        assert len(analysis.differences) == 3
 
 
 def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
-    paths = save(draw(analyse(wheel_failure(ENDS))), tmp_path)
+    paths = save(draw(analyse(wheel_failure(ENDS).frames())), tmp_path)
     assert [path.name for path in paths] == ["wheel-failure.png", "wheel-failure.svg"]
-    assert draw(analyse(Results({}, {}))) == {}
+    assert draw(analyse(NOTHING)) == {}
 
 
 def test_training_goes_through_the_failure_and_a_copy_keeps_its_weights() -> None:
@@ -149,8 +149,8 @@ def test_too_few_episodes_for_the_two_levels_are_refused() -> None:
 
 def test_an_unfinished_condition_is_left_out() -> None:
     results = wheel_failure(ENDS)
-    results = replace(results, phases={"training": results.training})
-    assert analyse(results).table == ()
+    results = replace(results, phases={})
+    assert analyse(results.frames()).table == ()
 
 
 def test_the_spec_can_be_run_and_crosses_faults_with_self_models() -> None:

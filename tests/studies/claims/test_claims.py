@@ -5,7 +5,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_up_results import ablation, arrays, games, related, scaling, shapes, wheel_failure
+from made_up_results import (
+    NOTHING,
+    Arrays,
+    ablation,
+    arrays,
+    games,
+    related,
+    scaling,
+    shapes,
+    wheel_failure,
+)
 
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
 from nested_agents.studies.catalogue.study import load_study
@@ -51,7 +61,7 @@ def test_criteria_decide_by_the_whole_interval(criterion, measured, verdict) -> 
     assert criterion.decide(measured) == verdict
 
 
-def curves(default: float, paper: float, planner: float) -> Results:
+def curves(default: float, paper: float, planner: float) -> Arrays:
     rng = np.random.default_rng(5)
     chances = {"own-value": np.linspace(0.0, 4 * default, 20).clip(0, default)}
     others = {"pose": default, "frozen": 0.02, "random": 0.0, "planner": planner, "paper": paper}
@@ -59,12 +69,10 @@ def curves(default: float, paper: float, planner: float) -> Results:
     training = {c: arrays(chance, rng) for c, chance in chances.items()}
     training["own-value"]["contact_fraction"][:, :5] -= 0.5 * default - 0.3
     evaluation = {c: arrays(chance[-5:], rng) for c, chance in chances.items()}
-    phases = {"training": training, "evaluation": evaluation}
-    seeds = dict.fromkeys(chances, tuple(range(20)))
-    return Results(training, evaluation, phases, seeds, measures=MEASURES)
+    return Arrays(training, evaluation, measures=MEASURES)
 
 
-def orders(chances: list[float]) -> Results:
+def orders(chances: list[float]) -> Arrays:
     return ablation({f"chain:{i}": chance for i, chance in enumerate(chances)}, seeds=100)
 
 
@@ -76,7 +84,7 @@ COMPUTED = ("cost", "complexity")
 
 
 def everything(good: bool) -> dict[str, Results]:
-    return {
+    made = {
         "learning-curve": curves(0.98, 0.9, 0.4) if good else curves(0.2, 0.0, 0.98),
         "chain-order": orders([0.8] * 3) if good else orders([0.9, 0.9, 0.3]),
         "scaling": scaling({2: 1.0, 64: 1.0 if good else 0.1}, 1e-4 if good else 1e-2),
@@ -86,6 +94,7 @@ def everything(good: bool) -> dict[str, Results]:
         "games": games(dict.fromkeys(SYSTEMS, 1.0 if good else 0.1)),
         "ablation": ablation({"default": 1.0, "static predictor": 1.0 if good else 0.1}),
     }
+    return {study: arrays.frames() for study, arrays in made.items()}
 
 
 @pytest.fixture(scope="module")
@@ -114,7 +123,7 @@ def test_a_chain_of_four_tries_a_third_of_what_joint_action_learners_try() -> No
 
 
 def test_the_worst_game_decides() -> None:
-    results = games({"nested, observed": 1.0}, {"climbing": 1.0, "penalty:-100": 0.0})
+    results = games({"nested, observed": 1.0}, {"climbing": 1.0, "penalty:-100": 0.0}).frames()
     (finding,) = [f for f in judge({"games": results}) if f.claim.name == "optimum"]
     assert finding.verdict == "does not hold"
     assert finding.measured.note == "penalty:-100"
@@ -126,7 +135,7 @@ def test_without_results_nothing_is_decided() -> None:
 
 
 def test_few_seeds_decide_nothing() -> None:
-    results = {"ablation": ablation({"default": 1.0, "static predictor": 0.0}, seeds=4)}
+    results = {"ablation": ablation({"default": 1.0, "static predictor": 0.0}, seeds=4).frames()}
     (finding,) = [f for f in judge(results) if f.claim.name == "model"]
     assert finding.measured.estimate.high < 0.8
     assert finding.verdict == "not decided"
@@ -275,7 +284,7 @@ def test_every_study_can_be_loaded() -> None:
     for name in STUDIES.names():
         study = load_study(name)
         assert callable(study.measure)
-        assert study.analyse(Results({}, {})).table == ()
+        assert study.analyse(NOTHING).table == ()
 
 
 TINY = """

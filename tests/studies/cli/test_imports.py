@@ -17,10 +17,13 @@ LOADED = [
     (["presets"], set()),
     (["results", STUDY], {"numpy"}),
     (["status", STUDY], {"numpy"}),
-    (["table", STUDY], {"numpy", "pydantic", "rich"}),
     (["topology", "list"], {"numpy", "pydantic", "rich"}),
     (["cost"], {"numpy", "pydantic", "rich", "core.agents.team"}),
     (["topology", "show", "chain"], {"numpy", "pydantic", "rich", "core.agents.team", "networkx"}),
+    (
+        ["table", STUDY],
+        {"numpy", "pydantic", "rich", "core.agents.team", "networkx", "pandas", "scipy"},
+    ),
 ]
 """Commands, one after the other in one process, and what may be loaded after each."""
 

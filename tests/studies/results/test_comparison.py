@@ -2,14 +2,21 @@ import numpy as np
 import pytest
 from made_up_results import ablation
 
-from nested_agents.studies.results.comparison import difference, differences, paired, ratio
+from nested_agents.studies.results.comparison import (
+    difference,
+    differences,
+    mean_success,
+    paired,
+    ratio,
+    with_first,
+)
 
-MEASURES = {"greedy": lambda r, c: r.evaluation[c]["success"].mean(axis=1)}
+MEASURES = {"greedy": mean_success("evaluation")}
 
 
 def test_a_difference_is_found_and_none_is_not() -> None:
-    results = ablation({"default": 0.9, "same": 0.9, "worse": 0.3})
-    same, worse = differences(results, "default", ["same", "worse"], MEASURES)
+    results = ablation({"default": 0.9, "same": 0.9, "worse": 0.3}).frames()
+    same, worse = differences(results, with_first(results.conditions), MEASURES)
     assert same.p > 0.05
     assert same.estimate.low < 0.0 < same.estimate.high
     assert worse.p < 0.001
@@ -19,14 +26,15 @@ def test_a_difference_is_found_and_none_is_not() -> None:
 
 
 def test_only_seeds_that_both_have_are_compared() -> None:
-    results = ablation({"a": 0.5, "b": 0.5})
-    results.seeds["a"] = tuple(range(20))
-    results.seeds["b"] = tuple(range(15, 35))
+    arrays = ablation({"a": 0.5, "b": 0.5})
+    arrays.seeds["a"] = tuple(range(20))
+    arrays.seeds["b"] = tuple(range(15, 35))
+    results = arrays.frames()
     one, other = paired(results, "a", "b", MEASURES["greedy"])
     assert (one == MEASURES["greedy"](results, "a")[15:]).all()
     assert (other == MEASURES["greedy"](results, "b")[:5]).all()
-    results.seeds["b"] = tuple(range(100, 120))
-    assert differences(results, "a", ["b"], MEASURES) == ()
+    arrays.seeds["b"] = tuple(range(100, 120))
+    assert differences(arrays.frames(), with_first(["a", "b"]), MEASURES) == ()
 
 
 def outcomes(rng: np.random.Generator, chance: float) -> np.ndarray:

@@ -1,8 +1,8 @@
 import pytest
 from made_up_results import hierarchies, scaling
 
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.results.contrasts import contrasts
-from nested_agents.studies.spec.errors import SpecError
 
 CHANCES = {
     ("chain", "team", 2): 0.9,
@@ -13,7 +13,7 @@ CHANCES = {
 
 
 def test_levels_are_compared_where_all_else_is_equal() -> None:
-    found = contrasts(hierarchies(CHANCES), by="topology")
+    found = contrasts(hierarchies(CHANCES).frames(), by="topology")
     assert [(g.setting, g.reference) for g in found.groups] == [
         ("team, robots=2", "chain"), ("team, robots=8", "chain"),
     ]  # fmt: skip
@@ -26,7 +26,7 @@ def test_levels_are_compared_where_all_else_is_equal() -> None:
 
 
 def test_the_reference_is_the_first_condition_or_a_named_one() -> None:
-    results = hierarchies(CHANCES)
+    results = hierarchies(CHANCES).frames()
     first = next(iter(results.columns))
     assert contrasts(results).groups[0].reference == first
     assert len(contrasts(results).differences) == 3
@@ -38,7 +38,7 @@ def test_the_reference_is_the_first_condition_or_a_named_one() -> None:
 
 def test_what_is_better_depends_on_the_measure() -> None:
     # Failed episodes take all their steps, which is worse.
-    text = "\n".join(contrasts(hierarchies(CHANCES), "steps", by="topology").notes)
+    text = "\n".join(contrasts(hierarchies(CHANCES).frames(), "steps", by="topology").notes)
     assert "worse: star" in text
     assert "better" not in text
 
@@ -47,7 +47,7 @@ def test_numbers_of_whole_trials_are_compared_too() -> None:
     results = scaling({2: 0.9})
     for condition in results.training:
         results.columns[condition] = {"name": condition.partition(",")[0]}
-    found = contrasts(results, "decision_median")
+    found = contrasts(results.frames(), "decision_median")
     assert found.phase == ""
     assert [d.condition for d in found.significant] == ["sampling, robots=2"]
     assert "worse: sampling" in "\n".join(found.notes)
@@ -64,9 +64,9 @@ def test_numbers_of_whole_trials_are_compared_too() -> None:
 )
 def test_what_there_is_not_is_refused(options: dict, complaint: str) -> None:
     with pytest.raises(SpecError, match=complaint):
-        contrasts(hierarchies(CHANCES), **options)
+        contrasts(hierarchies(CHANCES).frames(), **options)
 
 
 def test_too_few_shared_seeds_leave_nothing_to_compare() -> None:
-    results = hierarchies(CHANCES, seeds=1)
+    results = hierarchies(CHANCES, seeds=1).frames()
     assert contrasts(results).notes == ("Nothing to compare: no two conditions share two seeds.",)

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from scipy import stats
+from scipy import special, stats
 
 from nested_agents.studies.results.comparison import Difference, adjusted
 from nested_agents.studies.results.paired_tests import LEVEL, paired_permutation
@@ -8,11 +8,12 @@ from nested_agents.studies.results.power import (
     detectable,
     deviation_of,
     power,
+    power_of_t,
     seeds_for,
     seeds_needed,
 )
 from nested_agents.studies.results.statistics import bootstrap
-from nested_agents.studies.results.verdicts import power_lines, power_text, told
+from nested_agents.studies.results.verdicts import power_lines, power_text, verdict_lines
 
 
 def found_in_simulation(
@@ -84,7 +85,7 @@ def compared(own: list[float], base: list[float], title: str = "other") -> Diffe
 def test_five_seeds_that_all_agree_are_told_what_they_lack() -> None:
     found = adjusted([compared([1.0] * 5, [0.0] * 5), compared([1.0] * 5, [0.0] * 5, "third")])
     assert [round(d.raw, 4) for d in found] == [0.0625, 0.0625]
-    text = " ".join(" ".join(told(found)).split())
+    text = " ".join(" ".join(verdict_lines(found)).split())
     assert "+1.00 [+0.13, +1.00], p = 0.12 (0.062 unadjusted)" in text
     said = " ".join(line.strip() for line in power_lines(found))
     assert "5 seeds and 2 comparisons cannot give an adjusted p below .05" in said
@@ -127,3 +128,21 @@ def test_the_test_is_that_of_an_independent_implementation() -> None:
             for signs in product((1, -1), repeat=n)
         )
         assert paired_permutation(whole, [0] * n) == reached / 2**n
+
+
+@pytest.mark.parametrize("freedom", [5, 9, 19, 200, 5000])
+@pytest.mark.parametrize("shift", [0.0, 0.5, 2.0])
+def test_power_is_that_of_scipys_noncentral_t(freedom: int, shift: float) -> None:
+    beyond = special.stdtrit(freedom, 0.975)
+    below, above = special.nctdtr(freedom, shift, [-beyond, beyond])
+    assert power_of_t(freedom, shift, beyond) == pytest.approx(below + 1.0 - above, abs=1e-9)
+
+
+def test_power_far_out_where_scipy_has_no_number_is_that_of_simulated_studies() -> None:
+    # With these numbers scipy.special.nctdtr is nan, which was once taken for a power of 1.
+    freedom, shift, beyond = 29, 5.0, float(special.stdtrit(29, 1 - 0.05 / 1000))
+    rng = np.random.default_rng(0)
+    t = (rng.normal(size=200_000) + shift) / np.sqrt(rng.chisquare(freedom, 200_000) / freedom)
+    share = (abs(t) > beyond).mean()
+    assert power_of_t(freedom, shift, beyond) == pytest.approx(share, abs=0.005)
+    assert 0.6 < share < 0.75

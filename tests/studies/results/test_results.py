@@ -25,12 +25,16 @@ def test_phases_numbers_and_usage_are_read_by_condition(tmp_path: Path) -> None:
             )
             save(store, trial, result, 2.0)
         results = read(store)
-    assert results.seeds == {"default": (0, 1, 2), "frozen": (0, 1)}
-    assert list(results.phases) == ["training", "evaluation", "evaluation:circle"]
-    assert results.training is results.phases["training"]
-    circle = results.phases["evaluation:circle"]["default"]["success"]
-    assert (circle == results.evaluation["default"]["success"]).all()
-    assert results.numbers["default"]["messages"].tolist() == [6.0, 7.0, 8.0]
-    assert results.usage["frozen"]["peak_bytes"].tolist() == [0.0, 10.0]
-    assert results.usage["frozen"]["total"].tolist() == [2.0, 2.0]
-    assert len(results.usage["default"]["decision"]) == 3
+    assert {c: results.seeds(c) for c in results.conditions} == {
+        "default": (0, 1, 2), "frozen": (0, 1),
+    }  # fmt: skip
+    assert results.phases == ("training", "evaluation", "evaluation:circle")
+    assert results.other_evaluations("default") == {"circle": "evaluation:circle"}
+    circle = results.success("default", "evaluation:circle")
+    assert (circle == results.success("default", "evaluation")).all()
+    assert results.numbers("default")["messages"].tolist() == [6.0, 7.0, 8.0]
+    assert results.numbers("frozen")["peak_bytes"].tolist() == [0.0, 10.0]
+    assert results.numbers("frozen")["seconds.total"].tolist() == [2.0, 2.0]
+    assert len(results.numbers("default")["seconds.decision"]) == 3
+    assert "peak_bytes" in results.usage
+    assert "messages" not in results.usage

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from made_up_results import hierarchies, scaling
 
-from nested_agents.studies.results.selection import Where, selected, together
-from nested_agents.studies.spec.errors import SpecError
+from nested_agents.studies.errors import SpecError
+from nested_agents.studies.results.selection import Where, chosen, together
 
 SETTINGS = {"scenario": {"robots": 8, "box": "square"}, "learner": {"kind": "batch-td"}}
 COLUMNS = {"learner.self_model.enabled": "true"}
@@ -49,23 +49,30 @@ def test_a_name_of_several_settings_must_be_told_apart() -> None:
 
 
 def test_selected_trials_keep_their_values() -> None:
-    whole = scaling({2: 0.9, 4: 0.5})
-    part = selected(whole, lambda condition, seed: "robots=2" in condition and seed % 2 == 0)
-    assert list(part.training) == ["sums, robots=2", "sampling, robots=2"]
-    assert part.seeds["sums, robots=2"] == tuple(range(0, 20, 2))
-    there = whole.evaluation["sums, robots=2"]["success"][::2]
-    np.testing.assert_array_equal(part.evaluation["sums, robots=2"]["success"], there)
-    assert len(part.usage["sums, robots=2"]["learning"]) == 10
-    assert selected(whole, lambda condition, seed: False).seeds == {}
+    whole, condition = scaling({2: 0.9, 4: 0.5}).frames(), "sums, robots=2"
+    small = "condition in ['sums, robots=2', 'sampling, robots=2']"
+    part = chosen(whole, Where(f"{small} and seed in {list(range(0, 20, 2))}"), {})
+    assert part.conditions == ("sums, robots=2", "sampling, robots=2")
+    assert part.seeds(condition) == tuple(range(0, 20, 2))
+    there = whole.success(condition, "evaluation")[::2]
+    np.testing.assert_array_equal(part.success(condition, "evaluation"), there)
+    assert len(part.numbers(condition)["seconds.learning"]) == 10
+    assert chosen(whole, Where("seed < 0"), {}).conditions == ()
 
 
 def test_studies_together_name_what_would_be_confused() -> None:
     key = ("chain", "team", 2)
-    one, other = hierarchies({key: 0.9}), hierarchies({key: 0.1, ("star", "team", 2): 0.2})
+    first, second = hierarchies({key: 0.9}), hierarchies({key: 0.1, ("star", "team", 2): 0.2})
+    one, other = first.frames(), second.frames()
     whole, labels = together([("one", one), ("other", other)])
     label = "topology=chain, value_of=team, robots=2"
     assert labels[0] == {label: f"{label} (one)"}
     assert whole.columns[f"{label} (other)"]["directory"] == "other"
-    assert list(whole.seeds)[2] == "topology=star, value_of=team, robots=2"
-    there = whole.evaluation[f"{label} (one)"]["success"]
-    np.testing.assert_array_equal(there, one.evaluation[label]["success"])
+    assert whole.conditions[2] == "topology=star, value_of=team, robots=2"
+    there = whole.success(f"{label} (one)", "evaluation")
+    np.testing.assert_array_equal(there, one.success(label, "evaluation"))
+    assert set(whole.trials["directory"]) == {"one", "other"}
+    assert (
+        whole.episodes["topology"].tolist()
+        == whole.episodes["condition"].str.extract(r"topology=(\w+)", expand=False).tolist()
+    )

@@ -8,7 +8,7 @@ import made_up
 import pytest
 
 from nested_agents.studies.cli.main import main
-from nested_agents.studies.spec.errors import SpecError
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.schema import study_checksum
 from nested_agents.studies.store.store import DATABASE, SPEC_FILE, Store

@@ -5,8 +5,8 @@ import sqlite3
 import made_up
 import pytest
 
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec import spec as spec_module
-from nested_agents.studies.spec.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store import reading
 from nested_agents.studies.store import store as store_module

@@ -7,7 +7,7 @@ from pathlib import Path
 import made_up
 import pytest
 
-from nested_agents.studies.spec.errors import SpecError
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.trials import code
 from nested_agents.studies.trials.keeping import pending
 from nested_agents.studies.workers.runner import save

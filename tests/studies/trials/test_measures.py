@@ -3,7 +3,7 @@ import json
 import pytest
 
 from nested_agents.core.interface.measures import SUCCESS, Measure
-from nested_agents.studies.spec.errors import SpecError
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.store.schema import columns, measures_from, tables
 from nested_agents.studies.trials.measures import joined
 

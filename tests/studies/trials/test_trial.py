@@ -10,7 +10,7 @@ import pytest
 
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.world.settings import InfraredSettings
-from nested_agents.studies.spec.errors import SpecError
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.schema import RESULTS_VERSION
 from nested_agents.studies.trials import trial as trial_module

@@ -6,7 +6,7 @@ import pytest
 from nested_agents.core.learners.q_learning import QLearning
 from nested_agents.scenarios.box_pushing.options.config import PushingPointsSettings
 from nested_agents.scenarios.checking.checker import CHECKS, check_scenario
-from nested_agents.studies.spec.errors import SpecError
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import arrange, check
 from nested_agents.studies.trials.session import Session

@@ -16,7 +16,7 @@ from nested_agents.scenarios.box_pushing.world.robots import (
 )
 from nested_agents.scenarios.box_pushing.world.settings import BoxSettings, RobotSettings, label
 from nested_agents.scenarios.checking.checker import CHECKS, check_scenario
-from nested_agents.studies.spec.errors import SpecError
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import check
 from nested_agents.studies.trials.session import run_trial

@@ -18,7 +18,7 @@ from nested_agents.scenarios.box_pushing.world.infrared import (
 from nested_agents.scenarios.box_pushing.world.robots import E_PUCK_SENSORS, ROBOTS
 from nested_agents.scenarios.box_pushing.world.settings import InfraredSettings, Normalisation
 from nested_agents.scenarios.box_pushing.world.world import World
-from nested_agents.studies.spec.errors import SpecError
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 
 SPEC = InfraredSettings()
