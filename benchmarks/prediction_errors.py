@@ -40,7 +40,7 @@ def errors(**scenario: Any) -> tuple[int, list[float]]:
     """
     world = BoxPushing(BoxPushingSettings.model_validate({"start": "easy"} | scenario))
     robots = list(world.world.robots)
-    controller = ScriptedController(robots, world.box)
+    controller = ScriptedController(world)
     models = [push_model(name, robots, world.box) for name in PREDICTORS]
     rows = []
     for seed in SEEDS:

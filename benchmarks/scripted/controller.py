@@ -18,16 +18,12 @@ from typing import Any
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from nested_agents.core.interface.spaces import ActionSet
 from nested_agents.core.numerics.arrays import FloatArray, IntArray
 from nested_agents.scenarios.box_pushing.options.driving import CLEARANCE, Drivers
 from nested_agents.scenarios.box_pushing.options.routes import paths
-from nested_agents.scenarios.box_pushing.prediction.predictors import push_model
 from nested_agents.scenarios.box_pushing.prediction.push import push
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
-from nested_agents.scenarios.box_pushing.world.boxes import BoxSpec
 from nested_agents.scenarios.box_pushing.world.geometry import wrap
-from nested_agents.scenarios.box_pushing.world.robots import RobotSpec
 
 from .crowd import SLOT_GAP, Crowd
 from .sides import SPREAD, Side, behind, is_concave, sides_of
@@ -43,38 +39,20 @@ class ScriptedController:
 
     Parameters
     ----------
-    robots, box
-        What is in the world.
-    action_set, increment, seconds
-        As in the scenario: actions, what an increment changes as a fraction of the greatest
-        speed, and the decision period [s].
+    scenario
+        What is in the world, and what robots can do in a decision period.
     """
 
-    def __init__(
-        self,
-        robots: Sequence[RobotSpec],
-        box: BoxSpec,
-        action_set: ActionSet | None = None,
-        increment: float = 0.5,
-        seconds: float = 0.512,
-    ) -> None:
-        self.robots = tuple(robots)
-        self.box = box
-        self.actions = action_set or ActionSet()
-        self.increment = increment
-        self.seconds = seconds
+    def __init__(self, scenario: BoxPushing) -> None:
+        self.robots, self.box = robots, box = scenario.world.robots, scenario.box
         self._radii: FloatArray = np.array([robot.radius for robot in robots])
-        self._model = push_model("push", list(robots), box)
-        self._drivers = Drivers(
-            robots, box, self._model, self.actions, self.increment, self.seconds
-        )
+        self._drivers = Drivers(scenario)
+        self._model, self.seconds = self._drivers.model, self._drivers.seconds
         self._sides = sides_of(box, len(robots), float(self._radii.max()) + CLEARANCE)
         self._hollow = is_concave(box)
         alike = len(set(self.robots)) == 1
         crowded = len(self.robots) >= CROWD and alike and self._sides and not self._hollow
-        self._crowd = (
-            Crowd(self.robots, box, self._model, self._drivers, self._sides) if crowded else None
-        )
+        self._crowd = Crowd(self._drivers, self._sides) if crowded else None
         self._backs: dict[tuple[float, float, float], float] = {}
 
     def act(self, measurements: Mapping[str, Any]) -> IntArray:
@@ -262,10 +240,7 @@ def decisions_to_goal(scenario: BoxPushing, seed: int, steps: int) -> int | None
     int or None
         None if the episode ends otherwise.
     """
-    controller = ScriptedController(
-        scenario.world.robots, scenario.box, scenario.action_set,
-        scenario.settings.speed_increment, scenario.settings.period,
-    )  # fmt: skip
+    controller = ScriptedController(scenario)
     scenario.reset(seed)
     for step in range(1, steps + 1):
         transition = scenario.step(controller.act(scenario.measure()))

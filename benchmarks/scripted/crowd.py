@@ -26,10 +26,8 @@ from scipy.optimize import linear_sum_assignment
 from nested_agents.core.numerics.arrays import BoolArray, FloatArray, IntArray
 from nested_agents.scenarios.box_pushing.options.driving import CLEARANCE, Drivers
 from nested_agents.scenarios.box_pushing.options.routes import paths
-from nested_agents.scenarios.box_pushing.prediction.push import PushModel, push
-from nested_agents.scenarios.box_pushing.world.boxes import BoxSpec
+from nested_agents.scenarios.box_pushing.prediction.push import push
 from nested_agents.scenarios.box_pushing.world.geometry import wrap
-from nested_agents.scenarios.box_pushing.world.robots import RobotSpec
 
 from .sides import SPREAD, Side
 
@@ -83,24 +81,17 @@ class Crowd:
 
     Parameters
     ----------
-    robots, box, model, drivers
-        What is in the world, what is believed of it, and what robots can do.
+    drivers
+        What robots can do in the world, and what is believed of it.
     sides
         At which the box may be pushed.
     """
 
-    def __init__(
-        self,
-        robots: Sequence[RobotSpec],
-        box: BoxSpec,
-        model: PushModel,
-        drivers: Drivers,
-        sides: Sequence[Side],
-    ) -> None:
-        self.box, self.sides = box, tuple(sides)
-        self._model, self._drivers = model, drivers
-        self._radius = max(robot.radius for robot in robots)
-        self._n = len(robots)
+    def __init__(self, drivers: Drivers, sides: Sequence[Side]) -> None:
+        self.box, self.sides = drivers.box, tuple(sides)
+        self._model, self._drivers = drivers.model, drivers
+        self._radius = max(robot.radius for robot in drivers.robots)
+        self._n = len(drivers.robots)
 
     def choose(
         self, robots: FloatArray, box: FloatArray, goal: FloatArray, speeds: FloatArray

@@ -17,7 +17,7 @@ from .evaluator import (
 )
 
 if TYPE_CHECKING:
-    from ..rules.kernels import Tried
+    from ..rules.kernels.enumeration import Tried
 
 MOST_JOINT_ACTIONS = 4**12
 """The most that one agent enumerates: beyond, the tables do not fit into memory."""
@@ -66,14 +66,12 @@ class ExactEnumeration(Aggregation):
             self._tried = [self._tried_by(i, places) for i in range(n)]
 
     def _tried_by(self, agent: int, places: IntArray) -> Tried:
-        from ..rules.kernels import Tried
-
         below = np.array(self.hierarchy.below(agent), dtype=np.int64)
         indices = np.arange(self.n_actions)[:, None] * places[agent]
         indices = indices + (self._below[agent] @ places[below])[None, :]
         given = places.copy()
         given[agent] = given[below] = 0
-        return Tried(indices, given, below)
+        return indices, given, below
 
     def values(self, deliberation: Deliberation) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent."""
@@ -84,7 +82,7 @@ class ExactEnumeration(Aggregation):
         conditional = problem.teammates == "conditional"
         if tabulated and own and problem.rule == "value" and not conditional:
             tried = self._tried[agent]
-            self.count(agent, tried.indices.size)
+            self.count(agent, tried[0].size)
             empirical = problem.teammates == "empirical"
             return self.rules.enumerate(
                 deliberation.own_weights,
@@ -111,8 +109,9 @@ class ExactEnumeration(Aggregation):
     def _by_tables(self, deliberation: Deliberation) -> FloatArray:
         """Value ``(A, m)`` each own action with each joint action below, by anything."""
         prediction: Any = deliberation.prediction
-        tried, concerned = self._tried[deliberation.agent], self.concerned[deliberation.agent]
-        indices = (tried.indices + int(deliberation.joint_action @ tried.places)).ravel()
+        tried, places, _ = self._tried[deliberation.agent]
+        concerned = self.concerned[deliberation.agent]
+        indices = (tried + int(deliberation.joint_action @ places)).ravel()
         self.count(deliberation.agent, len(indices))
         rewards = values = None
         if self.problem.rule != "value":

@@ -56,23 +56,23 @@ class GradientTD(Online):
         self.second: FloatArray = np.zeros_like(self.theta)
 
     def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
-        from ..rules import kernels
+        from ..rules.kernels.updates import add_features, td_update
 
         s, rules, rows = self.settings, self.rules, self.rows
         delta = self.errors(self.theta, states, rewards, entered)
         expected = rules.each(self.of_agents(self.second), states[:, None])[:, 0]
         along = s.step_size * delta if s.correction == "tdc" else np.zeros_like(delta)
-        kernels.td_update(
+        td_update(
             self.theta, rows, self.trace, self.reach, states, along, s.discount * s.trace_decay,
             rules.layout,
         )  # fmt: skip
         if s.correction == "gtd2":
-            kernels.add_features(self.theta, rows, states, s.step_size * expected, rules.layout)
+            add_features(self.theta, rows, states, s.step_size * expected, rules.layout)
         if entered is not None:
             carried = np.einsum("ij,ij->i", self.trace, self.of_agents(self.second))
             weight = -s.step_size * s.discount * (1.0 - s.trace_decay) * carried
-            kernels.add_features(self.theta, rows, entered, weight, rules.layout)
+            add_features(self.theta, rows, entered, weight, rules.layout)
         np.add.at(self.second, rows, (s.second_step_size * delta)[:, None] * self.trace)
         change = -s.second_step_size * expected
-        kernels.add_features(self.second, rows, states, change, rules.layout)
+        add_features(self.second, rows, states, change, rules.layout)
         return 2 * self.theta.size

@@ -140,10 +140,10 @@ class OneStep(Online):
             ``(n,)`` or one for all: what steps are divided by; the squared lengths of phi if none
             is given.
         """
-        from ..rules import kernels
+        from ..rules.kernels.updates import add_features
 
         if lengths is None:
             lengths = self.rules.squared_lengths(states)
         steps = self.settings.step_size * delta / lengths
-        kernels.add_features(self.weights, self.rows, states, steps, self.rules.layout)
+        add_features(self.weights, self.rows, states, steps, self.rules.layout)
         return self.theta.size

@@ -23,8 +23,17 @@ import numpy as np
 from ..interface.prediction import Blocks
 from ..interface.spaces import StateSpace
 from ..numerics.arrays import FloatArray, IntArray
-from . import kernels
+from .kernels.compact import active_compact, each_compact, td_compact, total_compact
+from .kernels.dense import values_dense
+from .kernels.enumeration import (
+    Tried,
+    enumerate_contracted,
+    enumerate_dense,
+    enumerate_looked_up,
+)
+from .kernels.few_states import each_dense, td_dense
 from .kernels.fuzzy import Partition
+from .kernels.layout import layout, unpack
 from .settings import RuleBaseSettings
 
 MOST_RULES = 2**63 - 1
@@ -86,14 +95,14 @@ class RuleBase:
         self.n_rules = sum(self.sizes)
         if self.n_rules > MOST_RULES:
             raise ValueError(f"rule base: {self.n_rules} rules, allowed {MOST_RULES} at most")
-        self.layout = kernels.layout(self.partitions, self.terms, n_own)
+        self.layout = layout(self.partitions, self.terms, n_own)
         # Not worth compiling it for.
-        lay = getattr(kernels.unpack, "py_func", kernels.unpack)(self.layout)
+        lay = getattr(unpack, "py_func", unpack)(self.layout)
         self.n_parts = int(lay.row_sizes @ lay.part_sizes)
         self.dtype = np.dtype(dtype)
         self.compact = self.partitions[0].membership == "triangular"
-        self._enumerate = kernels.enumerate_dense
-        self._td_update = kernels.td_compact if self.compact else kernels.td_dense
+        self._enumerate = enumerate_dense
+        self._td_update = td_compact if self.compact else td_dense
         if self.compact:
             # Looking up 2 ** order corners is cheaper than contracting theta, unless the order is
             # high and most variables are own ones, contracted once for many joint actions.
@@ -101,7 +110,7 @@ class RuleBase:
                 len(term) <= 3 or 2 ** len(term) <= size
                 for term, size in zip(self.terms, lay.shared_sizes, strict=True)
             )
-            kind = kernels.enumerate_looked_up if looks_up else kernels.enumerate_contracted
+            kind = enumerate_looked_up if looks_up else enumerate_contracted
             self._enumerate = kind
 
     @classmethod
@@ -182,8 +191,8 @@ class RuleBase:
         self._check_states(states)
         self._check_theta(theta)
         if self.compact:
-            return kernels.values_compact(theta, states, self.layout)
-        return kernels.values_dense(theta, states, self.layout)
+            return each_compact(theta[None], states[None], self.layout)[0]
+        return values_dense(theta, states, self.layout)
 
     def each(self, theta: FloatArray, states: FloatArray) -> FloatArray:
         """Return f ``(n, s)`` of states ``(n, s, d)``, by the rows of theta ``(n, n_rules)``.
@@ -203,8 +212,8 @@ class RuleBase:
                 f"rule base: theta of shape {theta.shape}, must be {(len(states), self.n_rules)}"
             )
         if self.compact:
-            return kernels.each_compact(theta, states, self.layout)
-        return kernels.each_dense(theta, states, self.layout)
+            return each_compact(theta, states, self.layout)
+        return each_dense(theta, states, self.layout)
 
     def total(
         self,
@@ -215,16 +224,17 @@ class RuleBase:
         own: FloatArray,
         shared: FloatArray,
     ) -> FloatArray:
-        """Return the summed value ``(m,)`` of some agents, see `core.rules.kernels.total_compact`.
+        """Return the summed value ``(m,)`` of some agents, each thing shared valued once.
 
-        Shapes are trusted: an evaluator calls this many times at every decision. Where all rules
-        are active, each agent is valued by itself.
+        Arguments as of `core.rules.kernels.compact.total_compact`. Shapes are trusted: an evaluator
+        calls this many times at every decision. Where all rules are active, each agent is valued by
+        itself.
         """
         if self.compact:
-            return kernels.total_compact(weights, agents, firsts, kinds, own, shared, self.layout)
+            return total_compact(weights, agents, firsts, kinds, own, shared, self.layout)
         body = np.repeat(np.arange(len(shared)), np.diff(firsts))
         states = np.concatenate([own[agents], shared[body]], axis=2)
-        total: FloatArray = kernels.each_dense(weights[0], states, self.layout).sum(axis=0)
+        total: FloatArray = each_dense(weights[0], states, self.layout).sum(axis=0)
         return total
 
     def td_update(
@@ -241,7 +251,7 @@ class RuleBase:
         lengths: FloatArray,
         decay: float,
     ) -> None:
-        """Make one TD(lambda) update of all agents, see `core.rules.kernels.td_dense`.
+        """Make one TD(lambda) update of all agents, see `core.rules.kernels.few_states.td_dense`.
 
         Shapes are trusted: a learner calls this at every step.
         """
@@ -280,7 +290,7 @@ class RuleBase:
         states = np.ascontiguousarray(states, dtype=float)
         self._check_states(states)
         if self.compact:
-            return kernels.active_compact(states, self.layout)
+            return active_compact(states, self.layout)
         strengths = self.features(states)
         return np.broadcast_to(np.arange(self.n_rules), strengths.shape), strengths
 
@@ -298,14 +308,14 @@ class RuleBase:
         """
         self._check_theta(theta)
         none = np.zeros(0, dtype=np.int64)
-        tried = kernels.Tried(np.ascontiguousarray(indices)[:, None], none, none)
+        tried = np.ascontiguousarray(indices)[:, None], none, none
         return self.enumerate(theta, blocks, tried, none, np.zeros((0, 0)))
 
     def enumerate(
         self,
         theta: FloatArray,
         blocks: Blocks,
-        tried: kernels.Tried,
+        tried: Tried,
         joint_action: IntArray,
         probabilities: FloatArray,
     ) -> FloatArray:
@@ -328,10 +338,8 @@ class RuleBase:
             ``(n, A)`` probabilities of the actions of the agents below, to average over; with
             ``(0, 0)`` the maximum is taken.
         """
-        return self._enumerate(
-            theta, blocks.own, blocks.own_rows, blocks.shared, blocks.shared_rows, blocks.divisor,
-            tried.indices, tried.places, tried.below, joint_action, probabilities, self.layout,
-        )  # fmt: skip
+        tables = blocks.own, blocks.own_rows, blocks.shared, blocks.shared_rows, blocks.divisor
+        return self._enumerate(theta, tables, tried, joint_action, probabilities, self.layout)
 
     def _check_states(self, states: FloatArray) -> None:
         if states.shape[1:] != (len(self.partitions),):

@@ -135,12 +135,6 @@ def _numbered(n: int) -> IntArray:
 
 
 @njit(cache=True)
-def values_compact(theta: FloatArray, states: FloatArray, packed: Packed) -> FloatArray:
-    """Return f ``(m,)`` of states ``(m, d)``, triangular partitions."""
-    return each_compact(theta[None], states[None], packed)[0]
-
-
-@njit(cache=True)
 def each_compact(theta: FloatArray, states: FloatArray, packed: Packed) -> FloatArray:
     """Return f ``(n, s)`` of states ``(n, s, d)``, each by its row of theta ``(n, n_rules)``."""
     out, lay = np.zeros(states.shape[:2]), unpack(packed)
@@ -194,7 +188,7 @@ def td_compact(  # type: ignore[no-untyped-def]
     rewards: FloatArray, discount: float, step_size: float, lengths: FloatArray, decay: float,
     packed: Packed,
 ) -> None:  # fmt: skip
-    """Do what `core.rules.kernels.td_dense` does, triangular partitions."""
+    """Do what `core.rules.kernels.few_states.td_dense` does, triangular partitions."""
     lay = unpack(packed)
     strengths, spare = strengths_room(lay)
     functions, room = _room(lay)
@@ -228,10 +222,9 @@ def active_compact(states: FloatArray, packed: Packed) -> tuple[IntArray, FloatA
 
 
 @njit(cache=True)
-def looked_up(  # type: ignore[no-untyped-def]
-    theta, own, own_rows, shared, shared_rows, divisor: int, indices: IntArray, lay: Layout
-) -> FloatArray:
+def looked_up(theta, tables, indices: IntArray, lay: Layout) -> FloatArray:  # type: ignore[no-untyped-def]
     """Return f of joint-action indices from block tables: every active rule is looked up."""
+    own, own_rows, shared, shared_rows, divisor = tables
     n_local = len(own_rows) if len(own_rows) else len(own)
     # The own block with which a shared one was last met, and the number of that pair.
     n_known = len(shared) if len(shared_rows) else 0
@@ -267,13 +260,12 @@ def _add(target, row, weight) -> None:  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def contracted(  # type: ignore[no-untyped-def]
-    theta, own, own_rows, shared, shared_rows, divisor: int, indices: IntArray, lay: Layout
-) -> FloatArray:
+def contracted(theta, tables, indices: IntArray, lay: Layout) -> FloatArray:  # type: ignore[no-untyped-def]
     """Return what `looked_up` does: the active own rules are summed up once per own block."""
     functions, room = _room(lay)
     rules, strengths = room
-    used, slot_of, row_of, wanted = pairs(own, own_rows, shared, shared_rows, divisor, indices)
+    own, _, shared, _, _ = tables
+    used, slot_of, row_of, wanted = pairs(tables, indices)
     partial = np.zeros((len(used), total_width(lay)), theta.dtype)
     for b in range(len(used)):
         _pairs_of(own[used[b]], 0, lay, functions)

@@ -56,53 +56,28 @@ def _fill(strengths, row, lane, lay: Layout, room) -> None:  # type: ignore[no-u
 def values_dense(theta: FloatArray, states: FloatArray, packed: Packed) -> FloatArray:
     """Return f ``(m,)`` of states ``(m, d)``, all membership functions active."""
     lay = unpack(packed)
-    out = np.empty(len(states))
-    room, one, two, found = _scratch(theta, lay)
-    which = np.empty(CHUNK, np.int64)
-    own = np.empty((CHUNK, lay.n_own))
-    rows = np.empty(LANES, np.int64)
-    partial = np.empty((min(CHUNK, len(states)), total_width(lay)), theta.dtype)
+    out, none = np.empty(len(states)), np.empty(0, np.int64)
     for begin in range(0, len(states), CHUNK):
         chunk = states[begin : begin + CHUNK]
-        # States of one own block share its contraction.
-        count = 0
-        for s in range(len(chunk)):
-            which[s] = -1
-            for b in range(count):
-                if (own[b] == chunk[s, : lay.n_own]).all():
-                    which[s] = b
-                    break
-            if which[s] < 0:
-                which[s] = count
-                own[count] = chunk[s, : lay.n_own]
-                count += 1
-        strengths = _shared_strengths(chunk[:, lay.n_own :], lay)
-        contract(theta, own[:count], _peaks(strengths, lay), lay, partial[:count])
-        for b in range(count):
-            lane = 0
-            for s in range(len(chunk)):
-                if which[s] == b:
-                    rows[lane] = s
-                    _fill(strengths, s, lane, lay, room)
-                    lane += 1
-                if lane and (lane == LANES or s == len(chunk) - 1):
-                    fold(partial[b], room, lay, one, two, found, lane)
-                    for k in range(lane):
-                        out[begin + rows[k]] = found[k]
-                    lane = 0
+        own, shared = chunk[:, : lay.n_own].copy(), chunk[:, lay.n_own :].copy()
+        every, first = np.empty(len(chunk), np.int64), np.empty(len(chunk), np.int64)
+        for s in range(len(chunk)):  # states of one own block share its contraction
+            every[s], first[s] = s, 0
+            while first[s] < s and (own[first[s]] != own[s]).any():
+                first[s] += 1
+        out[begin : begin + CHUNK] = folded(theta, (own, first, shared, none, 1), every, lay)
     return out
 
 
 @njit(cache=True)
-def folded(  # type: ignore[no-untyped-def]
-    theta, own, own_rows, shared, shared_rows, divisor: int, indices: IntArray, lay: Layout
-) -> FloatArray:
+def folded(theta, tables, indices: IntArray, lay: Layout) -> FloatArray:  # type: ignore[no-untyped-def]
     """Return f of joint-action indices from block tables, all membership functions active.
 
     Contracts theta with each own block that occurs, once; each distinct pair of own and shared
     block is then folded, once, whatever the number of indices that lead to it.
     """
-    used, slot_of, row_of, wanted = pairs(own, own_rows, shared, shared_rows, divisor, indices)
+    own, _, shared, _, _ = tables
+    used, slot_of, row_of, wanted = pairs(tables, indices)
     count, n_rows = wanted.shape
     met = np.empty(n_rows, np.int64)  # rows of shared blocks that occur
     n_met = 0

@@ -5,52 +5,43 @@ There is one kernel for every way of valuing, so that none is compiled that is n
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TypeAlias
 
 import numpy as np
 
-from ...numerics.arrays import FloatArray, IntArray
+from ...numerics.arrays import IntArray
 from ...numerics.compiling import njit
 from .compact import contracted, looked_up
 from .dense import folded
 from .layout import Packed, unpack
 
+Tried: TypeAlias = tuple[IntArray, IntArray, IntArray]
+"""The joint actions that an agent tries, given ones above, all below, as a plain tuple.
 
-class Tried(NamedTuple):
-    """The joint actions that an agent tries: given ones above, all below.
-
-    Attributes
-    ----------
-    indices
-        ``(A, m)`` indices of own action and joint action of the agents below, the first of which
-        varies most slowly; the others take action 0.
-    places
-        ``(n,)`` what an action of each of these others adds to an index, 0 for the rest.
-    below
-        ``(k,)`` the agents below.
-    """
-
-    indices: IntArray
-    places: IntArray
-    below: IntArray
+- ``(A, m)`` indices of own action and joint action of the agents below, the first of which varies
+  most slowly; the others take action 0;
+- ``(n,)`` what an action of each of these others adds to an index, 0 for the rest;
+- ``(k,)`` the agents below.
+"""
 
 
 @njit(cache=True)
-def _indices(tried, places, joint_action):  # type: ignore[no-untyped-def]
-    given, (rows, m) = 0, tried.shape
+def _indices(tried, joint_action):  # type: ignore[no-untyped-def]
+    indices_of, places, _ = tried
+    given, (rows, m) = 0, indices_of.shape
     for i in range(len(joint_action)):
         given += places[i] * joint_action[i]
     indices = np.empty(rows * m, np.int64)
     for a in range(rows):
         for c in range(m):
-            indices[a * m + c] = tried[a, c] + given
+            indices[a * m + c] = indices_of[a, c] + given
     return indices
 
 
 @njit(cache=True)
-def _aggregate(values, n_own: int, below, probabilities):  # type: ignore[no-untyped-def]
+def _aggregate(values, tried, probabilities):  # type: ignore[no-untyped-def]
     """Return per own action the mean by probability ``(n, A)``, or the maximum if none is given."""
-    m = len(values) // n_own
+    (n_own, m), below = tried[0].shape, tried[2]
     out = np.empty(n_own)
     if not len(probabilities):
         for a in range(n_own):
@@ -89,21 +80,17 @@ def _learned(theta) -> bool:  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def enumerate_looked_up(  # type: ignore[no-untyped-def]
-    theta, own, own_rows, shared, shared_rows, divisor: int,
-    tried: IntArray, places: IntArray, below: IntArray, joint_action: IntArray,
-    probabilities: FloatArray, packed: Packed,
-) -> FloatArray:  # fmt: skip
+def enumerate_looked_up(theta, tables, tried, joint_action, probabilities, packed: Packed):  # type: ignore[no-untyped-def]
     """Value the own actions ``(A,)`` by looking up every active rule, triangular partitions.
 
     Parameters
     ----------
     theta
         ``(n_rules,)`` the agent's consequent weights.
-    own, own_rows, shared, shared_rows, divisor
-        As in `Blocks`.
-    tried, places, below
-        Which joint actions: the parts of a `Tried`.
+    tables
+        Where joint actions lead, see `core.rules.kernels.pairs.pairs`.
+    tried
+        Which joint actions, see `Tried`.
     joint_action
         ``(n,)`` the actions that are given.
     probabilities
@@ -113,35 +100,24 @@ def enumerate_looked_up(  # type: ignore[no-untyped-def]
         Layout of the rule base.
     """
     if not _learned(theta):
-        return np.zeros(len(tried))
-    indices, lay = _indices(tried, places, joint_action), unpack(packed)
-    values = looked_up(theta, own, own_rows, shared, shared_rows, divisor, indices, lay)
-    return _aggregate(values, len(tried), below, probabilities)
+        return np.zeros(len(tried[0]))
+    values = looked_up(theta, tables, _indices(tried, joint_action), unpack(packed))
+    return _aggregate(values, tried, probabilities)
 
 
 @njit(cache=True)
-def enumerate_contracted(  # type: ignore[no-untyped-def]
-    theta, own, own_rows, shared, shared_rows, divisor: int,
-    tried: IntArray, places: IntArray, below: IntArray, joint_action: IntArray,
-    probabilities: FloatArray, packed: Packed,
-) -> FloatArray:  # fmt: skip
+def enumerate_contracted(theta, tables, tried, joint_action, probabilities, packed: Packed):  # type: ignore[no-untyped-def]
     """Do what `enumerate_looked_up` does, by summing up the active own rules first."""
     if not _learned(theta):
-        return np.zeros(len(tried))
-    indices, lay = _indices(tried, places, joint_action), unpack(packed)
-    values = contracted(theta, own, own_rows, shared, shared_rows, divisor, indices, lay)
-    return _aggregate(values, len(tried), below, probabilities)
+        return np.zeros(len(tried[0]))
+    values = contracted(theta, tables, _indices(tried, joint_action), unpack(packed))
+    return _aggregate(values, tried, probabilities)
 
 
 @njit(cache=True)
-def enumerate_dense(  # type: ignore[no-untyped-def]
-    theta, own, own_rows, shared, shared_rows, divisor: int,
-    tried: IntArray, places: IntArray, below: IntArray, joint_action: IntArray,
-    probabilities: FloatArray, packed: Packed,
-) -> FloatArray:  # fmt: skip
-    """Do what `enumerate_looked_up` does, for any partitions."""
+def enumerate_dense(theta, tables, tried, joint_action, probabilities, packed: Packed):  # type: ignore[no-untyped-def]
+    """Do what `enumerate_looked_up` does, for sigmoid partitions."""
     if not _learned(theta):
-        return np.zeros(len(tried))
-    indices, lay = _indices(tried, places, joint_action), unpack(packed)
-    values = folded(theta, own, own_rows, shared, shared_rows, divisor, indices, lay)
-    return _aggregate(values, len(tried), below, probabilities)
+        return np.zeros(len(tried[0]))
+    values = folded(theta, tables, _indices(tried, joint_action), unpack(packed))
+    return _aggregate(values, tried, probabilities)

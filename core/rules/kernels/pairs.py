@@ -8,13 +8,13 @@ from ...numerics.compiling import njit
 
 
 @njit(cache=True)
-def pairs(own, own_rows, shared, shared_rows, divisor: int, indices):  # type: ignore[no-untyped-def]
+def pairs(tables, indices):  # type: ignore[no-untyped-def]
     """Sort joint-action indices by the blocks that they lead to.
 
     Parameters
     ----------
-    own, own_rows, shared, shared_rows, divisor
-        As in `Blocks`.
+    tables
+        Own blocks and their rows, shared blocks and theirs, and the divisor, as in `Blocks`.
     indices
         ``(m,)`` joint-action indices.
 
@@ -27,6 +27,7 @@ def pairs(own, own_rows, shared, shared_rows, divisor: int, indices):  # type: i
     wanted
         ``(b, R)`` which pairs occur.
     """
+    own, own_rows, shared, shared_rows, divisor = tables
     n_local = len(own_rows) if len(own_rows) else len(own)
     slots, used = np.full(len(own), -1), np.empty(len(own), np.int64)
     slot_of, row_of = np.empty(len(indices), np.int32), np.empty(len(indices), np.int32)

@@ -173,17 +173,11 @@ def product_of(term: int, first: int, last: int, lay: Layout, strengths, out) ->
 
 
 @njit(cache=True, fastmath=_FAST)
-def _rise(x, sigmoid, fresh, slope, bound, times, knot, width, power, rising):  # type: ignore[no-untyped-def]
+def _rise(x, fresh, slope, bound, times, power, rising):  # type: ignore[no-untyped-def]
     """Write by how much the functions up to one are left behind at every x: S_k of Eq. 6.
 
     `power` takes fresh exponentials, or holds those of which `times` as much is wanted.
     """
-    if not sigmoid:
-        for i in range(len(x)):
-            share = (x[i] - knot) / width
-            share = share if share > 0.0 else 0.0
-            rising[i] = share if share < 1.0 else 1.0
-        return
     if fresh:
         for i in range(len(x)):
             power[i] = _cut_exponential(-slope * (x[i] - bound))
@@ -205,7 +199,7 @@ def _fall(level, rising, out):  # type: ignore[no-untyped-def]
 def many_strengths(j: int, values: FloatArray, lay: Layout, out: FloatArray) -> None:
     """Write the firing strengths of variable j at many values ``(R,)`` into ``out[:counts[j]]``.
 
-    What `strengths_of` writes for one, `out` being ``(most memberships, R)``.
+    What `strengths_of` writes for one, `out` being ``(most memberships, R)``; sigmoids only.
     """
     m, last, total = lay.counts[j], lay.n_knots[j] - 1, len(values)
     lanes = min(ROWS, (total + LANES - 1) // LANES * LANES)
@@ -218,11 +212,8 @@ def many_strengths(j: int, values: FloatArray, lay: Layout, out: FloatArray) -> 
             x[i] = _wrapped(j, values[first + i], lay)
         level[:], found[:] = 1.0, 0.0
         for k in range(last):
-            knot = lay.knots[j, k]
-            _rise(
-                x, lay.sigmoid, k == 0 or not even, lay.slopes[j, k], lay.bounds[j, k],
-                lay.series[j, k] if even else 1.0, knot, lay.knots[j, k + 1] - knot, power, rising,
-            )  # fmt: skip
+            fresh, times = k == 0 or not even, lay.series[j, k] if even else 1.0
+            _rise(x, fresh, lay.slopes[j, k], lay.bounds[j, k], times, power, rising)
             _fall(level, rising, found[k % m])
         found[last % m] += level
         out[:m, first : first + n] = found[:, :n]

@@ -7,17 +7,15 @@ within reach count.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import pairwise, product
 from math import log
 from typing import Any
 
 import numpy as np
 
-from ....core.interface.spaces import ActionSet
 from ....core.numerics.arrays import FloatArray, IntArray
-from ..prediction.push import PushModel
-from ..world.boxes import BoxSpec
+from ..prediction.predictors import push_model
+from ..scenario import BoxPushing
 from ..world.geometry import wrap
 from ..world.robots import RobotSpec, nominal_effect
 from .routes import moved, paths
@@ -33,32 +31,28 @@ class Drivers:
 
     Parameters
     ----------
-    robots, box, model
-        What is in the world, and what is believed of it.
-    action_set, increment, seconds
-        As in the scenario: actions, what an increment changes as a fraction of the greatest
-        speed, and the decision period [s].
+    scenario
+        What is in the world, and what robots can do in a decision period.
 
     Attributes
     ----------
+    model
+        What is believed of the world.
+    seconds
+        The decision period [s].
     choices
         Per robot ``(k, w)``: its robot actions.
     wheels
         Per robot: where its wheels stand among those of all.
     """
 
-    def __init__(
-        self,
-        robots: Sequence[RobotSpec],
-        box: BoxSpec,
-        model: PushModel,
-        action_set: ActionSet,
-        increment: float,
-        seconds: float,
-    ) -> None:
-        self.robots, self.box, self.model = tuple(robots), box, model
-        self.actions, self.increment, self.seconds = action_set, increment, seconds
-        self.choices = [_robot_actions(robot, len(action_set)) for robot in robots]
+    def __init__(self, scenario: BoxPushing) -> None:
+        self.robots = robots = scenario.world.robots
+        self.box, self.actions = scenario.box, scenario.action_set
+        self.model = push_model("push", list(robots), self.box)
+        self.increment = scenario.settings.speed_increment
+        self.seconds = scenario.settings.period
+        self.choices = [_robot_actions(robot, len(self.actions)) for robot in robots]
         counts = np.cumsum([0] + [len(robot.wheels) for robot in robots])
         self.wheels = [slice(a, b) for a, b in pairwise(counts)]
         self._effects = [nominal_effect(robot) for robot in robots]

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from ....core.numerics.arrays import FloatArray, IntArray
-from ..prediction.predictors import push_model
 from ..scenario import BoxPushing
 from ..world.geometry import wrap
 from .driving import Drivers
@@ -40,13 +39,8 @@ class Pushing:
     """
 
     def __init__(self, world: BoxPushing, points: int) -> None:
-        robots = world.world.robots
         self.points = pushing_points(world.box, points, world.robot.radius + WAITING_GAP)
-        model = push_model("push", list(robots), world.box)
-        self._drivers = Drivers(
-            robots, world.box, model, world.action_set, world.settings.speed_increment,
-            world.settings.period,
-        )  # fmt: skip
+        self._drivers = Drivers(world)
 
     def act(self, measurements: Mapping[str, Any], chosen: IntArray) -> IntArray:
         """Return the actions of all wheels ``(n,)`` of robots on their way to points ``(M,)``.

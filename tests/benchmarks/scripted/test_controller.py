@@ -54,12 +54,12 @@ def test_every_robot(robot: str) -> None:
 
 def test_it_remembers_nothing() -> None:
     scenario = BoxPushingSettings(start="hard").build()
-    old = ScriptedController(scenario.world.robots, scenario.box)
+    old = ScriptedController(scenario)
     scenario.reset(3)
     for _ in range(10):
         measured = scenario.measure()
         action = old.act(measured)
-        fresh = ScriptedController(scenario.world.robots, scenario.box)
+        fresh = ScriptedController(scenario)
         np.testing.assert_array_equal(fresh.act(measured), action)
         scenario.step(action)
 
@@ -67,7 +67,7 @@ def test_it_remembers_nothing() -> None:
 def test_of_many_robots_not_every_joint_action_is_tried() -> None:
     scenario = BoxPushingSettings(robots=16, start="easy").build()
     scenario.reset(0)
-    controller = ScriptedController(scenario.world.robots, scenario.box)
+    controller = ScriptedController(scenario)
     situation = scenario.measure()
     poses, box, goal = (situation[k] for k in ("robot_poses", "box_pose", "goal_pose"))
     side, slots = controller._plan(poses, box, goal)

@@ -15,7 +15,7 @@ from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 def crowd_of(robots: int) -> tuple[BoxPushing, Crowd]:
     scenario = BoxPushingSettings(robots=robots).build()
     scenario.reset(0)
-    found = ScriptedController(scenario.world.robots, scenario.box)._crowd
+    found = ScriptedController(scenario)._crowd
     assert found is not None
     return scenario, found
 

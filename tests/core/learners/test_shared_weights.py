@@ -5,13 +5,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+import rule_oracles as oracle
 
 from nested_agents.core.agents.rows import rows_of
 from nested_agents.core.learners import LEARNERS
 from nested_agents.core.learners.batch import REWARD_SCALE, BatchTD, BatchTDSettings
 from nested_agents.core.learners.learner import Learner
 from nested_agents.core.learners.td import TDLambda, TDLambdaSettings
-from nested_agents.core.rules import reference
 from nested_agents.core.rules.kernels.fuzzy import Partition
 from nested_agents.core.rules.rule_base import RuleBase
 
@@ -154,10 +154,10 @@ def test_td_lambda_of_a_role_changes_its_weights_in_turn(averaging: float) -> No
         learner.observe(states[t], rewards[t], False)
         for i, row in enumerate(ROLES):
             before, after = states[t - 1, i : i + 1], states[t, i : i + 1]
-            ahead = reference.values(rules, weights[row], after)
-            delta = rewards[t - 1, i] + 0.9 * ahead - reference.values(rules, weights[row], before)
+            ahead = oracle.values(rules, weights[row], after)
+            delta = rewards[t - 1, i] + 0.9 * ahead - oracle.values(rules, weights[row], before)
             own, shared = trace[i : i + 1], weights[row : row + 1]
-            reference.td_update(rules, shared, own, before, 0.3 * delta, 0.45)
+            oracle.td_update(rules, shared, own, before, 0.3 * delta, 0.45)
         mean += (weights - mean) / min(t, averaging)
     assert learner.weights == pytest.approx(weights, rel=0, abs=1e-12)
     assert learner.theta == pytest.approx(mean, rel=0, abs=1e-12)

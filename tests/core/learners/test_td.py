@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+import rule_oracles as oracle
 
 from nested_agents.core.learners.td import TDLambda, TDLambdaSettings
-from nested_agents.core.rules import reference
 from nested_agents.core.rules.kernels.fuzzy import Partition
 from nested_agents.core.rules.rule_base import RuleBase
 
@@ -140,13 +140,13 @@ def test_the_equations_written_out(trace_decay: float, terminal: bool) -> None:
     feed(learner, states, rewards, terminal)
     theta, trace = np.zeros((1, FUZZY.n_rules)), np.zeros((1, FUZZY.n_rules))
     for t in range(30 if terminal else 29):
-        here = reference.values(FUZZY, theta[0], states[t : t + 1])
+        here = oracle.values(FUZZY, theta[0], states[t : t + 1])
         if t < 29:
-            target = rewards[t] + gamma * reference.values(FUZZY, theta[0], states[t + 1 : t + 2])
+            target = rewards[t] + gamma * oracle.values(FUZZY, theta[0], states[t + 1 : t + 2])
         else:
             target = rewards[t] / (1.0 - gamma)
         steps = alpha * (target - here)
-        reference.td_update(FUZZY, theta, trace, states[t : t + 1], steps, gamma * trace_decay)
+        oracle.td_update(FUZZY, theta, trace, states[t : t + 1], steps, gamma * trace_decay)
     assert learner.theta == pytest.approx(theta, rel=0, abs=1e-12)
 
 
@@ -161,7 +161,7 @@ def test_offline_td_lambda_is_the_lambda_return(trace_decay: float, terminal: bo
     states, rewards = rng.uniform(-1, 1, (last + 1, 2)), rng.normal(size=last + 1)
     learner = learner_of(FUZZY, step_size=alpha, discount=gamma, trace_decay=lam)
     learner.theta[:] = rng.normal(size=learner.theta.shape)
-    f = reference.values(FUZZY, learner.theta[0], states)
+    f = oracle.values(FUZZY, learner.theta[0], states)
     end = last + 1 if terminal else last
 
     def n_step(t: int, n: int) -> float:

@@ -8,8 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nested_agents.core.interface.spaces import Variable
-from nested_agents.core.rules import kernels
 from nested_agents.core.rules.kernels.fuzzy import Partition
+from nested_agents.core.rules.kernels.layout import layout, unpack
+from nested_agents.core.rules.kernels.strengths import strengths_of
 
 SHAPES = ("triangular", "sigmoid")
 
@@ -27,10 +28,10 @@ def partitions(draw: st.DrawFn, flattest: float = 1.0) -> Partition:
 
 
 def by_kernel(partition: Partition, x: np.ndarray) -> np.ndarray:
-    lay = kernels.unpack(kernels.layout([partition], [(0,)], 0))
+    lay = unpack(layout([partition], [(0,)], 0))
     out, room = np.empty((len(x), partition.size)), np.empty(lay.bounds.shape[1] + 1)
     for row, value in zip(out, x, strict=True):
-        kernels.strengths_of(0, value, lay, row, room)
+        strengths_of(0, value, lay, row, room)
     return out
 
 

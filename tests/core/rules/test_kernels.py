@@ -5,12 +5,20 @@ from math import pi
 
 import numpy as np
 import pytest
+import rule_oracles as oracle
 from hypothesis import given
 from hypothesis import strategies as st
 
 from nested_agents.core.interface.prediction import Blocks
-from nested_agents.core.rules import kernels, reference
+from nested_agents.core.rules.kernels.enumeration import (
+    enumerate_contracted,
+    enumerate_looked_up,
+)
+from nested_agents.core.rules.kernels.few_states import each_dense
 from nested_agents.core.rules.kernels.fuzzy import Partition
+from nested_agents.core.rules.kernels.layout import layout, unpack
+from nested_agents.core.rules.kernels.strengths import exponential, many_strengths
+from nested_agents.core.rules.kernels.updates import add_features, td_update
 from nested_agents.core.rules.rule_base import RuleBase
 
 N_ACTIONS, N_AGENTS, GROUP = 4, 4, 2
@@ -75,29 +83,22 @@ def rng() -> np.random.Generator:
 
 def test_values(base: RuleBase, rng: np.random.Generator) -> None:
     theta, states = rng.normal(size=base.n_rules), states_of(rng, 60)
-    expected = reference.values(base, theta, states)
+    expected = oracle.values(base, theta, states)
     assert base.values(theta, states) == pytest.approx(expected, rel=0, abs=1e-12)
-    # The dense kernel serves any shape; the compact one is a shortcut for triangles.
-    dense = kernels.values_dense(theta, states, base.layout)
-    assert dense == pytest.approx(expected, rel=0, abs=1e-12)
 
 
 def test_block_values(base: RuleBase, rng: np.random.Generator) -> None:
     theta, blocks = rng.normal(size=base.n_rules), blocks_of(rng, base.n_own)
     indices = rng.integers(N_ACTIONS**N_AGENTS, size=90)
-    expected = reference.block_values(base, theta, blocks, indices)
+    expected = oracle.block_values(base, theta, blocks, indices)
     assert base.block_values(theta, blocks, indices) == pytest.approx(expected, rel=0, abs=1e-12)
-    # Whatever the shape, the other kernels agree.
+    # A rule base chooses by its terms.
     none = np.zeros(0, dtype=np.int64)
-    tried = kernels.Tried(indices[:, None], none, none)
-    kinds = [kernels.enumerate_dense]
-    if base.compact:
-        kinds += [kernels.enumerate_looked_up, kernels.enumerate_contracted]
-    for kind in kinds:
+    tables = blocks.own, blocks.own_rows, blocks.shared, blocks.shared_rows, blocks.divisor
+    for kind in (enumerate_looked_up, enumerate_contracted) if base.compact else ():
         found = kind(
-            theta, blocks.own, blocks.own_rows, blocks.shared, blocks.shared_rows, blocks.divisor,
-            *tried, none, np.zeros((0, 0)), base.layout,
-        )  # fmt: skip
+            theta, tables, (indices[:, None], none, none), none, np.zeros((0, 0)), base.layout
+        )
         assert found == pytest.approx(expected, rel=0, abs=1e-12)
 
 
@@ -111,10 +112,10 @@ def test_enumerate(base: RuleBase, rng: np.random.Generator, agent: int, average
     every = np.tile(joint[:, None], grid.shape[1])
     every[agent:] = grid
     places = N_ACTIONS ** np.arange(N_AGENTS - 1, -1, -1)
-    values = reference.block_values(base, theta, blocks, places @ every).reshape(N_ACTIONS, -1)
+    values = oracle.block_values(base, theta, blocks, places @ every).reshape(N_ACTIONS, -1)
     given = np.where(np.arange(N_AGENTS) < agent, places, 0)
     indices = (places[agent:] @ grid).reshape(N_ACTIONS, -1)
-    tried = kernels.Tried(indices, given, below)
+    tried = indices, given, below
     expected = values.max(axis=1)
     if averaged:
         weights = np.ones(1)
@@ -134,8 +135,8 @@ def test_td_update(base: RuleBase, rng: np.random.Generator) -> None:
     reach = np.full((3, base.n_parts), 5.0)
     for _ in range(60):
         states, steps = states_of(rng, 3), 0.1 * rng.normal(size=3)
-        kernels.td_update(theta, ROWS, trace, reach, states, steps, 0.38, base.layout)
-        reference.td_update(base, theta_expected, trace_expected, states, steps, 0.38)
+        td_update(theta, ROWS, trace, reach, states, steps, 0.38, base.layout)
+        oracle.td_update(base, theta_expected, trace_expected, states, steps, 0.38)
     assert trace == pytest.approx(trace_expected, rel=0, abs=1e-12)
     assert theta == pytest.approx(theta_expected, rel=0, abs=1e-12)
 
@@ -157,18 +158,19 @@ def test_td_updates_with_their_errors(
             theta, ROWS, trace, reach, states, entered, rewards, discount, 0.1, lengths, 0.38
         )
         steps = 0.1 * (rewards + discount * ahead - now) / lengths
-        reference.td_update(base, theta_expected, trace_expected, states, steps, 0.38)
+        oracle.td_update(base, theta_expected, trace_expected, states, steps, 0.38)
     assert trace == pytest.approx(trace_expected, rel=0, abs=1e-12)
     assert theta == pytest.approx(theta_expected, rel=0, abs=1e-12)
 
 
-def test_strengths_of_many(base: RuleBase, rng: np.random.Generator) -> None:
-    lay = kernels.unpack(base.layout)
+def test_strengths_of_many(rng: np.random.Generator) -> None:
+    base = RuleBase(partitions_of("sigmoid"), TERMS["order 1"])
+    lay = unpack(base.layout)
     states = states_of(rng, 300)
     states[-3:] = [[-90.0] * 4, [90.0] * 4, [1e6] * 4]
     for j, partition in enumerate(base.partitions):
         out = np.empty((lay.counts.max(), len(states)))
-        kernels.many_strengths(j, states[:, j], lay, out)
+        many_strengths(j, states[:, j], lay, out)
         expected = partition.strengths(states[:, j]).T
         assert out[: lay.counts[j]] == pytest.approx(expected, rel=0, abs=1e-14)
 
@@ -177,13 +179,13 @@ def test_strengths_of_many_between_steep_sigmoids() -> None:
     steep = Partition(tuple(np.linspace(0.0, 1.0, 9).tolist()), "sigmoid", steepness=120.0)
     x = np.linspace(-2.0, 3.0, 501)
     out = np.empty((9, len(x)))
-    kernels.many_strengths(0, x, kernels.unpack(kernels.layout([steep], [(0,)], 0)), out)
+    many_strengths(0, x, unpack(layout([steep], [(0,)], 0)), out)
     assert out == pytest.approx(steep.strengths(x).T, rel=0, abs=1e-13)
 
 
 @given(st.floats(-690, 690))
 def test_exponentials_are_exact_to_the_last_bits(x: float) -> None:
-    assert kernels.exponential(x) == pytest.approx(np.exp(x), rel=1e-15, abs=0)
+    assert exponential(x) == pytest.approx(np.exp(x), rel=1e-15, abs=0)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
@@ -192,7 +194,7 @@ def test_each(base: RuleBase, rng: np.random.Generator, count: int) -> None:
     states = states_of(rng, 5 * count).reshape(5, count, -1)
     expected = [base.features(states[i]) @ theta[i] for i in range(5)]
     assert base.each(theta, states) == pytest.approx(np.array(expected), rel=0, abs=1e-12)
-    dense = kernels.each_dense(theta, states, base.layout)
+    dense = each_dense(theta, states, base.layout)
     assert dense == pytest.approx(np.array(expected), rel=0, abs=1e-12)
 
 
@@ -205,7 +207,7 @@ def test_single_precision(base: RuleBase, rng: np.random.Generator) -> None:
     for found, expected in (
         (
             base.block_values(theta[0], blocks, indices),
-            reference.block_values(base, wide[0][0], blocks, indices),
+            oracle.block_values(base, wide[0][0], blocks, indices),
         ),
         (
             base.each(theta, states[:, None])[:, 0],
@@ -214,8 +216,8 @@ def test_single_precision(base: RuleBase, rng: np.random.Generator) -> None:
     ):
         assert found == pytest.approx(expected, rel=1e-5, abs=1e-5 * scale)
     reach = np.full((3, base.n_parts), 5.0)
-    kernels.td_update(theta, ROWS, trace, reach, states, steps, 0.38, base.layout)
-    reference.td_update(base, *wide, states, steps, 0.38)
+    td_update(theta, ROWS, trace, reach, states, steps, 0.38, base.layout)
+    oracle.td_update(base, *wide, states, steps, 0.38)
     assert theta.dtype == trace.dtype == np.float32
     assert trace == pytest.approx(wide[1], rel=1e-5, abs=1e-5)
     assert theta == pytest.approx(wide[0], rel=1e-5, abs=1e-5)
@@ -248,12 +250,12 @@ def test_the_papers_78125_rules(membership: str, rng: np.random.Generator) -> No
     assert base.each(theta[None], states[None])[0] == pytest.approx(expected, rel=0, abs=1e-12)
     states = np.tile(states, (6, 1))
     states[:, 4:] += 0.01 * rng.normal(size=(24, 3))  # a few own blocks, shared ones near by
-    expected = reference.values(base, theta, states)
+    expected = oracle.values(base, theta, states)
     assert base.values(theta, states) == pytest.approx(expected, rel=0, abs=1e-12)
     for size in (1, 2, 3, 24):
         blocks, indices = blocks_of(rng, 4, 7), rng.integers(N_ACTIONS**N_AGENTS, size=size)
         blocks.own[:, 3] = rng.choice([0.1, 0.5, 0.52, 0.9], len(blocks.own))  # levels shared
-        expected = reference.block_values(base, theta, blocks, indices)
+        expected = oracle.block_values(base, theta, blocks, indices)
         found = base.block_values(theta, blocks, indices)
         assert found == pytest.approx(expected, rel=0, abs=1e-12)
 
@@ -261,8 +263,8 @@ def test_the_papers_78125_rules(membership: str, rng: np.random.Generator) -> No
     theta_expected, trace_expected = theta.copy(), trace.copy()
     steps = np.array([0.01, -0.02])
     reach = np.full((2, base.n_parts), 5.0)
-    kernels.td_update(theta, ROWS[:2], trace, reach, states[:2], steps, 0.3996, base.layout)
-    reference.td_update(base, theta_expected, trace_expected, states[:2], steps, 0.3996)
+    td_update(theta, ROWS[:2], trace, reach, states[:2], steps, 0.3996, base.layout)
+    oracle.td_update(base, theta_expected, trace_expected, states[:2], steps, 0.3996)
     assert np.abs(trace - trace_expected).max() <= 1e-12
     assert np.abs(theta - theta_expected).max() <= 1e-12
 
@@ -271,7 +273,7 @@ def test_add_features(base: RuleBase, rng: np.random.Generator) -> None:
     target, states = rng.normal(size=(3, base.n_rules)), states_of(rng, 3)
     weights = rng.normal(size=3)
     expected = target + weights[:, None] * base.features(states)
-    kernels.add_features(target, ROWS, states, weights, base.layout)
+    add_features(target, ROWS, states, weights, base.layout)
     assert target == pytest.approx(expected, rel=0, abs=1e-12)
 
 
@@ -287,13 +289,13 @@ def test_agents_of_one_row_change_it_in_turn(base: RuleBase, rng: np.random.Gene
         )
         for i, row in enumerate(rows):
             one = slice(i, i + 1)
-            f = reference.values(base, expected[row], np.stack([states[i], entered[i]]))
+            f = oracle.values(base, expected[row], np.stack([states[i], entered[i]]))
             steps = np.array([0.1 * (rewards[i] + discount * f[1] - f[0])])
-            reference.td_update(
+            oracle.td_update(
                 base, expected[row : row + 1], trace_expected[one], states[one], steps, 0.38
             )
     assert theta == pytest.approx(expected, rel=0, abs=1e-12)
     target, weights = theta.copy(), rng.normal(size=3)
-    kernels.add_features(target, rows, states, weights, base.layout)
+    add_features(target, rows, states, weights, base.layout)
     np.add.at(theta, rows, weights[:, None] * base.features(states))
     assert target == pytest.approx(theta, rel=0, abs=1e-12)

@@ -2,18 +2,14 @@
 
 import numpy as np
 
-from nested_agents.core.interface.spaces import ActionSet
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.options.driving import Drivers
-from nested_agents.scenarios.box_pushing.prediction.predictors import push_model
-from nested_agents.scenarios.box_pushing.world.boxes import BOXES
-from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
 
 BOX = np.zeros(3)
 
 
 def drivers(robots: int) -> Drivers:
-    team, box = [ROBOTS["e-puck"]] * robots, BOXES["square"]
-    return Drivers(team, box, push_model("push", team, box), ActionSet(), 0.5, 0.512)
+    return Drivers(BoxPushingSettings(robots=robots).build())
 
 
 def wheels_after(team: Drivers, choice: int, speeds: np.ndarray) -> np.ndarray:

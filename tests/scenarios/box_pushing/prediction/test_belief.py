@@ -102,7 +102,7 @@ def test_the_least_gap_between_robots():
 def test_wrong_constants_are_found_out_by_pushing(believed):
     world = scenario(start="easy", belief={"soft": SOFT, "stiff": STIFF}[believed])
     _, team = calibrating(world)
-    controller = ScriptedController(list(world.world.robots), world.box)
+    controller = ScriptedController(world)
     errors = []
     for seed in range(6):
         world.reset(seed)

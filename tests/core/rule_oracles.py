@@ -1,16 +1,15 @@
 """The paper's equations as plain NumPy over explicit feature vectors: the oracle of the kernels.
 
-Slow on purpose: 5^7 rules cost a 78,125-element feature vector per joint action here. Tests hold
-the kernels against these functions, benchmarks take them as the literal baseline.
+Slow on purpose: 5^7 rules cost a 78,125-element feature vector per joint action here.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from ..interface.prediction import Blocks
-from ..numerics.arrays import FloatArray, IntArray
-from .rule_base import RuleBase
+from nested_agents.core.interface.prediction import Blocks
+from nested_agents.core.numerics.arrays import FloatArray, IntArray
+from nested_agents.core.rules.rule_base import RuleBase
 
 
 def values(rules: RuleBase, theta: FloatArray, states: FloatArray) -> FloatArray:
