@@ -38,10 +38,12 @@ from .frames import (
     stepped,
 )
 from .predictions import fault_of_prediction
-from .sensing import fault_at_rest, fault_of_exact
+from .sensing import fault_of_sensing
 
 MEMBERS = ("agents", "state_space", "action_set", "reset", "step", "predict")
 """Of the protocol `Scenario`."""
+STEPS_AT_REST = 3
+"""Steps that are waited for a scenario to be at rest."""
 LEAST_STEPS = 2
 """Steps of the shortest episodes by which equal and different seeds can be told."""
 
@@ -295,9 +297,9 @@ def _senses(of: Examination) -> str | None:
         if not hasattr(scenario, "with_exact_prediction"):
             return None
         exact = scenario.with_exact_prediction()
-        fault = fault_of_exact(exact, seed, episode, of.actions(exact, seed)) or fault_at_rest(
-            scenario, seed, episode
-        )
+        neutral = np.full((STEPS_AT_REST, len(scenario.agents)), scenario.action_set.neutral)
+        fault = fault_of_sensing(exact, seed, episode, of.actions(exact, seed))
+        fault = fault or fault_of_sensing(scenario, seed, episode, neutral, at_rest=True)
         if fault is not None:
             return fault
     return None

@@ -38,34 +38,33 @@ def fault_of_prediction(
         Draws the joint actions for which tables are compared, where there are many.
     """
     prediction: Any = scenario.predict()
-    m, d = len(joint_actions), scenario.state_space.n_variables
+    n, m, d = len(scenario.agents), len(joint_actions), scenario.state_space.n_variables
+    each = [prediction.states(i, joint_actions) for i in range(n)]
     wanted: dict[str, tuple[Any, tuple[int, ...]]] = {
-        f"states of agent {i}": (prediction.states(i, joint_actions), (m, d))
-        for i in range(len(scenario.agents))
+        f"states of agent {i}": (states, (m, d)) for i, states in enumerate(each)
     }
     if hasattr(prediction, "rewards"):
         wanted["rewards"] = prediction.rewards(joint_actions), (m,)
     if hasattr(prediction, "states_of_all"):
-        together = prediction.states_of_all(joint_actions)
-        wanted["states of all agents"] = together, (len(scenario.agents), m, d)
+        wanted["states of all agents"] = prediction.states_of_all(joint_actions), (n, m, d)
     groups, n_own = groups_of(scenario), scenario.state_space.n_own
     own, shared = states_by_group(prediction, joint_actions, groups, n_own)
-    wanted["own variables of all agents"] = own, (len(scenario.agents), m, n_own)
+    wanted["own variables of all agents"] = own, (n, m, n_own)
     wanted["shared variables of all groups"] = shared, (len(groups), m, d - n_own)
     for name, (value, shape) in wanted.items():
         if np.shape(value) != shape:
             return f"predicted {name} of shape {np.shape(value)}, must be {shape}"
         if not np.isfinite(value).all():
             return f"predicted {name} are not finite"
-    alone = np.array([prediction.states(i, joint_actions) for i in range(len(scenario.agents))])
     body = np.repeat(np.arange(len(groups)), [len(group) for group in groups])
     by_group = np.concatenate([np.asarray(own), np.asarray(shared)[body]], axis=2)
     grouped = hasattr(prediction, "states_by_group")
-    found = [("states_by_group" if grouped else "shared variables of a group", by_group)]
+    sources = {"states_by_group" if grouped else "shared variables of a group": by_group}
     if hasattr(prediction, "states_of_all"):
-        found.insert(0, ("states_of_all", np.asarray(together)))
-    for source, states in found:
-        wrong = ~_close(apart(scenario, states, alone), alone)
+        together = np.asarray(wanted["states of all agents"][0])
+        sources = {"states_of_all": together, **sources}
+    for source, states in sources.items():
+        wrong = ~_close(apart(scenario, states, np.array(each)), np.array(each))
         if wrong.any():
             agent, _, j = np.argwhere(wrong)[0]
             name = scenario.state_space.variables[j].name
@@ -77,12 +76,12 @@ def fault_of_prediction(
 
 def apart(scenario: Scenario, states: FloatArray, others: FloatArray) -> FloatArray:
     """Return the difference of states ``(..., d)``, of periodic variables the shorter way round."""
-    found = states - others
+    differences = states - others
     for j, variable in enumerate(scenario.state_space.variables):
         if variable.periodic:
             period = variable.high - variable.low
-            found[..., j] -= period * np.round(found[..., j] / period)
-    return found
+            differences[..., j] -= period * np.round(differences[..., j] / period)
+    return differences
 
 
 def _wrong_tables(scenario: Scenario, prediction: Any, rng: np.random.Generator) -> str | None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.agents.loop import world_seed
+from ...core.interface.prediction import states_of_all
 from ...core.interface.scenario import Scenario
 from ...core.numerics.arrays import FloatArray, IntArray
 from .frames import at
@@ -17,63 +18,37 @@ from .predictions import apart
 
 TOLERANCE = 1e-6
 """Difference of sensed and predicted variables that rounding may make, relative to their range."""
-LEAST_STEPS_AT_REST = 3
-"""Steps that are waited for a scenario to be at rest."""
 
 
-def fault_of_exact(exact: Scenario, seed: int, episode: int, joint_actions: IntArray) -> str | None:
-    """Return which variable of an exactly predicted scenario is not sensed as predicted, or None.
+def fault_of_sensing(
+    scenario: Scenario, seed: int, episode: int, joint_actions: IntArray, *, at_rest: bool = False
+) -> str | None:
+    """Return which variable is not sensed as it was predicted, or None.
 
     Parameters
     ----------
-    exact
+    scenario
         Played; modified.
     seed, episode
         As in the control loop.
     joint_actions
         ``(steps, n)``; the episode may end earlier.
+    at_rest
+        Whether only steps count in which nothing changes.
     """
-    exact.reset(world_seed(seed, episode), episode)
+    before = scenario.reset(world_seed(seed, episode), episode)
     for step, action in enumerate(joint_actions, 1):
-        predicted = _predicted(exact, action)
-        transition = exact.step(action)
-        fault = _difference(exact, transition.states, predicted)
-        if fault is not None:
-            return f"{fault} {at(step)} of seed {seed}"
-        if transition.terminated or transition.truncated:
-            break
-    return None
-
-
-def fault_at_rest(scenario: Scenario, seed: int, episode: int) -> str | None:
-    """Return which variable is predicted to change where nothing moves, or None.
-
-    Parameters
-    ----------
-    scenario
-        Played, all agents taking the neutral action; modified.
-    seed, episode
-        As in the control loop.
-    """
-    states = scenario.reset(world_seed(seed, episode), episode)
-    neutral = np.full(len(scenario.agents), scenario.action_set.neutral)
-    for step in range(1, LEAST_STEPS_AT_REST + 1):
-        predicted = _predicted(scenario, neutral)
-        transition = scenario.step(neutral)
-        at_rest = _difference(scenario, transition.states, states) is None
-        fault = _difference(scenario, transition.states, predicted) if at_rest else None
-        if fault is not None:
-            return f"{fault} {at(step)} of seed {seed}, at rest"
+        predicted = states_of_all(scenario.predict(), action[None])[:, 0]
+        transition = scenario.step(action)
         states = transition.states
+        if not at_rest or _difference(scenario, states, before) is None:
+            fault = _difference(scenario, states, predicted)
+            if fault is not None:
+                return f"{fault} {at(step)} of seed {seed}{', at rest' if at_rest else ''}"
         if transition.terminated or transition.truncated:
             break
+        before = states
     return None
-
-
-def _predicted(scenario: Scenario, joint_action: IntArray) -> FloatArray:
-    prediction = scenario.predict()
-    states = [prediction.states(i, joint_action[None])[0] for i in range(len(joint_action))]
-    return np.array(states)
 
 
 def _difference(scenario: Scenario, sensed: FloatArray, predicted: FloatArray) -> str | None:

@@ -25,7 +25,7 @@ from nested_agents.scenarios.box_pushing.world.settings import (
 from nested_agents.scenarios.checking.checker import CHECKS, ScenarioError, check_scenario
 from nested_agents.scenarios.checking.frames import random_actions
 from nested_agents.scenarios.checking.predictions import fault_of_prediction
-from nested_agents.scenarios.checking.sensing import fault_of_exact
+from nested_agents.scenarios.checking.sensing import fault_of_sensing
 from nested_agents.scenarios.line_up import LEAD, LineUp, LineUpPrediction, LineUpSettings
 from nested_agents.scenarios.state_variables import StateVariable
 from nested_agents.studies.cli.main import main
@@ -99,7 +99,7 @@ def test_what_a_scenario_need_not_have_is_not_asked_for() -> None:
 def test_a_variable_with_a_hidden_state_is_sensed_otherwise_than_predicted() -> None:
     scenario: Any = perceiving(stale)()
     actions = random_actions(scenario, 5, 0)
-    fault = fault_of_exact(scenario.with_exact_prediction(), 0, 0, actions)
+    fault = fault_of_sensing(scenario.with_exact_prediction(), 0, 0, actions)
     assert re.match(r"stale of agent \d is \d, predicted \d, at step 1 of seed 0", fault or "")
 
 
