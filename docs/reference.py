@@ -71,8 +71,7 @@ MODULES = {
     "topologies": ("Who is above whom.", ("builders", "checks", "config", "drawing", "files")),
     "scenarios": ("Where agents act.", (
         "box_pushing.config", "box_pushing.world.settings", "box_pushing.prediction.settings",
-        "box_pushing.scenario", "box_pushing.environments",
-        "box_pushing.batched.environments", "adapters.passing_down",
+        "box_pushing.scenario", "box_pushing.environments", "adapters.passing_down",
         "box_pushing.world.reward", "box_pushing.world.starts", "box_pushing.states.view",
         "box_pushing.states.variables", "box_pushing.states.state_spaces",
         "box_pushing.prediction.predictors", "box_pushing.world.boxes",

@@ -10,7 +10,7 @@ Importing this module registers ``NestedAgents/BoxPushing-v0`` with Gymnasium::
 
     module = "nested_agents.scenarios.box_pushing.environments"
     gymnasium.make(f"{module}:NestedAgents/BoxPushing-v0", steps=200)
-    gymnasium.make_vec(f"{module}:NestedAgents/BoxPushing-v0", num_envs=8, steps=200)
+    gymnasium.make_vec(f"{module}:NestedAgents/BoxPushing-v0", 8, "async", steps=200)
 """
 
 from __future__ import annotations
@@ -78,11 +78,6 @@ class Seat:
         self.action_space = (
             Discrete(actions) if len(self.wheels) == 1 else MultiDiscrete([actions] * len(wheels))
         )
-
-    @classmethod
-    def of_all(cls, scenario: BoxPushing, *, by_wheel: bool = False) -> Seat:
-        """Return the seat of an agent that drives all wheels."""
-        return cls(scenario, range(len(scenario.agents)), by_wheel=by_wheel)
 
     def observe(self, states: FloatArray) -> FloatArray:
         """Return the observation in the states ``(n, d)`` of all wheels."""
@@ -295,6 +290,8 @@ class BoxPushingEnv(gymnasium.Env):
     ----------
     settings, steps, render_mode, sensors
         As in `Game`.
+    by_wheel
+        Whether it observes the state of every wheel in a row of its own.
 
     Examples
     --------
@@ -312,10 +309,12 @@ class BoxPushingEnv(gymnasium.Env):
         steps: int = 450,
         render_mode: str | None = None,
         sensors: bool = False,
+        by_wheel: bool = False,
     ) -> None:
         self.game = Game(settings, steps, render_mode, sensors=sensors)
         self.render_mode = render_mode
-        self.seat = Seat.of_all(self.game.scenario)
+        wheels = range(len(self.game.scenario.agents))
+        self.seat = Seat(self.game.scenario, wheels, by_wheel=by_wheel)
         self.observation_space = self.seat.observation_space
         self.action_space = self.seat.action_space
 
@@ -344,8 +343,4 @@ class BoxPushingEnv(gymnasium.Env):
 
 
 if ENV_ID not in gymnasium.registry:
-    gymnasium.register(
-        ENV_ID,
-        entry_point=f"{__name__}:BoxPushingEnv",
-        vector_entry_point=f"{__package__}.batched.environments:VecBoxPushingEnv",
-    )
+    gymnasium.register(ENV_ID, entry_point=f"{__name__}:BoxPushingEnv")

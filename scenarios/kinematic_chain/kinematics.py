@@ -46,25 +46,3 @@ def jacobian_of(places):  # type: ignore[no-untyped-def]
         moves[i, 0] = places[i, 1] - places[n, 1]
         moves[i, 1] = places[n, 0] - places[i, 0]
     return moves
-
-
-@njit(cache=True)
-def turned_about(places, turns):  # type: ignore[no-untyped-def]
-    """Return by how much the tip moves ``(n, A, 2)`` when one joint alone turns.
-
-    Parameters
-    ----------
-    places
-        ``(n + 1, 2)`` joints and tip before.
-    turns
-        ``(n, A)`` by how much each joint may turn [rad].
-    """
-    n, choices = turns.shape
-    moves = np.empty((n, choices, 2))
-    for i in range(n):
-        x, y = places[n, 0] - places[i, 0], places[n, 1] - places[i, 1]
-        for a in range(choices):
-            cos, sin = np.cos(turns[i, a]) - 1.0, np.sin(turns[i, a])
-            moves[i, a, 0] = cos * x - sin * y
-            moves[i, a, 1] = sin * x + cos * y
-    return moves

@@ -1,21 +1,18 @@
-"""What joint actions lead to: exactly if joints do what they are believed to do, and as sums.
+"""What joint actions lead to: exactly if joints do what they are believed to do.
 
 A decision turns every joint by its speed times the period, or up to its limit. What each of its
-actions would turn it by is found once; a joint action is then one posture. For many joints the tip
-is also had to first order: what a joint contributes is how far the tip moves as that joint alone
-departs from the mean of its possible turns, exactly, on a circle about it. Contributions add up.
+actions would turn it by is computed once; a joint action is then one posture.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from ...core.numerics.arrays import FloatArray, IntArray
-from .kinematics import ends_of, postures_of, turned_about
+from .kinematics import postures_of
 from .variables import ChainStates
 from .view import ChainView
 
@@ -45,7 +42,7 @@ class Premises:
 class ChainPrediction:
     """Prediction of one decision, of all agents at once.
 
-    It knows rewards, can be had as sums, and serves self-models, every joint being a body.
+    It knows rewards and serves self-models, every joint being a body.
 
     Parameters
     ----------
@@ -118,52 +115,3 @@ class ChainPrediction:
     def slips(self, joint_action: IntArray) -> FloatArray:
         """Return by how much contact changes the joints' motion ``(n, 3)``: not at all."""
         return np.zeros((len(self.angles), 3))
-
-    @cached_property
-    def alike(self) -> IntArray:
-        """The first action of each joint that comes to the same ``(n, A)``."""
-        same = self.speeds[:, :, None] == self.speeds[:, None, :]
-        return same.argmax(axis=2)
-
-    @cached_property
-    def superposition(self) -> ChainSuperposition:
-        """The prediction as sums of what joints contribute."""
-        return ChainSuperposition(self)
-
-
-class ChainSuperposition:
-    """The prediction of the kinematic chain to first order.
-
-    The sum is how far the tip moves away from the mean posture. Of those joints whose actions are
-    known, and of the deciding one, kinematics are exact: only what may yet be decided adds up.
-
-    Parameters
-    ----------
-    prediction
-        What is approximated.
-    """
-
-    def __init__(self, prediction: ChainPrediction) -> None:
-        self._prediction = prediction
-        self._mean = prediction.turns.mean(axis=1)
-        mean = ends_of(prediction.angles + self._mean, prediction.premises.length)
-        self.contributions: FloatArray = turned_about(mean, prediction.turns - self._mean[:, None])
-        self.alike: IntArray = prediction.alike
-
-    def states(
-        self, agent: int, local: IntArray, sums: FloatArray, shares: FloatArray
-    ) -> FloatArray:
-        """Return the next states ``(m, d)`` of `agent`, see `box_pushing.prediction.additive`."""
-        prediction = self._prediction
-        turns, speeds = (
-            np.tile((shares * each).sum(axis=1), (each.shape[1], 1))
-            for each in (prediction.turns, prediction.shares)
-        )
-        turns[:, agent], speeds[:, agent] = prediction.turns[agent], prediction.shares[agent]
-        angles = prediction.angles + turns
-        places = postures_of(angles, prediction.premises.length)
-        expected = (shares[:, :, None] * self.contributions).sum(axis=(0, 1))
-        places = places[local]
-        places[:, -1] += sums - expected - self.contributions[agent, local]
-        view = ChainView(places, angles[local], speeds[local], prediction.goal, prediction.before)
-        return prediction.premises.states.predicted(view, agent, 1)[0]

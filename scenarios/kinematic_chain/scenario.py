@@ -42,7 +42,7 @@ MOST_BEND = 2.5
 class KinematicChain:
     """A planar arm; a `Scenario` that can be drawn.
 
-    It is predicted exactly and as sums, and open to self-models.
+    It is predicted exactly, and open to self-models.
 
     Parameters
     ----------

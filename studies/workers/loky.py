@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Sequence
 from concurrent.futures import Future
+from typing import Any
 
 from joblib.externals.loky import get_reusable_executor
 from joblib.externals.loky.process_executor import TerminatedWorkerError
@@ -21,6 +23,9 @@ THREADS = ("BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "NUMBA_NUM_THREADS", "N
 
 IDLE = 300
 """How long a process without a trial is kept [s]."""
+
+HANDED_ON = 2.0
+"""How long loky may take to hand a trial on to a process [s]; until then it cannot stop it."""
 
 
 class LokyWorkers(Workers):
@@ -47,17 +52,18 @@ class LokyWorkers(Workers):
         if jobs < 1:
             raise ValueError(f"jobs = {jobs}: must be at least 1")
         self.processes = jobs
+        self._executor: Any = None
         filters = os.environ.get("PYTHONWARNINGS", "")
         if QUIET not in filters:  # processes that are started from here on inherit it
             os.environ["PYTHONWARNINGS"] = f"{filters},{QUIET}".lstrip(",")
 
     def submit(self, run_trial: RunTrial, trial: Trial) -> Future[Outcome]:
         """See `Workers.submit`."""
-        executor = get_reusable_executor(  # another one, if a worker has died
+        self._executor = get_reusable_executor(  # another one, if a worker has died
             self.processes, timeout=IDLE, initializer=begin, initargs=(os.getpid(),),
             env=ONE_THREAD | dict.fromkeys(THREADS, "1"),
         )  # fmt: skip
-        future: Future[Outcome] = executor.submit(attempt, run_trial, trial)
+        future: Future[Outcome] = self._executor.submit(attempt, run_trial, trial)
         return future
 
     def fetch(self, future: Future[Outcome], trial: Trial) -> Outcome:
@@ -69,4 +75,7 @@ class LokyWorkers(Workers):
 
     def stop(self, futures: Sequence[Future[Outcome]]) -> None:
         """See `Workers.stop`."""
-        get_reusable_executor().shutdown(wait=True, kill_workers=True)
+        until = time.monotonic() + HANDED_ON
+        while any(not (f.running() or f.done()) for f in futures) and time.monotonic() < until:
+            time.sleep(0.01)  # its thread would end with a traceback
+        self._executor.shutdown(wait=True, kill_workers=True)

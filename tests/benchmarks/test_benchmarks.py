@@ -95,10 +95,3 @@ def test_what_steering_limits_is_told_as_on_the_page(run: Run) -> None:
     told = [f"| {' | '.join(row)} |" for row in rows if row]
     assert len(told) == 6
     assert [row for row in told if row not in page] == []
-
-
-@pytest.mark.slow
-def test_worlds_in_one_call_are_timed(run: Run) -> None:
-    said = run("benchmarks.batched", "--worlds", "1", "2", "--steps", "8", "--rounds", "1")
-    assert all(len(line) <= 80 for line in said.splitlines())
-    assert "Steps of worlds per second" in said

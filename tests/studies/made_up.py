@@ -47,6 +47,12 @@ def slow(trial):
     return measure(trial)
 
 
+def endless(trial):
+    """As `measure` for the first seed; takes very long for others."""
+    time.sleep(0.0 if trial.seed == 0 else 300.0)
+    return measure(trial)
+
+
 def failing(trial):
     """Fails for one seed of one condition."""
     if trial.condition == "frozen" and trial.seed == 1:

@@ -18,7 +18,6 @@ from ....core.interface.prediction import Blocks
 from ....core.numerics.arrays import FloatArray, IntArray
 from ..states.view import View
 from ..world.reward import reward
-from .additive import PushSuperposition
 from .belief import outcomes
 from .push import PushModel, push
 from .situation import Premises, Situation
@@ -43,9 +42,7 @@ class BoxPrediction:
 
     def __init__(self, situation: Situation, model: PushModel, premises: Premises) -> None:
         self.situation, self.model, self.premises = situation, model, premises
-        # What was asked for last, and what is known of own blocks, by agent.
-        self._last: tuple[bytes, View] | None = None
-        self._own: dict[int, tuple[FloatArray, IntArray]] = {}
+        self._last: tuple[bytes, View] | None = None  # what was asked for last
 
     @cached_property
     def wheel_commands(self) -> WheelCommands:
@@ -84,17 +81,6 @@ class BoxPrediction:
         return choices_of(joint_actions, self.wheel_commands.which, len(self.premises.action_set))
 
     @cached_property
-    def alike(self) -> IntArray:
-        """The first robot-action index ``(M, A ** w)`` that gives the same wheel speeds."""
-        return first_alike(self.wheel_commands.which)
-
-    @cached_property
-    def alike_elsewhere(self) -> IntArray:
-        """The first robot-action index ``(M, A ** w)`` that gives the same twist."""
-        commands = self.wheel_commands
-        return first_alike(np.take_along_axis(commands.distinct, commands.which, axis=1))
-
-    @cached_property
     def _table(self) -> tuple[View, IntArray]:
         """Where all combinations of twists lead, and the row of every joint-action index."""
         choices, row = twist_table(self.wheel_commands)
@@ -123,21 +109,16 @@ class BoxPrediction:
 
     def blocks(self, agent: int) -> Blocks:
         """Return the next states of `agent` for all joint actions, own block as if alone."""
-        r, _ = self.situation.places[agent]
+        r, wheel = self.situation.places[agent]
         row = self._table[1]
-        own, which = self.own_block(agent)
+        own, which = self._own_block(r, wheel)
         behind = sum(len(group) for group in self.situation.groups[r + 1 :])
         divisor = len(self.premises.action_set) ** behind
         alone = self.premises.space.own_needs_pose
         return Blocks(own, self._shared[r], divisor, which, row, alone)
 
-    def own_block(self, agent: int) -> tuple[FloatArray, IntArray]:
+    def _own_block(self, r: int, wheel: int) -> tuple[FloatArray, IntArray]:
         """Return the own variables that occur, as if alone, and the row of each robot action."""
-        if agent not in self._own:
-            self._own[agent] = self._new_own_block(*self.situation.places[agent])
-        return self._own[agent]
-
-    def _new_own_block(self, r: int, wheel: int) -> tuple[FloatArray, IntArray]:
         commands, space, goal = self.wheel_commands, self.premises.space, self.situation.goal
         if space.own_needs_pose:
             speeds = commands.speeds[r, : commands.counts[r], wheel]
@@ -145,14 +126,6 @@ class BoxPrediction:
         speeds = commands.levels[r, wheel, : commands.n_levels[r, wheel]]
         own = space.own(np.zeros((len(speeds), 3)), speeds, goal)
         return own, commands.level[r, wheel]
-
-    @cached_property
-    def superposition(self) -> PushSuperposition:
-        """The prediction to first order in what each robot does."""
-        return PushSuperposition(
-            self.situation, self.model, self.premises, self.wheel_commands, self.alike,
-            self.own_block,
-        )  # fmt: skip
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
@@ -256,11 +229,6 @@ class BoxPrediction:
         )
         mean: FloatArray = of_parties.mean(axis=1)
         return mean
-
-
-def first_alike(keys: IntArray) -> IntArray:
-    """Return in every row of ``(M, L)`` the first column that holds the same."""
-    return (keys[:, :, None] == keys[:, None, :]).argmax(axis=2)
 
 
 def mean_twists(before: FloatArray, after: FloatArray, seconds: float) -> FloatArray:

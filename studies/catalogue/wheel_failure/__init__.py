@@ -195,7 +195,7 @@ def analyse(results: Results) -> Analysis:
     notes = ["Named after the colon is what adapts to the failure."] if courses else []
     notes += ["\nsuccess at the end against nothing adapting (p adjusted):"] if gains else []
     notes += [f"  {gain.condition}: {gain.shown}" for gain in gains] + power_lines(gains)
-    return Analysis(tuple(map(_summary, courses)), tuple(notes), courses, gains, "end")
+    return Analysis(tuple(map(_summary, courses)), tuple(notes), courses, gains)
 
 
 def courses_of(results: Results) -> list[Course]:

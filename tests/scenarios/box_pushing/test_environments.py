@@ -82,6 +82,8 @@ def test_the_three_views_show_one_scenario() -> None:
     scenario = BoxPushing(SETTINGS[1])
     seen = [wheels.reset(seed=1)[0], robots.reset(seed=1)[0], joint.reset(seed=1)[0]]
     states = scenario.reset(int(np.random.default_rng(1).integers(2**63)))
+    rows = BoxPushingEnv(SETTINGS[1], by_wheel=True).reset(seed=1)[0]
+    np.testing.assert_array_equal(rows, states.astype(np.float32))
     rng = np.random.default_rng(2)
     for _ in range(8):
         for i, name in enumerate(scenario.agents):

@@ -60,25 +60,6 @@ def test_predictions_come_true(table: dict[str, object]) -> None:
         assert rewards[k] == transition.reward
 
 
-@pytest.mark.parametrize("joints", [4, 16, 64])
-def test_sums_are_exact_for_what_is_decided_and_close_for_the_rest(joints: int) -> None:
-    prediction, rng = moving(joints).predict(), np.random.default_rng(2)
-    sums = prediction.superposition
-    actions = rng.integers(4, size=(50, joints))
-    added = sums.contributions[np.arange(joints), actions].sum(axis=1)
-    for agent in (0, joints - 1):
-        exact = prediction.states(agent, actions)
-        unknown = np.full((joints, 4), 0.25)
-        unknown[agent] = 0.0
-        found = sums.states(agent, actions[:, agent], added, unknown)
-        # The greatest rotation of the whole arm in a decision is half a radian: squared, halved.
-        assert np.abs(found - exact)[:, 2].max() < 0.01
-        told = np.eye(4)[actions[0]]
-        told[agent] = 0.0
-        found = sums.states(agent, actions[:1, agent], added[:1], told)
-        assert found == pytest.approx(exact[:1], abs=1e-12)
-
-
 def test_compiled_variables_are_what_their_functions_say() -> None:
     scenario = moving(6, state_space=COMPILED)
     view = scenario.predict().seen(np.random.default_rng(3).integers(4, size=(30, 6)))

@@ -6,12 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from nested_agents.scenarios.kinematic_chain.kinematics import (
-    ends_of,
-    jacobian_of,
-    postures_of,
-    turned_about,
-)
+from nested_agents.scenarios.kinematic_chain.kinematics import ends_of, jacobian_of, postures_of
 
 
 def composed(angles: np.ndarray, length: float) -> np.ndarray:
@@ -48,14 +43,3 @@ def test_the_jacobian_is_the_slope_of_the_tip(n: int, seed: int) -> None:
         step = small * (np.arange(n) == i)
         ahead, behind = (ends_of(angles + sign * step, 1.0 / n)[-1] for sign in (1, -1))
         assert moves[i] == pytest.approx((ahead - behind) / (2 * small), abs=1e-8)
-
-
-@given(st.integers(2, 64), st.integers(0, 2**32 - 1))
-def test_a_joint_alone_turns_the_tip_exactly(n: int, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    angles, turns = rng.uniform(-np.pi, np.pi, n), rng.uniform(-1, 1, (n, 4))
-    places = ends_of(angles, 1.0 / n)
-    moves = turned_about(places, turns)
-    i, a = rng.integers(n), rng.integers(4)
-    after = ends_of(angles + turns[i, a] * (np.arange(n) == i), 1.0 / n)
-    assert places[-1] + moves[i, a] == pytest.approx(after[-1], abs=1e-12)

@@ -144,6 +144,14 @@ def test_never_more_trials_are_said_to_run_than_there_are_processes():
     assert len(started) == len(set(started)) == len(made_up.TRIALS)
 
 
+def test_whoever_stops_waits_for_no_trial():
+    arriving = LokyWorkers(2).arrivals(made_up.TRIALS, made_up.endless, lambda _: None)
+    assert {next(arriving).error, next(arriving).error} == {None}
+    begin = time.monotonic()
+    arriving.close()
+    assert time.monotonic() - begin < 60
+
+
 @pytest.mark.parametrize(("jobs", "trials", "expected"), [(512, 3, 3), (1, 3, 1), (2, 0, 1)])
 def test_no_more_workers_than_trials(jobs, trials, expected):
     with start_workers("loky", jobs, None, trials) as workers:

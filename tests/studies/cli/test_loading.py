@@ -1,4 +1,4 @@
-"""Asking again without running again, watching, logging: the commands, with made-up results."""
+"""Results are read, watched and logged without running again: commands, with made-up results."""
 
 import shutil
 import sqlite3
@@ -41,7 +41,7 @@ class Mute:
 @pytest.fixture(scope="module")
 def study(tmp_path_factory: pytest.TempPathFactory):
     """A finished study, run with a logger, and what was said."""
-    folder = tmp_path_factory.mktemp("asked")
+    folder = tmp_path_factory.mktemp("loaded")
     (folder / "spec.toml").write_text(dumps(made_up.SPEC.table()))
     (folder / "log.py").write_text(LOGGER)
     with pytest.MonkeyPatch.context() as patch:

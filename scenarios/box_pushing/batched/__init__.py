@@ -1,1 +1,0 @@
-"""Many worlds stepped in one call, by several processes: Gymnasium vector environments."""
