@@ -25,7 +25,7 @@ from ..prediction.push import push
 from ..scenario import BoxPushing
 from ..world.boxes import BoxSpec
 from ..world.geometry import wrap
-from ..world.robots import RobotSpec
+from ..world.settings import RobotSettings
 from .crowd import SLOT_GAP, Crowd
 from .driving import CLEARANCE, Drivers
 from .routes import paths
@@ -64,7 +64,7 @@ class ScriptedController:
 
     def __init__(
         self,
-        robots: Sequence[RobotSpec],
+        robots: Sequence[RobotSettings],
         box: BoxSpec,
         action_set: ActionSet | None = None,
         increment: float = 0.5,

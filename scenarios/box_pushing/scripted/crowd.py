@@ -27,7 +27,7 @@ from ....core.numerics.arrays import BoolArray, FloatArray, IntArray
 from ..prediction.push import PushModel, push
 from ..world.boxes import BoxSpec
 from ..world.geometry import wrap
-from ..world.robots import RobotSpec
+from ..world.settings import RobotSettings
 from .driving import CLEARANCE, Drivers
 from .routes import paths
 from .sides import SPREAD, Side
@@ -90,7 +90,7 @@ class Crowd:
 
     def __init__(
         self,
-        robots: Sequence[RobotSpec],
+        robots: Sequence[RobotSettings],
         box: BoxSpec,
         model: PushModel,
         drivers: Drivers,
