@@ -13,7 +13,8 @@ from ..claims.claims import judge
 from ..claims.table import result
 from ..presentation.tables import tabulate
 from ..presentation.words import count
-from ..results.results import read
+from ..results.contrasts import contrasts
+from ..results.results import Results, read
 from ..spec.outline import Outline, sources_of
 from ..spec.toml import dumps
 from ..store.schema import RESULTS_VERSION
@@ -53,8 +54,7 @@ def page(directory: Path) -> str:
         compared=", ".join(next(iter(outline.columns.values()))),
         standing=words.standing(len(trials), counts["done"], counts["failed"]),
         complete=counts["done"] == len(trials),
-        verdict=words.verdicts(analysis),
-        notes=list(getattr(analysis, "notes", ())),
+        notes=getattr(analysis, "notes", ()) or _compared(results),
         table=tabulate(analysis.table),
         claims=[
             (finding.claim, result(finding), finding.verdict)
@@ -73,6 +73,11 @@ def page(directory: Path) -> str:
         js=_own("page.js"),
         replay_js=Markup(packed.script),
     )
+
+
+def _compared(results: Results) -> tuple[str, ...]:
+    """Return what `compare` says of a study that has no notes of its own."""
+    return contrasts(results).notes if len(results.conditions) > 1 else ()
 
 
 @cache

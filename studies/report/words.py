@@ -1,16 +1,12 @@
-"""What a report says in sentences: how far the study is, who fared best, what it was made with."""
+"""What a report says in sentences: how far the study is, and what it was made with."""
 
 from __future__ import annotations
 
 import platform
 import re
-from collections.abc import Iterable, Sequence
-from typing import Any
-
-import numpy as np
+from collections.abc import Iterable
 
 from ..presentation.words import count
-from ..results.summary import Summary, interval, two_figures
 from ..spec.outline import Outline
 from ..workers.worker import installed
 
@@ -27,8 +23,6 @@ PACKAGES = (
     "shapely",
 )
 """The packages that results and figures come from."""
-MOST_NAMED = 4
-"""Conditions that one clause names before it only counts them."""
 
 
 def runs(values: Iterable[int]) -> str:
@@ -76,71 +70,6 @@ def standing(total: int, done: int, failed: int) -> str:
     parts += [f"{failed} failed"] * bool(failed) + [f"{left} left"] * bool(left)
     what = "What follows is of those done." if done else "There is nothing to show yet."
     return f"{'Unfinished' if left else 'With failures'}: {', '.join(parts)}. {what}"
-
-
-def verdicts(analysis: Any) -> str:
-    """Return who fares best, of every group of conditions that are to be compared.
-
-    An analysis whose conditions differ in size, too, offers their summaries by size as `groups`.
-    """
-    headline = getattr(analysis, "headline", None)
-    groups = getattr(analysis, "groups", None) or {"": analysis.table}
-    texts = {name: contest(lines, headline) for name, lines in groups.items()}
-    return " ".join(f"{name}: {text}" if name else text for name, text in texts.items() if text)
-
-
-def contest(table: Sequence[Summary], headline: str | None) -> str:
-    """Return who is highest in one estimate, and whose intervals lie apart from the highest's.
-
-    Parameters
-    ----------
-    table
-        The lines of the study's table.
-    headline
-        Title of the estimate; if none or not in the table, its first one.
-
-    Examples
-    --------
-    >>> from nested_agents.studies.results.statistics import Estimate
-    >>> e = {"ours": (0.9, 0.8, 0.95), "frozen": (0.1, 0.0, 0.3), "other": (0.85, 0.7, 0.9)}
-    >>> table = [Summary(k, 8, {"success": Estimate(*map(np.asarray, v))}) for k, v in e.items()]
-    >>> contest(table, "success")
-    'success: highest is ours, .90 [.80–.95]. Interval wholly below: frozen .10 [0–.30]. Interval \
-overlapping: other .85 [.70–.90].'
-    """
-    titles = list(dict.fromkeys(title for line in table for title in line.estimates))
-    if not titles:
-        return ""
-    title = headline if headline in titles else titles[0]
-    lines = [s for s in table if title in s.estimates and not np.isnan(s.estimates[title].value)]
-    if not lines:
-        return ""
-    lines.sort(key=lambda s: -float(s.estimates[title].value))
-    best, *others = lines
-    if not others:
-        seeds = count(best.seeds, "seed")
-        return f"{title}: {_named(best, title)} over {seeds}."
-    floor = best.estimates[title].low
-    groups: dict[str, list[Summary]] = {"wholly below": [], "overlapping": [], "not known": []}
-    for line in others:
-        if np.isnan(floor) or np.isnan(line.estimates[title].high):
-            groups["not known"].append(line)
-        else:
-            below = line.estimates[title].high < floor
-            groups["wholly below" if below else "overlapping"].append(line)
-    verdict = f"{title}: highest is {_named(best, title, ', ')}."
-    for what, group in groups.items():
-        if group:
-            more = f" and {len(group) - MOST_NAMED} more" if len(group) > MOST_NAMED else ""
-            named = ", ".join(_named(s, title) for s in group[:MOST_NAMED])
-            verdict += f" Interval{'s' * (len(group) > 1)} {what}: {named}{more}."
-    return verdict
-
-
-def _named(line: Summary, title: str, between: str = " ") -> str:
-    estimate = line.estimates[title]
-    around = "" if np.isnan(estimate.low) else f" [{interval(estimate)}]"
-    return f"{line.condition}{between}{two_figures(float(estimate.value))}{around}"
 
 
 def versions() -> list[tuple[str, str]]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from .comparison import Difference
@@ -24,16 +24,9 @@ class Analysis:
         What the study's figures are drawn from.
     differences
         What was compared, p adjusted over all.
-    headline
-        Title of the estimate that a report speaks of first; the table's first one if it has none
-        of this title.
-    groups
-        The lines of the table by what they are compared within, if that is not the whole.
     """
 
     table: tuple[Summary, ...]
     notes: tuple[str, ...] = ()
     cases: Sequence[Any] = ()
     differences: tuple[Difference, ...] = ()
-    headline: str = ""
-    groups: Mapping[str, Sequence[Summary]] = field(default_factory=dict)

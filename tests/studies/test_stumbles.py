@@ -2,29 +2,20 @@
 
 import numpy as np
 import pytest
-from made_up_results import hierarchies, scaling, wheel_failure
+from made_up_results import hierarchies, wheel_failure
 from matplotlib.figure import Figure
 
 import nested_agents as na
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.interface.measures import SUCCESS
 from nested_agents.studies.catalogue.learning_curve import metrics_of
-from nested_agents.studies.catalogue.scaling import analyse as analyse_scaling
 from nested_agents.studies.catalogue.wheel_failure import analyse as analyse_failures
 from nested_agents.studies.catalogue.wheel_failure import draw as draw_failures
 from nested_agents.studies.claims import claims
 from nested_agents.studies.claims.table import latex
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.presentation.figures import log_axis
-from nested_agents.studies.report import words
 from nested_agents.topologies.drawing import draw
-
-
-def test_a_verdict_on_sizes_compares_within_a_size() -> None:
-    said = words.verdicts(analyse_scaling(scaling({2: 0.9, 8: 0.4}).frames()))
-    assert said.startswith("2 robots: ")
-    assert " 8 robots: " in said
-    assert said.count("highest is") == 2
 
 
 def test_every_failure_is_marked() -> None:

@@ -84,8 +84,7 @@ def analyse(results: Results) -> Analysis:
         cases.append(Case(str(columns.get("name", condition)), setting, optimal))
         estimates = {titled(plays): estimate for plays, estimate in optimal.items()}
         table.append(Summary(condition, len(steps), estimates))
-    headline = titled(max((max(case.optimal) for case in cases), default=0))
-    return Analysis(tuple(table), tuple(_side_by_side(cases)), cases, headline=headline)
+    return Analysis(tuple(table), tuple(_side_by_side(cases)), cases)
 
 
 def titled(plays: int) -> str:

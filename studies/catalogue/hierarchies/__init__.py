@@ -146,7 +146,7 @@ def analyse(results: Results) -> Analysis:
     verdicts = verdicts_of(results, cases)
     compared = tuple(d for verdict in verdicts for d in verdict.comparisons)
     notes = (*_legend(cases), *_verdict_lines(verdicts), *_highest(cases))
-    return Analysis(tuple(table), notes, cases, compared, EVALUATED)
+    return Analysis(tuple(table), notes, cases, compared)
 
 
 def _cases(results: Results) -> tuple[Case, ...]:

@@ -139,9 +139,7 @@ def analyse(results: Results) -> Analysis:
         own = [c for c in conditions if results.has(c, "training", m.name)]
         if own and (m.name == SUCCESS.name or not m.is_rate):
             followed.append(Followed(m, {c: results.values(c, m.name) for c in own}))
-    titles = {title for line in table for title in line.estimates}
-    headline = EVALUATED if EVALUATED in titles else f"success last {BLOCK}"
-    return Analysis(tuple(table), cases=followed, headline=headline)
+    return Analysis(tuple(table), cases=followed)
 
 
 def draw(analysis: Analysis) -> dict[str, Figure]:

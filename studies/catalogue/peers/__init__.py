@@ -120,7 +120,7 @@ def analyse(results: Results) -> Analysis:
         notes.append(f"\nsuccess against that of {conditions[0]} (p adjusted):")
     notes += [f"  {other.condition}: {other.shown}" for other in compared]
     notes += power_lines(compared)
-    return Analysis(tuple(table), tuple(notes), courses, compared, EVALUATED)
+    return Analysis(tuple(table), tuple(notes), courses, compared)
 
 
 def draw(analysis: Analysis) -> dict[str, Figure]:

@@ -126,7 +126,7 @@ def analyse(results: Results) -> Analysis:
         columns = results.columns.get(condition, {})
         cases.append(Case(str(columns.get("name", condition)), _world(columns), values))
         table.append(Summary(condition, len(steps), values))
-    return Analysis(tuple(table), NOTES, cases, headline=EVALUATED)
+    return Analysis(tuple(table), NOTES, cases)
 
 
 def _world(columns: Mapping[str, Any]) -> str:

@@ -176,22 +176,19 @@ def analyse(results: Results) -> Analysis:
     bodies = counted_bodies(results.columns, sizes)
     points = [_point(results, c, sizes, bodies) for c in conditions]
     table: list[Summary] = []
-    groups: dict[str, list[Summary]] = {}
     for condition, point in zip(conditions, points, strict=True):
         evaluations = evaluated(results, condition)
         titles = (*COLUMNS[:1], *evaluations, *COLUMNS[1:])
         shown = {title: point.values[title] for title in titles if title in point.values}
         label = condition if condition != str(point.robots) else _counted(point.robots, bodies)
-        line = Summary(label, len(point.seeds), shown)
-        table.append(line)
-        groups.setdefault(_counted(point.robots, "robots"), []).append(line)
+        table.append(Summary(label, len(point.seeds), shown))
     notes = [
         f"\n{evaluator}, time with n agents: "
         + ", ".join(f"{what} n^{_exponent_text(power)}" for what, power in by_what.items())
         for evaluator, by_what in exponents_of(points).items()
     ]
     notes += _messages_by_size(points, bodies)
-    return Analysis(tuple(table), tuple(notes), points, groups=groups)
+    return Analysis(tuple(table), tuple(notes), points)
 
 
 def _point(results: Results, condition: str, sizes: Mapping[str, int], bodies: str) -> Point:

@@ -109,7 +109,7 @@ def analyse(results: Results) -> Analysis:
         contender = contender.partition(",")[0]  # "single agent, 2 carts" is the single agent
         agents = int(numbers["agents"][0])
         contests.append(Contest(contender, agents, rates(success), milliseconds))
-    return Analysis(tuple(table), NOTES, contests, headline=EVALUATED)
+    return Analysis(tuple(table), NOTES, contests)
 
 
 def smoothed(curve: Estimate, episodes: int = SMOOTHED) -> np.ndarray:

@@ -113,8 +113,8 @@ def _keeping_weights(session: Session) -> Team:
     }
     frozen = settings.model_copy(update={"learner": FrozenSettings(**common)})
     _, team = build(frozen, session.trial.seed)
-    arrays = session.team.arrays()
-    team.restore({name: arrays[name] for name in team.arrays()})
+    own, arrays = team.arrays(), session.team.arrays()
+    team.restore({name: arrays.get(name, own[name]) for name in own})
     return team
 
 
@@ -195,7 +195,7 @@ def analyse(results: Results) -> Analysis:
     notes = ["Named after the colon is what adapts to the failure."] if courses else []
     notes += ["\nsuccess at the end against nothing adapting (p adjusted):"] if gains else []
     notes += [f"  {gain.condition}: {gain.shown}" for gain in gains] + power_lines(gains)
-    return Analysis(tuple(map(_summary, courses)), tuple(notes), courses, gains, "end")
+    return Analysis(tuple(map(_summary, courses)), tuple(notes), courses, gains)
 
 
 def courses_of(results: Results) -> list[Course]:

@@ -27,7 +27,7 @@ def test_a_finished_study_has_everything(finished):
         "summary", "table", "claims", "figures", "replay", "spec", "versions",
     ]  # fmt: skip
     assert "All 6 trials are done." in html
-    assert "evaluation success: highest is" in html
+    assert "success, evaluation, less that of default:" in html
     assert "preset = [\n    &#34;default&#34;,\n    &#34;frozen&#34;,\n]" in html
     assert len(html) < 500_000
 

@@ -1,14 +1,7 @@
 import Box2D
-import numpy as np
 import pytest
 
 from nested_agents.studies.report import words
-from nested_agents.studies.results.statistics import Estimate
-from nested_agents.studies.results.summary import Summary
-
-
-def line(condition, *numbers):
-    return Summary(condition, 8, {"success": Estimate(*map(np.asarray, numbers))})
 
 
 @pytest.mark.parametrize(
@@ -23,27 +16,6 @@ def line(condition, *numbers):
 )
 def test_standing(counts, said):
     assert words.standing(*counts).startswith(said)
-
-
-def test_nobody_and_one_alone():
-    assert words.contest([], None) == ""
-    assert words.contest([line("ours", 0.5, 0.4, 0.6)], None) == (
-        "success: ours .50 [.40–.60] over 8 seeds."
-    )
-
-
-def test_an_unknown_interval_is_not_taken_for_one():
-    table = [line("ours", 0.5, 0.4, 0.6), line("other", 0.1, np.nan, np.nan)]
-    assert words.contest(table, "no such title") == (
-        "success: highest is ours, .50 [.40–.60]. Interval not known: other .10."
-    )
-
-
-def test_many_are_counted():
-    table = [line("ours", 0.9, 0.8, 1.0), *(line(f"c{i}", 0.1, 0.0, 0.2) for i in range(7))]
-    said = words.contest(table, "success")
-    assert "Intervals wholly below: c0 .10 [0–.20]" in said
-    assert said.endswith("c3 .10 [0–.20] and 3 more.")
 
 
 def test_places_of_the_machine_are_shortened():

@@ -37,7 +37,8 @@ class Drivers:
     robots, box, model
         What is in the world, and what is believed of it.
     action_set, increment, seconds
-        As of `ScriptedController`.
+        As in the scenario: actions, what an increment changes as a fraction of the greatest
+        speed, and the decision period [s].
 
     Attributes
     ----------
