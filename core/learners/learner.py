@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Literal, Protocol
+from typing import Annotated, Literal, Protocol
 
 from pydantic import Field
 
@@ -15,9 +15,6 @@ from ..numerics.arrays import FloatArray
 from ..plugins.plugged import Plugged
 from ..plugins.settings import PartSettings
 from ..rules.settings import RuleBaseSettings
-
-if TYPE_CHECKING:
-    pass
 
 
 class Learner(Protocol):

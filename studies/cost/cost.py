@@ -31,7 +31,6 @@ from ...core.agents.team import Team
 from ...core.decision.settings import Decision
 from ...core.evaluators.coordination import VariableEliminationSettings
 from ...core.evaluators.evaluator import Counts
-from ...core.evaluators.exact import ExactSettings
 from ...core.interface.hierarchy import Hierarchy
 from ...core.interface.scenario import Scenario
 from ...core.learners.td import TDLambdaSettings
@@ -56,7 +55,7 @@ RULES = MEMBERSHIPS**2
 """|S| of an agent in what is counted and timed."""
 LEARNER = TDLambdaSettings(
     rule_base=RuleBaseSettings(membership="sigmoid", memberships=MEMBERSHIPS, order=2),
-    decision=Decision(rule="value", evaluator=ExactSettings()),
+    decision=Decision(rule="value", evaluator="exact"),
 )
 """The learner that is counted and timed: the paper's, over the two variables of line-up."""
 COORDINATED = LEARNER.model_copy(
