@@ -27,7 +27,7 @@ from nested_agents.scenarios.box_pushing.prediction.push import push
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.world.boxes import BoxSpec
 from nested_agents.scenarios.box_pushing.world.geometry import wrap
-from nested_agents.scenarios.box_pushing.world.robots import RobotSpec
+from nested_agents.scenarios.box_pushing.world.settings import RobotSettings
 
 from .crowd import SLOT_GAP, Crowd
 from .sides import SPREAD, Side, behind, is_concave, sides_of
@@ -52,7 +52,7 @@ class ScriptedController:
 
     def __init__(
         self,
-        robots: Sequence[RobotSpec],
+        robots: Sequence[RobotSettings],
         box: BoxSpec,
         action_set: ActionSet | None = None,
         increment: float = 0.5,

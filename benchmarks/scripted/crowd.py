@@ -29,7 +29,7 @@ from nested_agents.scenarios.box_pushing.options.routes import paths
 from nested_agents.scenarios.box_pushing.prediction.push import PushModel, push
 from nested_agents.scenarios.box_pushing.world.boxes import BoxSpec
 from nested_agents.scenarios.box_pushing.world.geometry import wrap
-from nested_agents.scenarios.box_pushing.world.robots import RobotSpec
+from nested_agents.scenarios.box_pushing.world.settings import RobotSettings
 
 from .sides import SPREAD, Side
 
@@ -91,7 +91,7 @@ class Crowd:
 
     def __init__(
         self,
-        robots: Sequence[RobotSpec],
+        robots: Sequence[RobotSettings],
         box: BoxSpec,
         model: PushModel,
         drivers: Drivers,
