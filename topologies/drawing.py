@@ -8,18 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..core.interface.hierarchy import Hierarchy
 from ..core.numerics.arrays import FloatArray
-from ..core.plugins.deferred import Deferred
-
-if TYPE_CHECKING:
-    import networkx as nx
-else:
-    nx = Deferred("networkx")
+from ..core.plugins.deferred import nx
 
 COLUMNS = 6
 """Levels side by side before the picture is folded."""
