@@ -57,7 +57,7 @@ def draw(analysis: Analysis) -> dict[str, Figure]:
     from ...presentation import forest
 
     panels = [
-        forest.Panel(f"success {title}", [d for d in analysis.differences if d.measure == title])
+        forest.Panel(title, [d for d in analysis.differences if d.measure == title])
         for title in analysis.cases
     ]
     figure = forest.draw(panels, "difference from the first condition")
