@@ -24,6 +24,8 @@ from ..study import run_training as measure
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+PUBLISHED = ("success",)
+"""Measures of an episode that published results keep."""
 PHASES = {"training success": "training", EVALUATED: "evaluation"}
 """The measures: success rates in these phases."""
 
