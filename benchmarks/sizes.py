@@ -17,9 +17,10 @@ from rich.console import Console
 from rich.table import Table
 
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
-from nested_agents.scenarios.box_pushing.scripted.controller import decisions_to_goal
 from nested_agents.scenarios.box_pushing.world.settings import BoxSettings
 from nested_agents.studies.results.statistics import rate
+
+from .scripted.controller import decisions_to_goal
 
 STARTS = ("easy", "medium")
 SIZES = (2, 4, 8, 16, 32, 64)

@@ -1,8 +1,14 @@
-"""A world small enough to reason about, for tests that need a scenario but no physics."""
+"""A world small enough to reason about, for tests that need a scenario but no physics.
+
+It also makes the benchmarks importable, which are no part of the package: their controller plays in
+tests, too.
+"""
 
 import os
+import sys
 from collections.abc import Iterator
 from math import pi
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +18,8 @@ from nested_agents.core.interface.prediction import Blocks
 from nested_agents.core.interface.scenario import Transition
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.scenarios.box_pushing.world.settings import BoxSettings, label
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 # The first example of a test may compile a kernel.
 settings.register_profile("no deadline", deadline=None)

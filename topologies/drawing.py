@@ -14,13 +14,10 @@ import numpy as np
 
 from ..core.interface.hierarchy import Hierarchy
 from ..core.numerics.arrays import FloatArray
-from ..core.plugins.deferred import Deferred
+from ..core.plugins.deferred import nx
 
 if TYPE_CHECKING:
-    import networkx as nx
     from matplotlib.axes import Axes
-else:
-    nx = Deferred("networkx")
 
 COLUMNS = 6
 """Levels side by side before the picture is folded."""

@@ -11,7 +11,7 @@ import numpy as np
 from ..adaptation.calibration import Calibration
 from ..adaptation.mirror import Mirror
 from ..adaptation.self_model import SelfModel
-from ..decision.exploration import Explorer, Greedy
+from ..decision.exploration import Explorer
 from ..evaluators.evaluator import NOTHING_GIVEN, DecisionProblem, Deliberation, Evaluator
 from ..interface.acting import Actors
 from ..interface.hierarchy import Hierarchy
@@ -21,6 +21,7 @@ from ..interface.spaces import ActionSet
 from ..learners.batch import ReplaySettings
 from ..learners.learner import Learner, LearnerSettings
 from ..numerics.arrays import FloatArray, IntArray
+from ..numerics.ties import greatest
 from ..rules.rule_base import RuleBase
 from .rows import rows_of
 
@@ -79,7 +80,6 @@ class Team:
         conditional = isinstance(problem, DecisionProblem) and problem.teammates == "conditional"
         self.given: FloatArray = np.ones(shape if conditional else (0, 0, 0, 0))
         """The same given each action of another ``(n, A, n, A)``, if the evaluator asks for it."""
-        self._greedy: Explorer = Greedy()
         # Agents in the order of decision, each with those before it that it does not see.
         order = hierarchy.order
         self._order = [
@@ -202,7 +202,6 @@ class Team:
         n, n_actions = len(self.hierarchy), len(self.action_set)
         if self.evaluator is None:
             return self.rng.integers(n_actions, size=n)
-        explorer = self.explorer if explore else self._greedy
         frequencies = self.seen / self.seen.sum(axis=1, keepdims=True)
         theta = self.learner.theta
         weights = [theta[row] for row in self.rows]
@@ -216,9 +215,12 @@ class Team:
                 i, known, prediction, weights, frequencies, self.rng, self._given_by(i)
             )
             values = self.evaluator.values(deliberation)
-            joint[i] = explorer.choose(i, values, self.rng)
+            if explore:
+                joint[i] = self.explorer.choose(i, values, self.rng)
+            else:
+                joint[i] = greatest(values, self.rng)
         if explore:
-            explorer.advance()
+            self.explorer.advance()
             every = np.arange(n)
             self.seen[every, joint] += 1.0
             if self.given.size:

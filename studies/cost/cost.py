@@ -20,7 +20,7 @@ from fractions import Fraction
 from functools import cache
 from math import log
 from statistics import median
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -31,21 +31,15 @@ from ...core.agents.team import Team
 from ...core.decision.settings import Decision
 from ...core.evaluators.coordination import VariableEliminationSettings
 from ...core.evaluators.evaluator import Counts
-from ...core.evaluators.exact import ExactSettings
 from ...core.interface.hierarchy import Hierarchy
 from ...core.interface.scenario import Scenario
 from ...core.learners.td import TDLambdaSettings
-from ...core.plugins.deferred import Deferred
+from ...core.plugins.deferred import stats
 from ...core.rules.settings import RuleBaseSettings
 from ...scenarios.line_up import LineUp, LineUpSettings
 from ...topologies import build, parse
 from ...topologies.view import team_of
 from ..results.statistics import Estimate
-
-if TYPE_CHECKING:
-    from scipy import stats
-else:
-    stats = Deferred("scipy.stats")
 
 SINGLE_AGENT = "single-agent"
 """Stands in place of a topology for the one agent of Eq. 23."""
@@ -56,7 +50,7 @@ RULES = MEMBERSHIPS**2
 """|S| of an agent in what is counted and timed."""
 LEARNER = TDLambdaSettings(
     rule_base=RuleBaseSettings(membership="sigmoid", memberships=MEMBERSHIPS, order=2),
-    decision=Decision(rule="value", evaluator=ExactSettings()),
+    decision=Decision(rule="value", evaluator="exact"),
 )
 """The learner that is counted and timed: the paper's, over the two variables of line-up."""
 COORDINATED = LEARNER.model_copy(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
@@ -84,7 +85,9 @@ def _writers(store: Store, form: Form) -> dict[str, Callable[[Path], None]]:
 def _write_csv(frame: DataFrame, path: Path) -> None:
     """Write a frame as CSV: truth values as 0 and 1, texts as they may stand in a spreadsheet."""
     with replacing(path) as file:
-        write_frame(frame, file)
+        text = io.TextIOWrapper(file, encoding="utf-8", newline="", write_through=True)
+        write_frame(text, frame)
+        text.detach()
 
 
 def _write_parquet(frame: DataFrame, path: Path) -> None:

@@ -19,7 +19,7 @@ PACKAGE = Path(__file__).parents[2]
 """Where the package is installed."""
 COMPUTING = ("core", "topologies", "scenarios", "studies/trials", "studies/catalogue")
 """Folders whose modules compute results."""
-SILENT = ("checking", "pictures", "scripted", "environments.py", "figure.py", "drawing.py")
+SILENT = ("checking", "pictures", "environments.py", "figure.py", "drawing.py")
 """Parts of them that do not."""
 GROUPS = "nested_agents."
 """With what the names of entry-point groups begin under which packages offer things."""

@@ -28,11 +28,9 @@ class TrialLogger(Protocol):
 
     def trial(self, trial: Trial, result: TrialResult) -> None:
         """Learn what a trial has measured: ``result.rows`` are its episodes."""
-        ...
 
     def close(self) -> None:
         """Learn that no trial will follow."""
-        ...
 
 
 def make(name: str, spec: Spec, directory: Path) -> TrialLogger:

@@ -11,8 +11,8 @@ import numpy as np
 from ....core.numerics.arrays import FloatArray, IntArray
 from ..prediction.predictors import push_model
 from ..scenario import BoxPushing
-from ..scripted.driving import Drivers
 from ..world.geometry import wrap
+from .driving import Drivers
 from .points import pushing_points
 
 WAITING_GAP = 0.015

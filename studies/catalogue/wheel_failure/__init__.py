@@ -113,8 +113,8 @@ def _keeping_weights(session: Session) -> Team:
     }
     frozen = settings.model_copy(update={"learner": FrozenSettings(**common)})
     _, team = build(frozen, session.trial.seed)
-    arrays = session.team.arrays()
-    team.restore({name: arrays[name] for name in team.arrays()})
+    own, arrays = team.arrays(), session.team.arrays()
+    team.restore({name: arrays.get(name, own[name]) for name in own})
     return team
 
 

@@ -12,6 +12,7 @@ import pytest
 from nested_agents.core.agents.joint_agents import join_agents
 from nested_agents.core.agents.rows import carried_rows
 from nested_agents.core.agents.team import Team
+from nested_agents.core.decision.exploration import BurstExploration
 from nested_agents.core.evaluators.exact import ExactEnumeration
 from nested_agents.core.evaluators.sampling import Sampling
 from nested_agents.core.interface.hierarchy import Hierarchy
@@ -216,7 +217,7 @@ def test_actions_are_passed_down_and_the_unseen_maintain(edges, told, world) -> 
 def test_frequencies_are_what_was_seen(world) -> None:
     team = team_of("random", world)
     team.evaluator = Witness([0, 1, 3, 0])  # type: ignore[assignment]
-    team.explorer = team._greedy
+    team.explorer = BurstExploration(rate=0.0, floor=0.0).build(4)
     world.reset(0)
     for _ in range(6):
         team.act(world.predict())

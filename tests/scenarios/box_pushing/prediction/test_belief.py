@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from benchmarks.scripted.controller import ScriptedController
 from nested_agents.core.adaptation.calibration import CalibrationSettings
 from nested_agents.core.agents.joint_agents import join_agents
 from nested_agents.core.agents.loop import control_loop, policy_seed
@@ -20,7 +21,6 @@ from nested_agents.scenarios.box_pushing.prediction.belief import (
 from nested_agents.scenarios.box_pushing.prediction.prediction import mean_twists
 from nested_agents.scenarios.box_pushing.prediction.push import push
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
-from nested_agents.scenarios.box_pushing.scripted.controller import ScriptedController
 from nested_agents.topologies import build
 
 SOFT = {"stiffness": 0.5, "load": 2.0, "contact_friction": 0.5}

@@ -14,8 +14,9 @@ from rich.console import Console
 from rich.table import Table
 
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
-from nested_agents.scenarios.box_pushing.scripted.controller import decisions_to_goal
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
+
+from .controller import decisions_to_goal
 
 STARTS = ("easy", "medium", "hard")
 STEPS = 200

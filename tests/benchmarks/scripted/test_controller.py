@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
-from nested_agents.scenarios.box_pushing.scenario import BoxPushing
-from nested_agents.scenarios.box_pushing.scripted.controller import (
+from benchmarks.scripted.controller import (
     ScriptedController,
     decisions_to_goal,
 )
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
+from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
 

@@ -5,7 +5,7 @@ the robots that are not at their slot there (a short search over sequences of ac
 around the box and clear of the others), and once all are, pushes: it tries the joint actions on the
 push predictor and takes the one after which the box is nearest to the goal and best aligned, with
 the robots still at their slots. Three robots and more push a convex box in another way, see
-`box_pushing.scripted.crowd`. It knows the whole situation and remembers nothing.
+`benchmarks.scripted.crowd`. It knows the whole situation and remembers nothing.
 """
 
 from __future__ import annotations
@@ -18,17 +18,18 @@ from typing import Any
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from ....core.interface.spaces import ActionSet
-from ....core.numerics.arrays import FloatArray, IntArray
-from ..prediction.predictors import push_model
-from ..prediction.push import push
-from ..scenario import BoxPushing
-from ..world.boxes import BoxSpec
-from ..world.geometry import wrap
-from ..world.robots import RobotSpec
+from nested_agents.core.interface.spaces import ActionSet
+from nested_agents.core.numerics.arrays import FloatArray, IntArray
+from nested_agents.scenarios.box_pushing.options.driving import CLEARANCE, Drivers
+from nested_agents.scenarios.box_pushing.options.routes import paths
+from nested_agents.scenarios.box_pushing.prediction.predictors import push_model
+from nested_agents.scenarios.box_pushing.prediction.push import push
+from nested_agents.scenarios.box_pushing.scenario import BoxPushing
+from nested_agents.scenarios.box_pushing.world.boxes import BoxSpec
+from nested_agents.scenarios.box_pushing.world.geometry import wrap
+from nested_agents.scenarios.box_pushing.world.settings import RobotSettings
+
 from .crowd import SLOT_GAP, Crowd
-from .driving import CLEARANCE, Drivers
-from .routes import paths
 from .sides import SPREAD, Side, behind, is_concave, sides_of
 
 CROWD = 3
@@ -47,24 +48,11 @@ class ScriptedController:
     action_set, increment, seconds
         As in the scenario: actions, what an increment changes as a fraction of the greatest
         speed, and the decision period [s].
-
-    Examples
-    --------
-    >>> from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
-    >>> scenario = BoxPushingSettings(start="easy").build()
-    >>> _ = scenario.reset(1)
-    >>> controller = ScriptedController(scenario.world.robots, scenario.box)
-    >>> for step in range(60):
-    ...     transition = scenario.step(controller.act(scenario.measure()))
-    ...     if transition.terminated:
-    ...         break
-    >>> transition.terminated
-    True
     """
 
     def __init__(
         self,
-        robots: Sequence[RobotSpec],
+        robots: Sequence[RobotSettings],
         box: BoxSpec,
         action_set: ActionSet | None = None,
         increment: float = 0.5,

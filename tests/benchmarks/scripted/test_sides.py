@@ -4,7 +4,7 @@ from math import pi
 
 import pytest
 
-from nested_agents.scenarios.box_pushing.scripted.sides import (
+from benchmarks.scripted.sides import (
     SPREAD,
     SQUARE,
     behind,

@@ -3,8 +3,8 @@
 import numpy as np
 
 from nested_agents.core.interface.spaces import ActionSet
+from nested_agents.scenarios.box_pushing.options.driving import Drivers
 from nested_agents.scenarios.box_pushing.prediction.predictors import push_model
-from nested_agents.scenarios.box_pushing.scripted.driving import Drivers
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
-from nested_agents.scenarios.box_pushing.scenario import BoxPushing
-from nested_agents.scenarios.box_pushing.scripted.controller import (
+from benchmarks.scripted.controller import (
     ScriptedController,
     decisions_to_goal,
 )
-from nested_agents.scenarios.box_pushing.scripted.crowd import CONE, Crowd
+from benchmarks.scripted.crowd import CONE, Crowd
+from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
+from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 
 
 def crowd_of(robots: int) -> tuple[BoxPushing, Crowd]:

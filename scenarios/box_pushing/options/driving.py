@@ -19,7 +19,8 @@ from ....core.numerics.arrays import FloatArray, IntArray
 from ..prediction.push import PushModel
 from ..world.boxes import BoxSpec
 from ..world.geometry import wrap
-from ..world.robots import RobotSpec, nominal_effect
+from ..world.robots import nominal_effect
+from ..world.settings import RobotSettings
 from .routes import moved, paths
 
 CLEARANCE = 0.006
@@ -36,7 +37,8 @@ class Drivers:
     robots, box, model
         What is in the world, and what is believed of it.
     action_set, increment, seconds
-        As of `ScriptedController`.
+        As in the scenario: actions, what an increment changes as a fraction of the greatest
+        speed, and the decision period [s].
 
     Attributes
     ----------
@@ -48,7 +50,7 @@ class Drivers:
 
     def __init__(
         self,
-        robots: Sequence[RobotSpec],
+        robots: Sequence[RobotSettings],
         box: BoxSpec,
         model: PushModel,
         action_set: ActionSet,
@@ -129,7 +131,7 @@ def _distinct(speeds: FloatArray) -> Any:
     return same.argmax(axis=2) == np.arange(speeds.shape[1])
 
 
-def _robot_actions(robot: RobotSpec, n_actions: int) -> IntArray:
+def _robot_actions(robot: RobotSettings, n_actions: int) -> IntArray:
     """Return the combinations ``(k, w)`` of actions to try: wheels of one side act alike."""
     sides = [int(np.sign(wheel.y)) for wheel in robot.wheels]
     groups = sorted(set(sides))

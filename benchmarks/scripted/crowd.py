@@ -23,13 +23,14 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from ....core.numerics.arrays import BoolArray, FloatArray, IntArray
-from ..prediction.push import PushModel, push
-from ..world.boxes import BoxSpec
-from ..world.geometry import wrap
-from ..world.robots import RobotSpec
-from .driving import CLEARANCE, Drivers
-from .routes import paths
+from nested_agents.core.numerics.arrays import BoolArray, FloatArray, IntArray
+from nested_agents.scenarios.box_pushing.options.driving import CLEARANCE, Drivers
+from nested_agents.scenarios.box_pushing.options.routes import paths
+from nested_agents.scenarios.box_pushing.prediction.push import PushModel, push
+from nested_agents.scenarios.box_pushing.world.boxes import BoxSpec
+from nested_agents.scenarios.box_pushing.world.geometry import wrap
+from nested_agents.scenarios.box_pushing.world.settings import RobotSettings
+
 from .sides import SPREAD, Side
 
 SLOT_GAP = 0.015
@@ -90,7 +91,7 @@ class Crowd:
 
     def __init__(
         self,
-        robots: Sequence[RobotSpec],
+        robots: Sequence[RobotSettings],
         box: BoxSpec,
         model: PushModel,
         drivers: Drivers,

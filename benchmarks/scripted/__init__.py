@@ -1,0 +1,1 @@
+"""A controller that knows the whole situation: what it solves shows what can be solved."""

@@ -1,1 +1,0 @@
-"""A scripted controller: the proof that the task can be solved."""
