@@ -1,4 +1,4 @@
-"""Figures of an explanation: functions of one variable, pairs, policy, self-model."""
+"""Figures of an explanation: functions of one variable, policy, self-model."""
 
 from __future__ import annotations
 
@@ -14,13 +14,11 @@ from ...core.numerics.arrays import FloatArray
 from ..presentation import figures
 from ..presentation.figures import COLOURS, add_legend, look, marker
 from .body import ROWS, Bodies, body_name, by_body
-from .rules import exponent, labels, percent, strongest_pairs
+from .rules import exponent, percent
 from .team import Explanation
 
 MOST_LINES = 8
 """Agents in one figure of functions."""
-MOST_MAPS = 4
-"""Agents in the figure of pairs."""
 MOST_BODIES = 8
 """Bodies in the figure of the self-model."""
 
@@ -37,8 +35,6 @@ def _figures(explained: Explanation) -> Iterator[tuple[str, Figure]]:
         for number, first in enumerate(blocks, 1):
             name = "functions" if len(blocks) == 1 else f"functions-{number}"
             yield name, _functions(explained, slice(first, first + MOST_LINES))
-        if strongest_pairs(explained.parts):
-            yield "pairs", _pairs(explained)
     if not isinstance(explained.policy, str):
         yield "policy", explained.policy.figure()
     if explained.bodies is not None:
@@ -90,29 +86,6 @@ def _scale(explained: Explanation) -> tuple[float, str]:
     """Return what consequents are multiplied by to be read, and what an axis says of it."""
     power = exponent(explained.parts)
     return 10.0**power, rf" [$\times 10^{{{-power}}}$]" if power else ""
-
-
-def _pairs(explained: Explanation) -> Figure:
-    pairs, parts = strongest_pairs(explained.parts), explained.parts[:MOST_MAPS]
-    size = 2.5 * len(parts) + 1.2, 2.4 * len(pairs) + 0.3
-    figure, panels = figures.panels(len(pairs), len(parts), size)
-    times, unit_of_f = _scale(explained)
-    greatest = max(float(np.abs(p.pairs[pair]).max()) for p in parts for pair in pairs) * times
-    for row, (j, k) in zip(panels, pairs, strict=True):
-        words = [labels(explained.variables[i], explained.rules.partitions[i]) for i in (j, k)]
-        for axes, name, part in zip(row, explained.agents, parts, strict=False):
-            image = axes.imshow(
-                times * part.pairs[j, k], cmap="cividis", vmin=-greatest, vmax=greatest,
-                origin="lower", aspect="auto",
-            )  # fmt: skip
-            axes.set_title(f"{name}, {percent(part.share(part.pairs[j, k]))}", loc="left")
-            axes.set_xticks(range(len(words[1])), words[1], rotation=40, ha="right", fontsize=7)
-            axes.set_yticks(range(len(words[0])), words[0], fontsize=7)
-            axes.set_xlabel(explained.variables[k].name)
-        row[0].set_ylabel(explained.variables[j].name)
-    label = f"adds to f beyond either alone{unit_of_f}"
-    figure.colorbar(image, ax=panels, label=label, shrink=0.8)
-    return figure
 
 
 def _bodies(actuators: tuple[str, ...], bodies: Bodies) -> Figure:
