@@ -94,13 +94,19 @@ def _bodies(actuators: tuple[str, ...], bodies: Bodies) -> Figure:
     every = [effect for effects in moments.values() for effect in effects]
     # What no body does is not drawn: a joint can but turn.
     rows = [k for k in range(len(ROWS)) if any(effect[k, :-1].any() for effect in every)]
-    # All bodies on one scale.
-    figure, panels = figures.panels(n_bodies, len(rows), (8.0, 1.9 * n_bodies + 0.6), sharey="col")
+    figure, panels = figures.panels(n_bodies, len(rows), (8.0, 1.9 * n_bodies + 0.6))
+    # All bodies on one scale, and ahead and left too, which have one unit.
+    extent = {unit: [0.0] for _, unit in ROWS}
+    for effect in every:
+        for row, (_, unit) in enumerate(ROWS):
+            extent[unit] += effect[row, :-1].tolist()
+    limits = {name: (1.08 * min(extent[unit]), 1.08 * max(extent[unit])) for name, unit in ROWS}
     for r, (axes_row, own) in enumerate(zip(panels, by_body(bodies, actuators), strict=False)):
         names = [name.rpartition(".")[2] for name in own]
         for axes, row in zip(axes_row, rows, strict=True):
             name, unit = ROWS[row]
             _bars(axes, names, {m: effects[r][row, :-1] for m, effects in moments.items()})
+            axes.set_ylim(limits[name])
             if r == 0:
                 axes.set_title(f"{name} [{unit} per m/s]", loc="left")
         axes_row[0].set_ylabel(body_name(own))
