@@ -20,7 +20,7 @@ from fractions import Fraction
 from functools import cache
 from math import log
 from statistics import median
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -34,17 +34,12 @@ from ...core.evaluators.evaluator import Counts
 from ...core.interface.hierarchy import Hierarchy
 from ...core.interface.scenario import Scenario
 from ...core.learners.td import TDLambdaSettings
-from ...core.plugins.deferred import Deferred
+from ...core.plugins.deferred import stats
 from ...core.rules.settings import RuleBaseSettings
 from ...scenarios.line_up import LineUp, LineUpSettings
 from ...topologies import build, parse
 from ...topologies.view import team_of
 from ..results.statistics import Estimate
-
-if TYPE_CHECKING:
-    from scipy import stats
-else:
-    stats = Deferred("scipy.stats")
 
 SINGLE_AGENT = "single-agent"
 """Stands in place of a topology for the one agent of Eq. 23."""
@@ -146,7 +141,7 @@ def agents_below(text: str, n: int) -> Sequence[int]:
     """
     if text in ("chain", "chain:reversed", "chain:interleaved"):
         return range(n)  # a thousand hierarchies of a thousand agents take their time
-    return below_counts(build(text, team_of(n, None, None).agents, pairs(n)))
+    return below_counts(build(text, team_of(n)[0], pairs(n)))
 
 
 def pairs(n: int) -> tuple[tuple[int, ...], ...]:
