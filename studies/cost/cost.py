@@ -141,7 +141,7 @@ def agents_below(text: str, n: int) -> Sequence[int]:
     """
     if text in ("chain", "chain:reversed", "chain:interleaved"):
         return range(n)  # a thousand hierarchies of a thousand agents take their time
-    return below_counts(build(text, team_of(n, None, None).agents, pairs(n)))
+    return below_counts(build(text, team_of(n)[0], pairs(n)))
 
 
 def pairs(n: int) -> tuple[tuple[int, ...], ...]:
