@@ -15,12 +15,11 @@ if TYPE_CHECKING:
 
 @click.command()
 @options.directory
-@click.option(
-    "--format",
-    "form",
-    type=click.Choice(["csv", "parquet", "json"]),
-    default="csv",
-    help="Of the files; parquet needs the extra nested-agents[parquet]. Distances and returns are "
+@options.formats(
+    "csv",
+    "parquet",
+    "json",
+    text="Of the files; parquet needs the extra nested-agents[parquet]. Distances and returns are "
     "left out of json.",
 )
 @click.option(
