@@ -67,14 +67,13 @@ def errors(
     decision = Decision(evaluator=SamplingSettings(samples=8), teammates=teammates)
     found: dict[str, list[tuple[float, float]]] = {}
     for seed in range(FIRST_SEED, FIRST_SEED + seeds):
-        team = Team.build(
-            BatchTDSettings(decision=decision), scenario, hierarchy, policy_seed(seed)
-        )
+        team = Team(BatchTDSettings(decision=decision), scenario, hierarchy, policy_seed(seed))
         rules = team.learner.rules  # type: ignore[attr-defined]
         problem = DecisionProblem(
             rules, hierarchy, len(scenario.action_set), scenario.groups, "value", teammates, 0.95,
         )  # fmt: skip
-        references, evaluator = _references(problem), Sampling(64, problem)
+        references = _references(problem)
+        evaluator = Sampling(SamplingSettings(samples=64), problem)
         rng = np.random.default_rng(seed)
         frequencies = rng.dirichlet(np.full(4, 3.0), size=n)
         for record in control_loop(scenario, team, episodes=TRAINING + 1, steps=steps, seed=seed):
@@ -106,7 +105,7 @@ def _references(problem: DecisionProblem) -> list[Evaluator]:
     """Return what is taken for exact."""
     if len(problem.hierarchy) <= LARGEST_EXACT:
         return [ExactEnumeration(problem)]
-    return [Sampling(SAMPLES, problem) for _ in range(REPLICATES)]
+    return [Sampling(SamplingSettings(samples=SAMPLES), problem) for _ in range(REPLICATES)]
 
 
 def times(n_agents: int, budget: float = 3.0) -> dict[str, float]:

@@ -15,12 +15,12 @@ from scipy.linalg import expm
 
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.failures import WheelFailures
-from nested_agents.scenarios.box_pushing.world.robots import (
-    ROBOTS,
-    RobotSpec,
-    nominal_effect,
+from nested_agents.scenarios.box_pushing.world.robots import ROBOTS, nominal_effect
+from nested_agents.scenarios.box_pushing.world.settings import (
+    CONTROL_PERIOD,
+    Failure,
+    RobotSettings,
 )
-from nested_agents.scenarios.box_pushing.world.settings import CONTROL_PERIOD, Failure
 from nested_agents.scenarios.box_pushing.world.world import World
 
 PERIODS, SPEED = 40, 0.04
@@ -29,22 +29,22 @@ COLUMN = {"none": 1.0, "seized": 0.0, "weak": 0.3, "reversed": -1.0, "stuck": 0.
 NOISY_SEEDS, NOISY_PERIODS = 1000, 10
 
 
-def told(robot: RobotSpec) -> Any:
+def told(robot: RobotSettings) -> Any:
     """Return the commanded wheel speeds [m/s]."""
     return np.linspace(0.75, 1.0, len(robot.wheels)) * SPEED
 
 
-def found(robot: RobotSpec, failure: dict[str, Any] | None) -> Any:
+def found(robot: RobotSettings, failure: dict[str, Any] | None) -> Any:
     """Return the twist, in the robot's frame, that the world shows [m/s, m/s, rad/s]."""
     world, ill = start(robot, failure)
     for held in ill.driven(told(robot), PERIODS):
         world.advance(held, 1)
-    (vx, vy, omega), heading = world.robot_twists[0], world.robot_poses[0, 2]
+    (vx, vy, omega), heading = world.twists[1], world.robot_poses[0, 2]
     cos, sin = np.cos(heading), np.sin(heading)
     return np.array([cos * vx + sin * vy, cos * vy - sin * vx, omega])
 
 
-def start(robot: RobotSpec, failure: dict[str, Any] | None) -> tuple[World, WheelFailures]:
+def start(robot: RobotSettings, failure: dict[str, Any] | None) -> tuple[World, WheelFailures]:
     """Return a robot far from any box, and its failure."""
     world = World([robot], BOXES["square"])
     world.place(np.array([[-2.0, 0.0, 0.0]]), np.zeros(3))
@@ -55,7 +55,7 @@ def start(robot: RobotSpec, failure: dict[str, Any] | None) -> tuple[World, Whee
     return world, ill
 
 
-def expected(robot: RobotSpec, kind: str) -> Any:
+def expected(robot: RobotSettings, kind: str) -> Any:
     """Return the twist that theory gives."""
     effect = nominal_effect(robot)
     if kind == "free":
@@ -66,7 +66,7 @@ def expected(robot: RobotSpec, kind: str) -> Any:
     return effect @ np.append(told(robot), 1.0)
 
 
-def freely(robot: RobotSpec) -> Any:
+def freely(robot: RobotSettings) -> Any:
     """Return the twist with the first wheel free: of M v' = B u - K v, from rest."""
     resistance, drive = np.zeros((3, 3)), np.zeros((3, len(robot.wheels)))
     for w, wheel in enumerate(robot.wheels):
@@ -81,7 +81,7 @@ def freely(robot: RobotSpec) -> Any:
     return expm(system * PERIODS * CONTROL_PERIOD)[:3, 3:].sum(axis=1)
 
 
-def ways(robot: RobotSpec, failure: dict[str, Any], periods: int, seeds: int) -> Any:
+def ways(robot: RobotSettings, failure: dict[str, Any], periods: int, seeds: int) -> Any:
     """Return how far the robot comes straight ahead, seed by seed [m]."""
     world, ill = start(robot, failure)
     result = []
@@ -94,7 +94,7 @@ def ways(robot: RobotSpec, failure: dict[str, Any], periods: int, seeds: int) ->
     return np.array(result)
 
 
-def table(robot: RobotSpec) -> None:
+def table(robot: RobotSettings) -> None:
     """Print a table in Markdown."""
     print(f"| {robot.name} | ahead [mm/s] | theory | yaw rate [rad/s] | theory |")
     print("|---|---|---|---|---|")

@@ -100,12 +100,12 @@ class NaiveWorld(World):
         self._before[r], self._applied[r] = [vx, vy, omega], total
 
     def infrared(self) -> FloatArray:
-        """Return what the infrared sensors read, ``(M, S)`` in [0, 1], of box and robots."""
+        """Return what the infrared sensors read, ``(1, M, S)`` in [0, 1], of box and robots."""
         reach, decay = self.sensor.reach, self.sensor.decay
         readings: FloatArray = np.zeros(self._sensors.shape)
         for r, (body, robot) in enumerate(zip(self._bodies, self.robots, strict=True)):
             x, y = body.position
-            for k, direction in enumerate(robot.sensors):
+            for k, direction in enumerate(self._sensors[r]):
                 angle = body.angle + direction
                 dx, dy = UNIT * cos(angle), UNIT * sin(angle)
                 near, far = robot.radius, robot.radius + reach
@@ -115,4 +115,4 @@ class NaiveWorld(World):
                 )
                 if nearest.fraction < 1.0:
                     readings[r, k] = exp(-nearest.fraction * reach / decay)
-        return readings
+        return readings[None]

@@ -77,7 +77,7 @@ class Run:
         if self.count % RUN == 0:
             self.world.place(*self.start)
         self.world.advance(self.speeds[self.count % RUN], 1)
-        self.readings = self.world.infrared()
+        self.readings = self.world.infrared().max(axis=0)
         self.count += 1
 
 

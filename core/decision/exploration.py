@@ -8,7 +8,7 @@ resting wheel lead to the same state).
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Protocol
+from typing import Annotated, Any, ClassVar, Literal, Protocol
 
 import numpy as np
 from pydantic import Field
@@ -50,23 +50,6 @@ class Explorer(Protocol):
 
 class ExplorationSettings(PartSettings):
     """What the settings of all kinds of exploration inherit; `build` is given how many agents."""
-
-
-class Greedy:
-    """Always the action of greatest value."""
-
-    def __init__(self) -> None:
-        self.memory: FloatArray = np.zeros(0)
-
-    def begin_episode(self) -> None:
-        """Nothing depends on time."""
-
-    def advance(self) -> None:
-        """Nothing depends on time."""
-
-    def choose(self, agent: int, values: FloatArray, rng: np.random.Generator) -> int:
-        """Return the greatest action."""
-        return greatest(values, rng)
 
 
 class BoltzmannExploration(ExplorationSettings):
@@ -175,6 +158,7 @@ class BurstExploration(ExplorationSettings):
     """
 
     kind: Literal["burst"] = "burst"
+    factory: ClassVar[str] = f"{__name__}:Bursts"
     rate: Fraction = 0.3
     """Fraction of explorative decisions in the first episode."""
     decay: Fraction = 0.75
@@ -186,10 +170,6 @@ class BurstExploration(ExplorationSettings):
     always; none: no limit."""
     length: Annotated[float, Field(ge=1)] = 4.0
     """Mean number of decisions for which a random action is repeated."""
-
-    def build(self, n_agents: int) -> Explorer:
-        """Return the explorer of a team of `n_agents`."""
-        return Bursts(self, n_agents)
 
 
 class Bursts:

@@ -14,11 +14,11 @@ EVALUATORS = SettingsRegistry(
     "evaluator",
     {
         "auto": f"{__name__}.auto:AutoSettings",
-        "exact": f"{__name__}.exact:ExactSettings",
+        "exact": f"{__name__}.exact:ExactEnumeration",
         "sampling": f"{__name__}.sampling:SamplingSettings",
         "variable-elimination": f"{__name__}.coordination:VariableEliminationSettings",
         "max-plus": f"{__name__}.coordination:MaxPlusSettings",
-        "best-response": f"{__name__}.best_response:BestResponseSettings",
+        "best-response": f"{__name__}.best_response:BestResponse",
         "cross-entropy": f"{__name__}.cross_entropy:CrossEntropySettings",
     },
     EvaluatorSettings,

@@ -10,9 +10,9 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from .best_response import BestResponseSettings
+from . import EVALUATORS
 from .evaluator import DecisionProblem, Evaluator, EvaluatorSettings
-from .exact import MOST_JOINT_ACTIONS, ExactSettings
+from .exact import MOST_JOINT_ACTIONS
 from .sampling import Samples, SamplingSettings
 
 
@@ -37,8 +37,8 @@ class AutoSettings(EvaluatorSettings):
         hierarchy = problem.hierarchy
         free = max(1 + len(hierarchy.below(i)) for i in range(len(hierarchy)))
         if free <= self.exact_up_to and problem.n_actions**free <= MOST_JOINT_ACTIONS:
-            return ExactSettings()
+            return EVALUATORS.parsed("exact")
         is_large = free > self.sampling_up_to or problem.value_of != "own"
         if is_large and problem.teammates == "best-response":
-            return BestResponseSettings()
+            return EVALUATORS.parsed("best-response")
         return SamplingSettings(samples=self.samples)

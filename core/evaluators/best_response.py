@@ -17,33 +17,17 @@ The number of joint actions tried grows linearly with the number of bodies.
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ..interface.prediction import Prediction
 from ..numerics.arrays import FloatArray, IntArray
 from ..numerics.ties import greatest
-from .evaluator import (
-    Aggregation,
-    DecisionProblem,
-    Deliberation,
-    EvaluatorSettings,
-    combinations,
-)
+from .evaluator import Aggregation, DecisionProblem, Deliberation, combinations
 
 CUTS = (0.25, 0.5, 0.75)
 """Where a team is cut in two, as shares of its bodies in the order of decision."""
-
-
-class BestResponseSettings(EvaluatorSettings):
-    """Best responses around a plan, for teams of any size."""
-
-    kind: Literal["best-response"] = "best-response"
-
-    def build(self, problem: DecisionProblem) -> BestResponse:
-        """Return the evaluator of a team."""
-        return BestResponse(problem)
 
 
 class _Known(NamedTuple):

@@ -10,7 +10,7 @@ from nothing. It learns nothing and has the reward function: a control for what 
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -26,6 +26,7 @@ class CrossEntropySettings(EvaluatorSettings):
     """Plan several decisions ahead by the cross-entropy method; decides by rewards alone."""
 
     kind: Literal["cross-entropy"] = "cross-entropy"
+    factory: ClassVar[str] = f"{__name__}:CrossEntropy"
     horizon: Annotated[int, Field(ge=1, le=50)] = 4
     """Decisions that a plan looks ahead."""
     samples: Annotated[int, Field(ge=2, le=100_000)] = 32
@@ -36,10 +37,6 @@ class CrossEntropySettings(EvaluatorSettings):
     """Fraction of the plans of an iteration whose frequencies the next one draws by."""
     smoothing: Annotated[float, Field(ge=0, le=1)] = 0.1
     """Weight of equal probabilities in those that the next iteration draws by."""
-
-    def build(self, problem: DecisionProblem) -> CrossEntropy:
-        """Return the evaluator of a team."""
-        return CrossEntropy(self, problem)
 
 
 class CrossEntropy(Aggregation):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Protocol
+from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
@@ -12,10 +12,8 @@ from ..interface.hierarchy import Hierarchy
 from ..interface.prediction import Prediction
 from ..numerics.arrays import FloatArray, IntArray
 from ..plugins.settings import PartSettings
+from ..rules.rule_base import RuleBase
 from .pooled import Pooled, Pooling
-
-if TYPE_CHECKING:
-    from ..rules.rule_base import RuleBase
 
 Rule = Literal["value", "reward", "reward-and-value"]
 """By what a joint action is valued."""
@@ -86,7 +84,6 @@ class Evaluator(Protocol):
 
     def values(self, deliberation: Deliberation) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent."""
-        ...
 
 
 @dataclass(frozen=True)

@@ -2,39 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any
 
 import numpy as np
 
 from ..numerics.arrays import FloatArray, IntArray
-from .evaluator import (
-    Aggregation,
-    DecisionProblem,
-    Deliberation,
-    EvaluatorSettings,
-    combinations,
-    probabilities_of,
-)
-
-if TYPE_CHECKING:
-    from ..rules.kernels.enumeration import Tried
+from ..rules.kernels.enumeration import Tried
+from .evaluator import Aggregation, DecisionProblem, Deliberation, combinations, probabilities_of
 
 MOST_JOINT_ACTIONS = 4**12
 """The most that one agent enumerates: beyond, the tables do not fit into memory."""
 
 
-class ExactSettings(EvaluatorSettings):
-    """Enumerate all joint actions of the agents below, as the paper does."""
-
-    kind: Literal["exact"] = "exact"
-
-    def build(self, problem: DecisionProblem) -> ExactEnumeration:
-        """Return the evaluator of a team."""
-        return ExactEnumeration(problem)
-
-
 class ExactEnumeration(Aggregation):
-    """Tries every joint action of the agents below: ``A ** (1 + len(below))`` per agent.
+    """Tries every joint action of the agents below, as the paper: ``A ** (1 + len(below))`` each.
 
     If all agents together try at least as many joint actions as there are, and the prediction has
     tables of all, next states are taken from there; else they are predicted for the joint actions

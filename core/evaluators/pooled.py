@@ -8,15 +8,13 @@ the variables that they share. So the mean of many agents costs little more than
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ..interface.prediction import Prediction, states_by_group
 from ..numerics.arrays import FloatArray, IntArray
-
-if TYPE_CHECKING:
-    from ..rules.rule_base import RuleBase
+from ..rules.rule_base import RuleBase
 
 
 class Pooled(NamedTuple):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -24,12 +24,9 @@ class SamplingSettings(EvaluatorSettings):
     """Try a random sample of the joint actions of the agents below."""
 
     kind: Literal["sampling"] = "sampling"
+    factory: ClassVar[str] = f"{__name__}:Sampling"
     samples: Samples = 64
     """Joint actions of the agents below that are tried with each own action."""
-
-    def build(self, problem: DecisionProblem) -> Sampling:
-        """Return the evaluator of a team."""
-        return Sampling(self.samples, problem)
 
 
 class Sampling(Aggregation):
@@ -45,14 +42,14 @@ class Sampling(Aggregation):
         If the teammate model is conditional on the own action.
     """
 
-    def __init__(self, samples: int, problem: DecisionProblem) -> None:
+    def __init__(self, settings: SamplingSettings, problem: DecisionProblem) -> None:
         super().__init__(problem)
         if problem.teammates == "conditional":
             raise ValueError(
                 "learner.decision.teammates = 'conditional': sampling evaluates best-response, "
                 "uniform, empirical; use exact"
             )
-        self.samples = samples
+        self.samples = settings.samples
 
     def values(self, deliberation: Deliberation) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent."""

@@ -29,18 +29,17 @@ They are consequent weights like any others: the agent decides by its rules, not
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
 from ..numerics.arrays import FloatArray, IntArray
 from ..plugins.settings import Fraction
+from ..rules.kernels import regression
+from ..rules.rule_base import RuleBase
 from .batch import REWARD_SCALE, Replay, ReplaySettings
-
-if TYPE_CHECKING:
-    from ..rules.rule_base import RuleBase
-    from .dictionary import Dictionary
+from .dictionary import Dictionary
 
 MOST_RULES = 5**9
 """Of one agent; beyond, the weights alone take more memory than a workstation has to spare."""
@@ -89,8 +88,6 @@ class AnovaTD(Replay):
         self._coefficients: FloatArray = np.zeros((len(self.theta), settings.dictionary))
 
     def _empty(self) -> list[Dictionary]:
-        from .dictionary import Dictionary
-
         s = self._anova
         return [
             Dictionary(self._sizes, s.interaction, s.tolerance, s.dictionary) for _ in self.theta
@@ -98,8 +95,6 @@ class AnovaTD(Replay):
 
     def _regress(self) -> int:
         from scipy.linalg import cho_factor, cho_solve
-
-        from ..rules.kernels import regression
 
         self._extend()
         s = self._anova
@@ -124,8 +119,6 @@ class AnovaTD(Replay):
     def _consequents(self, row: int) -> FloatArray:
         """Return theta of the coefficients of a row."""
         from scipy.linalg import solve_triangular
-
-        from ..rules.kernels import regression
 
         held = self._dictionaries[row]
         u = self._coefficients[row, : len(held.members)]

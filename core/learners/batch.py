@@ -11,17 +11,16 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, NamedTuple
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
 from ..numerics.arrays import FloatArray, IntArray
 from ..plugins.settings import Fraction, Positive
+from ..rules.kernels import regression
+from ..rules.rule_base import RuleBase
 from .learner import LearnerSettings
-
-if TYPE_CHECKING:
-    from ..rules.rule_base import RuleBase
 
 REWARD_SCALE = 100.0
 """Rewards are of the order of 0.01; the ridge weighs against rewards times this."""
@@ -224,8 +223,6 @@ class BatchTD(Replay):
     def _regress(self) -> int:
         from scipy.linalg import cho_factor
         from scipy.linalg.lapack import dpotrs  # `cho_solve` without what that does around it
-
-        from ..rules.kernels import regression
 
         self._extend()
         s = self.settings

@@ -6,16 +6,14 @@ one that was lucky (Kapetanakis and Kudenko 2002).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from ..numerics.arrays import FloatArray, IntArray
 from ..plugins.settings import NonNegative
+from ..rules.rule_base import RuleBase
 from .online import OneStep, OneStepSettings
-
-if TYPE_CHECKING:
-    from ..rules.rule_base import RuleBase
 
 
 class FMQSettings(OneStepSettings):

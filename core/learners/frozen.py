@@ -2,53 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Literal
-
-import numpy as np
+from typing import ClassVar, Literal
 
 from ..numerics.arrays import FloatArray, IntArray
+from ..rules.rule_base import RuleBase
 from .learner import LearnerSettings
-
-if TYPE_CHECKING:
-    from ..rules.rule_base import RuleBase
+from .online import Online
 
 
 class FrozenSettings(LearnerSettings):
     """No learning: the consequents stay zero. The control of every learning curve."""
 
     kind: Literal["frozen"] = "frozen"
-
-    def build(self, rules: RuleBase, rows: IntArray) -> Frozen:
-        """Return the learner of a team."""
-        return Frozen(rules, rows)
+    factory: ClassVar[str] = f"{__name__}:Frozen"
 
 
-class Frozen:
+class Frozen(Online):
     """Never learns: the consequent weights stay as they are, zero from the start."""
 
-    def __init__(self, rules: RuleBase, rows: IntArray) -> None:
-        self.theta: FloatArray = np.zeros((int(rows.max()) + 1, rules.n_rules), rules.dtype)
+    kept = ("theta",)
 
-    def begin_episode(self) -> None:
-        """Nothing to forget."""
+    def __init__(self, settings: FrozenSettings, rules: RuleBase, rows: IntArray) -> None:
+        super().__init__(settings.discount, rules, rows)
 
-    def observe(self, states: FloatArray, reward: float | FloatArray, terminated: bool) -> int:
-        """Change nothing."""
+    def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
         return 0
-
-    def end_episode(self) -> int:
-        """Change nothing."""
-        return 0
-
-    def arrays(self) -> dict[str, FloatArray]:
-        """Return the consequent weights."""
-        return {"theta": self.theta}
-
-    def restore(self, arrays: Mapping[str, FloatArray]) -> None:
-        """Take over the consequent weights."""
-        self.theta = arrays["theta"].copy()
-
-    def continue_from(self, former: Frozen, rows: IntArray) -> None:
-        """Begin with the consequent weights of another team."""
-        self.theta = former.theta[rows]

@@ -6,17 +6,16 @@ of the expected TD error given the features, learned with its own step size beta
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from ..numerics.arrays import FloatArray, IntArray
 from ..plugins.settings import Fraction, Positive
+from ..rules.kernels.updates import add_features, td_update
+from ..rules.rule_base import RuleBase
 from .learner import LearnerSettings
 from .online import Online
-
-if TYPE_CHECKING:
-    from ..rules.rule_base import RuleBase
 
 
 class GradientTDSettings(LearnerSettings):
@@ -56,8 +55,6 @@ class GradientTD(Online):
         self.second: FloatArray = np.zeros_like(self.theta)
 
     def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
-        from ..rules.kernels.updates import add_features, td_update
-
         s, rules, rows = self.settings, self.rules, self.rows
         delta = self.errors(self.theta, states, rewards, entered)
         expected = rules.each(self.of_agents(self.second), states[:, None])[:, 0]

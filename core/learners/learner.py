@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Literal, Protocol
+from typing import Annotated, Literal, Protocol
 
 from pydantic import Field
 
@@ -15,9 +15,6 @@ from ..numerics.arrays import FloatArray
 from ..plugins.plugged import Plugged
 from ..plugins.settings import PartSettings
 from ..rules.settings import RuleBaseSettings
-
-if TYPE_CHECKING:
-    pass
 
 
 class Learner(Protocol):
@@ -36,7 +33,6 @@ class Learner(Protocol):
 
     def begin_episode(self) -> None:
         """Forget what reached into the past: an episode begins."""
-        ...
 
     def observe(self, states: FloatArray, reward: float | FloatArray, terminated: bool) -> int:
         """Take in the states entered; return the number of consequent weights changed.
@@ -50,19 +46,15 @@ class Learner(Protocol):
         terminated
             Whether they are terminal.
         """
-        ...
 
     def end_episode(self) -> int:
         """Learn what is learned after an episode. Returns the number of weights changed."""
-        ...
 
     def arrays(self) -> dict[str, FloatArray]:
         """Return everything that `restore` needs."""
-        ...
 
     def restore(self, arrays: Mapping[str, FloatArray]) -> None:
         """Continue from `arrays`."""
-        ...
 
 
 class TeamSettings(PartSettings):

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ..numerics.arrays import FloatArray, IntArray
 from ..plugins.settings import Positive
+from ..rules.kernels.updates import add_features
+from ..rules.rule_base import RuleBase
 from .learner import LearnerSettings
-
-if TYPE_CHECKING:
-    from ..rules.rule_base import RuleBase
 
 
 class Online(ABC):
@@ -140,8 +139,6 @@ class OneStep(Online):
             ``(n,)`` or one for all: what steps are divided by; the squared lengths of phi if none
             is given.
         """
-        from ..rules.kernels.updates import add_features
-
         if lengths is None:
             lengths = self.rules.squared_lengths(states)
         steps = self.settings.step_size * delta / lengths

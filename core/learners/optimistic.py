@@ -7,16 +7,13 @@ let them fall, more slowly than they rise.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from ..numerics.arrays import FloatArray
 from ..plugins.settings import Fraction
 from .online import OneStep, OneStepSettings
-
-if TYPE_CHECKING:
-    pass
 
 
 class OptimisticTDSettings(OneStepSettings):

@@ -7,16 +7,14 @@ the value of a state is the value of an action (Watkins and Dayan 1992).
 from __future__ import annotations
 
 from itertools import product
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from ..numerics.arrays import FloatArray, IntArray
 from ..plugins.settings import Positive
+from ..rules.rule_base import RuleBase
 from .online import OneStep, OneStepSettings
-
-if TYPE_CHECKING:
-    from ..rules.rule_base import RuleBase
 
 
 class QLearningSettings(OneStepSettings):

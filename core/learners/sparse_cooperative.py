@@ -6,15 +6,12 @@ What all are paid together is shared out equally, so that the parts add up to it
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from ..numerics.arrays import FloatArray
 from .online import OneStep, OneStepSettings
-
-if TYPE_CHECKING:
-    pass
 
 
 class SparseCooperativeSettings(OneStepSettings):

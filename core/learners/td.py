@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 
 from ..numerics.arrays import FloatArray, IntArray
 from ..plugins.settings import Fraction, Positive
+from ..rules.rule_base import RuleBase
 from .learner import LearnerSettings
 from .online import Online
-
-if TYPE_CHECKING:
-    from ..rules.rule_base import RuleBase
 
 
 class TDLambdaSettings(LearnerSettings):

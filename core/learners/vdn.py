@@ -6,7 +6,7 @@ agent alike, who learn what their parts must be for the sum to be right.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -14,9 +14,6 @@ from ..numerics.arrays import FloatArray
 from ..plugins.settings import Positive
 from .online import OneStepSettings
 from .sparse_cooperative import SparseCooperative
-
-if TYPE_CHECKING:
-    pass
 
 
 class ValueDecompositionSettings(OneStepSettings):

@@ -76,8 +76,8 @@ class SettingsRegistry(Registry):
         ValueError
             If its settings are not of this kind, or it cannot be called.
         """
-        if name in self.built_in and isinstance(thing, type):
-            return cast(type[Settings], thing)
+        if name in self.built_in and isinstance(thing, type) and issubclass(thing, Settings):
+            return thing
         key = name, id(thing)
         if key not in self._adapted:
             self._adapted[key] = thing, self._derived(name, thing)
@@ -111,7 +111,7 @@ class SettingsRegistry(Registry):
             model.build = build  # type: ignore[attr-defined]
         return cast(type[Settings], model)
 
-    def parsed(self, text: str) -> Settings:
+    def parsed(self, text: str) -> Any:
         """Return the settings that a name alone stands for.
 
         Raises

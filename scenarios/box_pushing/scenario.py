@@ -168,8 +168,8 @@ class BoxPushing:
         for name, (x, y) in zip(self.robot.wheel_names, wheels, strict=True):
             if (x, -y) not in wheels:
                 raise ValueError(
-                    f"learner.mirrored: wheel {name!r} of robot {self.robot.name!r} has no wheel "
-                    "opposite"
+                    f"learner.mirrored: wheel {name!r} of robot "
+                    f"{self.robot.name or 'own'!r} has no wheel opposite"
                 )
         opposite = [wheels.index((x, -y)) for x, y in wheels]
         return tuple(group[k] for group in self.groups for k in opposite)
@@ -212,7 +212,7 @@ class BoxPushing:
             of_box = mean_twists(box[None], self.world.box_pose[None], period)
             twists = np.concatenate([of_box, twists])
         measured = self.measure()
-        readings = self.settings.infrared.noisy(self.world.infrared_of_box(), self._sensing)
+        readings = self.settings.infrared.noisy(self.world.infrared()[0], self._sensing)
         terminated = self._reached()
         gained = reward(
             self._task,

@@ -5,7 +5,7 @@ An option that may be given several times takes several values at once, too: `co
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 import click
@@ -26,9 +26,9 @@ def complete(command: click.Command, arguments: Iterable[str]) -> Iterator[str]:
 
     Examples
     --------
-    >>> command = click.Command("run", params=[click.Option(["--log"], multiple=True)])
-    >>> list(complete(command, ["--log", "a", "b", "--jobs", "3"]))
-    ['--log', 'a', '--log', 'b', '--jobs', '3']
+    >>> command = click.Command("run", params=[click.Option(["--set"], multiple=True)])
+    >>> list(complete(command, ["--set", "a", "b", "--jobs", "3"]))
+    ['--set', 'a', '--set', 'b', '--jobs', '3']
     """
     options = {
         name: option
@@ -140,11 +140,20 @@ where = click.option(
 )
 """A part of the trials, see `nested_agents.studies.results.selection.Where`."""
 
-form = click.option(
-    "--format",
-    "form",
-    type=click.Choice(["table", "markdown", "latex", "csv"]),
-    default="table",
-    help="How to print the table; CSV holds every digit, LaTeX needs the package booktabs.",
+
+def formats(
+    *choices: str, text: str = "How to print it."
+) -> Callable[[Callable[..., int]], Callable[..., int]]:
+    """Return the option ``--format``, whose default is the first choice."""
+    kind = click.Choice(choices)
+    return click.option("--format", "form", type=kind, default=choices[0], help=text)
+
+
+form = formats(
+    "table",
+    "markdown",
+    "latex",
+    "csv",
+    text="How to print the table; CSV holds every digit, LaTeX needs the package booktabs.",
 )
 """How a table of estimates is printed."""

@@ -8,8 +8,8 @@ begins so, and is no number, gets an apostrophe in front. Numbers stay numbers.
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any, BinaryIO, TextIO
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any, TextIO
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -25,27 +25,27 @@ def write_csv(file: TextIO, names: Sequence[str], rows: Iterable[Sequence[Any]])
     writer.writerows(map(harmless, row) for row in rows)
 
 
-def write_frame(frame: DataFrame, file: BinaryIO) -> None:
+def write_frame(file: TextIO, frame: DataFrame) -> None:
     """Write a frame with a header; truth values are 0 and 1, what is missing is an empty cell."""
-    columns = {}
-    for name, column in frame.items():
-        if column.dtype in ("bool", "boolean"):
-            columns[harmless(name)] = column.astype("Int64")
-        elif column.dtype.kind in "if":
-            columns[harmless(name)] = column
-        else:
-            columns[harmless(name)] = column.map(harmless, na_action="ignore")
-    type(frame)(columns).to_csv(file, index=False, lineterminator="\n", mode="wb")
+    write_csv(file, list(frame.columns), rows_of(frame))
+
+
+def rows_of(frame: DataFrame) -> Iterator[tuple[Any, ...]]:
+    """Yield the rows of a frame as values of Python's own types; None is what is missing."""
+    values: Any = frame.astype(object).where(frame.notna(), None)
+    yield from values.itertuples(index=False, name=None)
 
 
 def harmless(value: Any) -> Any:
-    """Return a value as it may stand in a spreadsheet.
+    """Return a value as it may stand in a spreadsheet, a truth value as 0 or 1.
 
     Examples
     --------
     >>> [harmless(value) for value in ("=1+1", "@SUM(A1)", "-0.5", -0.5, "chain", None)]
     ["'=1+1", "'@SUM(A1)", '-0.5', -0.5, 'chain', None]
     """
+    if isinstance(value, bool):
+        return int(value)
     if not isinstance(value, str) or not value.lstrip(" \n").startswith(FORMULA):
         return value
     try:

@@ -1,117 +1,74 @@
 """Rows of results written as a table to read, as CSV or as JSON.
 
-The table is for a terminal of 80 columns: it names condition and phase once, above their rows, and
-rounds. What the condition's label tells already, the swept keys, is left to CSV and JSON.
+The table is for a terminal: it names condition and phase once, above their rows, and rounds. What
+the condition's label says already, the swept keys, is left to CSV and JSON.
 """
 
 from __future__ import annotations
 
+import io
 import json
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from itertools import combinations, pairwise
+from collections.abc import Sequence
 from shutil import get_terminal_size
-from textwrap import wrap
-from typing import Any, Literal, TextIO
+from typing import TYPE_CHECKING, Any, Literal, TextIO
+
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
 
 from ...core.interface.measures import Measure
-from .csv_text import write_csv
+from .csv_text import rows_of, write_frame
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 Format = Literal["table", "csv", "json"]
 
 FORMATS = {"seed": "d", "episode": "d", "steps": "d", "return": ".4g"}
 """How values are shown that all scenarios have; measures see to theirs."""
-HEADER = 3
-"""Lines that a heading is broken into, at most."""
 MISSING = "–"
 
 
-@dataclass(frozen=True)
-class Column:
-    """A column of the table, as text.
-
-    Attributes
-    ----------
-    heading
-        Its heading, line by line.
-    cells
-        A cell for every row.
-    """
-
-    heading: tuple[str, ...]
-    cells: tuple[str, ...]
-
-    @property
-    def width(self) -> int:
-        """How wide it is."""
-        return max(map(len, (*self.heading, *self.cells)))
-
-
-def write_rows(
-    names: Sequence[str],
-    rows: Sequence[Sequence[Any]],
-    measures: Sequence[Measure],
-    form: Format,
-    file: TextIO,
-) -> None:
-    """Write rows with their column names, some of which are those of `measures`.
+def write_rows(frame: DataFrame, measures: Sequence[Measure], form: Format, file: TextIO) -> None:
+    """Write a frame of episodes, some of whose columns are those of `measures`.
 
     CSV and JSON hold every digit, so equal results are equal bytes. Truth values are 0 and 1 in
     CSV, true and false in JSON.
     """
     if form == "csv":
-        write_csv(file, names, rows)
+        write_frame(file, frame)
     elif form == "json":
-        rates = {measure.name for measure in measures if measure.is_rate}
-        truths = {i for i, name in enumerate(names) if name in rates}
-        lines = []
-        for row in rows:
-            values = [bool(v) if i in truths and v is not None else v for i, v in enumerate(row)]
-            lines.append(json.dumps(dict(zip(names, values, strict=True))))
+        names = list(frame.columns)
+        lines = [json.dumps(dict(zip(names, row, strict=True))) for row in rows_of(frame)]
         file.write("[" + ",\n ".join(lines) + "]\n")
     else:
-        file.write("\n".join(_table(names, rows, measures)) + "\n")
+        text = io.StringIO()  # a console would end the program when its reader goes away
+        console = Console(file=text, width=get_terminal_size().columns, highlight=False)
+        for (condition, phase), rows in frame.groupby(["condition", "phase"], sort=False):
+            console.print(f"\n{escape(condition)}, {escape(phase)}")
+            console.print(_table(rows, {m.name: m for m in measures}))
+        file.write(text.getvalue())
 
 
-def _table(
-    names: Sequence[str], rows: Sequence[Sequence[Any]], measures: Sequence[Measure]
-) -> Iterator[str]:
-    """Yield the lines of the table: a header, then the rows of each condition below its label."""
-    by_name = {measure.name: measure for measure in measures}
-    found = {
-        name: _column(name, [row[i] for row in rows], by_name.get(name))
-        for i, name in enumerate(names)
-        if name in FORMATS or name in by_name
-    }
-    width = get_terminal_size().columns
-    columns, gap = _fitting(found, width)
-    height = max(len(column.heading) for column in columns)
-    header = [_padded(column.heading, height) for column in columns]
-    cells = zip(*(head + c.cells for head, c in zip(header, columns, strict=True)), strict=True)
-    widths = [column.width for column in columns]
-    lines = [
-        gap.join(cell.rjust(wide) for cell, wide in zip(row, widths, strict=True)).rstrip()
-        for row in cells
-    ]
-    yield from lines[:height]
-    above = [i for i, name in enumerate(names) if name in ("condition", "phase")]
-    last: list[Any] = []
-    for row, line in zip(rows, lines[height:], strict=True):
-        here = [row[i] for i in above]
-        if here != last:
-            yield ""
-            yield from wrap(", ".join(here), width)
-            last = here
-        yield line
-    if hidden := [name for name, column in found.items() if column not in columns]:
-        yield from ("", *wrap(f"no room for {', '.join(hidden)}: CSV and JSON have them", width))
+def _table(frame: DataFrame, measures: dict[str, Measure]) -> Table:
+    """Return the rows of one condition; no word and no number is broken if there is any room."""
+    table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, header_style="")
+    shown = [name for name in frame.columns if name in FORMATS or name in measures]
+    cells = [_cells(frame[[name]], measures.get(name)) for name in shown]
+    for name, texts in zip(shown, cells, strict=True):
+        heading = measures[name].heading if name in measures else name
+        least = max(map(len, [*heading.split(), *texts]))
+        table.add_column(escape(heading), justify="right", vertical="bottom", min_width=least)
+    for row in zip(*cells, strict=True):
+        table.add_row(*row)
+    return table
 
 
-def _column(name: str, values: Sequence[Any], measure: Measure | None) -> Column:
-    """Return the column of a measure, or if it is none, of what all scenarios have."""
-    form = FORMATS[name] if measure is None else _format(measure, values)
-    cells = tuple(MISSING if value is None else format(value, form) for value in values)
-    return Column(_broken(name if measure is None else measure.heading), cells)
+def _cells(column: DataFrame, measure: Measure | None) -> list[str]:
+    """Return the values of a column as text."""
+    values = [value for (value,) in rows_of(column)]
+    form = FORMATS[column.columns[0]] if measure is None else _format(measure, values)
+    return [MISSING if value is None else format(value, form) for value in values]
 
 
 def _format(measure: Measure, values: Sequence[Any]) -> str:
@@ -122,46 +79,3 @@ def _format(measure: Measure, values: Sequence[Any]) -> str:
     if largest >= 1000.0:
         return ".4g"
     return ".2f" if measure.unit == "1" else ".3f"
-
-
-def _broken(heading: str) -> tuple[str, ...]:
-    """Return a heading broken into lines so that it is narrow, and then short.
-
-    Examples
-    --------
-    >>> _broken("stopped at goal"), _broken("steps")
-    (('stopped', 'at goal'), ('steps',))
-    """
-    words = heading.split()
-    breaks = (
-        cut for k in range(min(HEADER, len(words))) for cut in combinations(range(1, len(words)), k)
-    )
-    broken = [
-        tuple(" ".join(words[a:b]) for a, b in pairwise((0, *cut, len(words)))) for cut in breaks
-    ]
-    return min(broken, key=lambda lines: (max(map(len, lines)), len(lines)), default=(heading,))
-
-
-def _padded(heading: tuple[str, ...], height: int) -> tuple[str, ...]:
-    """Return a heading of as many lines, empty ones first."""
-    return ("",) * (height - len(heading)) + heading
-
-
-def _fitting(columns: dict[str, Column], width: int) -> tuple[list[Column], str]:
-    """Return the columns that there is room for, and the gap between them.
-
-    If not even narrow gaps let all of them fit, the last measures are left out.
-    """
-    found = dict(columns)
-    for gap in ("  ", " "):
-        if _width(found, gap) <= width:
-            return list(found.values()), gap
-    for name in reversed([name for name in columns if name not in FORMATS]):
-        del found[name]
-        if _width(found, gap) <= width:
-            break
-    return list(found.values()), gap
-
-
-def _width(columns: dict[str, Column], gap: str) -> int:
-    return sum(column.width for column in columns.values()) + len(gap) * (len(columns) - 1)

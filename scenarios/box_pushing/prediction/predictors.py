@@ -24,8 +24,8 @@ from ....core.numerics.arrays import FloatArray, IntArray
 from ..states.view import View
 from ..world.boxes import BoxSpec
 from ..world.failures import WheelFailures
-from ..world.robots import RobotSpec, compliance
-from ..world.settings import CONTROL_PERIOD
+from ..world.robots import compliance
+from ..world.settings import CONTROL_PERIOD, RobotSettings
 from ..world.world import World, WorldState
 from .prediction import BoxPrediction
 from .push import PushModel
@@ -38,7 +38,7 @@ IMMOBILE = 1e6
 
 def push_model(
     predictor: str,
-    robots: list[RobotSpec],
+    robots: list[RobotSettings],
     box: BoxSpec,
     belief: BeliefSettings = BeliefSettings(),  # noqa: B008 - frozen
 ) -> PushModel:

@@ -21,8 +21,7 @@ from ....core.numerics.arrays import FloatArray
 from ....core.plugins.messages import closest
 from .geometry import Outline
 from .polygons import LARGEST, Moments, Vertices, centred, convex_pieces, moments, polygon_edges
-from .robots import GRAVITY
-from .settings import BoxSettings
+from .settings import GRAVITY, BoxSettings
 
 AREA = 0.04
 """Of every box in the table [m2]: that of a square of 20 cm."""

@@ -14,7 +14,8 @@ import numpy as np
 from ....core.numerics.arrays import FloatArray
 from ....core.numerics.compiling import njit
 from .geometry import disc_hit, ray, surface
-from .robots import RobotSpec
+from .robots import E_PUCK_SENSORS
+from .settings import RobotSettings
 
 
 @njit(cache=True)
@@ -89,7 +90,7 @@ def infrared_readings(
     return out
 
 
-def sensor_directions(robots: Sequence[RobotSpec]) -> FloatArray:
+def sensor_directions(robots: Sequence[RobotSettings]) -> FloatArray:
     """Return the directions ``(M, S)`` of the robots' sensors [rad].
 
     Raises
@@ -97,7 +98,8 @@ def sensor_directions(robots: Sequence[RobotSpec]) -> FloatArray:
     ValueError
         If robots have different numbers of sensors.
     """
-    counts = {len(robot.sensors) for robot in robots}
+    sensors = [E_PUCK_SENSORS if robot.sensors is None else robot.sensors for robot in robots]
+    counts = {len(directions) for directions in sensors}
     if len(counts) != 1:
         raise ValueError(f"robots: {sorted(counts)} sensors, must be the same number on each")
-    return np.array([robot.sensors for robot in robots])
+    return np.array(sensors)

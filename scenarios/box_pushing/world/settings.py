@@ -11,6 +11,8 @@ from ....core.numerics.arrays import FloatArray
 from ....core.plugins.settings import NonNegative, Positive, Settings
 from ...faults.settings import DISCRIMINATOR, KINDS, FailureSettings, Names, befalling
 
+GRAVITY = 9.81
+"""Standard acceleration of free fall [m/s2], rounded."""
 CONTROL_PERIOD = 0.064
 """Time between commands to the wheels [s]; the basic time step of the e-puck in Webots."""
 
@@ -112,14 +114,14 @@ class WheelSettings(Settings):
 
 
 class RobotSettings(Described):
-    """A robot of one's own; what is not given is the e-Puck's."""
+    """A robot; what is not given is the e-Puck's."""
 
     wheels: Annotated[tuple[WheelSettings, ...], Field(min_length=1)]
     """Its wheels, one agent each."""
     radius: Annotated[float, Field(ge=0.001, le=10)] = 0.037
     """Radius of the round body [m]."""
     mass: Positive = 0.15
-    """Mass of the robot [kg]."""
+    """Mass of the robot [kg], spread evenly over the disc and resting evenly on the wheels."""
     max_speed: Positive = 0.13
     """Greatest wheel speed [m/s]; state spaces lay the memberships of wheel speeds over it."""
     stiffness: Positive = 6.5
@@ -130,6 +132,21 @@ class RobotSettings(Described):
     """Coefficient of friction between wheels and ground."""
     sensors: tuple[float, ...] | None = None
     """Directions of the infrared sensors [rad]; none: those of the e-Puck."""
+
+    @property
+    def wheel_names(self) -> tuple[str, ...]:
+        """Names of the wheels in agent order."""
+        return tuple(wheel.name for wheel in self.wheels)
+
+    @property
+    def inertia(self) -> float:
+        """Moment of inertia about the centre [kg m2], that of a disc."""
+        return self.mass * self.radius**2 / 2
+
+    @property
+    def wheel_limit(self) -> float:
+        """Greatest force between one wheel and the ground [N]."""
+        return self.traction * self.mass * GRAVITY / len(self.wheels)
 
 
 Normalisation = Literal["exponential", "linear", "binary"]

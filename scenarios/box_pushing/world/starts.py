@@ -17,7 +17,7 @@ import numpy as np
 from ....core.numerics.arrays import FloatArray
 from .boxes import BoxSpec
 from .geometry import surface, wrap
-from .robots import RobotSpec
+from .settings import RobotSettings
 
 GOAL = (1.0, 0.0, 0.0)
 """Goal pose of the box [m, m, rad]."""
@@ -68,7 +68,7 @@ STARTS: dict[str, Start] = {
 def place(
     start: str,
     rng: np.random.Generator,
-    robots: Sequence[RobotSpec],
+    robots: Sequence[RobotSettings],
     box: BoxSpec,
     unit: float = 1.0,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -144,7 +144,7 @@ def approach(
 
 
 def _behind(
-    spec: Start, rng: np.random.Generator, robots: Sequence[RobotSpec], box: BoxSpec
+    spec: Start, rng: np.random.Generator, robots: Sequence[RobotSettings], box: BoxSpec
 ) -> FloatArray:
     """Return poses ``(M, 3)`` side by side behind the box, first robot leftmost, in its frame."""
     least, most = box.width
@@ -166,7 +166,7 @@ def _behind(
 
 
 def _around(
-    spec: Start, rng: np.random.Generator, robots: Sequence[RobotSpec], box: BoxSpec
+    spec: Start, rng: np.random.Generator, robots: Sequence[RobotSettings], box: BoxSpec
 ) -> FloatArray:
     """Return poses ``(M, 3)`` anywhere around the box, in its frame."""
     poses = np.empty((len(robots), 3))

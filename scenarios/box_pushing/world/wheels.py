@@ -26,7 +26,7 @@ import numpy as np
 
 from ....core.numerics.arrays import FloatArray, IntArray
 from ....core.numerics.compiling import njit
-from .robots import RobotSpec
+from .settings import RobotSettings
 
 
 class WheelModel(NamedTuple):
@@ -58,7 +58,7 @@ class WheelModel(NamedTuple):
 
 
 def wheel_model(
-    robots: Sequence[RobotSpec], dt: float, grip: FloatArray, length: float = 1.0
+    robots: Sequence[RobotSettings], dt: float, grip: FloatArray, length: float = 1.0
 ) -> WheelModel:
     """Return the wheel model of robots.
 

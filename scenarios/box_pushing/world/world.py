@@ -30,8 +30,7 @@ from ....core.numerics.arrays import FloatArray
 from .boxes import BoxSpec
 from .geometry import gaps
 from .infrared import infrared_readings, sensor_directions
-from .robots import RobotSpec
-from .settings import CONTROL_PERIOD, InfraredSettings
+from .settings import CONTROL_PERIOD, InfraredSettings, RobotSettings
 from .wheels import wheel_model, wheel_wrenches
 
 UNIT = 10.0
@@ -111,7 +110,7 @@ class World:
 
     def __init__(
         self,
-        robots: Sequence[RobotSpec],
+        robots: Sequence[RobotSettings],
         box: BoxSpec,
         *,
         substeps: int = 4,
@@ -163,7 +162,7 @@ class World:
         """
         state = WorldState(
             np.vstack([self.box_pose, self.robot_poses]),
-            np.vstack([self.box_twist, self.robot_twists]),
+            self.twists,
             self._last.copy(),
             self._wrenches.copy(),
             self.contact_time.copy(),
@@ -219,34 +218,22 @@ class World:
         self.contact_time = touched / periods
 
     @property
-    def robot_twists(self) -> FloatArray:
-        """Velocities (vx, vy, omega) of the robots ``(M, 3)`` in the world frame [m/s, rad/s]."""
-        return np.array([_twist(handles) for handles in self._handles[1:]])
-
-    @property
-    def box_twist(self) -> FloatArray:
-        """Velocity (vx, vy, omega) of the box ``(3,)`` in the world frame [m/s, rad/s]."""
-        return np.array(_twist(self._handles[0]))
+    def twists(self) -> FloatArray:
+        """Velocities (vx, vy, omega) of the box and the robots ``(M + 1, 3)``, world frame."""
+        return np.array([_twist(handles) for handles in self._handles])
 
     def infrared(self) -> FloatArray:
-        """Return what the infrared sensors read, ``(M, S)`` in [0, 1], of box and robots.
+        """Return what the infrared sensors would read ``(2, M, S)``, free of noise.
 
-        Free of noise.
+        Of the box alone, and of the other robots alone; a sensor reads the greater one.
         """
-        return self._readings().max(axis=0)
-
-    def infrared_of_box(self) -> FloatArray:
-        """Return what the sensors would read ``(M, S)`` if there were no other robots."""
-        readings: FloatArray = self._readings()[0]
-        return readings
-
-    def _readings(self) -> FloatArray:
         outline = self.box.outline
-        return infrared_readings(
+        readings: FloatArray = infrared_readings(
             self.robot_poses, self._radii, self._sensors, self.box_pose,
             outline.edges, outline.rounding, self.sensor.reach, self.sensor.decay,
             self.sensor.index,
         )  # fmt: skip
+        return readings
 
     def _step(self, speeds: FloatArray) -> None:
         """Advance by one physics step; the inner loop."""

@@ -44,6 +44,8 @@ if TYPE_CHECKING:
 
 NUMBERS = ("onset",)
 """What of whole trials the analysis rests on."""
+PUBLISHED = ("success",)
+"""Measures of an episode that published results keep."""
 BLOCK = 5
 """Episodes that a level is measured over."""
 REGAINED = 0.9
@@ -113,8 +115,8 @@ def _keeping_weights(session: Session) -> Team:
     }
     frozen = settings.model_copy(update={"learner": FrozenSettings(**common)})
     _, team = build(frozen, session.trial.seed)
-    arrays = session.team.arrays()
-    team.restore({name: arrays[name] for name in team.arrays()})
+    own, arrays = team.arrays(), session.team.arrays()
+    team.restore({name: arrays.get(name, own[name]) for name in own})
     return team
 
 

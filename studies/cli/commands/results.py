@@ -15,12 +15,11 @@ if TYPE_CHECKING:
 
 @click.command()
 @options.directory
-@click.option(
-    "--format",
-    "form",
-    type=click.Choice(["table", "csv", "json"]),
-    default="table",
-    help="How to print the rows; CSV and JSON hold every digit, and a column for every swept key.",
+@options.formats(
+    "table",
+    "csv",
+    "json",
+    text="How to print the rows; CSV and JSON hold every digit, and a column for every swept key.",
 )
 @click.option(
     "--phase",
@@ -39,13 +38,14 @@ def command(directory: Path, form: Format, phase: str) -> int:
     from ....core.plugins.messages import closest
     from ...errors import SpecError
     from ...presentation.row_formats import write_rows
+    from ...results.results import read
     from ...store.store import Store
 
     with Store.open(directory) as store:
         store.verify()
-        measures, phases = store.measures(), store.phases()
-        if phases and phase not in phases:
-            raise SpecError(f"--phase {phase!r}: {closest(phase, phases)}")
-        names, rows = store.rows(phase)
-    write_rows(names, rows, measures, form, sys.stdout)
+        results = read(store)
+    if results.phases and phase not in results.phases:
+        raise SpecError(f"--phase {phase!r}: {closest(phase, results.phases)}")
+    episodes = results.episodes
+    write_rows(episodes[episodes["phase"] == phase], results.measures, form, sys.stdout)
     return 0

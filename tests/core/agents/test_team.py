@@ -12,6 +12,7 @@ import pytest
 from nested_agents.core.agents.joint_agents import join_agents
 from nested_agents.core.agents.rows import carried_rows
 from nested_agents.core.agents.team import Team
+from nested_agents.core.decision.exploration import BurstExploration
 from nested_agents.core.evaluators.exact import ExactEnumeration
 from nested_agents.core.evaluators.sampling import Sampling
 from nested_agents.core.interface.hierarchy import Hierarchy
@@ -60,7 +61,7 @@ def world(line_world):
 
 def team_of(name: str, world, seed: int = 1, hierarchy: Hierarchy | None = None) -> Team:
     hierarchy = hierarchy or chain_of(world.agents)
-    return Team.build(settings_of(TEAMS[name]), world, hierarchy, np.random.SeedSequence(seed))
+    return Team(settings_of(TEAMS[name]), world, hierarchy, np.random.SeedSequence(seed))
 
 
 def run_steps(team: Team, world, steps: int) -> list[list[int]]:
@@ -216,7 +217,7 @@ def test_actions_are_passed_down_and_the_unseen_maintain(edges, told, world) -> 
 def test_frequencies_are_what_was_seen(world) -> None:
     team = team_of("random", world)
     team.evaluator = Witness([0, 1, 3, 0])  # type: ignore[assignment]
-    team.explorer = team._greedy
+    team.explorer = BurstExploration(rate=0.0, floor=0.0).build(4)
     world.reset(0)
     for _ in range(6):
         team.act(world.predict())
@@ -272,7 +273,7 @@ def test_counts_of_an_episode(world) -> None:
 )
 def test_the_evaluator_follows_the_settings(decision: dict, kind: type, world) -> None:
     settings = settings_of({"kind": "frozen", "decision": decision})
-    team = Team.build(settings, world, chain_of(world.agents), np.random.SeedSequence(1))
+    team = Team(settings, world, chain_of(world.agents), np.random.SeedSequence(1))
     assert isinstance(team.evaluator, kind)
 
 
@@ -281,7 +282,7 @@ def test_what_is_too_much_to_enumerate_is_sampled(line_world) -> None:
     scenario = join_agents(line_world(carts=4, wheels=4), "body")
     learner = settings_of({"kind": "frozen"})
     hierarchy = chain_of(scenario.agents)
-    team = Team.build(learner, scenario, hierarchy, np.random.SeedSequence(1))
+    team = Team(learner, scenario, hierarchy, np.random.SeedSequence(1))
     assert isinstance(team.evaluator, Sampling)
 
 
@@ -343,7 +344,7 @@ def test_a_larger_team_takes_over_by_role(line_world) -> None:
         world.roles = ("front", "rear") * world.shape[0]
     settings = settings_of({**TEAMS["sampling"], "weights": "role", "exploration": BURST})
     former, successor = (
-        Team.build(settings, world, chain_of(world.agents), np.random.SeedSequence(1))
+        Team(settings, world, chain_of(world.agents), np.random.SeedSequence(1))
         for world in (small, large)
     )
     run_episode(former, small, seed=5)

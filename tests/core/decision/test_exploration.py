@@ -9,7 +9,6 @@ from nested_agents.core.decision.exploration import (
     BurstExploration,
     Bursts,
     EpsilonDecreasingBoltzmann,
-    Greedy,
     PaperExploration,
     boltzmann,
     greatest,
@@ -176,7 +175,7 @@ def test_ties_are_broken_at_random(rng: np.random.Generator) -> None:
 
 def test_without_a_tie_no_random_number_is_used(rng: np.random.Generator) -> None:
     before = rng.bit_generator.state
-    assert Greedy().choose(0, -VALUES, rng) == 0
+    assert greatest(-VALUES, rng) == 0
     assert rng.bit_generator.state == before
 
 
@@ -184,14 +183,6 @@ def test_without_a_tie_no_random_number_is_used(rng: np.random.Generator) -> Non
 def test_ties_are_relative_for_large_values(scale: float, rng: np.random.Generator) -> None:
     drawn = {greatest(scale * np.array([1.0, 1.0 + 1e-15]), rng) for _ in range(60)}
     assert drawn == {0, 1}
-
-
-def test_greedy_remembers_nothing(rng: np.random.Generator) -> None:
-    explorer = Greedy()
-    explorer.begin_episode()
-    assert explorer.choose(3, VALUES, rng) == 1
-    explorer.advance()
-    assert explorer.memory.size == 0
 
 
 def test_settings_choose_the_explorer() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from nested_agents.core.evaluators.auto import AutoSettings
-from nested_agents.core.evaluators.best_response import BestResponse, BestResponseSettings
+from nested_agents.core.evaluators.best_response import BestResponse
 from nested_agents.core.evaluators.evaluator import (
     DecisionProblem,
     Deliberation,
@@ -16,7 +16,7 @@ from nested_agents.core.evaluators.evaluator import (
 )
 from nested_agents.core.evaluators.exact import ExactEnumeration
 from nested_agents.core.evaluators.pooled import Pooling
-from nested_agents.core.evaluators.sampling import Sampling
+from nested_agents.core.evaluators.sampling import Sampling, SamplingSettings
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.interface.spaces import StateSpace, Variable
 from nested_agents.core.numerics.arrays import FloatArray
@@ -78,7 +78,8 @@ def test_whose_value_decides(name, value_of, rule, world, rules) -> None:
             joint = deliberation.joint_action.copy()
             joint[[agent, *below]] = own, *actions
             expected[own] = max(expected[own], worth_of(problem, deliberation, joint, theta))
-        for evaluator in (ExactEnumeration(problem), Sampling(A**3, problem)):
+        sampling = Sampling(SamplingSettings(samples=A**3), problem)
+        for evaluator in (ExactEnumeration(problem), sampling):
             assert evaluator.values(deliberation) == pytest.approx(expected, rel=0, abs=1e-12)
 
 
@@ -173,7 +174,7 @@ def test_pooled_means_are_means(order: int, membership: str) -> None:
 
 def test_auto_takes_best_responses_where_values_of_others_decide(world, rules) -> None:
     auto = AutoSettings(exact_up_to=2)
-    assert auto.chosen(problem_of(world, rules, "chain", "team")) == BestResponseSettings()
+    assert auto.chosen(problem_of(world, rules, "chain", "team")).kind == "best-response"
     assert auto.chosen(problem_of(world, rules, "apart", "team")).kind == "exact"
 
 

@@ -14,7 +14,7 @@ from nested_agents.core.evaluators.evaluator import (
     probabilities_of,
 )
 from nested_agents.core.evaluators.exact import MOST_JOINT_ACTIONS, ExactEnumeration
-from nested_agents.core.evaluators.sampling import Sampling
+from nested_agents.core.evaluators.sampling import Sampling, SamplingSettings
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.interface.prediction import Blocks
 from nested_agents.core.interface.spaces import StateSpace, Variable
@@ -148,7 +148,7 @@ def test_enumeration_is_brute_force(
     prediction, frequencies = world.predict(), frequencies_of(rng)
     theta = rng.normal(size=(4, rules.n_rules))
     common = problem_of(rules, hierarchy, rule, teammates)
-    exact, all_sampled = ExactEnumeration(common), Sampling(A**3, common)
+    exact, all_sampled = ExactEnumeration(common), Sampling(SamplingSettings(samples=A**3), common)
     for agent in range(4):
         joint = np.full(4, NEUTRAL)
         joint[list(hierarchy.above(agent))] = rng.integers(A, size=len(hierarchy.above(agent)))
@@ -244,7 +244,7 @@ def test_sampling_converges(world, rules: RuleBase, rng: np.random.Generator) ->
             Deliberation(0, joint, prediction, [theta] * 4, frequencies, rng)
         )
         # 63 of the 64 joint actions below would be drawn: with repetition, hence at random.
-        sampling = Sampling(63, common)
+        sampling = Sampling(SamplingSettings(samples=63), common)
         draws = [
             sampling.values(Deliberation(0, joint, prediction, [theta] * 4, frequencies, rng))
             for _ in range(300)
@@ -262,7 +262,10 @@ def test_a_sample_is_shared_by_all_own_actions(rng: np.random.Generator) -> None
     prediction = Tabled(np.zeros((4, A**4, 1)), np.tile(below, A))
     rules = RuleBase.build(ONE_VARIABLE, RuleBaseSettings())
     for teammates in TEAMMATES:
-        sampling = Sampling(5, problem_of(rules, hierarchy_of("chain"), "reward", teammates))
+        sampling = Sampling(
+            SamplingSettings(samples=5),
+            problem_of(rules, hierarchy_of("chain"), "reward", teammates),
+        )
         theta, joint = np.zeros(rules.n_rules), np.full(4, NEUTRAL)
         found = sampling.values(
             Deliberation(0, joint, prediction, [theta] * 4, frequencies_of(rng), rng)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from nested_agents.core.learners.batch import REWARD_SCALE, BatchTD, BatchTDSettings
-from nested_agents.core.learners.frozen import Frozen
+from nested_agents.core.learners.frozen import Frozen, FrozenSettings
 from nested_agents.core.learners.learner import Learner
 
 from .test_shared_weights import LEARNING, ROLES, experience, feed, learner_of, rules_of
@@ -81,7 +81,9 @@ def test_batch_td_regresses_on_all_experience_of_teams_of_any_size() -> None:
 
 
 def test_weights_that_never_learn_are_handed_on() -> None:
-    former, successor = (Frozen(rules_of("batch-td"), rows) for rows in (ROLES, np.array([1, 0])))
+    former, successor = (
+        Frozen(FrozenSettings(), rules_of("batch-td"), rows) for rows in (ROLES, np.array([1, 0]))
+    )
     former.theta[:] = [[1.0], [2.0]]
     successor.continue_from(former, np.array([1, 0]))
     assert successor.theta[:, 0].tolist() == [2.0, 1.0]

@@ -1,6 +1,7 @@
 import io
 
 import numpy as np
+import pandas as pd
 import pytest
 from made_up_results import Arrays
 
@@ -90,10 +91,10 @@ def test_an_unknown_interval_is_a_dash():
 
 
 @pytest.mark.parametrize("form", ["table", "csv", "json"])
-def test_no_rows_are_still_a_table(form):
-    expected = {"table": "seed  return\n", "csv": "seed,return\n", "json": "[]\n"}
+def test_no_rows_can_be_written(form):
+    expected = {"table": "", "csv": "condition,phase,seed\n", "json": "[]\n"}
     file = io.StringIO()
-    write_rows(["seed", "return"], [], [], form, file)
+    write_rows(pd.DataFrame(columns=["condition", "phase", "seed"]), [], form, file)
     assert file.getvalue() == expected[form]
 
 

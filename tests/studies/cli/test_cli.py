@@ -117,7 +117,7 @@ def test_results_in_every_form(study, capsys):
         assert bool(int(row["success"])) is item["success"]
     table = results(directory, "table", "--phase", "evaluation", capsys=capsys)
     lines = table.splitlines()
-    assert len(lines) == 3 + 2 * (2 + 3 * 2)
+    assert len([line for line in lines if line.split()[:1] in (["0"], ["1"], ["2"])]) == 2 * 3 * 2
     assert [line for line in lines if "evaluation" in line] == [
         "default, evaluation", "frozen, evaluation",
     ]  # fmt: skip

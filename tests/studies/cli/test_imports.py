@@ -15,11 +15,14 @@ LOADED = [
     (["--version"], set()),
     (["--help"], set()),
     (["presets"], set()),
-    (["results", STUDY], {"numpy"}),
     (["status", STUDY], {"numpy"}),
     (["topology", "list"], {"numpy", "pydantic", "rich"}),
     (["cost"], {"numpy", "pydantic", "rich", "core.agents.team"}),
     (["topology", "show", "chain"], {"numpy", "pydantic", "rich", "core.agents.team", "networkx"}),
+    (
+        ["results", STUDY],
+        {"numpy", "pydantic", "rich", "core.agents.team", "networkx", "pandas"},
+    ),
     (
         ["table", STUDY],
         {"numpy", "pydantic", "rich", "core.agents.team", "networkx", "pandas", "scipy"},

@@ -9,11 +9,7 @@ from nested_agents.core.agents.loop import world_seed
 from nested_agents.core.plugins.settings import SettingsError
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
-from nested_agents.scenarios.box_pushing.world.robots import (
-    E_PUCK_SENSORS,
-    ROBOTS,
-    robot_for,
-)
+from nested_agents.scenarios.box_pushing.world.robots import ROBOTS, robot_for
 from nested_agents.scenarios.box_pushing.world.settings import BoxSettings, RobotSettings, label
 from nested_agents.scenarios.checking.checker import CHECKS, check_scenario
 from nested_agents.studies.errors import SpecError
@@ -40,11 +36,8 @@ wheels = [{ name = "left", x = 0.0, y = 0.03 }, { name = "right", x = 0.0, y = -
 
 def test_an_e_puck_described_is_an_e_puck() -> None:
     wheels = tuple({"name": w.name, "x": w.x, "y": w.y} for w in ROBOTS["e-puck"].wheels)
-    robot = robot_for(RobotSettings.model_validate({"wheels": wheels}))
-    assert robot.sensors == E_PUCK_SENSORS
-    for name in ("radius", "mass", "max_speed", "stiffness", "lateral_stiffness", "traction"):
-        assert getattr(robot, name) == getattr(ROBOTS["e-puck"], name)
-    assert robot.wheels == ROBOTS["e-puck"].wheels
+    robot = robot_for(RobotSettings.model_validate({"name": "e-puck", "wheels": wheels}))
+    assert robot == ROBOTS["e-puck"]
 
 
 def test_a_spec_that_describes_its_box_and_robot_runs_and_can_be_drawn() -> None:

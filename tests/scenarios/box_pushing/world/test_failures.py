@@ -13,12 +13,12 @@ from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.failures import WheelFailures
-from nested_agents.scenarios.box_pushing.world.robots import (
-    ROBOTS,
-    RobotSpec,
-    nominal_effect,
+from nested_agents.scenarios.box_pushing.world.robots import ROBOTS, nominal_effect
+from nested_agents.scenarios.box_pushing.world.settings import (
+    Failure,
+    FailureSettings,
+    RobotSettings,
 )
-from nested_agents.scenarios.box_pushing.world.settings import Failure, FailureSettings
 from nested_agents.scenarios.box_pushing.world.world import World
 
 WHEELS = ("robot1.left", "robot1.right", "robot2.left", "robot2.right")
@@ -156,7 +156,7 @@ def test_refusals(table: dict[str, Any], complaint: str) -> None:
 # Theory of free motion: the wheels as springs between speeds, M v' = B u - K v in the body frame.
 
 
-def balance(robot: RobotSpec, grip: FloatArray) -> tuple[FloatArray, ...]:
+def balance(robot: RobotSettings, grip: FloatArray) -> tuple[FloatArray, ...]:
     """Return M, K ``(3, 3)`` and B ``(3, w)`` with every wheel's grip."""
     M = np.diag([robot.mass, robot.mass, robot.inertia])
     K, B = np.zeros((3, 3)), np.zeros((3, len(robot.wheels)))
@@ -168,7 +168,7 @@ def balance(robot: RobotSpec, grip: FloatArray) -> tuple[FloatArray, ...]:
     return M, K, B
 
 
-def free_twist(robot: RobotSpec, settings: FailureSettings, speeds: FloatArray) -> FloatArray:
+def free_twist(robot: RobotSettings, settings: FailureSettings, speeds: FloatArray) -> FloatArray:
     """Return the twist, own frame, of a free robot under a failure after 40 control periods."""
     world = World([robot], BOXES["square"])
     world.place(np.array([[-1.0, 0.0, 0.3]]), np.zeros(3))
@@ -177,7 +177,7 @@ def free_twist(robot: RobotSpec, settings: FailureSettings, speeds: FloatArray) 
     world.set_grip(ill.grip)
     for held in ill.driven(speeds, 40):
         world.advance(held, 1)
-    (vx, vy, omega), angle = world.robot_twists[0], world.robot_poses[0, 2]
+    (vx, vy, omega), angle = world.twists[1], world.robot_poses[0, 2]
     cos, sin = np.cos(angle), np.sin(angle)
     return np.array([cos * vx + sin * vy, cos * vy - sin * vx, omega])
 
@@ -185,7 +185,7 @@ def free_twist(robot: RobotSpec, settings: FailureSettings, speeds: FloatArray) 
 @pytest.mark.parametrize("robot", ROBOTS.values(), ids=lambda robot: robot.name)
 @pytest.mark.parametrize("kind", ["seized", "weak", "reversed", "stuck", "delayed"])
 def test_free_motion_is_that_of_the_nominal_effect_with_one_column_changed(
-    robot: RobotSpec, kind: str
+    robot: RobotSettings, kind: str
 ) -> None:
     settings = failure(kind, f"robot1.{robot.wheel_names[0]}")
     speeds = np.linspace(0.03, 0.04, len(robot.wheels))
@@ -201,7 +201,7 @@ def test_free_motion_is_that_of_the_nominal_effect_with_one_column_changed(
 
 
 @pytest.mark.parametrize("robot", ROBOTS.values(), ids=lambda robot: robot.name)
-def test_free_motion_with_a_free_wheel(robot: RobotSpec) -> None:
+def test_free_motion_with_a_free_wheel(robot: RobotSettings) -> None:
     # Nothing resists an e-puck that turns about its only driven wheel: there the twist follows
     # from the inertia, so that the motion is integrated rather than balanced.
     w = len(robot.wheels)

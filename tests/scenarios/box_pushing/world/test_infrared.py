@@ -1,6 +1,5 @@
 """Infrared sensors: known readings, and the kernel against its NumPy reference."""
 
-from dataclasses import replace
 from math import exp
 from typing import get_args
 
@@ -55,13 +54,13 @@ def test_readings_by_hand() -> None:
     world.place(
         np.array([[0.0, -0.1 - 0.037 - 0.03, 0.0], [0.0, -0.261, 0.0]]), np.array([0.0, 0.0, 0.0])
     )
-    readings = world.infrared()
+    readings = world.infrared().max(axis=0)
     assert readings.shape == (2, 8)
     assert readings[0, 5] == pytest.approx(exp(-0.03 / SPEC.decay))
     assert readings[0, 2] == pytest.approx(exp(-0.02 / SPEC.decay))
     assert readings[1, 5] == pytest.approx(exp(-0.02 / SPEC.decay))
-    assert world.infrared_of_box()[0, 2] == 0.0
-    strongest = world.infrared_of_box().max(axis=1)
+    assert world.infrared()[0, 0, 2] == 0.0
+    strongest = world.infrared()[0].max(axis=1)
     assert strongest[0] == pytest.approx(exp(-0.03 / SPEC.decay))
     assert strongest[1] == 0.0
     np.testing.assert_allclose(SPEC.reading(world.gaps), strongest, atol=1e-12)
@@ -126,6 +125,6 @@ def test_bad_options_are_refused(table: dict[str, object], complaint: str) -> No
 
 
 def test_bad_sensors_are_refused() -> None:
-    blind = [ROBOTS["e-puck"], replace(ROBOTS["e-puck"], sensors=(0.0,))]
+    blind = [ROBOTS["e-puck"], ROBOTS["e-puck"].model_copy(update={"sensors": (0.0,)})]
     with pytest.raises(ValueError, match="same number"):
         sensor_directions(blind)

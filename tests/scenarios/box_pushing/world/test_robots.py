@@ -1,7 +1,5 @@
 """Robots: kinematics, compliance, refusals."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -9,8 +7,9 @@ from nested_agents.scenarios.box_pushing.world.robots import (
     ROBOTS,
     compliance,
     nominal_effect,
+    robot_for,
 )
-from nested_agents.scenarios.box_pushing.world.settings import WheelSettings
+from nested_agents.scenarios.box_pushing.world.settings import RobotSettings, WheelSettings
 
 
 def test_two_wheels_are_a_differential_drive() -> None:
@@ -59,7 +58,7 @@ def wheel(name: str, x: float, y: float) -> WheelSettings:
     [
         ({"radius": 0.0}, "radius = 0.0"),
         ({"mass": float("nan")}, "mass"),
-        ({"wheels": ()}, "at least one"),
+        ({"wheels": ()}, "at least 1"),
         ({"wheels": (wheel("a", 0, 0.02), wheel("a", 0, -0.02))}, "different names"),
         ({"wheels": (wheel("a", 0, 0.05), wheel("b", 0, -0.02))}, "within the body"),
         ({"wheels": (wheel("a", 0, 0.02),)}, "cannot resist turning"),
@@ -68,5 +67,5 @@ def wheel(name: str, x: float, y: float) -> WheelSettings:
 )
 def test_bad_robots_are_refused(change: dict[str, object], word: str) -> None:
     with pytest.raises(ValueError, match=word) as error:
-        replace(ROBOTS["e-puck"], **change)  # type: ignore[arg-type]
+        robot_for(RobotSettings(**dict(ROBOTS["e-puck"]) | change))
     assert "\n" not in str(error.value)

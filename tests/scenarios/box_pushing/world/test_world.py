@@ -36,7 +36,7 @@ def test_a_free_robot_moves_as_its_nominal_effect_says(name: str) -> None:
     world.advance(speeds, 30)
     before = world.robot_poses[0]
     world.advance(speeds, 10)
-    twist, after = world.robot_twists[0], world.robot_poses[0]
+    twist, after = world.twists[1], world.robot_poses[0]
     cos, sin = np.cos(after[2]), np.sin(after[2])
     local = np.array([cos * twist[0] + sin * twist[1], cos * twist[1] - sin * twist[0], twist[2]])
     # Rounding a bend costs a little sideways grip.
@@ -56,8 +56,8 @@ def test_pushing_speed_is_that_of_servo_against_friction(n: int, substeps: int) 
     world.advance(np.full(2 * n, FULL), 40)
     # Box2D's friction joints let 4 % of the friction point sideways, see World.
     slip = compliance(E_PUCK)[0, 0] * 0.956 * BOXES["square"].friction_force / n
-    np.testing.assert_allclose(world.robot_twists[:, 0], FULL - slip, rtol=3e-3)
-    assert world.box_twist[0] == pytest.approx(FULL - slip, rel=3e-3)
+    np.testing.assert_allclose(world.twists[1:, 0], FULL - slip, rtol=3e-3)
+    assert world.twists[0, 0] == pytest.approx(FULL - slip, rel=3e-3)
     assert (world.contact_time > 0.9).all()
     assert world.contact.all()
     # What the servo stiffness was chosen for.
@@ -75,7 +75,7 @@ def test_the_box_stops_at_once_and_stays() -> None:
     world.advance(np.full(4, FULL), 30)
     world.advance(np.zeros(4), 2)
     resting = world.box_pose.copy()
-    np.testing.assert_allclose(world.box_twist, 0, atol=1e-5)
+    np.testing.assert_allclose(world.twists[0], 0, atol=1e-5)
     world.advance(np.full(4, -FULL), 30)
     np.testing.assert_allclose(world.box_pose, resting, atol=1e-6)
     np.testing.assert_array_equal(world.contact, False)
@@ -148,11 +148,11 @@ def test_a_free_wheel_turns_the_robot() -> None:
     world.advance(np.full(2, 0.1), 20)
     # Nothing holds the free wheel, so the robot turns about it: forces on the other one vanish.
     assert world.robot_poses[0, 2] > 0.1
-    assert world.robot_twists[0, 0] < 0.1
+    assert world.twists[1, 0] < 0.1
     world.set_grip(np.ones(2))
     world.place(np.array([[-0.5, 0.0, 0.0]]), np.zeros(3))
     world.advance(np.full(2, 0.1), 20)
-    np.testing.assert_allclose(world.robot_twists[0], [0.1, 0, 0], atol=1e-4)
+    np.testing.assert_allclose(world.twists[1], [0.1, 0, 0], atol=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -166,7 +166,7 @@ def test_ground_friction_is_as_documented(name: str, ahead: float, oblique: floa
         body = world._box
         body.linearVelocity, body.angularVelocity = (10 * vx, 10 * vy), omega
         world.advance(np.zeros(2), 1)
-        after = world.box_twist
+        after = world.twists[0]
         slowed = np.hypot(vx - after[0], vy - after[1]) / CONTROL_PERIOD
         return slowed * world.box.mass, (omega - after[2]) / CONTROL_PERIOD * world.box.inertia
 
