@@ -1,6 +1,6 @@
 """Faults of actuators for any Gymnasium environment and any PettingZoo parallel environment.
 
-Seven faults, by actuator, from an episode and step to another; a wrapper for each library; draws of
+Seven faults, by actuator, from an episode and step to another; a wrapper for each library;
 schedules from a seed; and the table of what they cost a policy, and how it comes back. The policy
 is told nothing. Box pushing's wheels and the arm's joints fail by the same definitions.
 
@@ -23,7 +23,6 @@ from .scenarios.faults.actuators import (
     Seized,
     Stuck,
     Weak,
-    draw_faults,
 )
 from .scenarios.faults.wrappers import FaultyEnv, FaultyParallelEnv
 from .studies.api.recovery import RandomPolicy, RecoveryTable, recovery_table
@@ -41,6 +40,5 @@ __all__ = [
     "Seized",
     "Stuck",
     "Weak",
-    "draw_faults",
     "recovery_table",
 ]

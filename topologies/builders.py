@@ -11,21 +11,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from itertools import chain as concatenated
 from itertools import zip_longest
-from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
 from pydantic import Field
 from typing_extensions import TypeAliasType
 
 from ..core.interface.hierarchy import Hierarchy
-from ..core.plugins.deferred import Deferred
+from ..core.plugins.deferred import nx
 from ..core.plugins.settings import Fraction
 from .checks import check_names, with_edges
-
-if TYPE_CHECKING:
-    import networkx as nx
-else:
-    nx = Deferred("networkx")
 
 Names: TypeAlias = Sequence[str]
 Bodies: TypeAlias = Sequence[Names]

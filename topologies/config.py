@@ -8,25 +8,20 @@ follow ``kind:`` is in `ARGUMENTS`.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
 
 from ..core.interface.hierarchy import Hierarchy
 from ..core.plugins import sources
-from ..core.plugins.deferred import Deferred
+from ..core.plugins.deferred import nx
 from ..core.plugins.messages import closest
 from ..core.plugins.plugged import Plugged, SettingsRegistry
 from ..core.plugins.settings import Settings, SettingsError, tuples
 from . import files
 from .builders import Bodies, Members, Names, from_networkx, names_of  # noqa: F401 - of a field
 from .checks import check_names
-
-if TYPE_CHECKING:
-    import networkx as nx
-else:
-    nx = Deferred("networkx")
 
 BUILDERS = "nested_agents.topologies.builders"
 

@@ -12,18 +12,13 @@ import tomllib
 import traceback
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from xml.etree import ElementTree
 
 from ..core.plugins import sources
-from ..core.plugins.deferred import Deferred
+from ..core.plugins.deferred import nx
 from .builders import Bodies, Names, independent
 from .checks import check_legible, shown, with_edges
-
-if TYPE_CHECKING:
-    import networkx as nx
-else:
-    nx = Deferred("networkx")
 
 
 def read(path: str) -> nx.DiGraph | dict[str, Any]:

@@ -9,17 +9,12 @@ back, each agent takes its best action given those that were eliminated later. T
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ..numerics.arrays import FloatArray, IntArray
-from ..plugins.deferred import Deferred
-
-if TYPE_CHECKING:
-    import networkx as nx
-else:
-    nx = Deferred("networkx")
+from ..plugins.deferred import nx
 
 Scope = tuple[int, ...]
 

@@ -10,18 +10,12 @@ whatever the width.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..numerics.arrays import FloatArray, IntArray
-from ..plugins.deferred import Deferred
+from ..plugins.deferred import nx
 from .elimination import Scope
-
-if TYPE_CHECKING:
-    import networkx as nx
-else:
-    nx = Deferred("networkx")
 
 
 class MaxPlus:

@@ -84,7 +84,6 @@ class Evaluator(Protocol):
 
     def values(self, deliberation: Deliberation) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent."""
-        ...
 
 
 @dataclass(frozen=True)

@@ -23,32 +23,24 @@ class Actors(Protocol):
 
     def begin_episode(self) -> None:
         """Note that an episode begins."""
-        ...
 
     def predict(self, scenario: Scenario) -> Any:
         """Return what they decide by, in the scenario's present state."""
-        ...
 
     def check(self, prediction: Any) -> None:
         """Refuse what they cannot decide by with a ValueError of one line."""
-        ...
 
     def act(self, prediction: Any, *, explore: bool = True) -> IntArray:
         """Return a joint action ``(n,)``; without `explore` the best that they know."""
-        ...
 
     def adapt(self, prediction: Any, joint_action: IntArray, transition: Transition) -> None:
         """Revise what predictions rest on."""
-        ...
 
     def learn(self, transition: Transition) -> None:
         """Take in what a step led to."""
-        ...
 
     def end_episode(self) -> None:
         """Learn what is learned after an episode."""
-        ...
 
     def arrays(self) -> dict[str, FloatArray]:
         """Return what they have learned."""
-        ...

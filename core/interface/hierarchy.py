@@ -18,14 +18,8 @@ joint-action learners (everybody is everybody's neighbour) and coordination grap
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING
 
-from ..plugins.deferred import Deferred
-
-if TYPE_CHECKING:
-    import networkx as nx
-else:
-    nx = Deferred("networkx")
+from ..plugins.deferred import nx
 
 
 class Hierarchy:

@@ -94,7 +94,6 @@ class Prediction(Protocol):
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
-        ...
 
 
 def states_of_all(prediction: Prediction, joint_actions: IntArray) -> FloatArray:

@@ -68,32 +68,26 @@ class Scenario(Protocol):
     @property
     def agents(self) -> tuple[str, ...]:
         """Names of the agents, in agent order."""
-        ...
 
     @property
     def state_space(self) -> StateSpace:
         """The state variables of every agent."""
-        ...
 
     @property
     def action_set(self) -> ActionSet:
         """The actions of every agent."""
-        ...
 
     def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
         """Start an episode and return states ``(n, d)``.
 
         Everything random in it follows from `seed`; what is scheduled, from its number `episode`.
         """
-        ...
 
     def step(self, joint_action: IntArray) -> Transition:
         """Carry out a joint action ``(n,)`` for one decision period."""
-        ...
 
     def predict(self) -> Prediction:
         """Predict from the present state."""
-        ...
 
 
 @runtime_checkable
@@ -109,16 +103,13 @@ class RecordedScenario(Scenario, Protocol):
 
         It is asked for between steps, and before the first one.
         """
-        ...
 
     @property
     def recorded(self) -> tuple[str, ...]:
         """Names of the measurements that are kept, one array ``(T + 1, ...)`` each."""
-        ...
 
     def constants_of_episode(self) -> Mapping[str, Any]:
         """Return what is kept once an episode: numbers, texts, arrays."""
-        ...
 
 
 @runtime_checkable
@@ -133,7 +124,6 @@ class EmbodiedScenario(Scenario, Protocol):
     @property
     def nominal_effects(self) -> tuple[FloatArray, ...]:
         """Per body the ``(3, w + 1)`` effect of its wheel speeds on its twist."""
-        ...
 
     def predict_with(
         self, effects: Sequence[FloatArray], constants: FloatArray | None = None
@@ -153,7 +143,6 @@ class EmbodiedScenario(Scenario, Protocol):
             of them ``(k, c)``, as mean twists ``(k, K + M, 3)`` of what is moved, and then of the
             bodies, see `Transition.twists`.
         """
-        ...
 
 
 def can_draw(scenario: Scenario) -> bool:

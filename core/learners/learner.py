@@ -33,7 +33,6 @@ class Learner(Protocol):
 
     def begin_episode(self) -> None:
         """Forget what reached into the past: an episode begins."""
-        ...
 
     def observe(self, states: FloatArray, reward: float | FloatArray, terminated: bool) -> int:
         """Take in the states entered; return the number of consequent weights changed.
@@ -47,19 +46,15 @@ class Learner(Protocol):
         terminated
             Whether they are terminal.
         """
-        ...
 
     def end_episode(self) -> int:
         """Learn what is learned after an episode. Returns the number of weights changed."""
-        ...
 
     def arrays(self) -> dict[str, FloatArray]:
         """Return everything that `restore` needs."""
-        ...
 
     def restore(self, arrays: Mapping[str, FloatArray]) -> None:
         """Continue from `arrays`."""
-        ...
 
 
 class TeamSettings(PartSettings):

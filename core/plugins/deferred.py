@@ -1,9 +1,9 @@
-"""What is imported when it is first asked for, since modules take their time."""
+"""What is imported when it is first asked for, since modules take their time: libraries, parts."""
 
 from __future__ import annotations
 
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 
 class Deferred:
@@ -29,6 +29,17 @@ class Deferred:
         if attribute.startswith("__"):  # asked by who inspects the object, not by who uses it
             raise AttributeError(attribute)
         return getattr(import_module(self._name), attribute)
+
+
+if TYPE_CHECKING:
+    import networkx as nx
+    import pandas as pd
+    from scipy import optimize, special, stats
+else:
+    nx, pd = Deferred("networkx"), Deferred("pandas")
+    optimize, special, stats = map(Deferred, ("scipy.optimize", "scipy.special", "scipy.stats"))
+
+__all__ = ["Deferred", "located", "nx", "optimize", "pd", "special", "stats"]
 
 
 def located(place: str) -> Any:

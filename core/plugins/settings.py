@@ -66,7 +66,10 @@ class Settings(BaseModel, metaclass=_Made):
     'wheels'? known: wheels
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True,
+        use_attribute_docstrings=True,
+    )  # fmt: skip
 
     @classmethod
     def made(cls, **table: Any) -> Any:

@@ -29,13 +29,11 @@ from .frames import (
     at,
     bits,
     difference,
-    ended,
     fields,
     measured,
     opening,
     play,
     random_actions,
-    stepped,
 )
 from .predictions import fault_of_prediction
 from .sensing import fault_of_sensing
@@ -349,29 +347,6 @@ def _keeps_off_globals(of: Examination) -> str | None:
     return f"the global state of {' and '.join(changed)} is changed" if changed else None
 
 
-def _restores(of: Examination) -> str | None:
-    """Check that a scenario with `save` and `restore` goes on from what it saved."""
-    scenario: Any = of.factory()
-    if not (hasattr(scenario, "save") and hasattr(scenario, "restore")):
-        return None
-    for seed, episode in _all(of):
-        opening(scenario, seed, episode)
-        actions = of.actions(scenario, seed)
-        half = len(actions) // 2
-        for action in actions[:half]:
-            if ended(stepped(scenario, action)):
-                break
-        else:
-            saved = scenario.save()
-            expected = [stepped(scenario, action) for action in actions[half:]]
-            scenario.restore(saved)
-            found = [stepped(scenario, action) for action in actions[half:]]
-            here = difference(expected, found, half + 1)
-            if here is not None:
-                return f"the future of a restored scenario differs {here} of seed {seed}"
-    return None
-
-
 CHECKS: dict[str, Callable[[Examination], str | None]] = {
     "form": _form,
     "measures": _measures,
@@ -385,7 +360,6 @@ CHECKS: dict[str, Callable[[Examination], str | None]] = {
     "sensed and predicted": _senses,
     "returned arrays": _leaves_alone,
     "global random numbers": _keeps_off_globals,
-    "save and restore": _restores,
 }
 """The checks by name, in their order: later ones rely on earlier ones."""
 

@@ -1,4 +1,4 @@
-"""Pictures of the kinematic chain, drawn from recordings: one moment, or an episode as GIF or MP4.
+"""Pictures of the kinematic chain, drawn from recordings: an episode as GIF or MP4.
 
 A recording is a mapping of arrays: ``angles (T + 1, n)`` [rad], ``speeds (T + 1, n)`` [rad/s],
 ``failed (T + 1, n)``, ``goal (2,)`` [m], and constants of no dimension: ``reach`` and ``tolerance``
@@ -54,8 +54,7 @@ class _Stage:
         self.axes.plot(0, 0, "s", color="black", ms=7, zorder=2)
         self._moving: list[Artist] = []
 
-    def draw(self, step: int) -> None:
-        """Draw the moment after `step` steps."""
+    def _draw(self, step: int) -> None:
         for artist in self._moving:
             artist.remove()
         recording, places = self.recording, self.places[step]
@@ -78,20 +77,14 @@ class _Stage:
         ]  # fmt: skip
         axes.set_title(f"step {step}: tip {100 * away:.0f} cm from the goal", loc="left")
 
-    def pixels(self) -> Pixels:
-        """Return what is drawn as ``(height, width, 3)`` bytes."""
+    def pixels(self, step: int) -> Pixels:
+        """Return the moment after `step` steps as ``(height, width, 3)`` bytes."""
+        self._draw(step)
         self.canvas.draw()
         return np.asarray(self.canvas.buffer_rgba())[..., :3].copy()
 
 
-def picture(recording: Recording, step: int) -> Pixels:
-    """Return the moment after `step` steps as ``(height, width, 3)`` bytes."""
-    stage = _Stage(recording)
-    stage.draw(step)
-    return stage.pixels()
-
-
-def animate(recording: Recording, path: Path, speed: float = 1.0) -> None:
+def animate(recording: Recording, path: Path) -> None:
     """Draw an episode as an animation, GIF or MP4 by the suffix of `path`.
 
     Parameters
@@ -100,8 +93,6 @@ def animate(recording: Recording, path: Path, speed: float = 1.0) -> None:
         The episode.
     path
         Where to write; an unfinished animation never bears this name.
-    speed
-        How many times faster than real time it plays; thinned-out episodes play faster still.
 
     Raises
     ------
@@ -110,8 +101,4 @@ def animate(recording: Recording, path: Path, speed: float = 1.0) -> None:
     """
     stage = _Stage(recording)
 
-    def drawn(step: int) -> Pixels:
-        stage.draw(step)
-        return stage.pixels()
-
-    film(drawn, len(recording["angles"]) - 1, float(recording["dt"]) / speed, path)
+    film(stage.pixels, len(recording["angles"]) - 1, float(recording["dt"]), path)

@@ -13,11 +13,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from ...core.plugins.deferred import Deferred
+from ...core.plugins.deferred import optimize
 from ..errors import SpecError
 from ..presentation.words import count, duration
 from ..results.power import SMALLEST, USUAL_DEVIATION, detectable, seeds_for
@@ -28,11 +28,6 @@ from ..trials.session import Session
 from ..trials.trial import Trial, trials_of
 from ..workers.worker import cores
 from .run_study import examine
-
-if TYPE_CHECKING:
-    from scipy import optimize
-else:
-    optimize = Deferred("scipy.optimize")
 
 SEED = 10_000
 """Of the trials that are tried out."""

@@ -5,7 +5,7 @@ Nothing is printed here: who wants to see how it goes passes an `Observer`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 
@@ -17,7 +17,6 @@ from ..store.store import Store
 from ..trials.arrangement import check
 from ..trials.keeping import open_to_run, pending
 from ..trials.trial import trials_of
-from ..workers.loggers import logged, make
 from ..workers.runner import Observer, run_trials
 from ..workers.worker import RunTrial
 from ..workers.workers import Backend, start_workers
@@ -34,7 +33,6 @@ def run_study(
     retry_failed: bool = False,
     accept_code: bool = False,
     observer: Observer | None = None,
-    loggers: Sequence[str] = (),
 ) -> Iterator[Store]:
     """Run what is left of a study; then its store is open for as long as the context lasts.
 
@@ -52,8 +50,6 @@ def run_study(
         Whether to go on with a study although the installed code has changed.
     observer
         Who is told how it goes; None: nobody.
-    loggers
-        Who else is told of every trial, by name, see `nested_agents.studies.workers.loggers`.
 
     Yields
     ------
@@ -84,9 +80,7 @@ def run_study(
             observer.note("there is no worker yet: waiting for one")
         try:
             with closing(run_trials(left, store, _run_trial(spec), workers)) as outcomes:
-                told = [make(name, spec, directory) for name in loggers] if left else []
-                following = logged(outcomes, told, observer.note)
-                observer.follow(following, len(trials), len(trials) - len(left))
+                observer.follow(outcomes, len(trials), len(trials) - len(left))
         except KeyboardInterrupt:
             observer.note(
                 f"interrupted: {store.counts()['done']} of {len(trials)} trials are kept in "

@@ -278,7 +278,6 @@ def run(
     accept_code: bool = False,
     progress: bool = True,
     observer: Observer | None = None,
-    loggers: Sequence[str] = (),
 ) -> StudyResults:
     """Run what is left of a study and return what it found; the same call again continues it.
 
@@ -289,7 +288,7 @@ def run(
     out
         Where the study is kept; made if it does not exist. Every trial is kept the moment it
         finishes.
-    jobs, backend, address, retry_failed, accept_code, loggers
+    jobs, backend, address, retry_failed, accept_code
         As those of `nested_agents.studies.api.run_study.run_study`.
     progress
         Whether to show how it goes.
@@ -315,7 +314,7 @@ def run(
     told = observer or (Terminal() if progress else Observer())
     with run_study(
         spec, out, jobs=jobs, backend=backend, address=address, retry_failed=retry_failed,
-        accept_code=accept_code, observer=told, loggers=loggers,
+        accept_code=accept_code, observer=told,
     ) as store:  # fmt: skip
         found = _of(store)
     if found.failed and observer is None:

@@ -30,7 +30,6 @@ class Study(Protocol):
 
     def measure(self, trial: Trial) -> TrialResult:
         """Run one trial; imported by name in worker processes."""
-        ...
 
     def analyse(self, results: Results) -> Any:
         """Turn results into estimates; its attribute `table` holds the `Summary` lines.
@@ -38,11 +37,9 @@ class Study(Protocol):
         Further attributes are those of `nested_agents.studies.results.analysis.Analysis`, each of
         which may be missing.
         """
-        ...
 
     def draw(self, analysis: Any) -> dict[str, Figure]:
         """Return the figures of an analysis by name."""
-        ...
 
 
 def load_study(name: str) -> Study:

@@ -26,9 +26,9 @@ def complete(command: click.Command, arguments: Iterable[str]) -> Iterator[str]:
 
     Examples
     --------
-    >>> command = click.Command("run", params=[click.Option(["--log"], multiple=True)])
-    >>> list(complete(command, ["--log", "a", "b", "--jobs", "3"]))
-    ['--log', 'a', '--log', 'b', '--jobs', '3']
+    >>> command = click.Command("run", params=[click.Option(["--set"], multiple=True)])
+    >>> list(complete(command, ["--set", "a", "b", "--jobs", "3"]))
+    ['--set', 'a', '--set', 'b', '--jobs', '3']
     """
     options = {
         name: option

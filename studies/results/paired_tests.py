@@ -6,17 +6,11 @@ All are permutation tests: they need no distribution, and bear the many ties of 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.plugins.deferred import Deferred
-
-if TYPE_CHECKING:
-    from scipy import stats
-else:
-    stats = Deferred("scipy.stats")
+from ...core.plugins.deferred import stats
 
 Array = NDArray[np.float64]
 

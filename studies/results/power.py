@@ -12,18 +12,12 @@ import math
 from collections.abc import Sequence
 from functools import lru_cache
 from itertools import combinations
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.plugins.deferred import Deferred
+from ...core.plugins.deferred import special
 from .paired_tests import EXACT, LEVEL
-
-if TYPE_CHECKING:
-    from scipy import special
-else:
-    special = Deferred("scipy.special")
 
 Array = NDArray[np.float64]
 

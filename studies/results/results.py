@@ -15,17 +15,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.interface.measures import SUCCESS, Measure
-from ...core.plugins.deferred import Deferred
+from ...core.plugins.deferred import pd
 from ..store.reading import NamesAndRows
 from ..store.schema import ELSEWHERE
 from ..store.store import Store
 from .numbers import NUMBERS
 
 if TYPE_CHECKING:
-    import pandas as pd
     from pandas import DataFrame
-else:
-    pd = Deferred("pandas")  # workers and quick commands import this module, not pandas
 
 Array = NDArray[Any]
 

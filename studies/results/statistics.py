@@ -11,17 +11,12 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.plugins.deferred import Deferred
-
-if TYPE_CHECKING:
-    from scipy import special, stats
-else:
-    special, stats = Deferred("scipy.special"), Deferred("scipy.stats")
+from ...core.plugins.deferred import special, stats
 
 Array = NDArray[np.float64]
 

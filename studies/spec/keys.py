@@ -7,15 +7,11 @@ walked as well, so a new scenario or learner has its keys here from the first da
 
 from __future__ import annotations
 
-import ast
 import inspect
 import json
 import re
-import textwrap
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cache
-from itertools import pairwise
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
@@ -202,10 +198,9 @@ def _held(
 def _table(
     name: str, kinds: tuple[str, str], model: type[Settings], base: Mapping[str, FieldInfo]
 ) -> Table:
-    told = meanings(model)
     laid = _laid_by_preset(name, kinds[0])
     keys = tuple(
-        _laid_over(_key(field, info, told.get(field, info.description or "")), laid)
+        _laid_over(_key(field, info), laid)
         for field, info in model.model_fields.items()
         if field != "kind" and not (field in base and base[field].default == info.default)
     )
@@ -250,35 +245,8 @@ def nearest(prefix: str) -> str:
     return near(prefix, names) or f"known: {', '.join(tops)}"
 
 
-@cache
-def meanings(model: type[Settings]) -> dict[str, str]:
-    """Return the docstrings of the fields of a model, inherited ones included, each as one line.
-
-    pydantic's `use_attribute_docstrings` reads them when a model is made: importing specs took 6 %
-    longer.
-    """
-    found: dict[str, str] = {}
-    for cls in reversed(model.__mro__):
-        if not (issubclass(cls, Settings) and cls is not Settings):
-            continue
-        try:
-            source = inspect.getsource(cls)
-        except OSError:  # made of classes that are written down, which are looked at, too
-            continue
-        (definition,) = ast.parse(textwrap.dedent(source)).body
-        body = definition.body if isinstance(definition, ast.ClassDef) else []
-        for field, text in pairwise(body):
-            if (
-                isinstance(field, ast.AnnAssign)
-                and isinstance(field.target, ast.Name)
-                and isinstance(text, ast.Expr)
-                and isinstance(text.value, ast.Constant)
-            ):
-                found[field.target.id] = " ".join(str(text.value.value).split())
-    return found
-
-
-def _key(name: str, info: FieldInfo, meaning: str) -> Key:
+def _key(name: str, info: FieldInfo) -> Key:
+    meaning = " ".join((info.description or "").split())
     unit = UNIT.search(meaning)
     plugged = registry_of(info)
     if plugged is not None:

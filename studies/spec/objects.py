@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ...core.decision.exploration import EXPLORATIONS
 from ...core.evaluators import EVALUATORS
 from ...core.interface.hierarchy import Hierarchy
 from ...core.learners import LEARNERS
-from ...core.plugins.deferred import Deferred, located
+from ...core.plugins.deferred import located, nx
 from ...core.plugins.registry import Registry
 from ...core.plugins.settings import Settings
 from ...scenarios import SCENARIOS
 from ...topologies import TOPOLOGIES
 from ..errors import SpecError
 from .studies import STUDIES
-
-if TYPE_CHECKING:
-    import networkx as nx
-else:
-    nx = Deferred("networkx")
 
 REGISTRIES: dict[str, Registry] = {
     "study": STUDIES,

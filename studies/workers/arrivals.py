@@ -81,7 +81,6 @@ class Workers(ABC):
                     continue
                 del running[future]
                 left -= 1
-                hand_out()  # nobody waits until the result is kept
                 yield outcome
         finally:
             if running:

@@ -29,13 +29,6 @@ if TYPE_CHECKING:
 @options.accept_code
 @options.trust
 @options.figures
-@click.option(
-    "--log",
-    "loggers",
-    multiple=True,
-    metavar="file.py:NAME...",
-    help="Tell this logger of every finished trial, as for TensorBoard or MLflow.",
-)
 @options.changes
 def command(
     spec: Path,
@@ -46,7 +39,6 @@ def command(
     accept_code: bool,
     trust: bool,
     figures: tuple[str, ...],
-    loggers: tuple[str, ...],
     changes: tuple[str, ...],
 ) -> int:
     """Run the study of a spec; the same command again continues it.
@@ -75,6 +67,6 @@ def command(
         ) from None
     study = run(
         given, out, jobs=jobs, backend=backend, address=address, accept_code=accept_code,
-        observer=Terminal(), loggers=loggers,
+        observer=Terminal(),
     )  # fmt: skip
     return show_results(study, figures)

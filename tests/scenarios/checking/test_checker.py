@@ -187,14 +187,6 @@ def greedy_hands(self: Any, joint_action: Any) -> Any:
     return transition
 
 
-def half_saved(self: Any) -> Any:
-    return self._places.copy()
-
-
-def half_restored(self: Any, saved: Any) -> None:
-    self._places = saved.copy()
-
-
 def angle_out_of_range(self: Any, *args: Any) -> None:
     LineUp.__init__(self, LineUpSettings())
     angle = replace(LEAD, low=-0.01, high=0.01, centres=(), periodic=True)
@@ -332,10 +324,6 @@ FAULTS: dict[str, tuple[Callable[[], Scenario], str]] = {
     "spawns": (line(reset=spawning), "returned arrays: reset spawns"),
     "one buffer": (line(_states=one_buffer), "returned arrays: states at the start: .* changed"),
     "action changed": (line(step=greedy_hands), "step changes the joint action"),
-    "half restored": (
-        line(save=half_saved, restore=half_restored),
-        "save and restore: the future of a restored scenario differs at step",
-    ),
     "period": (line(__init__=angle_out_of_range), "bounds: lead leaves .* at the start"),
     "shape": (line(_states=short_states), r"form: states of shape \(2, 1\) at the start"),
     "three rewards": (line(step=lengthy_reward), r"form: reward of shape \(3,\)"),
@@ -386,9 +374,12 @@ FAULTS: dict[str, tuple[Callable[[], Scenario], str]] = {
         BLOCKS + "shared_rows names rows -1 to 14",
     ),
     "few rows": (rowed(shared_rows=np.arange(5)), BLOCKS + "shared_rows has 5 .* must have 16"),
-    "broken rows": (rowed(own_rows=np.zeros(4)), BLOCKS + "own_rows is float64, must be an array"),
-    "listed own": (rowed(own=[[0.0]]), BLOCKS + "own is list, must be an array of floats"),
-    "flat own": (rowed(own=np.zeros(4)), BLOCKS + r"own of shape \(4,\), must have 2 axes"),
+    "broken rows": (
+        rowed(own_rows=np.zeros(4)),
+        "predictions: IndexError in states, .* must be of integer",
+    ),
+    "listed own": (rowed(own=[[0.0]]), BLOCKS + "own has 1 rows and no own_rows, must"),
+    "flat own": (rowed(own=np.zeros(4)), BLOCKS + r"own of shape \(4,\), must be \(rows, 1\)"),
     "NaN own": (rowed(own=np.full((4, 1), np.nan)), BLOCKS + "own is not finite"),
     "equal measures": (declared(measures=(SUCCESS, SUCCESS)), "measures: names .* distinct"),
     "no source": (
@@ -450,16 +441,6 @@ def test_the_command_catches_every_planted_fault(
     assert line.startswith("FAULT   fault_")
     assert re.search(FAULTS[name][1], line)
     assert line.count("\n") == 1
-
-
-def test_a_full_saver_passes() -> None:
-    def save(self: Any) -> Any:
-        return self._places.copy(), self._speeds.copy(), self._commands.copy()
-
-    def restore(self: Any, saved: Any) -> None:
-        self._places, self._speeds, self._commands = (part.copy() for part in saved)
-
-    assert check_scenario(line(save=save, restore=restore)) == tuple(CHECKS)
 
 
 @pytest.mark.parametrize("own", [0.5, np.nan])

@@ -210,18 +210,6 @@ def test_the_number_of_the_episode_is_an_option_of_ours_alone() -> None:
     assert env.carried.tolist() == [0, 0.5]
 
 
-def test_draws_repeat() -> None:
-    def drawn(seed: int) -> Any:
-        return faults.draw_faults(seed, ["a", "b", "c"], episodes=(2, 4), steps=9, count=2, lasts=3)
-
-    assert drawn(0) == drawn(0) != drawn(1)
-    for fault in (fault for seed in range(20) for fault in drawn(seed)):
-        assert 2 <= fault.episode <= 4
-        assert fault.step < 9
-        assert fault.end_episode == fault.episode + 3
-    assert len({fault.actuators for fault in drawn(5)}) == 2
-
-
 @pytest.mark.parametrize(
     ("make", "said"),
     [
@@ -232,9 +220,6 @@ def test_draws_repeat() -> None:
         (lambda: faults.FaultyEnv(Told(BOX), [], rest=np.array([3.0, 0.0])), "rest = "),
         (lambda: faults.FaultyEnv(Told(Box(-np.inf, np.inf, (1,))), []), "finite bounds"),
         (lambda: faults.FaultyEnv(Told(gymnasium.spaces.MultiBinary(2)), []), "allowed: Box"),
-        (lambda: faults.draw_faults(0, ["a"], episodes=(0, 1), count=2), "count = 2"),
-        (lambda: faults.draw_faults(0, ["a"], episodes=(0, 1), kinds=["loose"]), "'loose'"),
-        (lambda: faults.draw_faults(0, ["a"], episodes=(3, 1)), "episodes = (3, 1)"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_refused_in_a_line(make: Any, said: str) -> None:

@@ -1,4 +1,4 @@
-"""Results are read, watched and logged without running again: commands, with made-up results."""
+"""Results are read and watched without running again: commands, with made-up results."""
 
 import shutil
 import sqlite3
@@ -13,42 +13,17 @@ from nested_agents.studies.cli.main import main
 from nested_agents.studies.cli.watching import curve, frame
 from nested_agents.studies.spec.toml import dumps
 
-LOGGER = """
-class Lines:
-    def __init__(self, spec, directory):
-        self.path = directory / "told.txt"
-
-    def trial(self, trial, result):
-        with open(self.path, "a") as file:
-            file.write(f"{trial.condition} {trial.seed} {len(result.rows)}\\n")
-
-    def close(self):
-        with open(self.path, "a") as file:
-            file.write("closed\\n")
-
-
-class Raising(Lines):
-    def trial(self, trial, result):
-        raise OSError("the disk is full")
-
-
-class Mute:
-    def __init__(self, spec, directory):
-        pass
-"""
-
 
 @pytest.fixture(scope="module")
 def study(tmp_path_factory: pytest.TempPathFactory):
-    """A finished study, run with a logger, and what was said."""
+    """A finished study, and what was said."""
     folder = tmp_path_factory.mktemp("loaded")
     (folder / "spec.toml").write_text(dumps(made_up.SPEC.table()))
-    (folder / "log.py").write_text(LOGGER)
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(folder)
         said = run_here(
             made_up.failing, "run", "spec.toml", "--out", "out", "--jobs", 1,
-            "--figures", "pdf", "--log", "log.py:Lines", "log.py:Raising",
+            "--figures", "pdf",
         )  # fmt: skip
     return folder / "out", said
 
@@ -62,35 +37,6 @@ def test_figures_are_written_in_the_formats_asked_for(study) -> None:
     out, (_, printed, _) = study
     assert [path.suffix for path in (out / "figures").iterdir()] == [".pdf"]
     assert "learning-curves.pdf" in printed
-
-
-def test_loggers_are_told_of_every_finished_trial_and_never_in_the_way(study) -> None:
-    out, (status, _, errors) = study
-    lines = (out / "told.txt").read_text().splitlines()
-    assert len(lines) == 6  # one of six trials failed
-    assert lines[-1] == "closed"
-    assert lines[0].split()[2] == "6"
-    assert status == 1
-    assert errors.count("Raising is told no more: OSError: the disk is full") == 1
-
-
-@pytest.mark.parametrize(
-    ("name", "complaint"),
-    [
-        ("log.py:Mute", "has no trial, needs trial and close"),
-        ("log.py:None_", "log.py has no 'None_'"),
-        ("tensorbord", "known: none"),
-    ],
-)
-def test_what_is_no_logger_is_refused(tmp_path, monkeypatch, name, complaint) -> None:
-    (tmp_path / "log.py").write_text(LOGGER)
-    (tmp_path / "spec.toml").write_text(dumps(made_up.SPEC.table()))
-    monkeypatch.chdir(tmp_path)
-    status, _, errors = run_here(
-        made_up.measure, "run", "spec.toml", "--out", "out", "--jobs", 1, "--log", name
-    )
-    assert status == 2
-    assert complaint in errors
 
 
 def test_a_table_is_made_as_by_another_study_and_of_a_part(study, capsys) -> None:
@@ -117,11 +63,6 @@ def test_conditions_are_compared_in_every_form(study, capsys) -> None:
     assert said_by(capsys, "compare", out, "--format", "csv")[1].startswith("condition,seeds,")
     status, _, errors = said_by(capsys, "compare", out, out)
     assert (status, "is named more than once" in errors) == (2, True)
-
-
-def test_status_tells_the_power_before_the_money_is_spent(study, capsys) -> None:
-    printed = said_by(capsys, "status", study[0])[1]
-    assert "power    3 seeds cannot give an adjusted p below .05" in printed
 
 
 def test_watching_shows_trials_curves_and_failures(study, capsys, monkeypatch) -> None:
