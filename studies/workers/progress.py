@@ -48,25 +48,12 @@ def progress(store: Store) -> Progress:
     """Return how far the study of an open store is."""
     trials, refusal, states = store.planned(), outdated(store), store.states()
     failed = [*states.values()].count("failed")
-    if refusal is not None:
-        # Trials of another version have other identities: what is there counts.
-        return Progress(
-            total=len(trials),
-            done=len(states) - failed,
-            failed=failed,
-            left=len(trials) - len(states),
-            running=(),
-            processes=0,
-            seconds=None,
-            damaged=tuple(store.notes),
-            refusal=refusal,
-        )
-    now = look(store.directory)
+    now = None if refusal else look(store.directory)
     begun = {} if now is None else now[1]
     pending = [trial for trial in trials if trial.identity not in states]
     running = [trial for trial in pending if trial.identity in begun]
     left = [trial for trial in pending if trial.identity not in begun]
-    usual = cores() if left else 0
+    usual = cores() if left and not refusal else 0
     processes = usual if now is None else now[0]
     seconds = _estimate(
         store.mean_seconds(),
@@ -83,7 +70,7 @@ def progress(store: Store) -> Progress:
         processes=processes,
         seconds=seconds,
         damaged=tuple(store.notes),
-        refusal=None,
+        refusal=refusal,
     )
 
 
