@@ -8,8 +8,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal
-from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from ..core.agents.cost import below_counts
 from ..core.agents.joint_agents import Agents, joint_blocks
@@ -24,14 +23,6 @@ Form = Literal["table", "json"]
 
 MOST_AGENTS = 1000
 """Beyond, the table has more lines than anybody reads, and takes minutes."""
-
-
-@dataclass(frozen=True)
-class Crew:
-    """Agents by name, and their bodies: what a topology is built over."""
-
-    agents: tuple[str, ...]
-    bodies: tuple[tuple[int, ...], ...]
 
 
 @dataclass(frozen=True)
@@ -61,18 +52,11 @@ class HierarchyView:
         count = readable(sum(self.tries))
         return f"{self.text}: {agents}, depth {depth}, {count} joint actions a step"
 
-    def draw(self, path: Path) -> None:
-        """Write a picture."""
-        from .drawing import draw
-
-        draw(self.hierarchy, path, bodies=self.bodies, title=self.title)
-
 
 def view(
     text: str,
     agents: int | None,
     robots: int | None,
-    wheels: int | None,
     actions: int,
     per: Agents = "actuator",
 ) -> HierarchyView:
@@ -85,13 +69,12 @@ def view(
     ValueError
         If the topology or the numbers are refused.
     """
-    if actions < 2:
-        raise ValueError(f"actions = {actions}, allowed: 2 or more")
     settings = parse(text)
     named = named_by(settings) if per == "actuator" else ()
-    team = team_of(agents, robots, wheels, named)
-    names, blocks = joint_blocks(team.agents, team.bodies, actions, per)
-    bodies = team.bodies if per == "actuator" else tuple((i,) for i in range(len(names)))
+    names, bodies = team_of(agents, robots, named)
+    names, blocks = joint_blocks(names, bodies, actions, per)
+    if per != "actuator":
+        bodies = tuple((i,) for i in range(len(names)))
     hierarchy = build(settings, names, bodies)
     own = actions ** len(blocks[0])
     tries = tuple(own ** (1 + count) for count in below_counts(hierarchy))
@@ -113,12 +96,13 @@ def named_by(settings: TopologySettings) -> tuple[str, ...]:
 
 
 def team_of(
-    agents: int | None, robots: int | None, wheels: int | None, named: Sequence[str] = ()
-) -> Crew:
-    """Return agents and bodies for the numbers asked for.
+    agents: int | None = None, robots: int | None = None, named: Sequence[str] = ()
+) -> tuple[tuple[str, ...], tuple[tuple[int, ...], ...]]:
+    """Return names of agents, and these by body, for the numbers asked for.
 
-    Agents are named ``robot1.left``, ``robot1.right`` for two wheels, ``robot1.wheel1`` for more,
-    ``agent1`` for one; but as in `named` if the topology names others.
+    A robot has two wheels unless the numbers say otherwise. Agents are named ``robot1.left``,
+    ``robot1.right`` for two wheels, ``robot1.wheel1`` for more, ``agent1`` for one; but as in
+    `named` if the topology names others.
 
     Raises
     ------
@@ -127,54 +111,38 @@ def team_of(
 
     Examples
     --------
-    >>> team_of(4, None, None).agents
-    ('robot1.left', 'robot1.right', 'robot2.left', 'robot2.right')
+    >>> team_of(4)
+    (('robot1.left', 'robot1.right', 'robot2.left', 'robot2.right'), ((0, 1), (2, 3)))
     """
-    for name, value in (("agents", agents), ("robots", robots), ("wheels", wheels)):
-        if value is not None and value < 1:
-            raise ValueError(f"{name} = {value}, allowed: 1 or more")
-    n = agents or (robots * (wheels or 2) if robots else 2 * wheels if wheels else len(named) or 4)
+    n = agents or 2 * (robots or 0) or len(named) or 4
     if n > MOST_AGENTS:
         raise ValueError(f"agents = {n}, allowed: up to {MOST_AGENTS:,}, to be looked at")
-    if wheels is None:
-        wheels = n // robots if robots and n % robots == 0 else 1 if n % 2 else 2
-    robots = n // wheels if robots is None else robots
+    robots = robots or (n if n % 2 else n // 2)
     if n % robots:
         raise ValueError(f"agents = {n} cannot be divided among robots = {robots}")
-    if robots * wheels != n:
-        raise ValueError(f"agents = {n} are not robots = {robots} times wheels = {wheels}")
-    names = [f"wheel{w + 1}" for w in range(wheels)] if wheels != 2 else ["left", "right"]
-    own = tuple(f"robot{r + 1}.{name}" for r in range(robots) for name in names)
+    wheels = n // robots
+    wheel_names = ["left", "right"] if wheels == 2 else [f"wheel{w + 1}" for w in range(wheels)]
+    names = tuple(f"robot{r + 1}.{name}" for r in range(robots) for name in wheel_names)
     if wheels == 1:
-        own = tuple(f"agent{i + 1}" for i in range(n))
-    bodies = tuple(tuple(range(r * wheels, (r + 1) * wheels)) for r in range(robots))
-    if named and not set(named) <= set(own):
+        names = tuple(f"agent{i + 1}" for i in range(n))
+    if named and not set(named) <= set(names):
         if len(named) != n:
             raise ValueError(f"the topology names {len(named)} agents, {n} are asked for")
-        own = tuple(named)
-    return Crew(own, bodies)
+        names = tuple(named)
+    return names, tuple(tuple(range(r * wheels, (r + 1) * wheels)) for r in range(robots))
 
 
-def kinds(form: Form) -> str:
+def kinds() -> str:
     """Return all topologies, built-in and installed, for printing."""
-    rows: list[dict[str, Any]] = []
+    lines = []
     for kind in TOPOLOGIES.built_in:
         model = TOPOLOGIES.model(kind)
-        summary = (model.__doc__ or "").splitlines()[0]
-        optional = not any(field.is_required() for field in model.model_fields.values())
-        argument, _ = ARGUMENTS.get(kind, ("", ""))
-        rows.append({"kind": kind, "argument": argument, "optional": optional, "summary": summary})
-    for name, value in TOPOLOGIES.installed().items():
-        summary = f"Installed: {value}"
-        rows.append({"kind": name, "argument": "", "optional": True, "summary": summary})
-    if form == "json":
-        return json.dumps(rows, indent=1)
-    lines = []
-    for row in rows:
-        argument = f":{row['argument']}" if row["argument"] else ""
-        if argument and row["optional"]:
+        argument = f":{ARGUMENTS[kind][0]}" if kind in ARGUMENTS else ""
+        if argument and not any(field.is_required() for field in model.model_fields.values()):
             argument = f"[{argument}]"
-        lines += [f"{row['kind']}{argument}", f"    {row['summary']}"]
+        lines += [f"{kind}{argument}", f"    {(model.__doc__ or '').splitlines()[0]}"]
+    for name, value in TOPOLOGIES.installed().items():
+        lines += [name, f"    Installed: {value}"]
     return "\n".join(lines)
 
 

@@ -15,13 +15,15 @@ from typing import Any
 
 import numpy as np
 from gymnasium.spaces import Box, Discrete, MultiDiscrete
-from pettingzoo import AECEnv, ParallelEnv
+from pettingzoo import ParallelEnv
+from pettingzoo.utils import AgentSelector
+from pettingzoo.utils.conversions import parallel_to_aec_wrapper
 
 from ...core.interface.hierarchy import Hierarchy
 from ...core.numerics.arrays import FloatArray
 
 
-class PassingDownEnv(AECEnv):
+class PassingDownEnv(parallel_to_aec_wrapper):
     """A parallel environment whose agents take turns from the top of a hierarchy down.
 
     An observation is what the agent observes in `env`, and after it the actions that it has been
@@ -68,11 +70,8 @@ class PassingDownEnv(AECEnv):
                 f"hierarchy: agents {', '.join(hierarchy.agents)}, those of the environment are "
                 f"{', '.join(names)}"
             )
-        self.env, self.hierarchy = env, hierarchy
-        self.metadata = dict(env.metadata)
-        self.render_mode = getattr(env, "render_mode", None)
-        self.possible_agents = names
-        self.agents: list[str] = []
+        super().__init__(env)
+        self.hierarchy = hierarchy
         self._order = [hierarchy.agents[i] for i in hierarchy.order]
         self._above = {
             name: {hierarchy.agents[j] for j in hierarchy.above(i)}
@@ -96,25 +95,21 @@ class PassingDownEnv(AECEnv):
         """Return the space of an agent's observations."""
         return self._spaces[agent]
 
-    def action_space(self, agent: str) -> Any:
-        """Return the space of an agent's actions: that of the parallel environment."""
-        return self.env.action_space(agent)
-
     def reset(self, seed: int | None = None, options: Mapping[str, Any] | None = None) -> None:
         """Start an episode; the agent at the top of the hierarchy is the first to act."""
-        self._observations, self.infos = self.env.reset(seed=seed, options=options)
-        self.agents = list(self.env.agents)
-        self.rewards = dict.fromkeys(self.agents, 0.0)
-        self._cumulative_rewards = dict.fromkeys(self.agents, 0.0)
-        self.terminations = dict.fromkeys(self.agents, False)
-        self.truncations = dict.fromkeys(self.agents, False)
+        super().reset(seed=seed, options=options)
         self._begin_step()
 
     def _begin_step(self) -> None:
-        self._decided: dict[str, Any] = {}
-        self._waiting = [name for name in self._order if name in self.env.agents]
-        if self._waiting:
-            self.agent_selection = self._waiting.pop(0)
+        self._actions = dict.fromkeys(self.agents)
+        waiting = [name for name in self._order if name in self.env.agents]
+        if waiting:
+            self._agent_selector = AgentSelector(waiting)
+            self.agent_selection = self._agent_selector.reset()
+
+    def _deads_step_first(self) -> Any:
+        self._begin_step()  # PettingZoo calls this when the world has gone on
+        return super()._deads_step_first()
 
     def observe(self, agent: str) -> FloatArray:
         """Return what an agent observes, and the actions that it has been passed so far."""
@@ -122,8 +117,9 @@ class PassingDownEnv(AECEnv):
         parts = [own]
         for name, choices in self._choices.items():
             part = np.zeros(int(choices.sum()))
-            if name in self._decided and name in self._above[agent]:
-                part[np.cumsum(choices) - choices + self._decided[name]] = 1.0
+            decided = self._actions.get(name)
+            if decided is not None and name in self._above[agent]:
+                part[np.cumsum(choices) - choices + decided] = 1.0
             parts.append(part)
         return np.concatenate(parts).astype(own.dtype)
 
@@ -138,32 +134,12 @@ class PassingDownEnv(AECEnv):
             If the action is none of the agent's; one line.
         """
         agent = self.agent_selection
-        if self.terminations[agent] or self.truncations[agent]:
-            self._was_dead_step(action)
-            return
-        if not self.action_space(agent).contains(action):
+        is_done = self.terminations[agent] or self.truncations[agent]
+        if not is_done and not self.action_space(agent).contains(action):
             raise ValueError(
                 f"step: action {action!r} of {agent}, allowed {self.action_space(agent)}"
             )
-        self._cumulative_rewards[agent] = 0.0
-        self._clear_rewards()
-        self._decided[agent] = action
-        if self._waiting:
-            self.agent_selection = self._waiting.pop(0)
-            return
-        told = self.env.step(self._decided)
-        self._observations, self.rewards, self.terminations, self.truncations, self.infos = told
-        self._accumulate_rewards()
-        self._begin_step()
-        self._deads_step_first()
-
-    def render(self) -> Any:
-        """Return or show what the parallel environment does."""
-        return self.env.render()
-
-    def close(self) -> None:
-        """Close the parallel environment."""
-        self.env.close()
+        super().step(action)
 
 
 def _choices(name: str, space: Any) -> Any:

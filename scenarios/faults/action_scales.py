@@ -1,8 +1,8 @@
 """Actions of any Box or Discrete space as numbers along a scale, of which faults know what they do.
 
 Each entry of a Box is an actuator, whose scale is that of the action. Each discrete choice is one,
-too: its ``n`` actions are taken to be in order along a scale from -1 to 1, as left, none, right
-are. What a fault makes of them may lie between two actions; then one of these is drawn, with the
+too: its actions are taken to be in order along a scale, as left, none, right are, with rest in the
+middle. What a fault makes of them may lie between two actions; then one of these is drawn, with the
 probabilities whose mean is the place between.
 """
 
@@ -14,7 +14,7 @@ import gymnasium
 import numpy as np
 from gymnasium.spaces import Box, Discrete, MultiDiscrete
 
-from ...core.numerics.arrays import BoolArray, FloatArray, IntArray
+from ...core.numerics.arrays import BoolArray, FloatArray
 
 
 class ActionScale:
@@ -25,7 +25,7 @@ class ActionScale:
     space
         The action space: a bounded Box, Discrete or MultiDiscrete.
     rest
-        The action in which actuators rest; None: 0 where the scale has it, else its middle.
+        The action in which actuators rest; None: 0 where a Box has it, else the middle.
     said
         What the space is called in complaints.
 
@@ -52,7 +52,6 @@ class ActionScale:
         self, space: gymnasium.Space[Any], rest: Any = None, said: str = "action space"
     ) -> None:
         self.space = space
-        self._first: IntArray = np.zeros(1, dtype=np.int64)  # the first action of each choice
         if isinstance(space, Box):
             self._low, self._high = (b.ravel().astype(float) for b in (space.low, space.high))
             if not np.isfinite([self._low, self._high]).all():
@@ -60,30 +59,28 @@ class ActionScale:
                     f"{said} = {space}: faults need finite bounds; "
                     "gymnasium.wrappers.RescaleAction or ClipAction gives them"
                 )
-            self._counts = np.zeros(self._low.size, dtype=np.int64)
         elif isinstance(space, Discrete | MultiDiscrete):
             counts = space.n if isinstance(space, Discrete) else space.nvec
-            self._counts = np.atleast_1d(np.asarray(counts, dtype=np.int64)).ravel()
-            self._low, self._high = -np.ones(self._counts.size), np.ones(self._counts.size)
-            self._first = np.ravel(space.start)
+            self._low = np.ravel(space.start).astype(float)
+            self._high = self._low + np.ravel(counts) - 1.0
         else:
             raise ValueError(f"{said} = {space}: allowed: Box, Discrete, MultiDiscrete")
         if rest is None:
-            has_zero = (self._low <= 0) & (self._high >= 0)
+            has_zero = isinstance(space, Box) & (self._low <= 0) & (self._high >= 0)
             self._rest = np.where(has_zero, 0.0, (self._low + self._high) / 2)
+        elif space.contains(rest):
+            self._rest = np.ravel(rest).astype(float)
         else:
-            if not space.contains(rest):
-                raise ValueError(f"rest = {rest!r}: no action of {space}")
-            self._rest = self._scaled(rest)
+            raise ValueError(f"rest = {rest!r}: no action of {space}")
         self.limits: FloatArray = np.maximum(self._high - self._rest, self._rest - self._low)
 
     def __len__(self) -> int:
         """Return the number of actuators."""
-        return len(self._counts)
+        return len(self.limits)
 
     def place(self, action: Any) -> FloatArray:
         """Return where an action lies from rest, ``(k,)``."""
-        return self._scaled(action) - self._rest
+        return np.ravel(action).astype(float) - self._rest
 
     def action(self, place: FloatArray, told: Any, changed: BoolArray, drawn: FloatArray) -> Any:
         """Return the action at a place.
@@ -99,25 +96,14 @@ class ActionScale:
         drawn
             ``(k,)`` uniform random numbers for what lies between two actions.
         """
+        if not changed.any():
+            return told
         values = np.clip(self._rest + place, self._low, self._high)
-        if isinstance(self.space, Box):
-            whole = np.issubdtype(self.space.dtype, np.integer)
-            found = np.array(told, dtype=self.space.dtype)
-            entries = np.rint(values) if whole else values
-            found.ravel()[changed] = entries[changed].astype(self.space.dtype)
-            return found
-        index = (values + 1.0) / 2.0 * (self._counts - 1)
-        below = np.floor(index + 1e-12)
-        choices = (below + (drawn < index - below)).astype(np.int64)
-        choices += self._first
-        if isinstance(self.space, Discrete):
-            return choices[0] if changed[0] else told
-        found = np.array(told, dtype=self.space.dtype)
-        found.ravel()[changed] = choices[changed]
-        return found
-
-    def _scaled(self, action: Any) -> FloatArray:
-        if isinstance(self.space, Box):
-            return np.asarray(action, dtype=float).ravel()
-        choices = np.asarray(action, dtype=float).ravel() - self._first
-        return 2.0 * choices / np.maximum(self._counts - 1, 1) - 1.0
+        if not isinstance(self.space, Box):
+            below = np.floor(values + 1e-12)
+            values = below + (drawn < values - below)
+        elif np.issubdtype(self.space.dtype, np.integer):
+            values = np.rint(values)
+        action = np.array(told, dtype=self.space.dtype)
+        action.ravel()[changed] = values[changed].astype(action.dtype)
+        return action[()]  # a number, not an array, of Discrete

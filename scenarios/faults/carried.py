@@ -121,14 +121,17 @@ class Carried:
         driven = self._failures.driven(places, 1)[0]
         changed = self._failures.failed
         for fault, mask in self._failures.active():
-            if fault.kind == "seized" and self._commands == "position":
-                driven[mask] = self._held[mask]
-        for fault, mask in self._failures.active():
             if fault.kind == "free":
                 driven[mask] = 0.0
+            elif fault.kind == "seized" and self._commands == "position":
+                driven[mask] = self._held[mask]
         self._held = np.where(changed, driven, places)
-        if self._mechanism is not None:
-            self._hook(self._mechanism, environment)
+        unexpressed = {
+            name: kind for name, kind in self.now().items() if kind == INEXPRESSIBLE[self._commands]
+        }
+        if self._mechanism is not None and (unexpressed or self._hooked):
+            self._mechanism(environment, unexpressed)
+        self._hooked = bool(unexpressed)
         return {
             prefix: self.scales[prefix].action(
                 driven[span], action, changed[span], drawn[span]
@@ -136,13 +139,6 @@ class Carried:
             for prefix, action in told.items()
             for span in [self._spans[prefix]]
         }  # fmt: skip
-
-    def _hook(self, mechanism: Mechanism, environment: Any) -> None:
-        unexpressed = INEXPRESSIBLE[self._commands]
-        now = {name: kind for name, kind in self.now().items() if kind == unexpressed}
-        if now or self._hooked:
-            mechanism(environment, now)
-        self._hooked = bool(now)
 
     def now(self) -> dict[str, str]:
         """Return the kind of the fault of every actuator that has one; of several, the last."""

@@ -18,14 +18,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import gymnasium
-from gymnasium.utils import RecordConstructorArgs
 from pettingzoo.utils import BaseParallelWrapper
 
 from .actuators import ActuatorFault
 from .carried import Carried, Commands, Mechanism
 
 
-class FaultyEnv(gymnasium.Wrapper, RecordConstructorArgs):
+class FaultyEnv(gymnasium.Wrapper):
     """A Gymnasium environment whose actuators fail as scheduled, without the policy being told.
 
     Its worlds are those of the environment beneath, seed by seed, whatever fails. Steps and
@@ -53,6 +52,8 @@ class FaultyEnv(gymnasium.Wrapper, RecordConstructorArgs):
 
     Attributes
     ----------
+    actuators
+        Names of the actuators.
     carried
         The last action that was done.
 
@@ -73,34 +74,26 @@ class FaultyEnv(gymnasium.Wrapper, RecordConstructorArgs):
         mechanism: Mechanism | None = None,
         inform: bool = False,
     ) -> None:
-        RecordConstructorArgs.__init__(
-            self, faults=faults, seed=seed, commands=commands, rest=rest, mechanism=mechanism,
-            inform=inform,
-        )  # fmt: skip
-        gymnasium.Wrapper.__init__(self, env)
-        self._actuators = Carried({"": env.action_space}, faults, seed, commands,
-                                  {} if rest is None else {"": rest}, mechanism)  # fmt: skip
+        super().__init__(env)
+        spaces = {"": env.action_space}
+        self._carrier = Carried(spaces, faults, seed, commands, {"": rest}, mechanism)
+        self.actuators = self._carrier.names
         self._inform = inform
         self.carried: Any = None
-
-    @property
-    def actuators(self) -> tuple[str, ...]:
-        """Names of the actuators."""
-        return self._actuators.names
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
         """Start an episode of the environment beneath."""
-        left = self._actuators.reset(seed, options)
+        left = self._carrier.reset(seed, options)
         return self.env.reset(seed=seed, options=left)
 
     def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
         """Do what faulty actuators make of an action."""
-        self.carried = self._actuators.carry({"": action}, self.env)[""]
+        self.carried = self._carrier.carry({"": action}, self.env)[""]
         seen, reward, terminated, truncated, info = self.env.step(self.carried)
         if self._inform:
-            info = {**info, "faults": self._actuators.now(), "carried": self.carried}
+            info = {**info, "faults": self._carrier.now(), "carried": self.carried}
         return seen, reward, terminated, truncated, info
 
 
@@ -118,6 +111,8 @@ class FaultyParallelEnv(BaseParallelWrapper):
 
     Attributes
     ----------
+    actuators
+        Names of the actuators.
     carried
         The last actions that were done, by agent.
     """
@@ -135,29 +130,25 @@ class FaultyParallelEnv(BaseParallelWrapper):
     ) -> None:
         super().__init__(env)
         spaces = {agent: env.action_space(agent) for agent in env.possible_agents}
-        self._actuators = Carried(spaces, faults, seed, commands, rest or {}, mechanism)
+        self._carrier = Carried(spaces, faults, seed, commands, rest or {}, mechanism)
+        self.actuators = self._carrier.names
         self._inform = inform
         self.carried: dict[str, Any] = {}
-
-    @property
-    def actuators(self) -> tuple[str, ...]:
-        """Names of the actuators."""
-        return self._actuators.names
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
         """Start an episode of the environment beneath."""
-        left = self._actuators.reset(seed, options)
+        left = self._carrier.reset(seed, options)
         seen, infos = self.env.reset(seed=seed, options=left)
         return seen, infos
 
     def step(self, actions: Mapping[str, Any]) -> tuple[dict[str, Any], ...]:
         """Do what faulty actuators make of the agents' actions."""
-        self.carried = self._actuators.carry(actions, self.env)
+        self.carried = self._carrier.carry(actions, self.env)
         *given, infos = self.env.step(self.carried)
         if self._inform:
-            now = self._actuators.now()
+            now = self._carrier.now()
             infos = {
                 agent: {
                     **info,

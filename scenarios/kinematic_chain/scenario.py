@@ -9,7 +9,6 @@ they turn at the speed that they are told, unless they fail or reach their limit
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -23,7 +22,6 @@ from ...core.numerics.arrays import BoolArray, FloatArray, IntArray
 from ..faults.schedule import Failures
 from .config import PERIOD, REACH, KinematicChainSettings
 from .kinematics import postures_of
-from .prediction import ChainPrediction, Premises
 from .variables import ChainStates
 from .view import ChainView
 
@@ -73,11 +71,9 @@ class KinematicChain:
         self.action_set = ActionSet()
         self.length = REACH / n
         self._limits = np.full(n, settings.top_speed)
-        self._least, self._most = np.full(n, -np.inf), np.full(n, np.inf)
-        if settings.joint_limit is not None:
-            self._least[1:], self._most[1:] = -settings.joint_limit, settings.joint_limit
+        self._most = np.full(n, settings.joint_limit or np.inf)
+        self._most[0] = np.inf
         self._states = ChainStates(settings.state_space)
-        self._premises = Premises(self._states, self.length, settings.top_speed, self._reward)
         self._failures = Failures(settings.failures, self.agents, self._limits)
         # What an informed prediction knows of the next step, while the others tell of the last.
         self._known = Failures(settings.failures, self.agents, self._limits)
@@ -124,7 +120,7 @@ class KinematicChain:
         unit = self.settings.speed_increment * self._limits
         self._speeds = self.action_set.apply(self._speeds, joint_action, unit, self._limits)
         held = self._failures.driven(self._speeds, periods=1)[0]
-        self._angles = np.clip(angles + PERIOD * held, self._least, self._most)
+        self._angles = np.clip(angles + PERIOD * held, -self._most, self._most)
         self._step += 1
         moved = perf_counter()
         states, measured = self._observe(before), self.measure()
@@ -150,22 +146,7 @@ class KinematicChain:
 
     def predict_with(self, effects: Sequence[FloatArray]) -> ChainPrediction:
         """Predict from the present state, believing in these effects ``(3, 2)`` of the joints."""
-        return self._predict_from(effects, self._angles, self._speeds, self._distance())
-
-    def _predict_from(
-        self, effects: Sequence[FloatArray], angles: FloatArray, speeds: FloatArray, before: float
-    ) -> ChainPrediction:
-        """Predict from a posture, joint speeds ``(n,)`` and the distance of the tip in it."""
-        gains, offsets = np.array([effect[2] for effect in effects]).T
-        every = np.tile(np.arange(len(self.action_set))[:, None], len(self.agents))
-        unit = self.settings.speed_increment * self._limits
-        told = self.action_set.apply(speeds, every, unit, self._limits)
-        after = np.clip(angles + PERIOD * (gains * told + offsets), self._least, self._most)
-        turns = np.ascontiguousarray((after - angles).T)
-        return ChainPrediction(
-            self._premises, angles, np.ascontiguousarray(told.T), turns, self._goal, before,
-            partial(self._predict_from, effects),
-        )  # fmt: skip
+        return ChainPrediction(self, effects, self._angles, self._speeds, self._distance())
 
     def _actual_effects(self) -> tuple[FloatArray, ...]:
         """Return the effects of the joints in the coming step: all failures are linear."""
@@ -240,3 +221,84 @@ class KinematicChain:
             before,
         )
         return self._states.sensed(view)[0]
+
+
+class ChainPrediction:
+    """What joint actions lead to: exactly if joints do what they are believed to do.
+
+    A decision turns every joint by its speed times the period, or up to its limit. What each of
+    its actions would turn it by is computed once; a joint action is then one posture. The
+    prediction knows rewards and serves self-models, every joint being a body.
+
+    Parameters
+    ----------
+    arm
+        Whose joints turn.
+    effects
+        Per joint the ``(3, 2)`` effect of its speed that is believed in.
+    angles, speeds
+        ``(n,)`` the posture [rad] and the commanded speeds [rad/s] from which it is predicted.
+    before
+        Distance of the tip from the goal in that posture [m].
+
+    Attributes
+    ----------
+    speeds
+        ``(n, A)`` speed that each action of each joint commands [rad/s].
+    turns
+        ``(n, A)`` by how much it turns the joint [rad].
+    """
+
+    def __init__(
+        self,
+        arm: KinematicChain,
+        effects: Sequence[FloatArray],
+        angles: FloatArray,
+        speeds: FloatArray,
+        before: float,
+    ) -> None:
+        self.arm, self.effects, self.angles, self.before = arm, effects, angles, before
+        self.goal, self.groups = arm._goal, arm.groups
+        self._joints = np.arange(len(angles))
+        gains, offsets = np.array([effect[2] for effect in effects]).T
+        every = np.tile(np.arange(len(arm.action_set))[:, None], len(angles))
+        unit = arm.settings.speed_increment * arm._limits
+        commanded = arm.action_set.apply(speeds, every, unit, arm._limits)
+        after = np.clip(angles + PERIOD * (gains * commanded + offsets), -arm._most, arm._most)
+        self.speeds = np.ascontiguousarray(commanded.T)
+        self.turns = np.ascontiguousarray((after - angles).T)
+        self._fractions = self.speeds / arm.settings.top_speed
+
+    def seen(self, joint_actions: IntArray) -> ChainView:
+        """Return the situations after joint actions ``(m, n)``."""
+        angles = self.angles + self.turns[self._joints, joint_actions]
+        places = postures_of(angles, self.arm.length)
+        speeds = self._fractions[self._joints, joint_actions]
+        return ChainView(places, angles, speeds, self.goal, self.before)
+
+    def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
+        """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
+        return self.arm._states.predicted(self.seen(joint_actions), agent, 1)[0]
+
+    def states_of_all(self, joint_actions: IntArray) -> FloatArray:
+        """Return the next states ``(n, m, d)`` of all agents for joint actions ``(m, n)``."""
+        return self.arm._states.predicted(self.seen(joint_actions), 0, len(self.angles))
+
+    def rewards(self, joint_actions: IntArray) -> FloatArray:
+        """Return the rewards ``(m,)`` of joint actions ``(m, n)``."""
+        view = self.seen(joint_actions)
+        return self.arm._reward(view.distance, view.approach)
+
+    def after(self, joint_action: IntArray) -> ChainPrediction:
+        """Return the prediction from where a joint action ``(n,)`` leads in one decision."""
+        reached, speeds = self.seen(joint_action[None]), self.commands(joint_action)
+        before = float(reached.distance[0])
+        return ChainPrediction(self.arm, self.effects, reached.angles[0], speeds, before)
+
+    def commands(self, joint_action: IntArray) -> FloatArray:
+        """Return the joint speeds ``(n,)`` that a joint action ``(n,)`` would command [rad/s]."""
+        return self.speeds[self._joints, joint_action]
+
+    def slips(self, joint_action: IntArray) -> FloatArray:
+        """Return by how much contact changes the joints' motion ``(n, 3)``: not at all."""
+        return np.zeros((len(self.angles), 3))

@@ -29,14 +29,14 @@ from ...core.evaluators import EvaluatorSettings
 from ...core.evaluators.evaluator import Counts, DecisionProblem, Deliberation
 from ...core.numerics.arrays import FloatArray, IntArray
 from .kinematics import ends_of, jacobian_of
-from .prediction import ChainPrediction
+from .scenario import ChainPrediction
 
 
 class _Scripted(ABC):
     """What the two share: the action whose turn is nearest to the one that is wanted."""
 
     def __init__(self, settings: EvaluatorSettings, problem: DecisionProblem) -> None:
-        self.problem, self.counts = problem, Counts()
+        self.settings, self.problem, self.counts = settings, problem, Counts()
 
     def values(self, deliberation: Deliberation) -> FloatArray:
         """Return the value ``(A,)`` of each action: how near its turn comes, negative.
@@ -54,7 +54,7 @@ class _Scripted(ABC):
         above = np.array(self.problem.hierarchy.above(agent), dtype=np.int64)
         turns = np.zeros(len(prediction.angles))
         turns[above] = prediction.turns[above, deliberation.joint_action[above]]
-        places = ends_of(prediction.angles + turns, prediction.premises.length)
+        places = ends_of(prediction.angles + turns, prediction.arm.length)
         wanted = self._wanted(prediction, agent, above, places)
         values: FloatArray = -np.abs(prediction.turns[agent] - wanted)
         return values
@@ -78,9 +78,7 @@ class DampedLeastSquares(_Scripted):
         damping: Annotated[float, Field(gt=0)] = 0.05
         """In metres per radian: large where the arm is stretched and joints would race."""
 
-    def __init__(self, settings: Settings, problem: DecisionProblem) -> None:
-        super().__init__(settings, problem)
-        self._damping = settings.damping
+    settings: Settings
 
     def _wanted(
         self, prediction: ChainPrediction, agent: int, above: IntArray, places: FloatArray
@@ -95,7 +93,7 @@ class DampedLeastSquares(_Scripted):
         drift[above] = 0.0
         error = prediction.goal - places[-1] - drift @ moves
         own = moves[free]
-        square = own.T @ own + self._damping**2 * np.eye(2)
+        square = own.T @ own + self.settings.damping**2 * np.eye(2)
         turns = own @ np.linalg.solve(square, error)
         reach = np.maximum(np.abs(least), np.abs(most))[free]
         slower = min(1.0, float((reach / np.maximum(np.abs(turns), 1e-12)).min()))

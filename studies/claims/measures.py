@@ -73,10 +73,8 @@ def learned(name: str = "", known: tuple[str, ...] = UNREWARDED) -> Compute:
         if not results.has(condition, "training") or not controls:
             return None
         best = max(controls, key=lambda c: float(outcomes(results, c).mean()))
-        base, own = paired(results, best, condition, outcomes)
-        return (
-            Measured(difference(own, base), len(own), note=f"against {best}") if len(own) else None
-        )
+        note = f"against {best}"
+        return _compare(results, condition, best, outcomes, difference, "training", note=note)
 
     return compute
 
@@ -88,11 +86,11 @@ def learner_of(results: Results) -> str:
 
 def sooner_than_planned(results: Results) -> Measured | None:
     """Measure the learner's decisions in an evaluation episode over the planner's, by seed."""
-    learner = learner_of(results)
-    if not {learner, PLANNER} <= {*results.of_phase("evaluation")}:
-        return None
-    base, own = paired(results, PLANNER, learner, _evaluation_steps)
-    return Measured(bootstrap(own / base, bounds=NOT_NEGATIVE), len(own)) if len(own) else None
+
+    def share(own: np.ndarray, base: np.ndarray) -> Estimate:
+        return bootstrap(own / base, bounds=NOT_NEGATIVE)
+
+    return _compare(results, learner_of(results), PLANNER, _evaluation_steps, share)
 
 
 def success(episodes: slice) -> Compute:
@@ -126,11 +124,10 @@ def contact_gained(results: Results) -> Measured | None:
         contact = r.values(name, CONTACT)
         return np.asarray(contact[:, LAST].mean(axis=1) - contact[:, FIRST].mean(axis=1))
 
-    learner = learner_of(results)
-    if not all(results.has(name, "training", CONTACT) for name in (learner, PLANNER)):
-        return None
-    base, own = paired(results, PLANNER, learner, gained)
-    return Measured(bootstrap(own - base), len(own)) if len(own) else None
+    def more(own: np.ndarray, base: np.ndarray) -> Estimate:
+        return bootstrap(own - base)
+
+    return _compare(results, learner_of(results), PLANNER, gained, more, "training", CONTACT)
 
 
 def cost_error(results: Results) -> Measured:
@@ -225,9 +222,28 @@ def success_by_size(results: Results) -> Measured | None:
         max(sizes[robots], key=lambda c: float(_evaluation_success(results, c).mean()))
         for robots in (min(sizes), max(sizes))
     )
-    base, own = paired(results, fewest, most, _evaluation_success)
     note = f"{max(sizes)} against {min(sizes)} robots"
-    return Measured(ratio(own, base), len(own), note=note) if len(own) else None
+    return _compare(results, most, fewest, _evaluation_success, ratio, note=note)
+
+
+def _compare(
+    results: Results,
+    condition: str,
+    reference: str,
+    values: Callable[[Results, str], np.ndarray],
+    estimate: Callable[[np.ndarray, np.ndarray], Estimate],
+    phase: str = "evaluation",
+    measure: str = "",
+    note: str = "",
+) -> Measured | None:
+    """Return an estimate from the values of a condition and a reference, seed by seed.
+
+    None unless both have the measure in the episodes of the phase, for a seed in common.
+    """
+    if not all(results.has(c, phase, measure) for c in (condition, reference)):
+        return None
+    base, own = paired(results, reference, condition, values)
+    return Measured(estimate(own, base), len(own), note=note) if len(own) else None
 
 
 def _evaluation_steps(results: Results, condition: str) -> np.ndarray:
@@ -276,9 +292,6 @@ def without(condition: str) -> Compute:
     """Return what measures the evaluation success of a condition relative to the default's."""
 
     def compute(results: Results) -> Measured | None:
-        if not {condition, "default"} <= {*results.of_phase("evaluation")}:
-            return None
-        base, own = paired(results, "default", condition, _evaluation_success)
-        return Measured(ratio(own, base), len(own)) if len(own) else None
+        return _compare(results, condition, "default", _evaluation_success, ratio)
 
     return compute

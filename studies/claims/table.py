@@ -10,11 +10,10 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from ..presentation.tables import escaped, tabular
+from ..presentation.cells import ends
 from .claims import Finding
-from .measures import Measured
 
-Format = Literal["table", "json", "markdown", "latex"]
+Format = Literal["table", "json", "markdown"]
 
 COLOURS = {"holds": "green", "does not hold": "red", "not decided": "yellow"}
 
@@ -25,8 +24,6 @@ def print_claims(findings: Sequence[Finding], form: Format) -> None:
         print(json.dumps([_record(finding) for finding in findings], indent=1, allow_nan=False))
     elif form == "markdown":
         print(markdown(findings))
-    elif form == "latex":
-        print(latex(findings))
     else:
         _print_table(findings)
 
@@ -53,7 +50,7 @@ def result(finding: Finding) -> str:
     if finding.measured is None:
         return "no results"
     measured = finding.measured
-    value, low, high = _ends(measured)
+    value, low, high = ends(measured.estimate)
     text = f"{value:.2f}" if measured.seeds else f"{value:.2g}"
     if measured.seeds:
         text += f" ({low:.2f} to {high:.2f}), {measured.seeds} seeds"
@@ -78,22 +75,6 @@ def markdown(findings: Sequence[Finding]) -> str:
     return "\n".join(lines)
 
 
-def latex(findings: Sequence[Finding]) -> str:
-    """Return the table for LaTeX, which needs the packages booktabs and tabularx."""
-    lines = [["claim", "measure, criterion", "result", "verdict"]]
-    for finding in findings:
-        c = finding.claim
-        cells = (f"{c.text} ({c.place})", f"{c.measure}: {c.criterion.text}", result(finding))
-        lines.append([escaped(cell) for cell in (*cells, finding.verdict)])
-    needs = "{booktabs,tabularx}; 95 % intervals in brackets"
-    return tabular(needs, r"{\textwidth}{XXll}", lines, "tabularx")
-
-
-def _ends(measured: Measured) -> tuple[float, float, float]:
-    e = measured.estimate
-    return float(e.value), float(e.low), float(e.high)
-
-
 def _record(finding: Finding) -> dict[str, Any]:
     claim, measured = finding.claim, finding.measured
     record: dict[str, Any] = {
@@ -106,7 +87,7 @@ def _record(finding: Finding) -> dict[str, Any]:
         "verdict": finding.verdict,
     }
     if measured is not None:
-        value, low, high = (v if np.isfinite(v) else None for v in _ends(measured))
+        value, low, high = (v if np.isfinite(v) else None for v in ends(measured.estimate))
         record |= {"value": value, "low": low, "high": high, "seeds": measured.seeds}
         record |= {"p": measured.p, "note": measured.note}
     return record

@@ -141,7 +141,7 @@ def agents_below(text: str, n: int) -> Sequence[int]:
     """
     if text in ("chain", "chain:reversed", "chain:interleaved"):
         return range(n)  # a thousand hierarchies of a thousand agents take their time
-    return below_counts(build(text, team_of(n, None, None).agents, pairs(n)))
+    return below_counts(build(text, team_of(n)[0], pairs(n)))
 
 
 def pairs(n: int) -> tuple[tuple[int, ...], ...]:
@@ -170,7 +170,7 @@ def measure(text: str, n: int) -> StepCost | None:
     _warm_up()
     tracemalloc.start()
     try:
-        team = Team.build(learner, scenario, hierarchy, policy_seed(0))
+        team = Team(learner, scenario, hierarchy, policy_seed(0))
         _steps(team, scenario, 1)
         memory = tracemalloc.get_traced_memory()[1]
     finally:
@@ -241,7 +241,7 @@ def _warm_up() -> None:
     line_up = LineUpSettings(carts=2).build()
     for topology in ("chain", "independent"):
         hierarchy = build(topology, line_up.agents)
-        _steps(Team.build(LEARNER, line_up, hierarchy, policy_seed(0)), line_up, 1)
+        _steps(Team(LEARNER, line_up, hierarchy, policy_seed(0)), line_up, 1)
 
 
 def _steps(team: Team, scenario: Scenario, times: int) -> list[tuple[float, float]]:

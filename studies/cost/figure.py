@@ -9,14 +9,18 @@ from math import log10
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-from ..presentation.figures import COLOURS, MARKERS, SETTINGS, check_suffix, write
+from ..presentation import figures
+from ..presentation.figures import add_legend, handle, look, marker
 from .cost import CostRow
+
+TITLES = ("operations, by formula", "rule evaluations a step", "time of a step [s]")
+"""Of the panels; the last two hold what was measured."""
+Points = Sequence[tuple[int, float]]
+"""Numbers of agents, each with the logarithm of a value."""
 
 
 def draw(rows: Sequence[CostRow], path: Path) -> None:
@@ -32,81 +36,60 @@ def draw(rows: Sequence[CostRow], path: Path) -> None:
     ValueError
         If the suffix is none of these.
     """
-    check_suffix(path)
+    figures.check_suffix(path)
     series = {
         text: [row for row in rows if row.topology == text]
         for text in dict.fromkeys(row.topology for row in rows)
     }
     measured = any(row.measured is not None for row in rows)
-    with mpl.rc_context(SETTINGS):  # type: ignore[arg-type]
+    single = [(n, _log10(cost)) for n, cost in {r.agents: r.single_agent for r in rows}.items()]
+    with figures.styled():
         columns = 3 if measured else 1
-        figure = Figure(figsize=(3.2 * columns + 0.6, 3.7), layout="constrained")
-        panels = figure.subplots(1, columns, squeeze=False)[0]
-        _formulas(panels[0], series)
-        if measured:
-            _measured(panels[1], panels[2], series)
-        for axes in panels:
+        figure, (all_axes,) = figures.panels(1, columns, (3.2 * columns + 0.6, 3.9))
+        all_axes[0].plot(*zip(*single, strict=True), "--", color="black")
+        for index, own in enumerate(series.values()):
+            _draw_series(all_axes, own, index)
+        for axes, title in zip(all_axes, TITLES, strict=False):
+            axes.set_title(title, loc="left")
             axes.set_xlabel("agents n")
             axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
             axes.yaxis.set_major_locator(MaxNLocator(integer=True, nbins=7))
             axes.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"$10^{{{y:g}}}$"))
             axes.grid(alpha=0.25)
-        handles = _legend(list(series), measured)
-        longest = max(len(str(handle.get_label())) for handle in handles)
-        # A letter is about 0.06 in wide, the sample of a line and its margins 0.5 in.
-        columns = int(figure.get_figwidth() / (0.06 * longest + 0.5))
-        figure.legend(handles=handles, loc="outside lower center", ncols=max(1, min(4, columns)))
-        write(figure, path)
+        add_legend(figure, _handles(list(series), measured), ncols=1 + columns)
+        figures.write(figure, path)
 
 
-def _formulas(axes: Axes, series: dict[str, list[CostRow]]) -> None:
-    single = {row.agents: row.single_agent for rows in series.values() for row in rows}
-    axes.plot(list(single), [_log10(v) for v in single.values()], "--", color="black")
-    for index, rows in enumerate(series.values()):
-        points = [(r.agents, _log10(r.nested_exact)) for r in rows if r.nested_exact is not None]
-        if points:
-            axes.plot(*zip(*points, strict=True), **_line(index))
-            axes.plot(*points[-1], MARKERS[index % len(MARKERS)], **_marker(index))
-    axes.set_title("operations, by formula", loc="left")
+def _draw_series(all_axes: Sequence[Axes], rows: Sequence[CostRow], index: int) -> None:
+    exact = [(r.agents, _log10(r.nested_exact)) for r in rows if r.nested_exact is not None]
+    if exact:
+        _draw_line(all_axes[0], exact, exact[-1:], index)
+    costs = [(row.agents, row.measured) for row in rows if row.measured is not None]
+    if not costs:
+        return
+    formula = [(n, _log10(m.formula.rule_evaluations)) for n, m in costs]
+    counted = [(n, _log10(m.counted.rule_evaluations)) for n, m in costs]
+    timed = [(n, log10(m.deciding + m.learning)) for n, m in costs]
+    grown = [(n, value - formula[-1][1] + timed[-1][1]) for n, value in formula]
+    _draw_line(all_axes[1], formula, counted, index)
+    _draw_line(all_axes[2], grown, timed, index)
 
 
-def _measured(counts: Axes, times: Axes, series: dict[str, list[CostRow]]) -> None:
-    for index, rows in enumerate(series.values()):
-        points = [(r.agents, r.measured) for r in rows if r.measured is not None]
-        if not points:
-            continue
-        n = [agents for agents, _ in points]
-        formula = [_log10(m.formula.rule_evaluations) for _, m in points]
-        counted = [_log10(m.counted.rule_evaluations) for _, m in points]
-        timed = [log10(m.deciding + m.learning) for _, m in points]
-        grown = [value - formula[-1] + timed[-1] for value in formula]
-        for axes, line, marked in ((counts, formula, counted), (times, grown, timed)):
-            axes.plot(n, line, **_line(index))
-            axes.plot(n, marked, MARKERS[index % len(MARKERS)], **_marker(index))
-    counts.set_title("rule evaluations a step", loc="left")
-    times.set_title("time of a step [s]", loc="left")
+def _draw_line(axes: Axes, line: Points, marked: Points, index: int) -> None:
+    axes.plot(*zip(*line, strict=True), **look(index), lw=1.2)
+    colour = look(index)["color"]
+    axes.plot(*zip(*marked, strict=True), marker(index), color=colour, **_hollow(index))
 
 
-def _legend(topologies: Sequence[str], measured: bool) -> list[Line2D]:
+def _handles(topologies: Sequence[str], measured: bool) -> list[Line2D]:
     handles = [
-        Line2D([], [], marker=MARKERS[i % len(MARKERS)], label=text, **_line(i), **_hollow(i))
-        for i, text in enumerate(topologies)
+        handle(text, marker=marker(i), **look(i), **_hollow(i)) for i, text in enumerate(topologies)
     ]
-    handles.append(Line2D([], [], linestyle="--", color="black", label="single agent (Eq. 23)"))
+    handles.append(handle("single agent (Eq. 23)", ls="--", color="black"))
     if measured:
-        handles.append(Line2D([], [], color="grey", label="lines: formula"))
-        handles.append(
-            Line2D([], [], linestyle="", marker="o", color="grey", label="markers: measured")
-        )
+        handles.append(handle("lines: formula", color="grey"))
+        handles.append(handle("markers: measured", ls="", marker="o", color="grey"))
     return handles
-
-
-def _line(index: int) -> dict[str, Any]:
-    return {"color": COLOURS[index % len(COLOURS)], "linewidth": 1.2}
-
-
-def _marker(index: int) -> dict[str, Any]:
-    return {"color": COLOURS[index % len(COLOURS)], **_hollow(index)}
 
 
 def _hollow(index: int) -> dict[str, Any]:

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from math import ceil
-from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from ...core.numerics.arrays import FloatArray
-from ..presentation.figures import COLOURS, MARKERS, SETTINGS, STYLES
+from ..presentation import figures
+from ..presentation.figures import COLOURS, add_legend, look, marker
 from .body import ROWS, Bodies, body_name, by_body
 from .rules import exponent, labels, percent, strongest_pairs
 from .team import Explanation
@@ -28,7 +27,7 @@ MOST_BODIES = 8
 
 def draw(explained: Explanation) -> dict[str, Figure]:
     """Return all figures that there is something for, by name."""
-    with mpl.rc_context(SETTINGS):  # type: ignore[arg-type]
+    with figures.styled():
         return dict(_figures(explained))
 
 
@@ -50,8 +49,9 @@ def _functions(explained: Explanation, block: slice) -> Figure:
     d = len(explained.variables)
     columns = 4 if d > 3 else d
     rows = ceil(d / columns)
-    figure = Figure(figsize=(2.45 * columns, 2.2 * rows + 0.7), layout="constrained")
-    panels = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
+    size = 2.45 * columns, 2.2 * rows + 0.7
+    figure, panels = figures.panels(rows, columns, size, sharey=True)
+    panels = panels.ravel()
     times, unit_of_f = _scale(explained)
     names, parts = explained.agents[block], explained.parts[block]
     bodies = list(dict.fromkeys(name.partition(".")[0] for name in names))
@@ -66,19 +66,14 @@ def _functions(explained: Explanation, block: slice) -> Figure:
             axes.xaxis.set_major_locator(MultipleLocator(90))
         x = np.union1d(np.linspace(low, high, 401), partition.centres)
         strengths = partition.strengths(x)
-        for i, (name, part) in enumerate(zip(names, parts, strict=True)):
+        for name, part in zip(names, parts, strict=True):
             body = name.partition(".")[0]
             member = [n for n in names if n.partition(".")[0] == body].index(name)
             number = bodies.index(body)
-            look: dict[str, Any] = {
-                "color": COLOURS[number % len(COLOURS)], "ls": STYLES[member % len(STYLES)],
-                "marker": MARKERS[number % len(MARKERS)], "ms": 3,
-            }  # fmt: skip
-            at = np.searchsorted(x, partition.centres)
-            line = axes.plot(
-                turn * x, times * strengths @ part.singles[j], lw=1.4, markevery=at.tolist(), **look
-            )[0]
-            line.set_label(name if j == 0 else f"_{i}")
+            style = look(number) | {"ls": look(member)["ls"], "marker": marker(number), "ms": 3}
+            at = np.searchsorted(x, partition.centres).tolist()
+            y = times * strengths @ part.singles[j]
+            axes.plot(turn * x, y, lw=1.4, markevery=at, label=name, **style)
         share = float(np.mean([p.share(p.singles[j]) for p in parts]))
         unit = {"rad": " [°]", "1": ""}.get(variable.unit, f" [{variable.unit}]")
         axes.set_title(f"{variable.name}{unit}, {percent(share)}", loc="left")
@@ -86,10 +81,8 @@ def _functions(explained: Explanation, block: slice) -> Figure:
     for axes in panels[d:]:
         axes.set_visible(False)
     figure.supylabel(f"adds to f{unit_of_f}", fontsize=9)
-    figure.legend(
-        loc="outside lower center", ncols=4, frameon=False,
-        title="markers: rules, less their mean; in the titles the share of the variance of f",
-    )  # fmt: skip
+    title = "markers: rules, less their mean; in the titles the share of the variance of f"
+    add_legend(figure, panels[0].get_lines()[: len(names)], title)
     return figure
 
 
@@ -101,8 +94,8 @@ def _scale(explained: Explanation) -> tuple[float, str]:
 
 def _pairs(explained: Explanation) -> Figure:
     pairs, parts = strongest_pairs(explained.parts), explained.parts[:MOST_MAPS]
-    figure = Figure(figsize=(2.5 * len(parts) + 1.2, 2.4 * len(pairs) + 0.3), layout="constrained")
-    panels = figure.subplots(len(pairs), len(parts), squeeze=False)
+    size = 2.5 * len(parts) + 1.2, 2.4 * len(pairs) + 0.3
+    figure, panels = figures.panels(len(pairs), len(parts), size)
     times, unit_of_f = _scale(explained)
     greatest = max(float(np.abs(p.pairs[pair]).max()) for p in parts for pair in pairs) * times
     for row, (j, k) in zip(panels, pairs, strict=True):
@@ -128,25 +121,18 @@ def _bodies(actuators: tuple[str, ...], bodies: Bodies) -> Figure:
     every = [effect for effects in moments.values() for effect in effects]
     # What no body does is not drawn: a joint can but turn.
     rows = [k for k in range(len(ROWS)) if any(effect[k, :-1].any() for effect in every)]
-    figure = Figure(figsize=(8.0, 1.9 * n_bodies + 0.6), layout="constrained")
-    panels = figure.subplots(n_bodies, len(rows), squeeze=False)
-    # All bodies on one scale, and ahead and left too, which have one unit.
-    extent = {unit: [0.0] for _, unit in ROWS}
-    for effect in every:
-        for row, (_, unit) in enumerate(ROWS):
-            extent[unit] += effect[row, :-1].tolist()
-    limits = {name: (1.08 * min(extent[unit]), 1.08 * max(extent[unit])) for name, unit in ROWS}
+    # All bodies on one scale.
+    figure, panels = figures.panels(n_bodies, len(rows), (8.0, 1.9 * n_bodies + 0.6), sharey="col")
     for r, (axes_row, own) in enumerate(zip(panels, by_body(bodies, actuators), strict=False)):
         names = [name.rpartition(".")[2] for name in own]
         for axes, row in zip(axes_row, rows, strict=True):
             name, unit = ROWS[row]
             _bars(axes, names, {m: effects[r][row, :-1] for m, effects in moments.items()})
-            axes.set_ylim(limits[name])
             if r == 0:
                 axes.set_title(f"{name} [{unit} per m/s]", loc="left")
         axes_row[0].set_ylabel(body_name(own))
-    handles, titles = panels[0][0].get_legend_handles_labels()
-    figure.legend(handles, titles, loc="outside lower center", ncols=3, frameon=False)
+    handles, _ = panels[0][0].get_legend_handles_labels()
+    add_legend(figure, handles)
     return figure
 
 

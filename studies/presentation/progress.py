@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -95,37 +95,37 @@ def _follow_bar(outcomes: Iterable[Outcome], total: int, done: int) -> None:
 
 
 def _follow_lines(outcomes: Iterable[Outcome], total: int, done: int) -> None:
-    begin = said = time.monotonic()
-    for here, outcome in enumerate(outcomes, 1):
+    last = time.monotonic()
+    for finished, line, outcome in _counted(outcomes, total, done):
         if outcome.error is not None:
             say(_failure(outcome))
-        now = time.monotonic()
-        if now - said >= PLAIN_SECONDS or done + here == total:
-            said = now
-            left = duration((now - begin) / here * (total - done - here))
-            say(f"{done + here} of {total} trials, {duration(now - begin)}, about {left} left")
+        if time.monotonic() - last >= PLAIN_SECONDS or finished == total:
+            last = time.monotonic()
+            say(line)
 
 
 def _follow_notebook(outcomes: Iterable[Outcome], total: int, done: int) -> None:
     from IPython.display import HTML, display
 
-    begin = time.monotonic()
-    failures: list[str] = []
-
-    def bar(finished: int) -> HTML:
-        spent, here = time.monotonic() - begin, finished - done
-        left = f", about {duration(spent / here * (total - finished))} left" if here else ""
-        failed = "".join(f"<br>{escape(line)}" for line in failures)
-        return HTML(
-            f"<progress value='{finished}' max='{total}'></progress> "
-            f"{finished} of {total} trials, {duration(spent)}{left}{failed}"
-        )
-
-    shown = display(bar(done), display_id=True)
-    for here, outcome in enumerate(outcomes, 1):
+    bar = "<progress value='{}' max='{}'></progress> {}"
+    shown = display(HTML(bar.format(done, total, f"{done} of {total} trials")), display_id=True)
+    failures = ""
+    for finished, line, outcome in _counted(outcomes, total, done):
         if outcome.error is not None:
-            failures.append(_failure(outcome))
-        shown.update(bar(done + here))
+            failures += f"<br>{escape(_failure(outcome))}"
+        shown.update(HTML(bar.format(finished, total, line) + failures))
+
+
+def _counted(
+    outcomes: Iterable[Outcome], total: int, done: int
+) -> Iterator[tuple[int, str, Outcome]]:
+    """Yield how many trials are done, how long that took and what is left, and what has arrived."""
+    begin = time.monotonic()
+    for here, outcome in enumerate(outcomes, 1):
+        spent, finished = time.monotonic() - begin, done + here
+        left = duration(spent / here * (total - finished))
+        line = f"{finished} of {total} trials, {duration(spent)}, about {left} left"
+        yield finished, line, outcome
 
 
 def _failure(outcome: Outcome) -> str:

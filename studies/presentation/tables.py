@@ -159,9 +159,7 @@ def _latex(titles: Sequence[str], rows: Sequence[Row]) -> str:
     return tabular(note, f"{{lr{'r' * len(titles)}}}", lines) + "\n"
 
 
-def tabular(
-    needs: str, columns: str, rows: Sequence[Sequence[str]], environment: str = "tabular"
-) -> str:
+def tabular(needs: str, columns: str, rows: Sequence[Sequence[str]]) -> str:
     """Return rows of LaTeX as a table; the first one is its head.
 
     Parameters
@@ -169,23 +167,21 @@ def tabular(
     needs
         The packages in braces, and what a comment above the table says besides.
     columns
-        Arguments of the environment: how columns are aligned.
+        Arguments of ``tabular``: how columns are aligned.
     rows
         Cells, line by line.
-    environment
-        Which one.
     """
     head, *lines = (" & ".join(row) + r" \\" for row in rows)
     return "\n".join(
         [
             rf"% needs \usepackage{needs}",
-            rf"\begin{{{environment}}}{columns}",
+            rf"\begin{{tabular}}{columns}",
             r"\toprule",
             head,
             r"\midrule",
             *lines,
             r"\bottomrule",
-            rf"\end{{{environment}}}",
+            r"\end{tabular}",
         ]
     )
 

@@ -47,13 +47,15 @@ class Progress:
 def progress(store: Store) -> Progress:
     """Return how far the study of an open store is."""
     trials, refusal, states = store.planned(), outdated(store), store.states()
-    failed = [*states.values()].count("failed")
-    now = None if refusal else look(store.directory)
+    now = None if refusal is not None else look(store.directory)
     begun = {} if now is None else now[1]
     pending = [trial for trial in trials if trial.identity not in states]
     running = [trial for trial in pending if trial.identity in begun]
     left = [trial for trial in pending if trial.identity not in begun]
-    usual = cores() if left and not refusal else 0
+    failed = [*states.values()].count("failed")
+    # Trials of another version have other identities: what is there counts.
+    finished = len(trials) - len(pending) if refusal is None else len(states)
+    usual = cores() if left and refusal is None else 0
     processes = usual if now is None else now[0]
     seconds = _estimate(
         store.mean_seconds(),
@@ -63,12 +65,12 @@ def progress(store: Store) -> Progress:
     )
     return Progress(
         total=len(trials),
-        done=len(trials) - len(pending) - failed,
+        done=finished - failed,
         failed=failed,
-        left=len(left),
+        left=len(trials) - finished - len(running),
         running=tuple((t.condition, t.seed, begun[t.identity]) for t in running),
         processes=processes,
-        seconds=seconds,
+        seconds=seconds if refusal is None else None,
         damaged=tuple(store.notes),
         refusal=refusal,
     )

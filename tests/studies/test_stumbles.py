@@ -11,8 +11,6 @@ from nested_agents.core.interface.measures import SUCCESS
 from nested_agents.studies.catalogue.learning_curve import metrics_of
 from nested_agents.studies.catalogue.wheel_failure import analyse as analyse_failures
 from nested_agents.studies.catalogue.wheel_failure import draw as draw_failures
-from nested_agents.studies.claims import claims
-from nested_agents.studies.claims.table import latex
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.presentation.figures import log_axis
 from nested_agents.topologies.drawing import draw
@@ -68,12 +66,6 @@ def test_the_paper_s_numbers_stand_beside_ours(capsys) -> None:
     assert "The paper prints" not in capsys.readouterr().out
     assert main(["cost", "--format", "latex"]) == 0
     assert capsys.readouterr().out.startswith("% needs \\usepackage{booktabs}")
-
-
-def test_claims_are_written_for_latex_with_the_packages_they_need() -> None:
-    text = latex(claims.judge({}))
-    assert text.startswith("% needs \\usepackage{booktabs,tabularx}")
-    assert text.count(r"\\") == len(claims.judge({})) + 1
 
 
 def test_colours_of_a_drawn_hierarchy_are_explained(tmp_path) -> None:

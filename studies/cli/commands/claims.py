@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 @click.option(
     "--format",
     "form",
-    type=click.Choice(["table", "json", "markdown", "latex"]),
+    type=click.Choice(["table", "json", "markdown"]),
     default="table",
     help="How to print the table.",
 )

@@ -14,23 +14,17 @@ if TYPE_CHECKING:
     from ....topologies.view import Form
 
 
-form = click.option(
-    "--format", "form", type=click.Choice(["table", "json"]), default="table", help="How to print."
-)
-
-
 @click.group(no_args_is_help=False)
 def command() -> None:
     """List the topologies, or show one of them."""
 
 
 @command.command("list")
-@form
-def list_all(form: Form) -> int:
+def list_all() -> int:
     """List the topologies, built-in and installed."""
     from ....topologies.view import kinds
 
-    print(kinds(form))
+    print(kinds())
     return 0
 
 
@@ -38,22 +32,16 @@ def list_all(form: Form) -> int:
 @click.argument("topology", metavar="SPEC")
 @click.option(
     "--agents",
-    type=int,
+    type=click.IntRange(1),
     metavar="N",
-    help="Number of agents; default: those that the topology names, else robots times wheels, "
+    help="Number of agents; default: two for each robot, else those that the topology names, "
     "else 4.",
 )
 @click.option(
     "--robots",
-    type=int,
+    type=click.IntRange(1),
     metavar="N",
-    help="Number of robots, whose agents are consecutive.",
-)
-@click.option(
-    "--wheels",
-    type=int,
-    metavar="N",
-    help="Wheels (agents) of a robot; default: 2 if the number of agents is even, else 1.",
+    help="Number of robots, whose agents are consecutive; default: one for every two agents.",
 )
 @click.option(
     "--per",
@@ -61,14 +49,17 @@ def list_all(form: Form) -> int:
     default="actuator",
     help="What there is one agent for, as the key agents of a spec says.",
 )
-@click.option("--actions", type=int, metavar="N", default=4, help="Actions of each actuator.")
-@form
+@click.option(
+    "--actions", type=click.IntRange(2), metavar="N", default=4, help="Actions of each actuator."
+)
+@click.option(
+    "--format", "form", type=click.Choice(["table", "json"]), default="table", help="How to print."
+)
 @options.plot
 def show(
     topology: str,
     agents: int | None,
     robots: int | None,
-    wheels: int | None,
     per: Agents,
     actions: int,
     form: Form,
@@ -79,6 +70,7 @@ def show(
     SPEC is a topology as in a spec: chain:reversed, tree:2, file.py:function, graph.json,
     teams.json, ...; or the spec of a study, whose hierarchies are shown over its own agents.
     """
+    from ....topologies.drawing import draw
     from ....topologies.view import printed, view
     from ...errors import SpecError
     from ..hierarchies import of_spec
@@ -86,13 +78,14 @@ def show(
     try:
         views = of_spec(topology)
         if views is None:
-            views = [view(topology, agents, robots, wheels, actions, per)]
-        elif agents or robots or wheels or per != "actuator":
+            views = [view(topology, agents, robots, actions, per)]
+        elif agents or robots or per != "actuator":
             raise SpecError(f"{topology}: is the spec of a study, which says its own agents")
         for number, shown in enumerate(views, 1):
             if plot is not None:
                 several = f"-{number}" if len(views) > 1 else ""
-                shown.draw(plot.with_name(f"{plot.stem}{several}{plot.suffix}"))
+                path = plot.with_name(f"{plot.stem}{several}{plot.suffix}")
+                draw(shown.hierarchy, path, bodies=shown.bodies, title=shown.title)
             print(printed(shown, form), end="\n\n" if number < len(views) else "\n")
     except ValueError as error:
         raise SpecError(str(error)) from None

@@ -30,9 +30,6 @@ def test_list_names_every_kind(said) -> None:
         any(line.startswith(kind) for line in out.splitlines()) for kind in TOPOLOGIES.built_in
     )
     assert max(map(len, out.splitlines())) <= 80
-    assert [row["kind"] for row in json.loads(said("list", "--format", "json")[1])] == list(
-        TOPOLOGIES.built_in
-    )
 
 
 def test_show_as_json(said) -> None:
@@ -60,7 +57,7 @@ def test_show_as_table(said) -> None:
         (("chain",), ["robot1.left", "robot1.right", "robot2.left", "robot2.right"]),
         (("chain", "--agents", "3"), ["agent1", "agent2", "agent3"]),
         (("chain", "--robots", "1"), ["robot1.left", "robot1.right"]),
-        (("chain", "--robots", "1", "--wheels", "3"), [f"robot1.wheel{k}" for k in (1, 2, 3)]),
+        (("chain", "--robots", "1", "--agents", "3"), [f"robot1.wheel{k}" for k in (1, 2, 3)]),
         (("edges:x>y,z",), ["x", "y", "z"]),
     ],
 )
@@ -77,7 +74,7 @@ def test_the_single_agent_is_shown_with_its_joint_actions(said) -> None:
     ("arguments", "robots", "tried"),
     [
         (("--agents", "4"), ["robot1", "robot2"], 256 + 16),
-        (("--robots", "2", "--wheels", "4", "--actions", "3"), ["robot1", "robot2"], 81**2 + 81),
+        (("--robots", "2", "--agents", "8", "--actions", "3"), ["robot1", "robot2"], 81**2 + 81),
         (("--agents", "3"), ["agent1", "agent2", "agent3"], 64 + 16 + 4),
     ],
 )
@@ -128,14 +125,13 @@ def test_a_plot_is_written(said, tmp_path: Path) -> None:
         (("show", "chain", "--plot", ""), "an argument: must not be empty"),
         (("show", "edges:a>b,b>a"), "topology 'edges': cycle a -> b -> a"),
         (("show", "chian"), "did you mean 'chain'?"),
-        (("show", "chain", "--agents", "0"), "agents = 0, allowed: 1 or more"),
+        (("show", "chain", "--agents", "0"), "'--agents': 0 is not in the range x>=1"),
         (("show", "chain", "--agents", "1001"), "agents = 1001, allowed: up to 1,000"),
-        (("show", "chain", "--actions", "1"), "actions = 1, allowed: 2 or more"),
+        (("show", "chain", "--actions", "1"), "'--actions': 1 is not in the range x>=2"),
         (("show", "chain", "--agents", "5", "--robots", "2"), "agents = 5 cannot be divided"),
-        (("show", "chain", "--agents", "4", "--robots", "2", "--wheels", "3"), "are not robots"),
         (("show", "edges:a>b", "--agents", "4"), "the topology names 2 agents, 4 are asked for"),
         (
-            ("show", "chain", "--per", "body", "--wheels", "5"),
+            ("show", "chain", "--per", "body", "--agents", "5", "--robots", "1"),
             "agents = 'body': 4 ** 5 actions each, allowed: 256 or fewer",
         ),
         (("show", "chain", "--plot", "chain.txt"), "chain.txt: suffix must be"),
@@ -149,6 +145,6 @@ def test_what_the_user_can_mend_is_one_line(said, arguments: tuple[str, ...], me
 
 
 def test_teams_and_numbers() -> None:
-    assert team_of(6, 2, None).bodies == ((0, 1, 2), (3, 4, 5))
+    assert team_of(6, 2)[1] == ((0, 1, 2), (3, 4, 5))
     assert readable(999_999_999) == "999,999,999"
     assert readable(10**5000) == "1.000e5000"
