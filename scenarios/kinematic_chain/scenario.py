@@ -179,7 +179,7 @@ class KinematicChain:
     @property
     def failed(self) -> BoolArray:
         """Whether each joint is under a failure now, ``(n,)``."""
-        return self._failures.failed.copy()
+        return self._failures.failed
 
     def constants_of_episode(self) -> Mapping[str, Any]:
         """Return the goal of the episode, and what is drawn."""
@@ -220,7 +220,7 @@ class KinematicChain:
             self._goal,
             before,
         )
-        return self._states.sensed(view)[0]
+        return self._states.of_joints(view, 0, len(self.agents))[:, 0]
 
 
 class ChainPrediction:
@@ -278,11 +278,11 @@ class ChainPrediction:
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
-        return self.arm._states.predicted(self.seen(joint_actions), agent, 1)[0]
+        return self.arm._states.of_joints(self.seen(joint_actions), agent, 1)[0]
 
     def states_of_all(self, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(n, m, d)`` of all agents for joint actions ``(m, n)``."""
-        return self.arm._states.predicted(self.seen(joint_actions), 0, len(self.angles))
+        return self.arm._states.of_joints(self.seen(joint_actions), 0, len(self.angles))
 
     def rewards(self, joint_actions: IntArray) -> FloatArray:
         """Return the rewards ``(m,)`` of joint actions ``(m, n)``."""
