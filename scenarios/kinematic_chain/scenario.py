@@ -9,6 +9,7 @@ they turn at the speed that they are told, unless they fail or reach their limit
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -16,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from ...core.interface.measures import SUCCESS, Measure
+from ...core.interface.prediction import first_alike
 from ...core.interface.scenario import Transition
 from ...core.interface.spaces import ActionSet, StateSpace
 from ...core.numerics.arrays import BoolArray, FloatArray, IntArray
@@ -294,6 +296,11 @@ class ChainPrediction:
         reached, speeds = self.seen(joint_action[None]), self.commands(joint_action)
         before = float(reached.distance[0])
         return ChainPrediction(self.arm, self.effects, reached.angles[0], speeds, before)
+
+    @cached_property
+    def alike(self) -> IntArray:
+        """The first action of each joint that comes to the same ``(n, A)``."""
+        return first_alike(self.speeds)
 
     def commands(self, joint_action: IntArray) -> FloatArray:
         """Return the joint speeds ``(n,)`` that a joint action ``(n,)`` would command [rad/s]."""

@@ -61,6 +61,17 @@ def test_predictions_come_true(table: dict[str, object]) -> None:
         assert rewards[k] == transition.reward
 
 
+def test_actions_that_come_to_the_same_are_known_to_best_responses() -> None:
+    scenario = arm(3)
+    scenario.reset(0)
+    for _ in range(4):
+        scenario.step(np.zeros(3, dtype=int))
+    prediction = scenario.predict()
+    first = np.take_along_axis(prediction.speeds, prediction.alike, axis=1)
+    assert (first == prediction.speeds).all()
+    assert (prediction.alike < np.arange(4)).any()  # at full speed increasing changes nothing
+
+
 def test_compiled_variables_are_what_their_functions_say() -> None:
     scenario = moving(6, state_space=COMPILED)
     view = scenario.predict().seen(np.random.default_rng(3).integers(4, size=(30, 6)))
