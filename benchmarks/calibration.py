@@ -41,7 +41,7 @@ def calibrated(robot: str, believed: str, episodes: int) -> tuple[Any, Any]:
         self_model=SelfModelSettings(enabled=robot != "e-puck"),
     )
     hierarchy = build(parse("chain"), scenario.agents, scenario.groups)
-    team = Team.build(settings, scenario, hierarchy, policy_seed(SEED))
+    team = Team(settings, scenario, hierarchy, policy_seed(SEED))
     assert team.calibration is not None
     slip = belief["load"] / belief["stiffness"]
     right = -np.log([slip, slip, belief["contact_friction"]])

@@ -32,7 +32,7 @@ def main() -> None:
     scenario = settings.build()
     hierarchy = Hierarchy(scenario.agents, list(pairwise(scenario.agents)))
     learner = TDLambdaSettings(step_size=0.05, decision=Decision())
-    team = Team.build(learner, scenario, hierarchy, policy_seed(options.seed))
+    team = Team(learner, scenario, hierarchy, policy_seed(options.seed))
     watch, steps = Stopwatch(), 0
     scenario.reset(world_seed(options.seed, 0), 0)
     recorder = EpisodeRecorder(scenario)

@@ -67,9 +67,7 @@ def errors(
     decision = Decision(evaluator=SamplingSettings(samples=8), teammates=teammates)
     found: dict[str, list[tuple[float, float]]] = {}
     for seed in range(FIRST_SEED, FIRST_SEED + seeds):
-        team = Team.build(
-            BatchTDSettings(decision=decision), scenario, hierarchy, policy_seed(seed)
-        )
+        team = Team(BatchTDSettings(decision=decision), scenario, hierarchy, policy_seed(seed))
         rules = team.learner.rules  # type: ignore[attr-defined]
         problem = DecisionProblem(
             rules, hierarchy, len(scenario.action_set), scenario.groups, "value", teammates, 0.95,

@@ -92,7 +92,7 @@ def situation(
             "decision": {"teammates": "empirical", **(decision or {})},
         }
     )
-    team = Team.build(settings, scenario, hierarchy, np.random.SeedSequence(seed))
+    team = Team(settings, scenario, hierarchy, np.random.SeedSequence(seed))
     rng = np.random.default_rng(seed)
     scenario.reset(seed)
     history = []

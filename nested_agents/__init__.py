@@ -9,7 +9,7 @@ Two e-Pucks, their four wheels in a chain, learning by the default settings:
 >>> import nested_agents as na
 >>> scenario = na.BoxPushingSettings().build()
 >>> hierarchy = na.build_hierarchy(na.parse_topology("chain"), scenario.agents)
->>> team = na.Team.build(na.BatchTDSettings(), scenario, hierarchy, na.policy_seed(0))
+>>> team = na.Team(na.BatchTDSettings(), scenario, hierarchy, na.policy_seed(0))
 >>> steps = na.control_loop(scenario, team, episodes=1, steps=3, seed=0)
 >>> [record.step for record in steps]
 [0, 1, 2]

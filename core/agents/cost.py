@@ -81,16 +81,6 @@ class Problem:
         square = self.actions**2
         return self.iterations * self.rules * ((square ** (n + 1) - square) // (square - 1))
 
-    def chain_factored(self, n: int) -> Fraction:
-        """Return the same with the largest power taken out (Eq. 20); equal to Eq. 19.
-
-        ``L * |S| * (|A|^2)^n * (|A|^2 - (|A|^2)^(1-n)) / (|A|^2 - 1)``
-        """
-        _check(n)
-        square = self.actions**2
-        numerator = square - Fraction(1, square ** (n - 1))
-        return self.iterations * self.rules * square**n * numerator / (square - 1)
-
     def chain_asymptotic(self, n: int) -> Fraction:
         """Return the cost of a chain of many agents (Eq. 21, 22).
 

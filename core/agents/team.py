@@ -17,7 +17,6 @@ from ..interface.acting import Actors
 from ..interface.hierarchy import Hierarchy
 from ..interface.prediction import Prediction
 from ..interface.scenario import EmbodiedScenario, Scenario, Transition, groups_of
-from ..interface.spaces import ActionSet
 from ..learners.batch import ReplaySettings
 from ..learners.learner import Learner, LearnerSettings
 from ..numerics.arrays import FloatArray, IntArray
@@ -29,14 +28,19 @@ from .rows import rows_of
 class Team:
     """Agents in a hierarchy, one rule base each; consequent weights are an agent's own or a role's.
 
-    Use `Team.build` to make one from settings.
-
     Parameters
     ----------
+    settings
+        How the agents explore, decide and learn.
+    scenario
+        Where they act.
     hierarchy
         Who decides before whom, and sees whom.
-    action_set
-        What each agent can do.
+    seed
+        Source of everything random in the team.
+
+    Attributes
+    ----------
     learner
         Owns the consequent weights.
     rows
@@ -45,64 +49,31 @@ class Team:
         Chooses actions by value.
     evaluator
         Values actions; none: actions are drawn at random.
-    seed
-        Source of everything random in the team.
     self_model
         What the wheels do, as learned; none: prediction takes every robot as nominal.
     calibration
         The predictor's constants, as learned; none: as the scenario believes them to be.
     mirror
         Doubles what is learned from; none: it is what the agents met.
+    seen
+        ``(n, A)`` how often each agent was seen to take each action, one of each to begin with.
+    given
+        ``(n, A, n, A)`` the same given each action of another, if the teammate model asks for it.
+
+    Raises
+    ------
+    ValueError
+        If the hierarchy is over other agents than the scenario's, or the settings do not fit its
+        state space.
     """
 
     def __init__(
         self,
-        hierarchy: Hierarchy,
-        action_set: ActionSet,
-        learner: Learner,
-        rows: IntArray,
-        explorer: Explorer,
-        evaluator: Evaluator | None,
-        seed: np.random.SeedSequence,
-        self_model: SelfModel | None = None,
-        calibration: Calibration | None = None,
-        mirror: Mirror | None = None,
-    ) -> None:
-        self.hierarchy, self.action_set = hierarchy, action_set
-        self.learner, self.explorer, self.evaluator = learner, explorer, evaluator
-        self.rows = rows
-        self.self_model, self.calibration, self.mirror = self_model, calibration, mirror
-        self.rng = np.random.Generator(np.random.PCG64(seed))
-        self.seen: FloatArray = np.ones((len(hierarchy), len(action_set)))
-        """How often each agent was seen to take each action, one of each to begin with."""
-        shape = (len(hierarchy), len(action_set)) * 2
-        problem = getattr(evaluator, "problem", None)
-        conditional = isinstance(problem, DecisionProblem) and problem.teammates == "conditional"
-        self.given: FloatArray = np.ones(shape if conditional else (0, 0, 0, 0))
-        """The same given each action of another ``(n, A, n, A)``, if the evaluator asks for it."""
-        # Agents in the order of decision, each with those before it that it does not see.
-        order = hierarchy.order
-        self._order = [
-            (i, np.array(sorted({*order[:k]} - {*hierarchy.above(i)}), dtype=np.int64))
-            for k, i in enumerate(order)
-        ]
-
-    @classmethod
-    def build(
-        cls,
         settings: LearnerSettings,
         scenario: Scenario,
         hierarchy: Hierarchy,
         seed: np.random.SeedSequence,
-    ) -> Team:
-        """Build the team of `settings` for the agents of a scenario.
-
-        Raises
-        ------
-        ValueError
-            If the hierarchy is over other agents than the scenario's, or the settings do not fit
-            its state space.
-        """
+    ) -> None:
         if not isinstance(settings, LearnerSettings):
             raise ValueError(f"settings = {settings!r}: must be a learner's, as BatchTDSettings()")
         if hierarchy.agents != tuple(scenario.agents):
@@ -110,50 +81,41 @@ class Team:
                 f"topology: agents {', '.join(hierarchy.agents)} are not the scenario's "
                 f"{', '.join(scenario.agents)}"
             )
-        self_model = None
-        if settings.self_model.enabled:
-            if not isinstance(scenario, EmbodiedScenario):
-                raise ValueError("learner.self_model.enabled: the scenario has no bodies on wheels")
-            self_model = SelfModel(settings.self_model, scenario.nominal_effects)
-        calibration = None
-        if settings.calibration.enabled:
-            constants = getattr(scenario, "constants", ())
-            if not isinstance(scenario, EmbodiedScenario) or not constants:
-                raise ValueError(
-                    "learner.calibration.enabled: the scenario's predictor has no constants "
-                    "to calibrate"
-                )
-            levers = scenario.levers  # type: ignore[attr-defined]
-            calibration = Calibration(settings.calibration, len(constants), levers)
-        rules = RuleBase.build(scenario.state_space, settings.rule_base)
-        rows = rows_of(scenario, shared=settings.weights == "role")
+        self.hierarchy, self.action_set = hierarchy, scenario.action_set
+        n, n_actions = len(hierarchy), len(scenario.action_set)
+        self.self_model = _self_model_of(scenario, settings)
+        self.calibration = _calibration_of(scenario, settings)
         is_mirrored = isinstance(settings, ReplaySettings) and settings.mirrored
-        mirror = Mirror.of(scenario) if is_mirrored else None
-        evaluator, decision = None, settings.decision
+        self.mirror = Mirror.of(scenario) if is_mirrored else None
+        self.rows = rows_of(scenario, shared=settings.weights == "role")
+        rows = self.rows if self.mirror is None else self.mirror.rows(self.rows)
+        rules = RuleBase.build(scenario.state_space, settings.rule_base)
+        self.learner: Learner = settings.build(rules, rows)
+        self.evaluator: Evaluator | None = None
+        decision = settings.decision
         if decision.rule != "random":
             problem = DecisionProblem(
                 rules,
                 hierarchy,
-                len(scenario.action_set),
+                n_actions,
                 groups_of(scenario),
                 decision.rule,
                 decision.teammates,
                 settings.discount,
                 decision.value_of,
             )
-            evaluator = decision.evaluator.build(problem)
-        return cls(
-            hierarchy,
-            scenario.action_set,
-            settings.build(rules, rows if mirror is None else mirror.rows(rows)),
-            rows,
-            settings.exploration.build(len(hierarchy)),
-            evaluator,
-            seed,
-            self_model,
-            calibration,
-            mirror,
-        )
+            self.evaluator = decision.evaluator.build(problem)
+        self.explorer: Explorer = settings.exploration.build(n)
+        self.rng = np.random.Generator(np.random.PCG64(seed))
+        self.seen: FloatArray = np.ones((n, n_actions))
+        conditional = self.evaluator is not None and decision.teammates == "conditional"
+        self.given: FloatArray = np.ones((n, n_actions) * 2 if conditional else (0, 0, 0, 0))
+        # Agents in the order of decision, each with those before it that it does not see.
+        order = hierarchy.order
+        self._order = [
+            (i, np.array(sorted({*order[:k]} - {*hierarchy.above(i)}), dtype=np.int64))
+            for k, i in enumerate(order)
+        ]
 
     def check(self, prediction: Prediction) -> None:
         """Refuse a prediction without what the team decides by.
@@ -377,6 +339,25 @@ class Team:
             self.self_model.restore(_part(arrays, "self_model."))
         if self.calibration is not None:
             self.calibration.restore(_part(arrays, "calibration."))
+
+
+def _self_model_of(scenario: Scenario, settings: LearnerSettings) -> SelfModel | None:
+    if not settings.self_model.enabled:
+        return None
+    if not isinstance(scenario, EmbodiedScenario):
+        raise ValueError("learner.self_model.enabled: the scenario has no bodies on wheels")
+    return SelfModel(settings.self_model, scenario.nominal_effects)
+
+
+def _calibration_of(scenario: Scenario, settings: LearnerSettings) -> Calibration | None:
+    if not settings.calibration.enabled:
+        return None
+    constants = getattr(scenario, "constants", ())
+    if not isinstance(scenario, EmbodiedScenario) or not constants:
+        raise ValueError(
+            "learner.calibration.enabled: the scenario's predictor has no constants to calibrate"
+        )
+    return Calibration(settings.calibration, len(constants), cast(Any, scenario).levers)
 
 
 def _part(arrays: Mapping[str, FloatArray], prefix: str) -> dict[str, FloatArray]:

@@ -80,7 +80,7 @@ def arrange(settings: ConditionSettings, seed: int) -> Arrangement:
     scenario, hierarchy = settings.arrange(world)
     learner, source = settings.learner, policy_seed(seed)
     if isinstance(learner, LearnerSettings):
-        team: Actors = Team.build(learner, scenario, hierarchy, source)
+        team: Actors = Team(learner, scenario, hierarchy, source)
     else:
         scenario = SeenScenario(scenario)
         team = learner.build(scenario, source)

@@ -58,7 +58,7 @@ def case(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[LineUp, Hierar
 
 
 def team_of(scenario: LineUp, hierarchy: Hierarchy) -> Team:
-    return Team.build(LEARNER, scenario, hierarchy, policy_seed(0))
+    return Team(LEARNER, scenario, hierarchy, policy_seed(0))
 
 
 def steps(scenario: LineUp, team: Team, first_episode: int = 0) -> list[list[int]]:
@@ -135,12 +135,12 @@ def decided_values(team: Team, theta: np.ndarray, prediction) -> np.ndarray:
 def test_the_single_agent_acts_learns_saves_and_loads(n: int, tmp_path: Path) -> None:
     scenario = join_agents(LineUp(LineUpSettings(carts=n)), "team")
     hierarchy = build("chain", scenario.agents)
-    team = Team.build(LEARNER, scenario, hierarchy, policy_seed(0))
+    team = Team(LEARNER, scenario, hierarchy, policy_seed(0))
     joint_actions = steps(scenario, team)
     assert max(map(max, joint_actions)) < 4**n
     assert np.abs(team.learner.theta).sum() > 0
     team.save(tmp_path / "team.npz")
-    other = Team.build(LEARNER, scenario, hierarchy, policy_seed(1))
+    other = Team(LEARNER, scenario, hierarchy, policy_seed(1))
     other.load(tmp_path / "team.npz")
     assert steps(scenario, other, 2) == steps(scenario, team, 2)
 

@@ -60,7 +60,7 @@ def test_left_and_right_wheels_learn_the_same_function_in_the_mirror() -> None:
     )
     agents = scenario.agents
     chain = Hierarchy(agents, list(pairwise(agents)))
-    team = Team.build(settings, scenario, chain, np.random.SeedSequence(0))
+    team = Team(settings, scenario, chain, np.random.SeedSequence(0))
     scenario.reset(0)
     team.begin_episode()
     for _ in range(12):

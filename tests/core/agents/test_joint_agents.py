@@ -79,7 +79,7 @@ def test_predictions_are_those_of_the_world(pair) -> None:
 def test_a_team_of_one_acts_and_learns(pair) -> None:
     _, single = pair
     settings = TDLambdaSettings(rule_base=RuleBaseSettings(memberships=2, order=6), step_size=0.1)
-    team = Team.build(settings, single, Hierarchy(["single"], []), np.random.SeedSequence(1))
+    team = Team(settings, single, Hierarchy(["single"], []), np.random.SeedSequence(1))
     records = list(control_loop(single, team, episodes=2, steps=5, seed=1))
     assert len(records) == 10
     assert team.learner.theta.shape == (1, 2**6)
@@ -181,7 +181,7 @@ def test_both_evaluators_and_a_self_model_work_on_it() -> None:
         scenario = join_agents(BoxPushing(settings), "body")
         hierarchy = build("chain", scenario.agents)
         assert hierarchy.edges == ((0, 1),)
-        team = Team.build(learner, scenario, hierarchy, policy_seed(0))
+        team = Team(learner, scenario, hierarchy, policy_seed(0))
         nominal = team.self_model.effects[0].copy()
         for record in control_loop(scenario, team, episodes=2, steps=8, seed=0):
             assert record.joint_action.shape == (2,)

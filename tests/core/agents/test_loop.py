@@ -28,7 +28,7 @@ def world(line_world):
 
 def team_of(world, settings=LEARNING, seed: int = 5) -> Team:
     hierarchy = Hierarchy(world.agents, [world.agents])
-    return Team.build(settings, world, hierarchy, policy_seed(seed))
+    return Team(settings, world, hierarchy, policy_seed(seed))
 
 
 def run(world, team: Team, **changes: object) -> list[StepRecord]:
@@ -168,7 +168,7 @@ def test_a_team_learns_to_push(line_world) -> None:
     hierarchy = Hierarchy(world.agents, list(pairwise(world.agents)))
 
     def solved(settings, episodes: int) -> float:
-        team = Team.build(settings, world, hierarchy, policy_seed(3))
+        team = Team(settings, world, hierarchy, policy_seed(3))
         for _ in control_loop(world, team, episodes=episodes, steps=40, seed=3):
             pass
         test = control_loop(world, team, episodes=20, steps=40, seed=4, learn=False)

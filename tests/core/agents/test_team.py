@@ -61,7 +61,7 @@ def world(line_world):
 
 def team_of(name: str, world, seed: int = 1, hierarchy: Hierarchy | None = None) -> Team:
     hierarchy = hierarchy or chain_of(world.agents)
-    return Team.build(settings_of(TEAMS[name]), world, hierarchy, np.random.SeedSequence(seed))
+    return Team(settings_of(TEAMS[name]), world, hierarchy, np.random.SeedSequence(seed))
 
 
 def run_steps(team: Team, world, steps: int) -> list[list[int]]:
@@ -273,7 +273,7 @@ def test_counts_of_an_episode(world) -> None:
 )
 def test_the_evaluator_follows_the_settings(decision: dict, kind: type, world) -> None:
     settings = settings_of({"kind": "frozen", "decision": decision})
-    team = Team.build(settings, world, chain_of(world.agents), np.random.SeedSequence(1))
+    team = Team(settings, world, chain_of(world.agents), np.random.SeedSequence(1))
     assert isinstance(team.evaluator, kind)
 
 
@@ -282,7 +282,7 @@ def test_what_is_too_much_to_enumerate_is_sampled(line_world) -> None:
     scenario = join_agents(line_world(carts=4, wheels=4), "body")
     learner = settings_of({"kind": "frozen"})
     hierarchy = chain_of(scenario.agents)
-    team = Team.build(learner, scenario, hierarchy, np.random.SeedSequence(1))
+    team = Team(learner, scenario, hierarchy, np.random.SeedSequence(1))
     assert isinstance(team.evaluator, Sampling)
 
 
@@ -344,7 +344,7 @@ def test_a_larger_team_takes_over_by_role(line_world) -> None:
         world.roles = ("front", "rear") * world.shape[0]
     settings = settings_of({**TEAMS["sampling"], "weights": "role", "exploration": BURST})
     former, successor = (
-        Team.build(settings, world, chain_of(world.agents), np.random.SeedSequence(1))
+        Team(settings, world, chain_of(world.agents), np.random.SeedSequence(1))
         for world in (small, large)
     )
     run_episode(former, small, seed=5)

@@ -18,7 +18,7 @@ def test_auto_goes_by_size(carts: int, teammates: str, line_world) -> None:
     world = line_world(carts, 2)
     chain = Hierarchy(world.agents, list(zip(world.agents, world.agents[1:], strict=False)))
     decision = Decision(teammates=teammates)
-    team = Team.build(FrozenSettings(decision=decision), world, chain, np.random.SeedSequence(1))
+    team = Team(FrozenSettings(decision=decision), world, chain, np.random.SeedSequence(1))
     many = BestResponse if teammates == "best-response" else Sampling
     assert type(team.evaluator) is {2: ExactEnumeration, 5: Sampling, 8: many}[carts]
 

@@ -17,7 +17,7 @@ def team_of(evaluator="exact", topology="chain", carts=3):
         step_size=0.1, decision=Decision(teammates="conditional", evaluator=evaluator)
     )
     hierarchy = build(parse(topology), scenario.agents)
-    return scenario, Team.build(settings, scenario, hierarchy, policy_seed(0))
+    return scenario, Team(settings, scenario, hierarchy, policy_seed(0))
 
 
 def test_values_are_means_by_what_was_seen_with_the_same_own_action():

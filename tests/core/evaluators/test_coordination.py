@@ -22,7 +22,7 @@ def team_of(evaluator, topology="coordination-graph", carts=4, **decision):
         exploration={"kind": "burst", "rate": 0.3},
     )
     hierarchy = build(parse(topology), scenario.agents)
-    return scenario, Team.build(settings, scenario, hierarchy, policy_seed(0))
+    return scenario, Team(settings, scenario, hierarchy, policy_seed(0))
 
 
 @pytest.mark.parametrize("evaluator", KINDS)

@@ -101,7 +101,7 @@ class FewMembers:
 
 def team_of(settings, scenario) -> Team:
     hierarchy = Hierarchy(scenario.agents, [scenario.agents] if len(scenario.agents) == 2 else [])
-    return Team.build(settings, scenario, hierarchy, policy_seed(1))
+    return Team(settings, scenario, hierarchy, policy_seed(1))
 
 
 def test_a_team_of_ones_own_parts(line_world, tmp_path) -> None:

@@ -25,7 +25,7 @@ from nested_agents.topologies import build, parse
 def test_teams_of_one_to_four_robots_act_and_learn(robots: int, space: str) -> None:
     scenario = BoxPushing(BoxPushingSettings(robots=robots, state_space=space))
     hierarchy = build(parse("chain"), scenario.agents)
-    team = Team.build(BatchTDSettings(), scenario, hierarchy, policy_seed(0))
+    team = Team(BatchTDSettings(), scenario, hierarchy, policy_seed(0))
     for record in control_loop(scenario, team, episodes=1, steps=4, seed=0):
         assert record.states.shape == (2 * robots, scenario.state_space.n_variables)
         assert np.isfinite(record.transition.states).all()
@@ -88,7 +88,7 @@ def test_a_team_finds_out_that_a_wheel_has_seized() -> None:
     settings = BatchTDSettings(
         self_model=SelfModelSettings(enabled=True), decision=Decision(rule="random")
     )
-    team = Team.build(settings, scenario, hierarchy, policy_seed(0))
+    team = Team(settings, scenario, hierarchy, policy_seed(0))
     for _ in control_loop(scenario, team, episodes=2, steps=40, seed=0):
         pass
     found, nominal = team.self_model.effects[0][0, :4], scenario.nominal_effects[0][0, :4]

@@ -133,7 +133,7 @@ def test_a_self_model_finds_the_locked_joint() -> None:
     scenario = arm(4, failures=({"kind": "locked", "joints": "joint3"},))
     hierarchy = na.build_hierarchy(na.parse_topology("chain"), scenario.agents)
     learner = na.BatchTDSettings.model_validate({"self_model": {"enabled": True}})
-    team = na.Team.build(learner, scenario, hierarchy, na.policy_seed(0))
+    team = na.Team(learner, scenario, hierarchy, na.policy_seed(0))
     for _ in na.control_loop(scenario, team, episodes=1, steps=60, seed=0):
         pass
     assert team.self_model is not None
@@ -189,7 +189,7 @@ def test_scripted_controllers_solve_it(controller: str, least: float, joints: in
     settings = spec.conditions()[0].settings
     scenario = settings.scenario.build()
     hierarchy = na.build_hierarchy(settings.topology, scenario.agents)
-    team = na.Team.build(settings.learner, scenario, hierarchy, na.policy_seed(0))
+    team = na.Team(settings.learner, scenario, hierarchy, na.policy_seed(0))
     steps = na.control_loop(scenario, team, episodes=10, steps=150, seed=0, learn=False)
     reached = [record.transition.terminated for record in steps if record.last]
     assert np.mean(reached) >= least

@@ -39,7 +39,7 @@ def calibrating(world, agents="actuator"):
         calibration=CalibrationSettings(enabled=True), decision=Decision(rule="random")
     )
     seen = join_agents(world, agents)
-    return seen, Team.build(settings, seen, build("chain", seen.agents), policy_seed(0))
+    return seen, Team(settings, seen, build("chain", seen.agents), policy_seed(0))
 
 
 def pushed(model, twists=TWISTS):
