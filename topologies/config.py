@@ -7,10 +7,9 @@ follow ``kind:`` is in `ARGUMENTS`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any
 
-import numpy as np
 from pydantic import Field
 
 from ..core.interface.hierarchy import Hierarchy
@@ -21,7 +20,7 @@ from ..core.plugins.plugged import Plugged, SettingsRegistry
 from ..core.plugins.settings import Settings, SettingsError, tuples
 from . import files
 from .builders import Bodies, Members, Names, from_networkx, names_of  # noqa: F401 - of a field
-from .checks import check_names
+from .checks import check_names, shown
 
 BUILDERS = "nested_agents.topologies.builders"
 
@@ -210,15 +209,12 @@ def read(path: str) -> nx.DiGraph | TopologySettings:
 
 def _named(agents: Names, bodies: Sequence[Any]) -> Bodies:
     """Return the names of agents given by index, by body; refuse what is no index."""
-    named = []
-    for body in bodies:
-        if isinstance(body, str) or not isinstance(body, Iterable):
-            raise ValueError(f"bodies: {body!r} is no body, allowed: a sequence of agent indices")
-        for i in body:
-            if not isinstance(i, int | np.integer) or not 0 <= i < len(agents):
-                last = len(agents) - 1
-                raise ValueError(f"bodies: {i!r} is no agent index, allowed: 0 to {last}")
-        named.append([agents[i] for i in body])
+    indices = range(len(agents))
+    try:
+        named = [[agents[indices.index(i)] for i in body] for body in bodies]
+    except (TypeError, ValueError):
+        allowed = f"agent indices by body, 0 to {len(agents) - 1}"
+        raise ValueError(f"bodies = {shown(bodies)}: must be {allowed}") from None
     check_names(names_of(named), agents, "bodies")
     return named
 

@@ -3,11 +3,14 @@
 A study is a module, or a class, that offers these, and one line in `STUDIES`
 or ``study = "mine.py:Mine"`` in a spec. It may also offer ``check(spec)``, which raises `SpecError`
 if the spec has not what it needs; and ``NUMBERS``, names of the numbers of whole trials that its
-analysis rests on, so that trials of other studies that lack them are refused.
+analysis rests on, so that trials of other studies that lack them are refused; ``PUBLISHED``, names
+of the measures of an episode that its published results keep, all unless it says so; and ``TIMED``,
+False if its trials are too short for their times to say anything.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
 from ..errors import SpecError
@@ -120,6 +123,18 @@ def analysed(name: str, results: Results) -> Any:
                     f"{condition!r} have not measured"
                 )
     return study.analyse(results)
+
+
+def published_part(name: str, results: Results) -> Results:
+    """Return what a study's results are published with, see `PUBLISHED` and `TIMED` above."""
+    study = load_study(name)
+    wanted = getattr(study, "PUBLISHED", [m.name for m in results.measures])
+    usage = [] if getattr(study, "TIMED", True) else list(results.usage)
+    return replace(
+        results,
+        measures=tuple(m for m in results.measures if m.name in wanted),
+        trials=results.trials.drop(columns=usage),
+    )
 
 
 def drawn(study: Study, analysis: Any) -> dict[str, Figure]:

@@ -5,7 +5,7 @@ An option that may be given several times takes several values at once, too: `co
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 import click
@@ -140,11 +140,20 @@ where = click.option(
 )
 """A part of the trials, see `nested_agents.studies.results.selection.Where`."""
 
-form = click.option(
-    "--format",
-    "form",
-    type=click.Choice(["table", "markdown", "latex", "csv"]),
-    default="table",
-    help="How to print the table; CSV holds every digit, LaTeX needs the package booktabs.",
+
+def formats(
+    *choices: str, text: str = "How to print it."
+) -> Callable[[Callable[..., int]], Callable[..., int]]:
+    """Return the option ``--format``, whose default is the first choice."""
+    kind = click.Choice(choices)
+    return click.option("--format", "form", type=kind, default=choices[0], help=text)
+
+
+form = formats(
+    "table",
+    "markdown",
+    "latex",
+    "csv",
+    text="How to print the table; CSV holds every digit, LaTeX needs the package booktabs.",
 )
 """How a table of estimates is printed."""

@@ -18,11 +18,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import astuple, dataclass
 from fractions import Fraction
 from functools import cache
-from math import log
 from statistics import median
-from typing import Literal
-
-import numpy as np
 
 from ...core.agents.cost import Problem, below_counts, is_chain
 from ...core.agents.joint_agents import join_agents
@@ -34,12 +30,10 @@ from ...core.evaluators.evaluator import Counts
 from ...core.interface.hierarchy import Hierarchy
 from ...core.interface.scenario import Scenario
 from ...core.learners.td import TDLambdaSettings
-from ...core.plugins.deferred import stats
 from ...core.rules.settings import RuleBaseSettings
 from ...scenarios.line_up import LineUp, LineUpSettings
 from ...topologies import build, parse
 from ...topologies.view import team_of
-from ..results.statistics import Estimate
 
 SINGLE_AGENT = "single-agent"
 """Stands in place of a topology for the one agent of Eq. 23."""
@@ -61,8 +55,6 @@ MOST_OPERATIONS = 4 * 10**8
 """Rule evaluations a step beyond which nothing is measured: about a second a step."""
 LEAST_SECONDS, MOST_TIMES = 0.3, 100
 """How long each case is timed at least, but no more times than that."""
-LEAST_ROWS = 5
-"""The fewest numbers of agents that an exponent is fitted over."""
 
 
 @dataclass(frozen=True)
@@ -199,40 +191,6 @@ def _arrange(text: str, line_up: LineUp) -> tuple[TDLambdaSettings, Scenario, Hi
     settings = parse(text)
     learner = COORDINATED if settings.kind == "coordination-graph" else LEARNER
     return learner, line_up, build(settings, line_up.agents, pairs(n))
-
-
-def fitted(rows: Sequence[CostRow]) -> list[CostRow]:
-    """Return the measured rows of a topology that exponents are fitted over, by number of agents.
-
-    These are the larger half of the numbers of agents, where what is fixed per agent and step
-    matters least, but no fewer than five; none if fewer are measured.
-    """
-    measured = sorted((r for r in rows if r.measured is not None), key=lambda r: r.agents)
-    if len(measured) < LEAST_ROWS:
-        return []
-    return measured[min(len(measured) // 2, len(measured) - LEAST_ROWS) :]
-
-
-def exponent(
-    rows: Sequence[CostRow], quantity: Literal["deciding", "memory"], level: float = 0.95
-) -> Estimate | None:
-    """Return p of quantity ~ rule evaluations ** p, with its interval; none of too few rows.
-
-    Least squares on logarithms over the `fitted` rows. The formula's growth is p = 1. As long as
-    what is fixed per agent and step matters there, the true p is underestimated.
-    """
-    points = [
-        (log(r.measured.formula.rule_evaluations), log(getattr(r.measured, quantity)))
-        for r in fitted(rows)
-        if r.measured is not None
-    ]
-    if not points:
-        return None
-    x, y = zip(*points, strict=True)
-    fit = stats.linregress(x, y)
-    half = float(stats.t.ppf(0.5 + level / 2, len(points) - 2)) * fit.stderr
-    value, low, high = (np.asarray(v) for v in (fit.slope, fit.slope - half, fit.slope + half))
-    return Estimate(value, low, high)
 
 
 @cache

@@ -16,8 +16,7 @@ from typing import Any, Literal
 from ...topologies.view import aligned, readable
 from ..presentation.csv_text import write_csv
 from ..presentation.tables import escaped, tabular
-from ..results.statistics import Estimate
-from .cost import PAPER, RULES, CostRow, StepCost, exponent, fitted
+from .cost import PAPER, RULES, CostRow, StepCost
 
 Form = Literal["table", "json", "csv", "latex"]
 
@@ -142,28 +141,7 @@ def _measured(rows: Sequence[CostRow]) -> list[str]:
     lines += ["formula, counted: joint actions tried; ms: deciding and learning;"]
     lines += ["-: beyond a second or so a step."]
     lines += [f"All counts equal the formulas in {agreeing} of {len(measured)} rows."]
-    return lines + _exponents(rows)
-
-
-def _exponents(rows: Sequence[CostRow]) -> list[str]:
-    lines = []
-    for text in dict.fromkeys(row.topology for row in rows):
-        own = [row for row in rows if row.topology == text]
-        deciding, memory = exponent(own, "deciding"), exponent(own, "memory")
-        if deciding is not None and memory is not None:
-            over = fitted(own)
-            lines.append(
-                f"{text}, n = {over[0].agents} to {over[-1].agents}: "
-                f"deciding {_interval(deciding)}, memory {_interval(memory)}"
-            )
-    if not lines:
-        return []
-    return [
-        "",
-        "Exponent p of (rules valued)^p, 95 % interval; the formula's is 1. Below that, p",
-        "is a lower bound: what is fixed per agent and step still matters for few agents.",
-        *lines,
-    ]
+    return lines
 
 
 def _measured_cells(measured: StepCost | None) -> list[str]:
@@ -173,10 +151,6 @@ def _measured_cells(measured: StepCost | None) -> list[str]:
     counts = measured.formula.joint_actions, c.joint_actions, c.rule_evaluations, c.weight_updates
     amounts = (1e3 * (measured.deciding + measured.learning), 1e-6 * measured.memory)
     return [*map(scientific, counts), *(f"{a:.3g}" if a < 1000 else f"{a:,.0f}" for a in amounts)]
-
-
-def _interval(estimate: Estimate) -> str:
-    return f"{estimate.value:.2f} [{estimate.low:.2f}, {estimate.high:.2f}]"
 
 
 def _latex(rows: Sequence[CostRow]) -> str:

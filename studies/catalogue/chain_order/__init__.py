@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+PUBLISHED = ("success",)
+"""Measures of an episode that published results keep."""
 PHASES = {"success, all training": "training", EVALUATED: "evaluation"}
 """What the orders are compared by: success rates in these phases."""
 

@@ -29,6 +29,10 @@ from ..study import check_evaluated as check
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+PUBLISHED = ("success",)
+"""Measures of an episode that published results keep."""
+TIMED = False
+"""Trials are too short for their times to say anything."""
 AFTER_ONE = f"{ELSEWHERE}after one episode"
 """Phase of the evaluation after the first episode of training."""
 COLUMNS = 3

@@ -38,6 +38,8 @@ from ..study import check_evaluated
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+PUBLISHED = ("success",)
+"""Measures of an episode that published results keep."""
 VALUE_OF = "learner.decision.value_of"
 """What is swept to vary whose value decides."""
 REFERENCE = "chain"

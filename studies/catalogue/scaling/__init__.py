@@ -40,6 +40,8 @@ if TYPE_CHECKING:
 
 NUMBERS = ("robots", "agents", "messages", "team_bytes", "decision_median", "step_bytes")
 """What of whole trials the analysis rests on."""
+PUBLISHED = ("success",)
+"""Measures of an episode that published results keep."""
 TIMES = {"deciding": "decide [ms]", "learning": "learn [ms]"}
 """Times whose growth with the number of agents is estimated, by what they are of."""
 COLUMNS = (

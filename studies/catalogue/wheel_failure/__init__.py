@@ -44,6 +44,8 @@ if TYPE_CHECKING:
 
 NUMBERS = ("onset",)
 """What of whole trials the analysis rests on."""
+PUBLISHED = ("success",)
+"""Measures of an episode that published results keep."""
 BLOCK = 5
 """Episodes that a level is measured over."""
 REGAINED = 0.9

@@ -28,13 +28,7 @@ if TYPE_CHECKING:
     help="Small versions of the studies: six minutes on two cores, and wide intervals.",
 )
 @options.jobs
-@click.option(
-    "--format",
-    "form",
-    type=click.Choice(["table", "json", "markdown"]),
-    default="table",
-    help="How to print the table.",
-)
+@options.formats("table", "json", "markdown")
 def command(out: Path | None, quick: bool, jobs: int | None, form: Format) -> int:
     """Print one table: each claim of the paper, its measure, the result, the verdict.
 

@@ -40,13 +40,7 @@ MOST_AGENTS = 10_000
     help="L, iterations (steps) of an epoch.",
 )
 @click.option("--measured/--no-measured", help="Also count and time steps of the running system.")
-@click.option(
-    "--format",
-    "form",
-    type=click.Choice(["table", "json", "csv", "latex"]),
-    default="table",
-    help="How to print it.",
-)
+@options.formats("table", "json", "csv", "latex")
 @options.plot
 def command(
     agents: str,

@@ -10,17 +10,16 @@ import click
 from .. import options
 
 if TYPE_CHECKING:
-    from ...presentation.export import Form
+    from ...api.export import Form
 
 
 @click.command()
 @options.directory
-@click.option(
-    "--format",
-    "form",
-    type=click.Choice(["csv", "parquet", "json"]),
-    default="csv",
-    help="Of the files; parquet needs the extra nested-agents[parquet]. Distances and returns are "
+@options.formats(
+    "csv",
+    "parquet",
+    "json",
+    text="Of the files; parquet needs the extra nested-agents[parquet]. Distances and returns are "
     "left out of json.",
 )
 @click.option(
@@ -36,7 +35,7 @@ def command(directory: Path, form: Form, out: Path | None, overwrite: bool) -> i
     DIR is where the study is kept. JSON is one small file of spec, seeds and rounded measures, fit
     to be published with a paper; `nested-agents table` reads it.
     """
-    from ...presentation.export import export
+    from ...api.export import export
     from ...store.store import Store
 
     with Store.open(directory) as store:

@@ -15,12 +15,11 @@ if TYPE_CHECKING:
 
 @click.command()
 @options.directory
-@click.option(
-    "--format",
-    "form",
-    type=click.Choice(["table", "csv", "json"]),
-    default="table",
-    help="How to print the rows; CSV and JSON hold every digit, and a column for every swept key.",
+@options.formats(
+    "table",
+    "csv",
+    "json",
+    text="How to print the rows; CSV and JSON hold every digit, and a column for every swept key.",
 )
 @click.option(
     "--phase",

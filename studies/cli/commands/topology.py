@@ -52,9 +52,7 @@ def list_all() -> int:
 @click.option(
     "--actions", type=click.IntRange(2), metavar="N", default=4, help="Actions of each actuator."
 )
-@click.option(
-    "--format", "form", type=click.Choice(["table", "json"]), default="table", help="How to print."
-)
+@options.formats("table", "json")
 @options.plot
 def show(
     topology: str,

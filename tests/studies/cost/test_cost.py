@@ -7,7 +7,6 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from nested_agents.core.agents.cost import Problem
@@ -19,8 +18,6 @@ from nested_agents.studies.cost.cost import (
     StepCost,
     agents_below,
     cost_rows,
-    exponent,
-    fitted,
     measure,
 )
 from nested_agents.studies.cost.table import written
@@ -153,32 +150,10 @@ def made_up(n: int, power: float) -> CostRow:
     return CostRow(n, "chain", 1, None, None, 1, measured)
 
 
-def test_exponents_are_found() -> None:
-    rows = [made_up(n, 1.5) for n in range(1, 9)]
-    found = exponent(rows, "deciding")
-    assert found is not None
-    np.testing.assert_allclose([found.value, found.low, found.high], 1.5, atol=1e-6)
-    memory = exponent(rows, "memory")
-    assert memory is not None
-    assert memory.value == pytest.approx(1.0)
-    assert exponent(rows[:4], "deciding") is None
-
-
-@pytest.mark.parametrize(
-    ("most", "over"), [(4, []), (5, [1, 5]), (8, [4, 8]), (10, [6, 10]), (16, [9, 16])]
-)
-def test_exponents_are_of_the_larger_half_but_of_five_at_least(most: int, over: list[int]) -> None:
-    chosen = [row.agents for row in fitted([made_up(n, 1.0) for n in range(most, 0, -1)])]
-    assert chosen == (list(range(over[0], over[1] + 1)) if over else [])
-
-
-def test_the_table_says_what_exponents_are_of() -> None:
+def test_the_table_of_what_was_measured_says_what_it_holds() -> None:
     out = written([made_up(n, 1.5) for n in range(1, 11)], "table")
-    assert "chain, n = 6 to 10: deciding 1.50 [1.50, 1.50], memory 1.00 [1.00, 1.00]" in out
-    assert "Below that, p\nis a lower bound: what is fixed" in out
     assert "ms: deciding and learning" in out
     assert max(map(len, out.splitlines())) <= 80
-    assert "Exponent" not in written([made_up(n, 1.5) for n in range(1, 5)], "table")
 
 
 def test_latex_has_what_was_measured() -> None:

@@ -79,7 +79,7 @@ def test_pairs_of_variables_and_nothing_learned(study, capsys):
     assert "Pairs of variables beyond that: " in said.out
     assert "Three and more" not in said.out
     assert said.out.count(" AND side is ") == 3
-    assert (study / "explain" / "a-pair-seed3" / "pairs.png").stat().st_size > 5000
+    assert not (study / "explain" / "a-pair-seed3" / "pairs.png").exists()
     status, said = run(capsys, study, "--condition", "random")
     assert status == 0
     assert "the agents have learned nothing" in said.out

@@ -24,7 +24,7 @@ def test_what_there_is_no_room_for_is_named(kept, tmp_path):
     found = read(kept(tmp_path), most_bytes=1)
     assert len(found.episodes) == 2
     assert found.remarks == [
-        "Left out to keep the page small: frozen: seeds 0 to 2. default: seeds 1, 2."
+        "Left out to keep the page small: frozen (3 seeds), default (2 seeds)."
     ]
 
 

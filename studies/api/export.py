@@ -8,13 +8,14 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from ..catalogue.study import published_part
 from ..errors import SpecError
+from ..presentation.csv_text import write_frame
 from ..results import published
 from ..results.results import read
 from ..spec.outline import Outline
 from ..store.durable import replacing
 from ..store.store import Store
-from .csv_text import write_frame
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -68,9 +69,9 @@ def _writers(store: Store, form: Form) -> dict[str, Callable[[Path], None]]:
     results = read(store)
     if form == "json":
         version = int(store.meta("results_version"))
-        return {
-            "results": lambda path: published.write(path, Outline.kept(store), results, version)
-        }
+        outline = Outline.kept(store)
+        kept = published_part(outline.study, results)
+        return {"results": lambda path: published.write(path, outline, kept, version)}
     if form == "parquet" and not find_spec("pyarrow"):
         raise SpecError(
             "--format parquet: pyarrow is not installed; pip install 'nested-agents[parquet]'"
