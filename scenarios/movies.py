@@ -40,8 +40,10 @@ def film(draw: Callable[[int], Pixels], last: int, seconds: float, path: Path) -
     steps = np.unique(np.linspace(0, last, min(last + 1, MOST_FRAMES)).round().astype(int))
     frames = [draw(int(step)) for step in steps]
     partial = path.with_name(f".{path.stem}.partial{path.suffix}")
-    write = _write_gif if path.suffix == ".gif" else _write_mp4
-    write(partial, frames, seconds)
+    if path.suffix == ".gif":
+        _write_gif(partial, frames, seconds)
+    else:
+        imageio.mimwrite(partial, frames, fps=1 / seconds, macro_block_size=16)  # type: ignore[arg-type]
     partial.replace(path)
 
 
@@ -53,7 +55,3 @@ def _write_gif(path: Path, frames: list[Pixels], seconds: float) -> None:
     ]
     durations = [round(1000 * seconds)] * (len(images) - 1) + [1500]
     images[0].save(path, save_all=True, append_images=images[1:], duration=durations, loop=0)
-
-
-def _write_mp4(path: Path, frames: list[Pixels], seconds: float) -> None:
-    imageio.mimwrite(path, frames, fps=1 / seconds, macro_block_size=16)  # type: ignore[arg-type]

@@ -96,6 +96,11 @@ class Prediction(Protocol):
         """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
 
 
+def first_alike(keys: IntArray | FloatArray) -> IntArray:
+    """Return in every row of ``(G, L)`` the first column that holds the same."""
+    return (keys[:, :, None] == keys[:, None, :]).argmax(axis=2)
+
+
 def states_of_all(prediction: Prediction, joint_actions: IntArray) -> FloatArray:
     """Return the next states ``(n, m, d)`` of all agents for joint actions ``(m, n)``."""
     own_way = getattr(prediction, "states_of_all", None)

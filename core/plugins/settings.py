@@ -103,11 +103,11 @@ class PartSettings(Settings):
 class ScenarioSettings(PartSettings):
     """What the settings of all scenarios inherit; a scenario is built of nothing else."""
 
-    def doubts(self) -> tuple[str, ...]:
-        """Return what looks like a slip of the pen, a line each, such as a size in another unit."""
+    def warnings(self) -> tuple[str, ...]:
+        """Return what looks wrong and is not refused, a line each: a size in another unit."""
         return ()
 
-    def suited(self, preset: str) -> Mapping[str, Any]:
+    def scenario_defaults(self, preset: str) -> Mapping[str, Any]:
         """Return what this scenario lays over a preset: its ``learner`` and ``topology`` tables.
 
         A preset is made for box pushing; what learns best elsewhere may be something else, and

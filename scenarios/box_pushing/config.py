@@ -54,15 +54,15 @@ class BoxTaskSettings(ScenarioSettings):
     orientation_tolerance: Positive | None = None
     """Orientation error that still counts as reached [rad]; none: any."""
 
-    def doubts(self) -> tuple[str, ...]:
+    def warnings(self) -> tuple[str, ...]:
         """Return sizes that are surely meant in another unit, a line each.
 
         Examples
         --------
-        >>> BoxPushingSettings(infrared={"reach": 60.0}).doubts()
+        >>> BoxPushingSettings(infrared={"reach": 60.0}).warnings()
         ('scenario.infrared.reach = 60 m: perhaps meant in mm, 0.06 m',)
         """
-        return tuple(units.doubts(self))
+        return tuple(units.warnings(self))
 
     @property
     def onset(self) -> int | None:
@@ -112,7 +112,7 @@ class BoxPushingSettings(BoxTaskSettings):
             raise ValueError(f"belief is for predictor = 'push', received {self.predictor!r}")
         return self
 
-    def suited(self, preset: str) -> Mapping[str, Any]:
+    def scenario_defaults(self, preset: str) -> Mapping[str, Any]:
         """Return what learns best here: with one or two robots, every wheel by weights of its own.
 
         Two robots stand on different sides of the box and need different functions; larger teams

@@ -69,9 +69,6 @@ class Seat:
         if by_wheel:
             places = [wheel * d + i for wheel in self.wheels for i in range(d)]
         self.places: IntArray = np.reshape(places, (len(self.wheels), d) if by_wheel else -1)
-        self.names = tuple(
-            f"{scenario.agents[place // d]}.{space.variables[place % d].name}" for place in places
-        )
         low, high = np.moveaxis(bounds[self.places % d].astype(np.float32), -1, 0)
         self.observation_space = Box(low, high, dtype=np.float32)
         actions = len(scenario.action_set)

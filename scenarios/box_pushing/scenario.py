@@ -336,7 +336,7 @@ class BoxPushing:
         """Whether each wheel is under a failure now, ``(n,)``."""
         if self._failures is None:
             return np.zeros(len(self.agents), dtype=bool)
-        return self._failures.failed.copy()
+        return self._failures.failed
 
     def _advance(self, commands: FloatArray) -> None:
         """Let the world go on for one decision period, the wheels being told `commands`."""

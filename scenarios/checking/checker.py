@@ -14,7 +14,7 @@ from __future__ import annotations
 import random
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import zip_longest
+from itertools import product, zip_longest
 from pathlib import Path
 from traceback import extract_tb
 from typing import Any
@@ -195,7 +195,7 @@ def _measures(of: Examination) -> str | None:
 
 def _finite(of: Examination) -> str | None:
     """Check that all numbers are finite."""
-    for seed, episode in _all(of):
+    for seed, episode in product(of.seeds, of.episodes):
         for step, frame in enumerate(of.play(of.factory(), seed, episode)):
             for name, value in frame.items():
                 array = np.asarray(value)
@@ -206,7 +206,7 @@ def _finite(of: Examination) -> str | None:
 
 def _bounds(of: Examination) -> str | None:
     """Check that variables stay within their period, and within `bounds` if a scenario has them."""
-    for seed, episode in _all(of):
+    for seed, episode in product(of.seeds, of.episodes):
         scenario = of.factory()
         limits = [
             (v.low, v.high) if v.periodic else (-np.inf, np.inf)
@@ -228,7 +228,7 @@ def _bounds(of: Examination) -> str | None:
 def _repeats(of: Examination) -> str | None:
     """Check that equal seeds give equal bits, also in an instance that has played before."""
     used = of.factory()
-    for seed, episode in _all(of):
+    for seed, episode in product(of.seeds, of.episodes):
         first = list(of.play(of.factory(), seed, episode))
         again = difference(first, of.play(of.factory(), seed, episode))
         if again is not None:
@@ -251,15 +251,13 @@ def _varies(of: Examination) -> str | None:
 
 def _keeps_apart(of: Examination) -> str | None:
     """Check that two instances played in turns do not notice each other."""
-    one, other = of.seeds[0], of.seeds[1]
+    seeds = of.seeds[:2]
     for episode in of.episodes:
-        alone = [list(of.play(of.factory(), seed, episode)) for seed in (one, other)]
-        runs = [of.play(of.factory(), seed, episode) for seed in (one, other)]
-        frames = list(zip_longest(*runs))
-        for seed, expected, found in zip(
-            (one, other), alone, zip(*frames, strict=True), strict=True
-        ):
-            here = difference(expected, [frame for frame in found if frame is not None])
+        runs = [of.play(of.factory(), seed, episode) for seed in seeds]
+        in_turns = zip(*zip_longest(*runs), strict=True)
+        for seed, frames in zip(seeds, in_turns, strict=True):
+            alone = of.play(of.factory(), seed, episode)
+            here = difference(alone, [frame for frame in frames if frame is not None])
             if here is not None:
                 return f"an instance with seed {seed} played in turns with another differs {here}"
     return None
@@ -267,7 +265,7 @@ def _keeps_apart(of: Examination) -> str | None:
 
 def _only_looks(of: Examination) -> str | None:
     """Check that predicting and measuring change nothing."""
-    for seed, episode in _all(of):
+    for seed, episode in product(of.seeds, of.episodes):
         silent = list(of.play(of.factory(), seed, episode))
         here = difference(silent, of.play(of.factory(), seed, episode, predicting=True))
         if here is not None:
@@ -290,7 +288,7 @@ def _predicts(of: Examination) -> str | None:
 
 def _senses(of: Examination) -> str | None:
     """Check that variables mean the same in sensing and prediction, where that can be told."""
-    for seed, episode in _all(of):
+    for seed, episode in product(of.seeds, of.episodes):
         scenario: Any = of.factory()
         if not hasattr(scenario, "with_exact_prediction"):
             return None
@@ -362,7 +360,3 @@ CHECKS: dict[str, Callable[[Examination], str | None]] = {
     "global random numbers": _keeps_off_globals,
 }
 """The checks by name, in their order: later ones rely on earlier ones."""
-
-
-def _all(of: Examination) -> Iterator[tuple[int, int]]:
-    return ((seed, episode) for seed in of.seeds for episode in of.episodes)

@@ -69,19 +69,15 @@ class Carried:
                     f"faults[{i}]: no {commands} makes an actuator {fault.kind}; give a "
                     f"mechanism that does, or say what else actions command"
                 )
-        self.scales = {
-            prefix: ActionScale(space, rest.get(prefix), f"action space {prefix}".rstrip())
-            for prefix, space in spaces.items()
-        }
-        self.names = tuple(
-            f"{prefix}.{i}" if prefix else str(i)
-            for prefix, scale in self.scales.items()
-            for i in range(len(scale))
-        )
-        ends = np.cumsum([0, *map(len, self.scales.values())])
-        self._spans = {
-            prefix: slice(*ends[i : i + 2].tolist()) for i, prefix in enumerate(self.scales)
-        }
+        self.scales: dict[str, ActionScale] = {}
+        self._spans: dict[str, slice] = {}
+        names: list[str] = []
+        for prefix, space in spaces.items():
+            scale = ActionScale(space, rest.get(prefix), f"action space {prefix}".rstrip())
+            self.scales[prefix] = scale
+            self._spans[prefix] = slice(len(names), len(names) + len(scale))
+            names += [f"{prefix}.{i}" if prefix else str(i) for i in range(len(scale))]
+        self.names = tuple(names)
         limits = np.concatenate([scale.limits for scale in self.scales.values()])
         self._failures = Failures(faults, self.names, limits, "faults")
         self._commands, self._mechanism, self._seed = commands, mechanism, seed

@@ -31,11 +31,6 @@ class Failures:
     said
         What the failures are called in complaints.
 
-    Attributes
-    ----------
-    failed
-        ``(n,)`` whether each actuator is under a failure now.
-
     Raises
     ------
     ValueError
@@ -87,7 +82,6 @@ class Failures:
         # Commands of the last control periods, the oldest first.
         self._commands = np.zeros((self._memory, len(self._limits)))
         self._active: tuple[int, ...] = ()
-        self._gather()
         self.strike(0)
 
     def strike(self, step: int) -> bool:
@@ -95,9 +89,7 @@ class Failures:
         now = (self._episode, step)
         active = tuple(i for i in self._delays_first if _lasts(self._settings[i], now))
         changed = active != self._active
-        if changed:
-            self._active = active
-            self._gather()
+        self._active = active
         return changed
 
     def driven(self, commands: FloatArray, periods: int) -> FloatArray:
@@ -128,11 +120,13 @@ class Failures:
         for i in self._active:
             yield self._settings[i], self._masks[i]
 
-    def _gather(self) -> None:
-        n = len(self._limits)
-        self.failed = np.zeros(n, dtype=bool)
+    @property
+    def failed(self) -> BoolArray:
+        """Whether each actuator is under a failure now, ``(n,)``."""
+        failed = np.zeros(len(self._limits), dtype=bool)
         for _, mask in self.active():
-            self.failed |= mask
+            failed |= mask
+        return failed
 
 
 def _lasts(failure: FailureSettings, now: tuple[int, int]) -> bool:

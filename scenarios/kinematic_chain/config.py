@@ -103,7 +103,7 @@ class KinematicChainSettings(ScenarioSettings):
 
         return referred(CHAIN_VARIABLES, value)
 
-    def suited(self, preset: str) -> Mapping[str, Any]:
+    def scenario_defaults(self, preset: str) -> Mapping[str, Any]:
         """Return what learns best here: little regularisation, and little foresight.
 
         The ridge weighs against the squared errors of all joints that share weights, so that it

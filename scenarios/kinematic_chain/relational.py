@@ -1,7 +1,7 @@
 """The built-in state variables of the kinematic chain: where the goal is, seen from a joint.
 
-Each is a function of a view and a joint, in NumPy: the definition, which serves sensing, and the
-test oracle of the compiled columns in `kernels`, which serve prediction.
+Each is a function of a view and a joint, in NumPy: the definition, and the test oracle of the
+compiled columns in `kernels`, which serve sensing and prediction.
 """
 
 from __future__ import annotations

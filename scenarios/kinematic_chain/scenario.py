@@ -9,6 +9,7 @@ they turn at the speed that they are told, unless they fail or reach their limit
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -16,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from ...core.interface.measures import SUCCESS, Measure
+from ...core.interface.prediction import first_alike
 from ...core.interface.scenario import Transition
 from ...core.interface.spaces import ActionSet, StateSpace
 from ...core.numerics.arrays import BoolArray, FloatArray, IntArray
@@ -179,7 +181,7 @@ class KinematicChain:
     @property
     def failed(self) -> BoolArray:
         """Whether each joint is under a failure now, ``(n,)``."""
-        return self._failures.failed.copy()
+        return self._failures.failed
 
     def constants_of_episode(self) -> Mapping[str, Any]:
         """Return the goal of the episode, and what is drawn."""
@@ -220,7 +222,7 @@ class KinematicChain:
             self._goal,
             before,
         )
-        return self._states.sensed(view)[0]
+        return self._states.of_joints(view, 0, len(self.agents))[:, 0]
 
 
 class ChainPrediction:
@@ -278,11 +280,11 @@ class ChainPrediction:
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
-        return self.arm._states.predicted(self.seen(joint_actions), agent, 1)[0]
+        return self.arm._states.of_joints(self.seen(joint_actions), agent, 1)[0]
 
     def states_of_all(self, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(n, m, d)`` of all agents for joint actions ``(m, n)``."""
-        return self.arm._states.predicted(self.seen(joint_actions), 0, len(self.angles))
+        return self.arm._states.of_joints(self.seen(joint_actions), 0, len(self.angles))
 
     def rewards(self, joint_actions: IntArray) -> FloatArray:
         """Return the rewards ``(m,)`` of joint actions ``(m, n)``."""
@@ -294,6 +296,11 @@ class ChainPrediction:
         reached, speeds = self.seen(joint_action[None]), self.commands(joint_action)
         before = float(reached.distance[0])
         return ChainPrediction(self.arm, self.effects, reached.angles[0], speeds, before)
+
+    @cached_property
+    def alike(self) -> IntArray:
+        """The first action of each joint that comes to the same ``(n, A)``."""
+        return first_alike(self.speeds)
 
     def commands(self, joint_action: IntArray) -> FloatArray:
         """Return the joint speeds ``(n,)`` that a joint action ``(n,)`` would command [rad/s]."""

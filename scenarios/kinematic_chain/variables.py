@@ -20,7 +20,7 @@ import numpy as np
 from ...core.interface.spaces import StateSpace, Variable
 from ...core.numerics.arrays import FloatArray
 from ...core.plugins.registry import Registry
-from ..state_variables import find_variable, sensed
+from ..state_variables import find_variable
 from .kernels import COMPILED, columns
 from .view import ChainView
 
@@ -50,28 +50,25 @@ class ChainStates:
     """
 
     def __init__(self, names: Sequence[str]) -> None:
-        self._things = [find_variable(CHAIN_VARIABLES, name) for name in names]
-        variables = tuple(thing.variable for thing in self._things)
+        things = [find_variable(CHAIN_VARIABLES, name) for name in names]
+        variables = tuple(thing.variable for thing in things)
         distinct = {"speed", *(variable.name for variable in variables)}
         if not names or len(distinct) <= len(names):
             raise ValueError(
                 f"scenario.state_space = {list(names)}: variables must be distinct and at least one"
             )
-        common = tuple(thing.variable.name for thing in self._things if thing.common)
+        common = tuple(thing.variable.name for thing in things if thing.common)
         self.space = StateSpace("+".join(names), (SPEED, *variables), 1, common)
-        self._is_compiled = [name in COMPILED for name in names]
-        own = [k for k, is_compiled in enumerate(self._is_compiled) if not is_compiled]
-        self._own = [(1 + k, self._things[k]) for k in own]
-        self._rows = np.array([-1] + [_row(name) for name in names])
+        self._own = [
+            (column, thing)
+            for column, (name, thing) in enumerate(zip(names, things, strict=True), 1)
+            if name not in COMPILED
+        ]
+        # Beyond the last of the compiled columns: the column is none of these.
+        rows = [COMPILED.index(name) if name in COMPILED else len(COMPILED) for name in names]
+        self._rows = np.array([-1, *rows])
 
-    def sensed(self, view: ChainView) -> FloatArray:
-        """Return the states ``(m, n, d)`` of all joints, by the functions alone."""
-        joints = range(view.angles.shape[1])
-        of_joints = sensed(self._things, self._is_compiled, view, joints)
-        speeds = view.speeds.T[:, :, None]
-        return np.concatenate([speeds, of_joints], axis=2).swapaxes(0, 1)
-
-    def predicted(self, view: ChainView, first: int, count: int) -> FloatArray:
+    def of_joints(self, view: ChainView, first: int, count: int) -> FloatArray:
         """Return the states ``(count, m, d)`` of joints from `first` on, compiled if possible."""
         states: FloatArray = columns(
             view.places, view.angles, view.speeds, view.goal, view.before, first, count, self._rows
@@ -82,8 +79,3 @@ class ChainStates:
                 for i in range(count):
                     states[i, :, column] = thing.checked(guarded, first + i)
         return states
-
-
-def _row(name: str) -> int:
-    """Return which compiled column a variable is; beyond the last if it is none."""
-    return COMPILED.index(name) if name in COMPILED else len(COMPILED)

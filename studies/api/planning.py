@@ -27,6 +27,7 @@ from ..spec.spec import Spec
 from ..trials.session import Session
 from ..trials.trial import Trial, trials_of
 from ..workers.worker import cores
+from ..workers.workers import check_jobs
 from .run_study import examine
 
 SEED = 10_000
@@ -100,8 +101,8 @@ class Plan:
         Standard deviation of paired differences that is supposed.
     smallest
         The smallest difference of success rates that is of interest.
-    doubts
-        What looks like a slip of the pen, a line each.
+    warnings
+        What looks wrong and is not refused, a line each.
     """
 
     outline: Outline
@@ -112,7 +113,7 @@ class Plan:
     comparisons: int
     deviation: float
     smallest: float
-    doubts: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     @property
     def detectable(self) -> float:
@@ -152,7 +153,7 @@ class Plan:
                 f"differences of single seeds are taken to deviate by {self.deviation:g}."
             )
             yield from wrap(said, WIDTH)
-        yield from self.doubts
+        yield from self.warnings
 
 
 def plan(
@@ -183,12 +184,12 @@ def plan(
     SpecError
         If the study cannot be run, or a number is out of range.
     """
-    made = Spec.meant(spec)
+    made = Spec.read(spec)
     for name, value in (("deviation", deviation), ("smallest", smallest)):
         if not 0.0 < value <= 1.0:
             raise SpecError(f"--{name} {value:g}: must be above 0 and at most 1")
-    if jobs is not None and jobs < 1:
-        raise SpecError(f"--jobs {jobs}: must be at least 1")
+    if jobs is not None:
+        check_jobs(jobs)
     examine(made)
     trials = trials_of(made)
     processes = max(1, min(jobs or cores(), len(trials)))
@@ -197,7 +198,7 @@ def plan(
         seconds, memory = _taken(made, trials, processes)
     return Plan(
         Outline.of(made), len(trials), processes, seconds, memory, len(made.conditions()) - 1,
-        deviation, smallest, made.doubts(),
+        deviation, smallest, made.warnings(),
     )  # fmt: skip
 
 

@@ -72,7 +72,7 @@ def run_study(
         if retry_failed:
             store.forget_failed()
         left = pending(store, trials)
-        for note in (*store.notes, *spec.doubts()):
+        for note in (*store.notes, *spec.warnings()):
             observer.note(note)
         if left:
             observer.announce(spec, directory, workers.processes)

@@ -310,7 +310,7 @@ def run(
     from .run_study import run_study
 
     out = Path(out)
-    spec = Spec.meant(spec, study=out)
+    spec = Spec.read(spec, study=out)
     told = observer or (Terminal() if progress else Observer())
     with run_study(
         spec, out, jobs=jobs, backend=backend, address=address, retry_failed=retry_failed,

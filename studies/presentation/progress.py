@@ -51,42 +51,31 @@ class Terminal(Observer):
             say(f"{done} of {total} trials were run before")
         if done == total:
             return
+        from rich.console import Console
+
         if sys.stderr.isatty():
             _follow_bar(outcomes, total, done)
-        elif _in_notebook():
+        elif Console().is_jupyter:
             _follow_notebook(outcomes, total, done)
         else:
             _follow_lines(outcomes, total, done)
 
 
-def _in_notebook() -> bool:
-    from rich.console import Console
-
-    return Console().is_jupyter
-
-
 def _follow_bar(outcomes: Iterable[Outcome], total: int, done: int) -> None:
+    from rich import progress as bars
     from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
 
     columns = (
-        TextColumn("{task.description}"),
-        BarColumn(bar_width=None),
-        MofNCompleteColumn(),
-        TextColumn("trials"),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(compact=True),
+        bars.TextColumn("{task.description}"),
+        bars.BarColumn(bar_width=None),
+        bars.MofNCompleteColumn(),
+        bars.TextColumn("trials"),
+        bars.TimeElapsedColumn(),
+        bars.TextColumn("left"),
+        bars.TimeRemainingColumn(compact=True),
     )
     console = Console(stderr=True)
-    with Progress(*columns, console=console, speed_estimate_period=600.0) as progress:
+    with bars.Progress(*columns, console=console, speed_estimate_period=600.0) as progress:
         task = progress.add_task("running", total=total, completed=done)
         for outcome in outcomes:
             progress.advance(task)

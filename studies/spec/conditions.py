@@ -221,8 +221,8 @@ def resolve(
     own_layers += [nested(key, value) for key, value in point.items() if key != "preset"]
     table = _laid([PRESETS[name].table, *own_layers])
     scenario = _validated({"scenario": table["scenario"]}, where).scenario
-    if suited := scenario.suited(name):
-        table = _laid([PRESETS[name].table, suited, *own_layers])
+    if scenario_defaults := scenario.scenario_defaults(name):
+        table = _laid([PRESETS[name].table, scenario_defaults, *own_layers])
     return _validated(table, where)
 
 

@@ -33,7 +33,7 @@ from .refused import explain, misplaced
 from .studies import STUDIES
 
 MOST_TRIALS = 100_000
-"""A larger grid is taken for a slip of the pen."""
+"""A larger grid is taken for a mistake."""
 
 Seed = Annotated[int, Field(ge=0, le=2**63 - 1)]
 
@@ -176,7 +176,7 @@ class Spec(Settings):
         return spec
 
     @classmethod
-    def meant(
+    def read(
         cls, spec: Spec | Mapping[str, Any] | str | PathLike[str], study: Path | None = None
     ) -> Spec:
         """Return the spec that a table or the path of a TOML file stands for; see `of`, `load`."""
@@ -247,14 +247,14 @@ class Spec(Settings):
         """Return a spec with some fields changed, and the conditions that then follow."""
         return Spec.of({**self.table(), **(update or {})}, self.sources)
 
-    def doubts(self) -> tuple[str, ...]:
-        """Return what looks like a slip of the pen, a line each: sizes in another unit."""
-        found: dict[str, None] = {}
+    def warnings(self) -> tuple[str, ...]:
+        """Return what looks wrong and is not refused, a line each: sizes in another unit."""
+        lines: dict[str, None] = {}
         for condition in self.conditions():
             scenarios = [condition.settings.scenario, *(s for _, s in condition.evaluations)]
             for scenario in (*scenarios, *(stage.scenario for stage in condition.curriculum)):
-                found |= dict.fromkeys(scenario.doubts())
-        return tuple(found)
+                lines |= dict.fromkeys(scenario.warnings())
+        return tuple(lines)
 
     @property
     def sources(self) -> Sources:

@@ -239,14 +239,6 @@ class Reading:
             rows.append((*row[:error], last, *row[error + 1 :], *measured))
         return [*columns[: -len(SECONDS)], *(f"seconds.{part}" for part in SECONDS), *names], rows
 
-    def seconds(self) -> tuple[list[str], list[tuple[Any, ...]]]:
-        """Return the column names and the seconds of every part of every trial."""
-        cursor = self._db.execute(
-            f"SELECT condition, seed, {', '.join(SECONDS)} FROM seconds "
-            "JOIN trials USING (identity) JOIN conditions USING (condition) ORDER BY position, seed"
-        )
-        return [column[0] for column in cursor.description], cursor.fetchall()
-
     def mean_seconds(self) -> dict[str, float]:
         """Return by condition how long its finished trials took on average [s]."""
         query = "SELECT condition, avg(total) FROM seconds JOIN trials USING (identity) GROUP BY 1"

@@ -14,7 +14,6 @@ import os
 import threading
 import time
 from pathlib import Path
-from types import TracebackType
 
 LOCK = ".lock"
 MARK = "running.json"
@@ -40,12 +39,7 @@ class Running:
     def __enter__(self) -> Running:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         with contextlib.suppress(OSError):
             self._path.unlink(missing_ok=True)
 

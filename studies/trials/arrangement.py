@@ -6,7 +6,7 @@ that read results import nothing that learns.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import NamedTuple
 
@@ -22,8 +22,12 @@ from ...core.plugins.settings import ScenarioSettings
 from ...core.policies.seen import SeenScenario
 from ..errors import SpecError
 from ..spec.conditions import Condition, ConditionSettings
+from ..spec.curriculum import Stage
 from ..spec.spec import Spec
 from .measures import joined
+
+Evaluations = Sequence[tuple[str, ScenarioSettings]]
+"""Names and scenarios in which a trained team is evaluated beside its own."""
 
 
 class Arrangement(NamedTuple):
@@ -93,6 +97,56 @@ def build(settings: ConditionSettings, seed: int) -> tuple[Scenario, Team]:
     return found.scenario, of_fuzzy_agents(found.team)
 
 
+def teach(
+    own: Arrangement, settings: ConditionSettings, curriculum: Sequence[Stage], seed: int
+) -> Iterator[tuple[Stage, Arrangement]]:
+    """Yield each stage with its arrangement, which is trained before the next is asked for.
+
+    Its team continues from that of the stage before; after the last, the team of `own` continues.
+
+    Raises
+    ------
+    ValueError
+        If a stage cannot be built, or what is learned in one means nothing in the next.
+    """
+    reached: Arrangement | None = None
+    for stage in curriculum:
+        with _naming(f"curriculum.{stage.name}"):
+            there = arrange(settings.model_copy(update={"scenario": stage.scenario}), seed)
+            if reached is not None:
+                there.continue_from(reached, settings.learner)
+        yield stage, there
+        reached = there
+    if reached is not None:
+        with _naming("curriculum"):
+            own.continue_from(reached, settings.learner)
+
+
+def transfer(
+    own: Arrangement, settings: ConditionSettings, scenarios: Evaluations, seed: int
+) -> Iterator[tuple[str, Arrangement]]:
+    """Yield the name and the arrangement of each further evaluation, with the team of `own`.
+
+    Raises
+    ------
+    ValueError
+        If a scenario cannot be built, or what the team has learned means nothing in it.
+    """
+    for name, scenario in scenarios:
+        with _naming(f"evaluations.{name}"):
+            there = arrange(settings.model_copy(update={"scenario": scenario}), seed)
+            there = there.with_trained(own, settings.learner)
+        yield name, there
+
+
+@contextmanager
+def _naming(key: str) -> Iterator[None]:
+    try:
+        yield
+    except ValueError as error:
+        raise ValueError(f"{key}: {error}") from error
+
+
 def check(spec: Spec) -> tuple[Measure, ...]:
     """Return what a study measures of its episodes, if all its conditions can be built.
 
@@ -102,64 +156,28 @@ def check(spec: Spec) -> tuple[Measure, ...]:
         If one cannot be, or their measures do not fit together; before anything is run or written.
     """
     conditions = spec.conditions()
-    found = []
+    measures: list[Sequence[Measure]] = []
     with spec.sources.active():
         for condition in conditions:
             where = f" (condition {condition.label!r})" if len(conditions) > 1 else ""
-            found += [measures_of(world) for world in _worlds(condition, where)]
-    return joined(found, conditions[0].columns)
+            try:
+                measures += [measures_of(there.world) for there in _arrangements(condition)]
+            except ValueError as error:
+                raise SpecError(f"{error}{where}") from None
+            except SystemExit as error:
+                said = f"the scenario or topology calls sys.exit({error.code})"
+                raise SpecError(f"{said}{where}") from None
+    return joined(measures, conditions[0].columns)
 
 
-def _worlds(condition: Condition, where: str) -> Iterator[Scenario]:
-    """Yield a condition's own world and those of its stages and evaluations, if all can be built.
-
-    Raises
-    ------
-    SpecError
-        If one cannot be, or what is learned in one means nothing in the next.
-    """
-    settings = condition.settings
-    own = _built(settings, where)
-    yield own.world
-    reached: Arrangement | None = None
-    for stage in condition.curriculum:
-        there = _built(_changed(settings, stage.scenario), f" (stage {stage.name!r}){where}")
-        yield there.world
-        if reached is not None:
-            with _naming(f"curriculum.{stage.name}", where):
-                there.continue_from(reached, settings.learner)
-        reached = there
-    if reached is not None:
-        with _naming("curriculum", where):
-            own.continue_from(reached, settings.learner)
-    for name, scenario in condition.evaluations:
-        there = _built(_changed(settings, scenario), f" (evaluation {name!r}){where}")
-        yield there.world
-        with _naming(f"evaluations.{name}", where):
-            there.with_trained(own, settings.learner)
-
-
-def _changed(settings: ConditionSettings, scenario: ScenarioSettings) -> ConditionSettings:
-    return settings.model_copy(update={"scenario": scenario})
-
-
-def _built(settings: ConditionSettings, where: str) -> Arrangement:
-    try:
-        found = arrange(settings, 0)
-        learner = settings.learner
+def _arrangements(condition: Condition) -> Iterator[Arrangement]:
+    """Yield a condition's own arrangement and those of its stages and evaluations."""
+    settings, learner = condition.settings, condition.settings.learner
+    own = arrange(settings, 0)
+    stages = teach(own, settings, condition.curriculum, 0)
+    evaluations = transfer(own, settings, condition.evaluations, 0)
+    for there in (own, *(a for _, a in stages), *(a for _, a in evaluations)):
         if isinstance(learner, LearnerSettings) and learner.decision.rule != "value":
-            found.scenario.reset(0)
-            found.team.check(found.scenario.predict())
-    except ValueError as error:
-        raise SpecError(f"{error}{where}") from None
-    except SystemExit as error:
-        raise SpecError(f"the scenario or topology calls sys.exit({error.code}){where}") from None
-    return found
-
-
-@contextmanager
-def _naming(key: str, where: str) -> Iterator[None]:
-    try:
-        yield
-    except ValueError as error:
-        raise SpecError(f"{key}: {error}{where}") from None
+            there.scenario.reset(0)
+            of_fuzzy_agents(there.team).check(there.scenario.predict())
+        yield there

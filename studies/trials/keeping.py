@@ -1,15 +1,20 @@
-"""A study and its store: opened to run what is left, and read back as a spec."""
+"""A study and its store: opened to run what is left, if it is the same study, and read back."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+import json
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from ...core.interface.measures import Measure
-from ...core.plugins.sources import FOLDER, kept_name
+from ...core.plugins.sources import FOLDER, Sources, kept_name
+from ..errors import SpecError, show
 from ..spec.outline import sources_of
+from ..spec.overlay import flat
 from ..spec.spec import Spec
 from ..spec.toml import dumps
 from ..store import integrity
@@ -18,8 +23,11 @@ from ..store.reading import Reading
 from ..store.schema import Noted
 from ..store.store import Store, locked
 from . import code
-from .refusal import examine, is_copy, noted_of
+from .measures import column_of
 from .trial import Trial
+
+SAME = ("study", "episodes", "steps", "evaluation", "evaluation_steps", "evaluations")
+"""What of a spec must be the same for a study to go on."""
 
 
 @contextmanager
@@ -87,3 +95,140 @@ def pending(store: Store, trials: Iterable[Trial]) -> list[Trial]:
     """
     states = store.states()
     return [trial for trial in trials if trial.identity not in states]
+
+
+def noted_of(spec: Spec, measures: Sequence[Measure] = (), trials: Sequence[Trial] = ()) -> Noted:
+    """Return what a store notes of a study."""
+    return Noted(
+        spec=json.loads(json.dumps(spec.table())),
+        conditions={c.label: c.settings.model_dump(mode="json") for c in spec.conditions()},
+        columns={c.label: c.columns for c in spec.conditions()},
+        sources=spec.sources.texts,
+        measures=measures,
+        planned=[trial.planned for trial in trials],
+    )
+
+
+def examine(directory: Path, spec: Spec, noted: Noted, *, accept_code: bool) -> str | None:
+    """Return what is wrong with a directory's database as a whole, if anything is.
+
+    Parameters
+    ----------
+    directory
+        The directory.
+    spec, noted
+        The study that is to be run in it, and what would be noted of it.
+    accept_code
+        Whether to go on although the installed code has changed.
+
+    Raises
+    ------
+    SpecError
+        If the directory holds another study, or something that is none.
+    """
+    damage = integrity.damage(directory / DATABASE)
+    if damage is None and integrity.holds_tables(directory / DATABASE):
+        with Reading.open(directory) as store:
+            refusal = _of_study(store, spec, noted, accept_code)
+    else:
+        refusal = _of_file(directory, spec, noted, damage)
+    if refusal is not None:
+        raise SpecError(refusal)
+    return damage
+
+
+def is_copy(path: Path, spec: Spec, noted: Noted) -> bool:
+    """Tell whether a file holds a spec; what the spec names of users' files is not read again."""
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        return table == noted.spec or Spec.of(table, spec.sources) == spec
+    except (OSError, ValueError, RecursionError):
+        return False
+
+
+def _of_file(directory: Path, spec: Spec, noted: Noted, damage: str | None) -> str | None:
+    """Return why a spec may not be run where there is no sound database, in one line."""
+    path = directory / SPEC_FILE
+    if not path.exists() or is_copy(path, spec, noted):
+        return None
+    if damage is None:
+        return f"{path}: is in the way of this study's own copy"
+    try:
+        found = difference(noted_of(Spec.load(path)), noted)
+    except SpecError as error:
+        return (
+            f"{path}: is no spec, and {DATABASE} beside it is damaged: which study this is cannot "
+            f"be told ({error})"
+        )
+    return f"{directory}: holds another study: {found}" if found else None
+
+
+def _of_study(store: Reading, spec: Spec, noted: Noted, accept_code: bool) -> str | None:
+    """Return why a spec may not be added to an open study, in one line; None if it may."""
+    refusal = code.outdated(store)
+    if refusal is not None and not (accept_code and store.other_version() is None):
+        return refusal
+    found = difference(store.noted(), noted)
+    copy = store.directory / SPEC_FILE
+    if found is not None and is_copy(copy, spec, noted):
+        return (
+            f"{copy}: is not the spec of the study beside it: {found}; if you did not edit it, it "
+            f"is damaged: nested-agents retry {store.directory} goes on by the database"
+        )
+    return f"{store.directory}: holds another study: {found}" if found else None
+
+
+def difference(old: Noted, new: Noted) -> str | None:
+    """Return one line on what keeps a study from being added to another; None if nothing does.
+
+    Only what they mean is compared, not how it is written. Seeds may be added.
+    """
+    lines = list(_differences(old, new))
+    if not lines:
+        return None
+    more = f" (and {len(lines) - 1} more)" if len(lines) > 1 else ""
+    return f"{lines[0]}{more}; use another directory"
+
+
+def _differences(old: Noted, new: Noted) -> Iterator[str]:
+    files = Sources(None, old.sources), Sources(None, new.sources)
+    for name in sorted(old.sources):
+        if name not in new.sources:
+            yield f"{name} is part of it, not of this one"
+        elif files[0].digest(name) != files[1].digest(name):
+            yield f"{name} has changed since"
+    for name in SAME:
+        yield from _unequal(name, old.spec.get(name, "absent"), new.spec.get(name, "absent"))
+    seeds, more_seeds = _seeds(old), _seeds(new)
+    if not set(seeds) <= set(more_seeds):
+        yield f"seeds = {show(seeds)} there, {show(more_seeds)} here"
+    yield from _unequal("conditions", list(old.conditions), list(new.conditions))
+    for stages, new_stages in zip(_curricula(old), _curricula(new), strict=False):
+        yield from _unequal("curriculum", stages, new_stages)
+    # What tells conditions apart are the columns of every table.
+    keys, new_keys = (list(next(iter(noted.columns.values()))) for noted in (old, new))
+    yield from _unequal("columns", keys, new_keys)
+    if old.measures and [*map(column_of, old.measures)] != [*map(column_of, new.measures)]:
+        there, here = (", ".join(m.name for m in noted.measures) for noted in (old, new))
+        yield f"episodes are measured by {there} there, {here} here, or these mean something else"
+    for label in [label for label in new.conditions if label in old.conditions]:
+        before, after = (dict(flat(noted.conditions[label])) for noted in (old, new))
+        for key in sorted(before.keys() | after.keys()):
+            there, here = before.get(key, "absent"), after.get(key, "absent")
+            yield from _unequal(f"condition {label!r}: {key}", there, here)
+
+
+def _unequal(name: str, there: Any, here: Any) -> Iterator[str]:
+    if there != here:
+        yield f"{name} = {show(there)} there, {show(here)} here"
+
+
+def _seeds(noted: Noted) -> list[int]:
+    seeds = noted.spec["seeds"]
+    return list(range(seeds)) if isinstance(seeds, int) else seeds
+
+
+def _curricula(noted: Noted) -> list[Sequence[Mapping[str, Any]]]:
+    """Return the stages of the spec and of each of its overrides, as they are written."""
+    own = noted.spec.get("curriculum", [])
+    return [own, *(o.get("curriculum", own) for o in noted.spec.get("overrides", ()))]

@@ -11,10 +11,9 @@ from ...core.agents.team import Team
 from ...core.interface.acting import Actors
 from ...core.interface.measures import Measure, measures_of
 from ...core.interface.scenario import RecordedScenario
-from ...core.plugins.settings import ScenarioSettings
 from ..store.durable import Recording
 from ..store.schema import ELSEWHERE, STAGE
-from .arrangement import Arrangement, arrange
+from .arrangement import Arrangement, arrange, teach, transfer
 from .episodes import EpisodeMeter, EpisodeRecorder, EpisodeRow, Stopwatch
 from .measures import joined
 from .trial import Trial, TrialResult
@@ -118,40 +117,30 @@ class Session:
         are shown to the observer of its name, if there is one.
         """
         self._go_through_curriculum()
-        state = self.team.rng.bit_generator.state
-        for name, settings in self.trial.evaluations:
-            self.team.rng.bit_generator.state = state
-            there = self._elsewhere(settings)
-            there = there.with_trained(self._own, self.trial.settings.learner)
-            observe = (observers or {}).get(name)
-            self._evaluate(there, f"{ELSEWHERE}{name}", observe)
+        trial, rng = self.trial, self.team.rng.bit_generator
+        state = rng.state
+        for name, there in transfer(self._own, trial.settings, trial.evaluations, trial.seed):
+            self._note_measures(there)
+            self._evaluate(there, f"{ELSEWHERE}{name}", (observers or {}).get(name))
+            rng.state = state
 
-    def _elsewhere(self, scenario: ScenarioSettings) -> Arrangement:
-        """Return another world with its untrained team, and note what is measured there."""
-        settings = self.trial.settings.model_copy(update={"scenario": scenario})
-        there = arrange(settings, self.trial.seed)
+    def _note_measures(self, there: Arrangement) -> None:
         self._measures = joined((self._measures, measures_of(there.world)))
-        return there
 
     def _go_through_curriculum(self) -> None:
         """Train team after team in the stages that are left; the trial's own takes over at last."""
-        stages, self._stages = self._stages, ()
-        reached: Arrangement | None = None
+        trial, stages, self._stages = self.trial, self._stages, ()
         done = 0
-        for stage in stages:
-            there = self._elsewhere(stage.scenario)
-            if reached is not None:
-                there.continue_from(reached, self.trial.settings.learner)
+        for stage, there in teach(self._own, trial.settings, stages, trial.seed):
+            self._note_measures(there)
             steps = control_loop(
-                there.scenario, there.team, episodes=stage.episodes, steps=self.trial.steps,
-                seed=self.trial.seed, first_world=CURRICULUM_WORLDS + done,
+                there.scenario, there.team, episodes=stage.episodes, steps=trial.steps,
+                seed=trial.seed, first_world=CURRICULUM_WORLDS + done,
             )  # fmt: skip
             measures = measures_of(there.world)
             for _ in self._measured(steps, f"{STAGE}{stage.name}", measures, first=-done):
                 pass
-            reached, done = there, done + stage.episodes
-        if reached is not None:
-            self._own.continue_from(reached, self.trial.settings.learner)
+            done += stage.episodes
 
     def _evaluate(self, there: Arrangement, phase: str, observe: Observer | None) -> None:
         episodes = self.trial.evaluation

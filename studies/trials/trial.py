@@ -72,16 +72,19 @@ class Trial:
     @cached_property
     def identity(self) -> str:
         """Hash of the canonical content and of the version of the code that matters."""
-        before, after = self._content
-        return hashlib.sha256(f'{{{before}"seed":{self.seed},{after}}}'.encode()).hexdigest()[:32]
+        content = json.dumps(
+            {**self._content, "seed": self.seed},
+            sort_keys=True, separators=(",", ":"), allow_nan=False,
+        )  # fmt: skip
+        return hashlib.sha256(content.encode()).hexdigest()[:32]
 
     @cached_property
-    def _content(self) -> tuple[str, str]:
-        """What is hashed, as JSON with sorted keys: the text before and that after the seed."""
+    def _content(self) -> dict[str, Any]:
+        """What is hashed, but for the seed."""
         content: dict[str, Any] = {
             "version": RESULTS_VERSION,
             "study": self.study,
-            "settings": json.loads(self.settings.canonical()),
+            "settings": self.settings.model_dump(mode="json"),
             "episodes": self.episodes,
             "steps": self.steps,
             "evaluation": self.evaluation,
@@ -96,15 +99,7 @@ class Trial:
             content["curriculum"] = [stage.table() for stage in self.curriculum]
         if files := sorted(named([self.study, content])):
             content["sources"] = {name: self.sources.digest(name) for name in files}
-        parts = (
-            {key: value for key, value in content.items() if (key < "seed") == is_before}
-            for is_before in (True, False)
-        )
-        before, after = (
-            json.dumps(part, sort_keys=True, separators=(",", ":"), allow_nan=False)[1:-1]
-            for part in parts
-        )
-        return f"{before},", after
+        return content
 
     def with_seed(self, seed: int) -> Trial:
         """Return the trial with another seed; what both have in common is not written out again."""

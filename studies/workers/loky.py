@@ -38,19 +38,12 @@ class LokyWorkers(Workers):
     Parameters
     ----------
     jobs
-        Number of processes that are busy at a time.
-
-    Raises
-    ------
-    ValueError
-        If `jobs` is less than 1.
+        Number of processes that are busy at a time, at least 1.
     """
 
     processes = 0
 
     def __init__(self, jobs: int) -> None:
-        if jobs < 1:
-            raise ValueError(f"jobs = {jobs}: must be at least 1")
         self.processes = jobs
         self._executor: Any = None
         filters = os.environ.get("PYTHONWARNINGS", "")

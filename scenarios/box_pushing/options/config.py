@@ -39,7 +39,7 @@ class PushingPointsSettings(BoxTaskSettings):
         """Seconds for which a decision is held: those of an option."""
         return self.option_length * super().period
 
-    def suited(self, preset: str) -> Mapping[str, Any]:
+    def scenario_defaults(self, preset: str) -> Mapping[str, Any]:
         """Return Q-learning over pushing points, of every robot alone or of the joint choice."""
         topology = "independent" if self.observed == "own" else "chain"
         learner: dict[str, Any] = {"rule_base": {"order": "full"}}

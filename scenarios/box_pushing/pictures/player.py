@@ -36,7 +36,9 @@ LEAST_SCALE = 1e-4
 
 
 def scene_of(recording: Recording) -> dict[str, Any]:
-    """Return the shapes in which an episode is drawn: equal for episodes of equal bodies.
+    """Return the shapes of an episode [m] and the names of the wheels.
+
+    They are equal for episodes of equal bodies.
 
     Raises
     ------
@@ -47,7 +49,16 @@ def scene_of(recording: Recording) -> dict[str, Any]:
     if missing:
         raise ValueError(f"the recording holds no {missing[0]}")
     robots = recording["robot_poses"].shape[1]
-    return shapes(str(recording["robot"]), str(recording["box"]), robots)
+    robot, box = robot_for(str(recording["robot"])), box_for(str(recording["box"]), robots)
+    return {
+        "radius": robot.radius,
+        "speed": robot.max_speed,
+        "wheels": [[wheel.x, wheel.y] for wheel in robot.wheels],
+        "agents": [f"robot{r + 1}.{name}" for r in range(robots) for name in robot.wheel_names],
+        "rings": [] if box.radius else [_rounded(ring[:-1]) for ring in box.rings],
+        "disc": round(box.radius, 5),
+        "reach": round(box.reach, 5),
+    }
 
 
 def pack(recording: Recording, scene: Mapping[str, Any]) -> dict[str, Any]:
@@ -84,22 +95,6 @@ def pack(recording: Recording, scene: Mapping[str, Any]) -> dict[str, Any]:
         "dt": float(recording["dt"]),
         "goal": [round(float(v), 5) for v in recording["goal_pose"]],
         "data": base64.b64encode(content).decode("ascii"),
-    }
-
-
-def shapes(robot_name: str, box_name: str, robots: int) -> dict[str, Any]:
-    """Return the shapes that robots and box are drawn in [m], and the names of the wheels."""
-    robot, box = robot_for(robot_name), box_for(box_name, robots)
-    polygon = box.polygon
-    rings = [] if polygon is None else [polygon.exterior, *polygon.interiors]
-    return {
-        "radius": robot.radius,
-        "speed": robot.max_speed,
-        "wheels": [[wheel.x, wheel.y] for wheel in robot.wheels],
-        "agents": [f"robot{r + 1}.{name}" for r in range(robots) for name in robot.wheel_names],
-        "rings": [_rounded(np.array(ring.coords)[:-1]) for ring in rings],
-        "disc": round(box.radius, 5),
-        "reach": round(box.reach, 5),
     }
 
 

@@ -18,7 +18,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, PathPatch
-from matplotlib.path import Path as Outline
 from shapely.geometry import Point, Polygon
 
 from ....core.agents.team import Team
@@ -29,6 +28,7 @@ from ..world.boxes import BoxSpec
 from ..world.geometry import surface, wrap
 from ..world.settings import RobotSettings
 from ..world.starts import place
+from .rendering import BOX_COLOUR, curve
 
 AHEAD = 0.6
 """From the box to the goal [m]."""
@@ -237,7 +237,7 @@ def _draw(axes: Axes, field: Field, box: BoxSpec, radius: float) -> None:
     colours = [COLOURS[move] for move in moves]
     longest = max(float(np.hypot(*field.ways.T).max()), 1e-9)
     ways = 0.9 * spacing * field.ways / longest
-    axes.add_patch(PathPatch(_outline(box), fc="#E69F00", ec="black", alpha=0.75))
+    axes.add_patch(PathPatch(curve(box), fc=BOX_COLOUR, ec="black", alpha=0.75))
     for spot in field.others:
         axes.add_patch(Circle((spot[0], spot[1]), radius, fc="#bbbbbb", ec="#777777"))
     axes.quiver(
@@ -262,10 +262,3 @@ def _draw(axes: Axes, field: Field, box: BoxSpec, radius: float) -> None:
     axes.set_box_aspect(1.0)  # a square of equal lengths; `set_aspect` would cut the title off
     axes.set_title(f"robot {field.robot + 1}; longest arrow {1000 * longest:.0f} mm", loc="left")
     axes.set_xlabel("along the course to the goal [m]")
-
-
-def _outline(box: BoxSpec) -> Outline:
-    if box.polygon is None:
-        return Outline.circle((0, 0), box.radius)
-    rings = [np.array(r.coords) for r in (box.polygon.exterior, *box.polygon.interiors)]
-    return Outline.make_compound_path(*(Outline(ring, closed=True) for ring in rings))

@@ -52,14 +52,6 @@ BOX_COLOUR, GOAL_COLOUR, FAILED_COLOUR = "#E69F00", "#555555", "#B00020"
 RAY_COLOUR, HIT_COLOUR = "#BBBBBB", "#6A3D9A"
 
 
-def _rings(box: BoxSpec) -> list[FloatArray]:
-    """Return the closed outline ``(k, 2)`` of a box in its frame [m], then its holes."""
-    if box.polygon is None:
-        angles = np.linspace(0, 2 * np.pi, 65)
-        return [box.radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)]
-    return [np.array(ring.coords) for ring in (box.polygon.exterior, *box.polygon.interiors)]
-
-
 def _pointer(box: BoxSpec) -> FloatArray:
     """Return an arrow ``(k, 2)`` from the centre of a box ahead, in its frame [m]."""
     size = 0.3 * np.sqrt(box.area)
@@ -74,7 +66,6 @@ class _Stage:
         self.robot: RobotSettings = robot_for(str(recording["robot"]))
         robots = recording["robot_poses"].shape[1]
         self.box = box_for(str(recording["box"]), robots)
-        self.rings = _rings(self.box)
         self.infrared: InfraredSettings | None = None
         if sensors:
             described = str(recording.get("infrared", "{}"))
@@ -100,7 +91,7 @@ class _Stage:
         self._moving: list[Artist] = []
         goal = recording["goal_pose"]
         line = {"fill": False, "lw": 1.5, "ec": GOAL_COLOUR, "zorder": 3}
-        self._patch(PathPatch(_curve(self.rings), ls="--", **line), goal)
+        self._patch(PathPatch(curve(self.box), ls="--", **line), goal)
         self._patch(Polygon(_pointer(self.box), closed=False, **line), goal)
         self._moving = []  # these stay
 
@@ -109,7 +100,7 @@ class _Stage:
         poses = np.vstack([self.recording["box_pose"], self.recording["goal_pose"]])
         cos, sin = np.cos(poses[:, 2]), np.sin(poses[:, 2])
         turns = np.array([[cos, -sin], [sin, cos]])
-        corners = np.einsum("ijt,kj->tki", turns, self.rings[0]) + poses[:, None, :2]
+        corners = np.einsum("ijt,kj->tki", turns, self.box.rings[0]) + poses[:, None, :2]
         robots = self.recording["robot_poses"][..., :2].reshape(-1, 2)
         places = np.vstack(
             [corners.reshape(-1, 2), robots - self.robot.radius, robots + self.robot.radius]
@@ -123,7 +114,7 @@ class _Stage:
         self._moving = []
         box = self.recording["box_pose"]
         fill = to_rgba(BOX_COLOUR, 0.75)
-        self._patch(PathPatch(_curve(self.rings), fc=fill, ec="black", zorder=1), box[step])
+        self._patch(PathPatch(curve(self.box), fc=fill, ec="black", zorder=1), box[step])
         pointer = Polygon(_pointer(self.box), closed=False, fill=False, lw=1.5, zorder=1)
         self._patch(pointer, box[step])
         self._trail(box, step, BOX_COLOUR)
@@ -215,9 +206,9 @@ def _at(pose: FloatArray) -> Affine2D:
     return Affine2D().rotate(float(pose[2])).translate(float(pose[0]), float(pose[1]))
 
 
-def _curve(rings: list[FloatArray]) -> Curve:
-    """Return a path along rings, oriented against each other, so that holes stay open."""
-    return Curve.make_compound_path(*(Curve(ring, closed=True) for ring in rings))
+def curve(box: BoxSpec) -> Curve:
+    """Return a path along the rings of a box, against each other, so that holes stay open."""
+    return Curve.make_compound_path(*(Curve(ring, closed=True) for ring in box.rings))
 
 
 def picture(recording: Recording, step: int, *, sensors: bool = False) -> Pixels:

@@ -29,14 +29,12 @@ class Screen:
         self.mode, self.sensors = mode, sensors
         self._constants = {name: np.array(value) for name, value in drawn.items()}
         self._frames: dict[str, list[Any]] = {}
-        self._rewards: list[float] = []
         self._window: Any = None
 
     def begin(self, measured: Mapping[str, Any]) -> None:
         """Forget the past and take in the start of an episode."""
         self._constants["goal_pose"] = np.array(measured["goal_pose"])
         self._frames = {name: [np.array(measured[name])] for name in SHOWN}
-        self._rewards = []
         if self.mode == "human":
             self._show()
 
@@ -44,7 +42,6 @@ class Screen:
         """Take in a step."""
         for name, frames in self._frames.items():
             frames.append(np.array(transition.info[name]))
-        self._rewards.append(float(transition.reward))
         if self.mode == "human":
             self._show()
 
@@ -73,8 +70,7 @@ class Screen:
 
         recording = {name: np.stack(frames) for name, frames in self._frames.items()}
         recording |= self._constants
-        recording["reward"] = np.array(self._rewards)
-        return picture(recording, len(self._rewards), sensors=self.sensors)
+        return picture(recording, len(recording["box_pose"]) - 1, sensors=self.sensors)
 
     def _show(self) -> None:
         try:

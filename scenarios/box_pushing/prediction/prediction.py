@@ -14,7 +14,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ....core.interface.prediction import Blocks
+from ....core.interface.prediction import Blocks, first_alike
 from ....core.numerics.arrays import FloatArray, IntArray
 from ..states.view import View
 from ..world.reward import reward
@@ -79,6 +79,11 @@ class BoxPrediction:
     def _choices(self, joint_actions: IntArray) -> IntArray:
         """Return the wheel command ``(m, M)`` of each robot in joint actions ``(m, n)``."""
         return choices_of(joint_actions, self.wheel_commands.which, len(self.premises.action_set))
+
+    @cached_property
+    def alike(self) -> IntArray:
+        """The first robot-action index ``(M, A ** w)`` that gives the same wheel speeds."""
+        return first_alike(self.wheel_commands.which)
 
     @cached_property
     def _table(self) -> tuple[View, IntArray]:

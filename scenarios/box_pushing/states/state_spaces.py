@@ -58,10 +58,6 @@ class BoxStateSpace:
         names = zip(self.functions, self.compiled, strict=True)
         return Columns([function.variable.name for function, compiled in names if compiled])
 
-    def shared(self, view: View, robot: int) -> FloatArray:
-        """Return the shared block ``(m, d - n_own)`` of a robot, by the functions alone."""
-        return self.sensed(view, [robot])[0]
-
     def sensed(self, view: View, robots: Sequence[int]) -> FloatArray:
         """Return the shared blocks ``(k, m, d - n_own)`` of k robots, by the functions alone."""
         trusted = [compiled or not self.of_users for compiled in self.compiled]

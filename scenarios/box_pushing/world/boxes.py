@@ -4,7 +4,7 @@ The frame of a box has its centre of mass at the origin and its back, where robo
 easier start distributions, towards -x. Its weight rests on the ground as a distributed friction,
 stood for by four points, so that sliding and turning share one friction budget as they do for a
 real box. A further box, concave or with holes, is one `BoxSpec` and one line in `BOXES`; a spec may
-also describe one by its vertices, and `BoxSpec.of` takes a shapely geometry.
+also describe one by its vertices.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from math import cos, isfinite, pi, sin, sqrt
 
 import numpy as np
 from shapely.geometry import Polygon
-from shapely.geometry.polygon import orient
 
 from ....core.numerics.arrays import FloatArray
 from ....core.plugins.messages import closest
@@ -83,30 +82,18 @@ class BoxSpec:
             )
         _ = self.polygon  # what cannot be one is refused at once
 
-    @classmethod
-    def of(cls, name: str, geometry: Polygon, **quantities: float) -> BoxSpec:
-        """Return a box from a shapely polygon [m]; `quantities` as of the class.
-
-        Examples
-        --------
-        >>> from shapely.geometry import Point
-        >>> ring = Point(0, 0).buffer(0.1) - Point(0, 0).buffer(0.05)
-        >>> round(BoxSpec.of("ring", ring, mass=0.2).area, 4)
-        0.0235
-        """
-        if not isinstance(geometry, Polygon):
-            raise ValueError(f"box {name!r}: a {geometry.geom_type}, must be one Polygon")
-        polygon = orient(geometry)
-        outline, *holes = [
-            tuple((float(x), float(y)) for x, y in ring.coords[:-1])
-            for ring in (polygon.exterior, *polygon.interiors)
-        ]
-        return cls(name, outline, tuple(holes), **quantities)
-
     @cached_property
     def polygon(self) -> Polygon | None:
         """The centred polygon; None for a disc."""
         return centred(self.name, self.vertices, self.holes) if self.vertices else None
+
+    @cached_property
+    def rings(self) -> list[FloatArray]:
+        """The closed outline ``(k, 2)`` in the frame of the box [m], then its holes."""
+        if self.polygon is None:
+            angles = np.linspace(0, 2 * pi, 65)
+            return [self.radius * np.stack([np.cos(angles), np.sin(angles)], axis=1)]
+        return [np.array(ring.coords) for ring in (self.polygon.exterior, *self.polygon.interiors)]
 
     @cached_property
     def outline(self) -> Outline:
@@ -174,24 +161,16 @@ class BoxSpec:
         ends = self.outline.edges.reshape(-1, 2)[:, 1]
         return float(ends.min()) - self.outline.rounding, float(ends.max()) + self.outline.rounding
 
-    def scaled(self, factor: float) -> BoxSpec:
-        """Return the box with lengths and mass multiplied by `factor`."""
-        rings = [
-            tuple((factor * x, factor * y) for x, y in ring)
-            for ring in (self.vertices, *self.holes)
+    def scaled(self, factor: float, *, width_only: bool = False) -> BoxSpec:
+        """Return the box with lengths, or those along y only, and mass multiplied by `factor`."""
+        along = 1.0 if width_only else factor
+        outline, *holes = [
+            tuple((along * x, factor * y) for x, y in ring) for ring in (self.vertices, *self.holes)
         ]
         return replace(
-            self,
-            vertices=rings[0],
-            holes=tuple(rings[1:]),
-            radius=factor * self.radius,
+            self, vertices=outline, holes=tuple(holes), radius=along * self.radius,
             mass=factor * self.mass,
-        )
-
-    def widened(self, factor: float) -> BoxSpec:
-        """Return the polygon with its extent along y and its mass multiplied by `factor`."""
-        rings = [tuple((x, factor * y) for x, y in ring) for ring in (self.vertices, *self.holes)]
-        return replace(self, vertices=rings[0], holes=tuple(rings[1:]), mass=factor * self.mass)
+        )  # fmt: skip
 
 
 def box_for(box: str | BoxSettings, robots: int) -> BoxSpec:
@@ -215,9 +194,7 @@ def box_for(box: str | BoxSettings, robots: int) -> BoxSpec:
     """
     described, grows = _described(box)
     factor = growth(box, robots)
-    if factor == 1.0:
-        return described
-    return described.widened(factor) if grows == "width" else described.scaled(factor)
+    return described if factor == 1.0 else described.scaled(factor, width_only=grows == "width")
 
 
 def growth(box: str | BoxSettings, robots: int) -> float:

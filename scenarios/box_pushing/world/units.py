@@ -20,7 +20,7 @@ NEAREST_GOAL = 1e-4
 """Less than this no tolerance is meant to be [m]."""
 
 
-def doubts(settings: Any) -> Iterator[str]:
+def warnings(settings: Any) -> Iterator[str]:
     """Yield a line for every size of `BoxTaskSettings` that is surely meant in another unit."""
     box, robot = settings.box, settings.robot
     if not isinstance(box, str):

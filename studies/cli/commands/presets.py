@@ -24,7 +24,7 @@ def command(name: str | None) -> int:
     from ...spec.toml import dumps
 
     settings = resolve(name, {}, {})
-    if defaults := settings.scenario.suited(name):
+    if defaults := settings.scenario.scenario_defaults(name):
         print("# What this scenario lays over the preset, as it is set here:")
         print(*(f"# {line}" for line in dumps(defaults).splitlines() if line), sep="\n", end="\n\n")
     print(dumps(settings.model_dump()), end="")

@@ -11,6 +11,7 @@ from nested_agents.core.numerics.arrays import FloatArray
 from nested_agents.scenarios.kinematic_chain.config import KinematicChainSettings
 from nested_agents.scenarios.kinematic_chain.kernels import COMPILED
 from nested_agents.scenarios.kinematic_chain.scenario import KinematicChain
+from nested_agents.scenarios.kinematic_chain.variables import CHAIN_VARIABLES
 from nested_agents.scenarios.kinematic_chain.view import ChainView
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
@@ -60,11 +61,25 @@ def test_predictions_come_true(table: dict[str, object]) -> None:
         assert rewards[k] == transition.reward
 
 
+def test_actions_that_come_to_the_same_are_known_to_best_responses() -> None:
+    scenario = arm(3)
+    scenario.reset(0)
+    for _ in range(4):
+        scenario.step(np.zeros(3, dtype=int))
+    prediction = scenario.predict()
+    first = np.take_along_axis(prediction.speeds, prediction.alike, axis=1)
+    assert (first == prediction.speeds).all()
+    assert (prediction.alike < np.arange(4)).any()  # at full speed increasing changes nothing
+
+
 def test_compiled_variables_are_what_their_functions_say() -> None:
     scenario = moving(6, state_space=COMPILED)
     view = scenario.predict().seen(np.random.default_rng(3).integers(4, size=(30, 6)))
-    states = scenario._states
-    assert states.predicted(view, 0, 6) == pytest.approx(states.sensed(view).swapaxes(0, 1))
+    states = scenario._states.of_joints(view, 0, 6)[:, :, 1:]
+    for column, name in enumerate(COMPILED):
+        variable = CHAIN_VARIABLES.find(name)
+        for joint in range(6):
+            assert states[joint, :, column] == pytest.approx(variable(view, joint))
 
 
 @na.state_variable("m", -1.0, 1.0)

@@ -89,9 +89,10 @@ def test_a_saved_trial_replaces_what_was_there(finished):
 
 def test_seconds_are_kept_apart(finished):
     with Store.open(finished) as store:
-        names, rows = store.seconds()
-    assert names[2:] == ["decision", "physics", "sensors", "learning", "total"]
-    assert {row[-1] for row in rows} == {1.5}
+        names, rows = store.trials()
+    parts = [f"seconds.{part}" for part in ("decision", "physics", "sensors", "learning", "total")]
+    assert [name for name in names if name.startswith("seconds.")] == parts
+    assert {row[names.index("seconds.total")] for row in rows} == {1.5}
 
 
 @pytest.mark.parametrize("damage", ["missing", "truncated", "flipped"])

@@ -103,11 +103,6 @@ def test_workers_compute_with_one_thread(tmp_path):
             assert [o.error for o in outcomes] == [None, None]
 
 
-def test_no_jobs_is_refused():
-    with pytest.raises(ValueError, match="jobs = 0: must be at least 1"):
-        LokyWorkers(0)
-
-
 def test_workers_do_not_outlive_a_killed_parent(tmp_path):
     program = """
         import sys

@@ -4,7 +4,7 @@ import zlib
 import numpy as np
 import pytest
 
-from nested_agents.scenarios.box_pushing.pictures.player import pack, scene_of, shapes
+from nested_agents.scenarios.box_pushing.pictures.player import pack, scene_of
 
 
 def unpack(packed):
@@ -47,5 +47,5 @@ def test_shapes_hold_holes_and_discs(recorded):
     ring = scene_of(recorded())
     assert [len(points) for points in ring["rings"]] == [4, 4]
     assert (ring["agents"][4], len(ring["wheels"])) == ("robot2.front-left", 4)
-    disc = shapes("e-puck", "circle", 2)
+    disc = scene_of(recorded() | {"box": np.array("circle")})
     assert (disc["rings"], disc["disc"] > 0.1) == ([], True)

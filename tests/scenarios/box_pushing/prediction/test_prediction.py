@@ -133,3 +133,10 @@ def test_the_states_of_all_agents_are_those_of_each(settings: dict) -> None:
     joint = np.random.default_rng(0).integers(4, size=(20, n))
     expected = np.stack([scenario.predict().states(agent, joint) for agent in range(n)])
     np.testing.assert_array_equal(scenario.predict().states_of_all(joint), expected)
+
+
+def test_wheel_commands_that_come_to_the_same_are_known_to_best_responses() -> None:
+    prediction = moving().predict()
+    which, alike = prediction.wheel_commands.which, prediction.alike
+    assert (np.take_along_axis(which, alike, axis=1) == which).all()
+    assert (alike < np.arange(which.shape[1])).any()
