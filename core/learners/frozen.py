@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import ClassVar, Literal
 
 from ..numerics.arrays import FloatArray, IntArray
@@ -27,3 +28,11 @@ class Frozen(Online):
 
     def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
         return 0
+
+    def arrays(self) -> dict[str, FloatArray]:
+        """Return the weights, which is all there is."""
+        return {"theta": self.theta}
+
+    def restore(self, arrays: Mapping[str, FloatArray]) -> None:
+        """Continue from `arrays`."""
+        super().restore({"previous": self.theta[:0], "rewards": self._rewards, **arrays})
