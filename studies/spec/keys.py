@@ -117,8 +117,7 @@ def tables() -> tuple[Table, ...]:
     >>> [key.name for key in by_name["scenario", "line-up"].keys]
     ['carts']
     """
-    own: list[tuple[str, type[Settings]]]
-    own = [("", Spec), ("overrides", Override), ("curriculum", StageSettings)]
+    own = (("", Spec), ("overrides", Override), ("curriculum", StageSettings))
     heads = [_table(name, ("", ""), model, {}) for name, model in own]
     return (*heads, *_below(ConditionSettings, "", "", set()))
 
@@ -223,8 +222,8 @@ def _laid_over(key: Key, table: Mapping[str, Any]) -> Key:
     value = table.get(key.name)
     if isinstance(value, Mapping):
         value = value.get("kind")  # its other keys stand in a table of their own
-    told = "" if value is None else json.dumps(value)
-    return replace(key, preset="" if told == key.default else told)
+    text = "" if value is None else json.dumps(value)
+    return replace(key, preset="" if text == key.default else text)
 
 
 def nearest(prefix: str) -> str:
@@ -247,19 +246,14 @@ def nearest(prefix: str) -> str:
 
 def _key(name: str, info: FieldInfo) -> Key:
     meaning = " ".join((info.description or "").split())
-    unit = UNIT.search(meaning)
     plugged = registry_of(info)
     if plugged is not None:
         kinds = f"kind: {', '.join(plugged.built_in)}"
         return Key(name, "table", _shown(info), kinds, "", meaning)
-    allowed = [*_bounds(info.metadata), *_allowed(info.annotation)]
+    allowed = ", ".join(dict.fromkeys([*_bounds(info.metadata), *_allowed(info.annotation)]))
+    unit = UNIT.search(meaning)
     return Key(
-        name,
-        _type(info.annotation),
-        _shown(info),
-        ", ".join(dict.fromkeys(allowed)),
-        unit[1] if unit else "",
-        meaning,
+        name, _type(info.annotation), _shown(info), allowed, unit[1] if unit else "", meaning
     )
 
 
@@ -277,34 +271,20 @@ def _shown(info: FieldInfo) -> str:
     return json.dumps(value)
 
 
-def _arms(annotation: Any) -> tuple[Any, ...]:
-    """Return the alternatives of a union but None, aliases and annotations taken off."""
-    origin = get_origin(annotation)
-    if isinstance(annotation, TypeAliasType):
-        return (annotation,)
-    if origin is Annotated:
-        return _arms(get_args(annotation)[0])
-    if origin in (Union, UnionType):
-        return tuple(arm for one in get_args(annotation) for arm in _arms(one))
-    return () if annotation is NoneType else (annotation,)
-
-
 def _type(annotation: Any) -> str:
-    return " or ".join(dict.fromkeys(_type_of(arm) for arm in _arms(annotation)))
-
-
-def _type_of(arm: Any) -> str:
-    origin, given = get_origin(arm), get_args(arm)
-    if isinstance(arm, TypeAliasType):
+    """Return the type of a field in words: alternatives but None, annotations taken off."""
+    origin, given = get_origin(annotation), get_args(annotation)
+    if isinstance(annotation, TypeAliasType):
         return "nested lists of text"
-    if origin is Literal:
-        return " or ".join(dict.fromkeys(TYPES[type(value)] for value in given))
+    if origin is Annotated:
+        return _type(given[0])
     if origin is tuple:
-        inner = _type(given[0])
-        return f"list of {inner}" if given[-1] is Ellipsis else f"pair of {inner}"
-    if inspect.isclass(origin) or (isinstance(arm, type) and issubclass(arm, Settings)):
-        return "table"
-    return TYPES[arm]
+        return f"{'list' if given[-1] is Ellipsis else 'pair'} of {_type(given[0])}"
+    if origin is Literal:
+        given = tuple(map(type, given))
+    if origin in (Union, UnionType, Literal):
+        return " or ".join(dict.fromkeys(_type(one) for one in given if one is not NoneType))
+    return TYPES.get(annotation, "table")
 
 
 def _allowed(annotation: Any) -> Iterator[str]:
