@@ -68,10 +68,9 @@ def _writers(store: Store, form: Form) -> dict[str, Callable[[Path], None]]:
     """Return what writes each file, by its name."""
     results = read(store)
     if form == "json":
-        version = int(store.meta("results_version"))
         outline = Outline.kept(store)
         kept = published_part(outline.study, results)
-        return {"results": lambda path: published.write(path, outline, kept, version)}
+        return {"results": lambda path: published.write(path, outline, kept)}
     if form == "parquet" and not find_spec("pyarrow"):
         raise SpecError(
             "--format parquet: pyarrow is not installed; pip install 'nested-agents[parquet]'"

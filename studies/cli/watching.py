@@ -43,14 +43,13 @@ def curve(rates: Sequence[float], width: int = CURVE) -> str:
 def frame(directory: Path) -> tuple[Group, bool]:
     """Return what there is to see of a study now, and whether anything is still to come.
 
-    Rows that are damaged, or of another version, are not drawn. Of a damaged study nothing is to
-    come unless somebody runs it.
+    Rows that are damaged are not drawn. Of a damaged study nothing is to come unless somebody runs
+    it.
     """
     with Store.open(directory) as store:
         now = progress(store)
         lines = Text("\n".join([*describe(store, now), *warnings(now)]))
-        is_whole = not now.damaged and store.other_version() is None
-        results = read(store) if is_whole else from_arrays({})
+        results = from_arrays({}) if now.damaged else read(store)
         failed = store.failed()
         planned = Counter(trial.condition for trial in store.planned())
     shown = [f"failed: {c}, seed {s}: {(e.strip() or '-').splitlines()[-1]}" for c, s, e in failed]

@@ -43,7 +43,6 @@ def page(directory: Path) -> str:
         ]
         trials = store.planned()
         packed = replays(store, trials)
-        version = store.meta("results_version")
         sources = sources_of(store)
     with sources.active():
         analysis = analysed(outline.study, results)
@@ -67,8 +66,7 @@ def page(directory: Path) -> str:
         seeds=words.runs(outline.seeds),
         spec=dumps(outline.table),
         versions=words.versions(),
-        results_version=version,
-        outdated=version != str(RESULTS_VERSION),
+        results_version=RESULTS_VERSION,
         css=_own("page.css"),
         js=_own("page.js"),
         replay_js=Markup(packed.script),

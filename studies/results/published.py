@@ -26,12 +26,12 @@ FEW = 100
 """Fewer rows, or values, are always written one by one."""
 
 
-def dumps(outline: Outline, results: Results, version: int = RESULTS_VERSION) -> str:
-    """Return results, their spec and the version that they are of as JSON text."""
+def dumps(outline: Outline, results: Results) -> str:
+    """Return results of this version, and their spec, as JSON text."""
     measures = [m for m in results.measures if m.name in results.episodes]
     rates = {"steps": False} | {measure.name: measure.is_rate for measure in measures}
     content = {
-        "results_version": version,
+        "results_version": RESULTS_VERSION,
         "spec": outline.table,
         "columns": results.columns,
         "measures": tables(measures),
@@ -103,9 +103,9 @@ def loads(text: str) -> Published:
     )
 
 
-def write(path: Path, outline: Outline, results: Results, version: int = RESULTS_VERSION) -> None:
+def write(path: Path, outline: Outline, results: Results) -> None:
     """Write the same to a file, which is there whole or not at all."""
-    durable.write(path, dumps(outline, results, version).encode())
+    durable.write(path, dumps(outline, results).encode())
 
 
 def read(folder: Path, studies: Iterable[str]) -> dict[str, Published]:

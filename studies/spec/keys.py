@@ -10,7 +10,7 @@ from __future__ import annotations
 import inspect
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
@@ -163,19 +163,12 @@ def _families(info: FieldInfo) -> Iterator[tuple[Any, list[tuple[str, type[Setti
     models = [m for m in models_of(info.annotation) if issubclass(m, Settings)]
     kinds = [(m.model_fields["kind"].default, m) for m in models if "kind" in m.model_fields]
     if kinds:
-        yield _common(model for _, model in kinds), kinds
+        bases = kinds[0][1].__mro__[1:]
+        base = next(cls for cls in bases if all(issubclass(m, cls) for _, m in kinds))
+        yield base if getattr(base, "model_fields", None) else None, kinds
     for model in models:
         if "kind" not in model.model_fields:
             yield None, [("", model)]
-
-
-def _common(models: Iterable[type[Settings]]) -> type[Settings] | None:
-    """Return the nearest model that all models inherit, unless it has no keys."""
-    first, *others = models
-    for cls in first.__mro__[1:]:
-        if all(issubclass(other, cls) for other in others) and issubclass(cls, Settings):
-            return cls if cls.model_fields else None
-    return None
 
 
 def _held(

@@ -19,7 +19,7 @@ def damage(path: Path) -> str | None:
     Raises
     ------
     SpecError
-        If it cannot be read for another reason, is of a newer version, or is no study's.
+        If it cannot be read for another reason, is of another version, or is no study's.
     """
     if bereft(path):
         return "its log is there without it"
@@ -64,20 +64,18 @@ def fault(path: Path, db: sqlite3.Connection) -> str | None:
             return " ".join(str(answer).replace("*** in database main ***", "").split())
         noted = dict(db.execute("SELECT key, value FROM meta").fetchall())
         version = str(noted.get("results_version"))
-        if version.isdecimal() and int(version) > RESULTS_VERSION:  # its checksums may be others
+        # Checksums of another version may be others.
+        if version.isdecimal() and int(version) != RESULTS_VERSION:
+            is_newer = int(version) > RESULTS_VERSION
             raise SpecError(
                 f"{path}: holds results of version {version}, this is version {RESULTS_VERSION}; "
-                "a newer nested-agents reads it"
+                f"{'a newer' if is_newer else 'an older'} nested-agents reads it"
             )
-        if "planned" not in tables and noted.get("results_version") != str(RESULTS_VERSION):
-            return None  # of a version that kept less; what it holds is not read
-        # Studies begun before there were checksums have none.
-        if noted.get("sha256") not in (None, study_checksum(db)):
+        if noted.get("sha256") != study_checksum(db):
             return "what it says of the study is not what was written"
-        if "ledger" in tables:
-            kept = db.execute("SELECT count(*) FROM checksums").fetchall()
-            if db.execute("SELECT trials FROM ledger").fetchall() != kept:
-                return "it does not hold as many trials as were run"
+        kept = db.execute("SELECT count(*) FROM checksums").fetchall()
+        if db.execute("SELECT trials FROM ledger").fetchall() != kept:
+            return "it does not hold as many trials as were run"
     except database.ILL as error:
         return " ".join(str(error).split()) or type(error).__name__
     return None

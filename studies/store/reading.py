@@ -6,7 +6,6 @@ import json
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
@@ -17,7 +16,6 @@ from .database import DATABASE
 from .schema import (
     ELSEWHERE,
     PLANNED,
-    RESULTS_VERSION,
     SECONDS,
     STAGE,
     Noted,
@@ -51,8 +49,9 @@ class Reading:
         Raises
         ------
         SpecError
-            If the directory holds no readable study, or its database is damaged as a whole: what
-            it says of the study, or the number of its trials. For their rows see `verify`.
+            If the directory holds no readable study, or one of another version, or its database is
+            damaged as a whole: what it says of the study, or the number of its trials. For their
+            rows see `verify`.
         """
         path = directory / DATABASE
         if integrity.bereft(path):
@@ -102,23 +101,8 @@ class Reading:
         """Return what the study is, but for its trials and code."""
         return Noted(self.spec(), self.settings(), self.columns(), self.sources(), self.measures())
 
-    def other_version(self) -> str | None:
-        """Return of which version the results are, in one line, if they are not of this one."""
-        if (version := self.meta("results_version")) == str(RESULTS_VERSION):
-            return None
-        return (
-            f"{self.directory}: holds results of version {version}, this is version "
-            f"{RESULTS_VERSION}"
-        )
-
     def measures(self) -> tuple[Measure, ...]:
         """Return what the study measures of its episodes, of any condition."""
-        return self._measures
-
-    @cached_property
-    def _measures(self) -> tuple[Measure, ...]:
-        if (other := self.other_version()) is not None:
-            raise SpecError(f"{other}; run it again to read it")
         try:
             return measures_from(json.loads(self.meta("measures")))
         except (ValueError, TypeError):
@@ -127,7 +111,7 @@ class Reading:
             ) from None
 
     def meta(self, key: str) -> str:
-        """Return what is noted under `key`, as ``spec``, ``conditions`` or ``results_version``."""
+        """Return what is noted under `key`, as ``spec`` or ``conditions``."""
         found = self._db.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
         if found is None:
             raise SpecError(f"{self.directory / DATABASE}: is no study: it has no {key}")
@@ -149,8 +133,6 @@ class Reading:
 
     def _damaged_rows(self) -> dict[str, str]:
         """Return by identity whose rows are not what was written, one line each."""
-        if not self._db.execute("PRAGMA table_info(checksums)").fetchall():
-            return {}  # begun before there were checksums
         noted = dict(self._db.execute("SELECT identity, sha256 FROM checksums").fetchall())
         names = {
             identity: f"{condition}, seed {seed}"

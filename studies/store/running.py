@@ -11,7 +11,6 @@ import contextlib
 import fcntl
 import json
 import os
-import threading
 import time
 from pathlib import Path
 
@@ -34,7 +33,6 @@ class Running:
         self._path = directory / MARK
         self._processes = processes
         self._begun: dict[str, float] = {}
-        self._changing = threading.Lock()
 
     def __enter__(self) -> Running:
         return self
@@ -45,15 +43,13 @@ class Running:
 
     def begin(self, identity: str) -> None:
         """Note that a trial has been handed to a worker."""
-        with self._changing:
-            self._begun[identity] = time.time()
-            self._write()
+        self._begun[identity] = time.time()
+        self._write()
 
     def end(self, identity: str) -> None:
         """Note that a trial has come back."""
-        with self._changing:
-            self._begun.pop(identity, None)
-            self._write()
+        self._begun.pop(identity, None)
+        self._write()
 
     def _write(self) -> None:
         temporary = self._path.with_name(f".{MARK}.new")

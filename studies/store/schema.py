@@ -165,8 +165,7 @@ def prepare(db: sqlite3.Connection, noted: Noted) -> None:
     insert(db, "meta", list(meta.items()))
     insert(db, "meta", [("sha256", study_checksum(db))])
     if db.execute("SELECT 1 FROM ledger").fetchone() is None:
-        # A study begun before there was a ledger: what has a checksum is what there is.
-        db.execute("INSERT INTO ledger SELECT count(*) FROM checksums")
+        db.execute("INSERT INTO ledger VALUES (0)")
 
 
 def _episodes(measures: Sequence[Measure]) -> str:

@@ -63,7 +63,7 @@ def present(known: Mapping[str, tuple[str, str]] | None = None) -> Code:
     """Return the digests of the installed code; modules whose text is `known` are not parsed."""
     found, known = {}, known or {}
     for name, text in modules().items():
-        digest = _digest(text)
+        digest = hashlib.sha256(text.encode()).hexdigest()[:16]
         is_same = name in known and known[name][0] == digest
         found[name] = known[name] if is_same else (digest, meaning(text, name))
     return found
@@ -78,8 +78,6 @@ def changed(known: Mapping[str, tuple[str, str]]) -> list[str]:
 
 def outdated(store: Reading) -> str | None:
     """Return why this code would not go on with a study, in one line; None if it would."""
-    if (other := store.other_version()) is not None:
-        return f"{other}; use another directory"
     modules = changed(store.code())
     if not modules:
         return None
@@ -88,7 +86,3 @@ def outdated(store: Reading) -> str | None:
         f"{store.directory}: its results are of other code: {modules[0]}{more} changed "
         "since; --accept-code goes on with it"
     )
-
-
-def _digest(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()[:16]

@@ -165,8 +165,7 @@ def _of_file(directory: Path, spec: Spec, noted: Noted, damage: str | None) -> s
 
 def _of_study(store: Reading, spec: Spec, noted: Noted, accept_code: bool) -> str | None:
     """Return why a spec may not be added to an open study, in one line; None if it may."""
-    refusal = code.outdated(store)
-    if refusal is not None and not (accept_code and store.other_version() is None):
+    if not accept_code and (refusal := code.outdated(store)) is not None:
         return refusal
     found = difference(store.noted(), noted)
     copy = store.directory / SPEC_FILE

@@ -59,18 +59,14 @@ class Workers(ABC):
         waiting, left = iter(trials), len(trials)
         running: dict[Any, Trial] = {}
         finished: SimpleQueue[Any] = SimpleQueue()
-
-        def hand_out() -> None:
-            for trial in islice(waiting, max(self.processes - len(running), 0)):
-                with ignore_interrupts():
-                    future = self.submit(run_trial, trial)
-                running[future] = trial
-                started(trial.identity)
-                future.add_done_callback(finished.put)
-
         try:
             while left:
-                hand_out()
+                for trial in islice(waiting, max(self.processes - len(running), 0)):
+                    with ignore_interrupts():
+                        future = self.submit(run_trial, trial)
+                    running[future] = trial
+                    started(trial.identity)
+                    future.add_done_callback(finished.put)
                 try:
                     future = finished.get(timeout=POLL)
                 except Empty:

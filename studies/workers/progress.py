@@ -30,7 +30,7 @@ class Progress:
     damaged
         What has finished but is not as it was written, one line each; counted as left.
     refusal
-        Why this version would not go on with the study, in one line; None if it would.
+        Why the installed code would not go on with the study, in one line; None if it would.
     """
 
     total: int
@@ -53,8 +53,7 @@ def progress(store: Store) -> Progress:
     running = [trial for trial in pending if trial.identity in begun]
     left = [trial for trial in pending if trial.identity not in begun]
     failed = [*states.values()].count("failed")
-    # Trials of another version have other identities: what is there counts.
-    finished = len(trials) - len(pending) if refusal is None else len(states)
+    finished = len(trials) - len(pending)
     usual = cores() if left and refusal is None else 0
     processes = usual if now is None else now[0]
     seconds = _estimate(

@@ -8,7 +8,7 @@ import pytest
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec import spec as spec_module
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.store import reading
+from nested_agents.studies.store import integrity
 from nested_agents.studies.store import store as store_module
 from nested_agents.studies.store.schema import RESULTS_VERSION
 from nested_agents.studies.store.store import DATABASE, SPEC_FILE, Store
@@ -157,7 +157,7 @@ def test_another_study_is_refused_and_nothing_changed(finished, changes, said):
 
 
 def test_results_of_another_version_are_refused(finished, monkeypatch):
-    monkeypatch.setattr(reading, "RESULTS_VERSION", 99)
+    monkeypatch.setattr(integrity, "RESULTS_VERSION", 99)
     said = f"holds results of version {RESULTS_VERSION}, this is version 99"
     with (
         pytest.raises(SpecError, match=said),

@@ -4,9 +4,10 @@ import made_up
 import pytest
 
 from nested_agents.studies.cli.main import main
-from nested_agents.studies.store import reading
+from nested_agents.studies.store import integrity
 from nested_agents.studies.store.running import LOCK, MARK, Running, look
 from nested_agents.studies.store.store import Store
+from nested_agents.studies.trials import code
 from nested_agents.studies.workers.progress import _estimate, progress
 from nested_agents.studies.workers.runner import save
 
@@ -84,15 +85,23 @@ def test_failed_and_damaged_trials_are_counted_once(study, capsys):
     assert "default, seed 2 failed:\nTraceback\nRuntimeError: a wheel came off" in said
 
 
-def test_what_another_version_has_done_is_done(study, monkeypatch, capsys):
-    monkeypatch.setattr(reading, "RESULTS_VERSION", 99)
+def test_what_other_code_has_done_is_done(study, monkeypatch, capsys):
+    monkeypatch.setattr(code, "changed", lambda known: ["core/a.py"])
     now = read(study)
     assert (now.done, now.left, now.seconds) == (4, 2, None)
     assert main(["status", str(study)]) == 0
-    said = capsys.readouterr().out
-    assert "done     4 of 6 trials" in said
-    assert "nothing can be added: " in said
-    assert "this is version 99" in said
+    text = capsys.readouterr().out
+    assert "done     4 of 6 trials" in text
+    assert "nothing can be added: " in text
+
+
+def test_a_study_of_another_version_is_refused(study, monkeypatch, capsys):
+    monkeypatch.setattr(integrity, "RESULTS_VERSION", 99)
+    for command in (["status"], ["watch", "--once"]):
+        assert main([*command, str(study)]) == 2
+        error = capsys.readouterr().err
+        assert "this is version 99; an older nested-agents reads it" in error
+        assert error.count("\n") == 1
 
 
 @pytest.mark.parametrize(
