@@ -146,45 +146,35 @@ def _below(model: type[Settings], name: str, within: str, seen: set[Any]) -> Ite
     """Yield the tables that the fields of a model hold, at any depth, each once."""
     for field, info in model.model_fields.items():
         place = f"{name}.{field}" if name else field
-        for base, kinds in _families(info):
-            if base is not None:
-                yield from _held(base, place, ("", within), {}, seen)
-            inherited = {} if base is None else base.model_fields
-            for kind, held in kinds:
-                yield from _held(held, place, (kind, within), inherited, seen)
+        for kind, held, inherited in _held(info):
+            if (place, held) not in seen:
+                seen.add((place, held))
+                table = _table(place, (kind, within), held, inherited)
+                if table.keys or kind:
+                    yield table
+                yield from _below(held, place, kind or within, seen)
 
 
-def _families(info: FieldInfo) -> Iterator[tuple[Any, list[tuple[str, type[Settings]]]]]:
-    """Yield what a field may hold: models by kind, after the model that they inherit, if any."""
+def _held(info: FieldInfo) -> Iterator[tuple[str, type[Settings], Mapping[str, FieldInfo]]]:
+    """Yield what a field may hold: kind, model, and the fields told of the model that it inherits.
+
+    What all kinds inherit comes first, if it has keys.
+    """
     plugged = registry_of(info)
-    if plugged is not None:
-        yield plugged.base, [(kind, plugged.model(kind)) for kind in plugged.built_in]
-        return
-    models = [m for m in models_of(info.annotation) if issubclass(m, Settings)]
+    models: list[Any] = [m for m in models_of(info.annotation) if issubclass(m, Settings)]
     kinds = [(m.model_fields["kind"].default, m) for m in models if "kind" in m.model_fields]
-    if kinds:
+    base: Any = None
+    if plugged is not None:
+        base, models = plugged.base, []
+        kinds = [(kind, plugged.model(kind)) for kind in plugged.built_in]
+    elif kinds:
         bases = kinds[0][1].__mro__[1:]
         base = next(cls for cls in bases if all(issubclass(m, cls) for _, m in kinds))
-        yield base if getattr(base, "model_fields", None) else None, kinds
-    for model in models:
-        if "kind" not in model.model_fields:
-            yield None, [("", model)]
-
-
-def _held(
-    model: type[Settings],
-    name: str,
-    kinds: tuple[str, str],
-    base: Mapping[str, FieldInfo],
-    seen: set[Any],
-) -> Iterator[Table]:
-    if (name, model) in seen:
-        return
-    seen.add((name, model))
-    table = _table(name, kinds, model, base)
-    if table.keys or table.kind:
-        yield table
-    yield from _below(model, name, kinds[0] or kinds[1], seen)
+    inherited = getattr(base, "model_fields", {})
+    if inherited or plugged is not None:
+        yield "", base, {}
+    yield from ((kind, model, inherited) for kind, model in kinds)
+    yield from (("", model, {}) for model in models if "kind" not in model.model_fields)
 
 
 def _table(
