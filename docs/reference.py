@@ -66,7 +66,7 @@ MODULES = {
         "coordination.elimination", "coordination.max_plus", "adaptation.self_model",
         "adaptation.calibration", "agents.cost", "plugins.registry", "plugins.plugged",
         "plugins.settings", "interface.acting", "numerics.ties", "policies.settings",
-        "policies.peer", "policies.seen", "policies.inputs",
+        "policies.peer", "policies.inputs",
     )),
     "topologies": ("Who is above whom.", ("builders", "checks", "config", "drawing", "files")),
     "scenarios": ("Where agents act.", (

@@ -160,10 +160,11 @@ class LineUpPrediction:
         own = places[:, agent]
         return np.stack([own, own - places.mean(axis=1)], axis=1)
 
-    def states_of_all(self, joint_actions: IntArray) -> FloatArray:
-        """Return the next states ``(n, m, 2)`` of all agents for joint actions ``(m, n)``."""
+    def states_by_group(self, joint_actions: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Return the next places and leads ``(n, m, 1)`` of all agents."""
         places = self._after(joint_actions)
-        return np.stack([places.T, (places - places.mean(axis=1, keepdims=True)).T], axis=2)
+        leads = places - places.mean(axis=1, keepdims=True)
+        return places.T[:, :, None].copy(), leads.T[:, :, None].copy()
 
     def rewards(self, joint_actions: IntArray) -> FloatArray:
         """Return the rewards ``(m,)`` of joint actions ``(m, n)``."""

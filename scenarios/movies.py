@@ -1,4 +1,4 @@
-"""Animations of recorded episodes: frames that a scenario draws, written as GIF or MP4."""
+"""Pictures of recorded episodes: the figure they are drawn on, and animations, GIF or MP4."""
 
 from __future__ import annotations
 
@@ -7,6 +7,9 @@ from pathlib import Path
 
 import imageio.v2 as imageio
 import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -14,6 +17,45 @@ Pixels = NDArray[np.uint8]
 """A picture ``(height, width, 3)``; sides are multiples of 16, as video codecs want them."""
 MOST_FRAMES = 120
 """Longer episodes are thinned out to this many frames."""
+DPI = 100
+
+
+class Stage:
+    """A figure in metres on which any moment of an episode can be drawn.
+
+    Parameters
+    ----------
+    sides
+        Width and height of the picture in pixels.
+    place
+        Left, bottom, width and height of the axes as fractions of the picture.
+    """
+
+    def __init__(self, sides: tuple[int, int], place: tuple[float, float, float, float]) -> None:
+        self.figure = Figure(figsize=(sides[0] / DPI, sides[1] / DPI), dpi=DPI)
+        self.canvas = FigureCanvasAgg(self.figure)
+        self.axes = self.figure.add_axes(place)
+        self.axes.set_aspect("equal")
+        self.axes.set_xlabel("x [m]")
+        self.axes.set_ylabel("y [m]")
+        self._moving: list[Artist] = []
+
+    def draw(self, step: int) -> None:
+        """Draw the moment after `step` steps in place of what moved in the last one."""
+        for artist in self._moving:
+            artist.remove()
+        self._moving = []
+        self._add(step)
+
+    def _add(self, step: int) -> None:
+        """Add what moves to `_moving`, and the title."""
+        raise NotImplementedError
+
+    def pixels(self, step: int) -> Pixels:
+        """Return the moment after `step` steps as ``(height, width, 3)`` bytes."""
+        self.draw(step)
+        self.canvas.draw()
+        return np.asarray(self.canvas.buffer_rgba())[..., :3].copy()
 
 
 def film(draw: Callable[[int], Pixels], last: int, seconds: float, path: Path) -> None:

@@ -6,7 +6,7 @@ tests, too.
 
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from math import pi
 from pathlib import Path
 
@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from hypothesis import settings
 
+from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.interface.prediction import Blocks
 from nested_agents.core.interface.scenario import Transition
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
@@ -29,6 +30,20 @@ settings.load_profile("no deadline")
 def decode(codes: np.ndarray, n_agents: int, n_actions: int) -> np.ndarray:
     """Joint actions ``(m, n)`` of codes ``(m,)``."""
     return np.stack(np.unravel_index(codes, (n_actions,) * n_agents), axis=-1)
+
+
+@pytest.fixture(scope="session")
+def permuted() -> Callable[[Hierarchy, Sequence[int]], Hierarchy]:
+    """Gives the same hierarchy with agent ``permutation[k]`` listed as k-th."""
+
+    def of(hierarchy: Hierarchy, permutation: Sequence[int]) -> Hierarchy:
+        edges, neighbours = (
+            [(hierarchy.agents[a], hierarchy.agents[b]) for a, b in pairs]
+            for pairs in (hierarchy.edges, hierarchy.neighbours)
+        )
+        return Hierarchy([hierarchy.agents[i] for i in permutation], edges, neighbours)
+
+    return of
 
 
 class LineWorld:

@@ -58,9 +58,7 @@ def chain(
     }
     names = orders[order] if isinstance(order, str) else order
     check_names(names, agents, "order")
-    graph = nx.DiGraph()
-    nx.add_path(graph, names)
-    return graph
+    return nx.path_graph(names, create_using=nx.DiGraph)
 
 
 def tree(
@@ -144,9 +142,7 @@ def independent(agents: Names, bodies: Bodies = ()) -> nx.DiGraph:
     >>> list(independent(["a", "b"]).edges)
     []
     """
-    graph = nx.DiGraph()
-    graph.add_nodes_from(agents)
-    return graph
+    return nx.empty_graph(agents, create_using=nx.DiGraph)
 
 
 def simultaneous(agents: Names, bodies: Bodies = ()) -> nx.Graph:
@@ -157,8 +153,7 @@ def simultaneous(agents: Names, bodies: Bodies = ()) -> nx.Graph:
     >>> list(simultaneous(["a", "b", "c"]).edges)
     [('a', 'b'), ('a', 'c'), ('b', 'c')]
     """
-    graph: nx.Graph = nx.complete_graph(agents)
-    return graph
+    return nx.complete_graph(agents)
 
 
 def coordination_graph(
@@ -185,16 +180,13 @@ def coordination_graph(
     >>> list(coordination_graph(["a", "b", "c"], shape="ring").edges)
     [('a', 'b'), ('a', 'c'), ('b', 'c')]
     """
-    graph = nx.Graph()
-    graph.add_nodes_from(agents)
-    if edges is not None:
-        pairs = [(min(a, b), max(a, b)) for a, b in edges]
-        Hierarchy(agents, [], pairs)  # raises and names what is wrong
-        graph.add_edges_from(pairs)
-        return graph
-    nx.add_path(graph, agents)
-    if shape == "ring" and len(agents) > 2:
-        graph.add_edge(agents[-1], agents[0])
+    if edges is None:
+        is_ring = shape == "ring" and len(agents) > 2
+        return nx.cycle_graph(agents) if is_ring else nx.path_graph(agents)
+    pairs = [(min(a, b), max(a, b)) for a, b in edges]
+    Hierarchy(agents, [], pairs)  # raises and names what is wrong
+    graph = nx.empty_graph(agents)
+    graph.add_edges_from(pairs)
     return graph
 
 
@@ -217,9 +209,7 @@ def from_edges(
     >>> list(from_edges(["a", "b", "c"], edges=(("a", "b"),), alone=("c",)).edges)
     [('a', 'b')]
     """
-    graph = nx.DiGraph()
-    graph.add_nodes_from(alone)
-    with_edges(graph, edges)
+    graph = with_edges(independent(alone), edges)
     check_names(list(graph), agents, "edges and alone")
     return graph
 

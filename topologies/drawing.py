@@ -72,7 +72,8 @@ def draw(
     axes.set_xlim(centre - width / 2, centre + width / 2)
     top = low[1] - HEIGHT / 2 - 0.65
     axes.set_ylim(top + height, top)
-    implied = _implied(hierarchy)
+    # Edges without which everyone would see the same agents.
+    implied = set(hierarchy.edges) - set(nx.transitive_reduction(nx.DiGraph(hierarchy.edges)).edges)
     _arrows(axes, hierarchy, places, implied)
     _agents(axes, hierarchy, places, bodies or [])
     notes = ["numbers: order of decision"]
@@ -119,11 +120,6 @@ def positions(hierarchy: Hierarchy) -> FloatArray:
         lowest = places[bands == band - 1, 1].max() + 2.2 * DOWN
         places[bands == band, 1] += lowest - places[bands == band, 1].min()
     return places
-
-
-def _implied(hierarchy: Hierarchy) -> set[tuple[int, int]]:
-    """Return the edges without which everyone would see the same agents."""
-    return set(hierarchy.edges) - set(nx.transitive_reduction(nx.DiGraph(hierarchy.edges)).edges)
 
 
 def _arrows(

@@ -150,9 +150,7 @@ def _graph_of(content: Any) -> nx.DiGraph:
         check_legible(edge)
     alone = _list_of(content, "alone") if "alone" in content else []
     check_legible(alone)
-    graph = nx.DiGraph()
-    graph.add_nodes_from(alone)
-    return with_edges(graph, edges)
+    return with_edges(independent(alone), edges)
 
 
 def _check_graphml(text: str) -> None:

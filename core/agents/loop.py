@@ -115,7 +115,7 @@ def control_loop(
         states = scenario.reset(world_seed(seed, first_world + k), episode)
         if learn:
             team.begin_episode()
-        prediction = team.predict(scenario)
+        prediction = team.predict(scenario, states)
         team.check(prediction)
         for step in range(steps):
             begin = perf_counter()
@@ -126,7 +126,7 @@ def control_loop(
             moved = perf_counter()
             if learn:
                 team.adapt(prediction, joint_action, transition)
-            prediction = team.predict(scenario)
+            prediction = team.predict(scenario, transition.states)
             if learn:
                 team.learn(transition)
                 if last:

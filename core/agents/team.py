@@ -145,8 +145,11 @@ class Team:
         self.explorer.begin_episode()
         self.learner.begin_episode()
 
-    def predict(self, scenario: Scenario) -> Prediction:
-        """Predict from the scenario's present state, by what has been learned of it."""
+    def predict(self, scenario: Scenario, states: FloatArray | None = None) -> Prediction:
+        """Predict from the scenario's present state, by what has been learned of it.
+
+        The agents' `states` are not needed.
+        """
         if self.self_model is None and self.calibration is None:
             return scenario.predict()
         embodied = cast(EmbodiedScenario, scenario)

@@ -24,8 +24,8 @@ class Actors(Protocol):
     def begin_episode(self) -> None:
         """Note that an episode begins."""
 
-    def predict(self, scenario: Scenario) -> Any:
-        """Return what they decide by, in the scenario's present state."""
+    def predict(self, scenario: Scenario, states: FloatArray) -> Any:
+        """Return what they decide by, in the scenario's present state, of states ``(n, d)``."""
 
     def check(self, prediction: Any) -> None:
         """Refuse what they cannot decide by with a ValueError of one line."""

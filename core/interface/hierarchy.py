@@ -117,15 +117,6 @@ class Hierarchy:
         """Return how many joint actions one decision of all agents enumerates (exact integer)."""
         return sum(n_actions ** (1 + len(below)) for below in self._below)
 
-    def permuted(self, permutation: Sequence[int]) -> Hierarchy:
-        """Return the same hierarchy with agent ``permutation[k]`` listed as k-th."""
-        names = [self.agents[i] for i in permutation]
-        edges, neighbours = (
-            [(self.agents[a], self.agents[b]) for a, b in pairs]
-            for pairs in (self.edges, self.neighbours)
-        )
-        return Hierarchy(names, edges, neighbours)
-
 
 def _check_edges(
     edges: Sequence[tuple[str, ...]],

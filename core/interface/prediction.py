@@ -71,8 +71,6 @@ class Prediction(Protocol):
     is missing, what needs it does without or says so. `nested_agents.scenarios.checking` compares
     it with `states`.
 
-    ``states_of_all(joint_actions)``
-        Next states ``(n, m, d)`` of all agents at once. `states_of_all` asks for it.
     ``states_by_group(joint_actions)``
         Own variables ``(n, m, n_own)`` of all agents and shared ones ``(G, m, d - n_own)`` of all
         groups. `states_by_group` asks for it, where the values of many agents are pooled.
@@ -101,15 +99,6 @@ def first_alike(keys: IntArray | FloatArray) -> IntArray:
     return (keys[:, :, None] == keys[:, None, :]).argmax(axis=2)
 
 
-def states_of_all(prediction: Prediction, joint_actions: IntArray) -> FloatArray:
-    """Return the next states ``(n, m, d)`` of all agents for joint actions ``(m, n)``."""
-    own_way = getattr(prediction, "states_of_all", None)
-    if own_way is not None:
-        found: FloatArray = own_way(joint_actions)
-        return found
-    return np.stack([prediction.states(i, joint_actions) for i in range(joint_actions.shape[1])])
-
-
 def states_by_group(
     prediction: Prediction,
     joint_actions: IntArray,
@@ -119,7 +108,8 @@ def states_by_group(
     """Return the own variables ``(n, m, n_own)`` and the shared ones ``(G, m, d - n_own)``."""
     own_way = getattr(prediction, "states_by_group", None)
     if own_way is not None:
-        found: tuple[FloatArray, FloatArray] = own_way(joint_actions)
-        return found
-    states = states_of_all(prediction, joint_actions)
+        parts: tuple[FloatArray, FloatArray] = own_way(joint_actions)
+        return parts
+    each = range(joint_actions.shape[1])
+    states = np.stack([prediction.states(i, joint_actions) for i in each])
     return states[:, :, :n_own], states[[group[0] for group in groups], :, n_own:]

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import cast
-
 import numpy as np
 
 from ..interface.scenario import Scenario, Transition
 from ..numerics.arrays import FloatArray, IntArray
-from .seen import Seen
 
 
 class Peer:
@@ -26,14 +23,14 @@ class Peer:
     def begin_episode(self) -> None:
         """Note that an episode begins."""
 
-    def predict(self, scenario: Scenario) -> Seen:
-        """Return the present states, see `nested_agents.core.policies.seen`."""
-        return cast(Seen, scenario.predict())
+    def predict(self, scenario: Scenario, states: FloatArray) -> FloatArray:
+        """Return the present states: nothing is predicted, and it costs nothing."""
+        return states
 
-    def check(self, prediction: Seen) -> None:
+    def check(self, prediction: FloatArray) -> None:
         """Refuse nothing."""
 
-    def adapt(self, prediction: Seen, joint_action: IntArray, transition: Transition) -> None:
+    def adapt(self, prediction: FloatArray, joint_action: IntArray, transition: Transition) -> None:
         """Revise nothing: nothing was predicted."""
 
     def learn(self, transition: Transition) -> None:

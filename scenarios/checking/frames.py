@@ -49,9 +49,9 @@ def play(
     for action in actions:
         if predicting:
             _look_ahead(scenario)
-        frame = stepped(scenario, action)
+        frame = _copied(dict(fields(scenario.step(action))))
         yield frame
-        if ended(frame):
+        if frame["terminated"] or frame["truncated"]:
             return
 
 
@@ -65,16 +65,6 @@ def measured(scenario: Scenario) -> Mapping[str, Any]:
     """Return the measurements of the present state, of a scenario that has them between steps."""
     measure = getattr(scenario, "measure", None)
     return {} if measure is None else measure()
-
-
-def stepped(scenario: Scenario, action: IntArray) -> Frame:
-    """Step a scenario and return the frame."""
-    return _copied(dict(fields(scenario.step(action))))
-
-
-def ended(frame: Frame) -> bool:
-    """Return whether an episode ends with a frame."""
-    return bool(frame["terminated"] or frame["truncated"])
 
 
 def fields(transition: Transition) -> Iterator[tuple[str, Any]]:

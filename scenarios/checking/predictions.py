@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.interface.prediction import Blocks, states_by_group, states_of_all
+from ...core.interface.prediction import Blocks, states_by_group
 from ...core.interface.scenario import Scenario, groups_of
 from ...core.numerics.arrays import BoolArray, FloatArray, IntArray
 
@@ -41,12 +41,10 @@ def fault_of_prediction(
     n, m, d = len(scenario.agents), len(joint_actions), scenario.state_space.n_variables
     groups, n_own = groups_of(scenario), scenario.state_space.n_own
     each = [prediction.states(i, joint_actions) for i in range(n)]
-    together = states_of_all(prediction, joint_actions)
     own, shared = states_by_group(prediction, joint_actions, groups, n_own)
     wanted: dict[str, tuple[Any, tuple[int, ...]]] = {
         f"states of agent {i}": (states, (m, d)) for i, states in enumerate(each)
     }
-    wanted["states of all agents"] = together, (n, m, d)
     wanted["own variables of all agents"] = own, (n, m, n_own)
     wanted["shared variables of all groups"] = shared, (len(groups), m, d - n_own)
     if hasattr(prediction, "rewards"):
@@ -58,17 +56,13 @@ def fault_of_prediction(
             return f"predicted {name} are not finite"
     body = np.repeat(np.arange(len(groups)), [len(group) for group in groups])
     by_group = np.concatenate([np.asarray(own), np.asarray(shared)[body]], axis=2)
-    grouped = hasattr(prediction, "states_by_group")
-    sources = {
-        "states_of_all": together,
-        "states_by_group" if grouped else "shared variables of a group": by_group,
-    }
-    for source, states in sources.items():
-        wrong = _differs(scenario, states, np.array(each))
-        if wrong.any():
-            agent, _, j = np.argwhere(wrong)[0]
-            name = scenario.state_space.variables[j].name
-            return f"{source} and states differ in {name} of agent {agent}"
+    wrong = _differs(scenario, by_group, np.array(each))
+    if wrong.any():
+        grouped = hasattr(prediction, "states_by_group")
+        source = "states_by_group" if grouped else "shared variables of a group"
+        agent, _, j = np.argwhere(wrong)[0]
+        name = scenario.state_space.variables[j].name
+        return f"{source} and states differ in {name} of agent {agent}"
     if hasattr(prediction, "blocks") and hasattr(prediction, "reward_table"):
         return _wrong_tables(scenario, prediction, rng)
     return None

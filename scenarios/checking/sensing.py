@@ -10,7 +10,6 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.agents.loop import world_seed
-from ...core.interface.prediction import states_of_all
 from ...core.interface.scenario import Scenario
 from ...core.numerics.arrays import FloatArray, IntArray
 from .frames import at
@@ -38,7 +37,8 @@ def fault_of_sensing(
     """
     before = scenario.reset(world_seed(seed, episode), episode)
     for step, action in enumerate(joint_actions, 1):
-        predicted = states_of_all(scenario.predict(), action[None])[:, 0]
+        prediction = scenario.predict()
+        predicted = np.stack([prediction.states(i, action[None])[0] for i in range(len(action))])
         transition = scenario.step(action)
         states = transition.states
         if not at_rest or _difference(scenario, states, before) is None:

@@ -7,18 +7,10 @@ is told nothing of it.
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
-
-import numpy as np
-from pydantic import BeforeValidator, Field
+from typing import ClassVar
 
 from . import settings
-from .settings import FailureSettings, befalling
-
-
-def _names(value: object) -> object:
-    several = value if isinstance(value, list | tuple) else (value,)
-    return tuple(str(one) if isinstance(one, int | np.integer) else one for one in several)
+from .settings import FailureSettings, Names, befalling
 
 
 class ActuatorFault(FailureSettings):
@@ -26,7 +18,7 @@ class ActuatorFault(FailureSettings):
 
     part: ClassVar[str] = "actuators"
 
-    actuators: Annotated[tuple[str, ...], Field(min_length=1), BeforeValidator(_names)]
+    actuators: Names
     """Actuators by name, pattern or number, one or a list."""
     kind: str = ""
     """What is wrong with them."""

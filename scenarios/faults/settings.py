@@ -29,12 +29,13 @@ from ...core.plugins.settings import Settings
 Index = Annotated[int, Field(ge=0)]
 
 
-def _one(value: object) -> object:
-    return (value,) if isinstance(value, str) else value
+def _names(value: object) -> object:
+    several = value if isinstance(value, list | tuple) else (value,)
+    return tuple(str(one) if isinstance(one, int | np.integer) else one for one in several)
 
 
-Names = Annotated[tuple[str, ...], Field(min_length=1), BeforeValidator(_one)]
-"""Agents by name or pattern, one or a list."""
+Names = Annotated[tuple[str, ...], Field(min_length=1), BeforeValidator(_names)]
+"""What fails by name, pattern or number, one or a list."""
 
 
 class FailureSettings(Settings):

@@ -15,48 +15,36 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from matplotlib.artist import Artist
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from ...core.numerics.arrays import FloatArray
-from ..movies import Pixels, film
+from ..movies import Stage, film
 from .kinematics import postures_of
 
 Recording = Mapping[str, FloatArray]
 
 SIDE = 480
 """Width and height of a picture in pixels."""
-DPI = 100
 # Colour-blind-safe (Okabe and Ito 2008), as in the pictures of box pushing.
 LINK, TIP, GOAL, FAILED = "#0072B2", "#E69F00", "#555555", "#B00020"
 
 
-class _Stage:
+class _Stage(Stage):
     """A figure on which any moment of a recording can be drawn."""
 
     def __init__(self, recording: Recording) -> None:
+        super().__init__((SIDE, SIDE), (0.15, 0.1, 0.83, 0.83))
         self.recording = recording
         angles, reach = recording["angles"], float(recording["reach"])
         self.places = postures_of(angles, reach / angles.shape[1])
-        self.figure = Figure(figsize=(SIDE / DPI, SIDE / DPI), dpi=DPI)
-        self.canvas = FigureCanvasAgg(self.figure)
-        self.axes = self.figure.add_axes((0.15, 0.1, 0.83, 0.83))
-        self.axes.set_aspect("equal")
         self.axes.set_xlim(-1.05 * reach, 1.05 * reach)
         self.axes.set_ylim(-1.05 * reach, 1.05 * reach)
-        self.axes.set_xlabel("x [m]")
-        self.axes.set_ylabel("y [m]")
         self.axes.add_patch(Circle((0, 0), reach, fill=False, ec="#dddddd", lw=1))
         goal, ring = recording["goal"], max(float(recording["tolerance"]), 0.02 * reach)
         self.axes.add_patch(Circle(tuple(goal), ring, fill=False, ec=GOAL, ls="--", lw=1.5))
         self.axes.plot(0, 0, "s", color="black", ms=7, zorder=2)
-        self._moving: list[Artist] = []
 
-    def _draw(self, step: int) -> None:
-        for artist in self._moving:
-            artist.remove()
+    def _add(self, step: int) -> None:
         recording, places = self.recording, self.places[step]
         tips = self.places[: step + 1, -1]
         away = np.hypot(*(recording["goal"] - places[-1]))
@@ -77,12 +65,6 @@ class _Stage:
         ]  # fmt: skip
         axes.set_title(f"step {step}: tip {100 * away:.0f} cm from the goal", loc="left")
 
-    def pixels(self, step: int) -> Pixels:
-        """Return the moment after `step` steps as ``(height, width, 3)`` bytes."""
-        self._draw(step)
-        self.canvas.draw()
-        return np.asarray(self.canvas.buffer_rgba())[..., :3].copy()
-
 
 def animate(recording: Recording, path: Path) -> None:
     """Draw an episode as an animation, GIF or MP4 by the suffix of `path`.
@@ -99,6 +81,4 @@ def animate(recording: Recording, path: Path) -> None:
     ValueError
         If the suffix is neither ``.gif`` nor ``.mp4``.
     """
-    stage = _Stage(recording)
-
-    film(stage.pixels, len(recording["angles"]) - 1, float(recording["dt"]), path)
+    film(_Stage(recording).pixels, len(recording["angles"]) - 1, float(recording["dt"]), path)

@@ -282,9 +282,10 @@ class ChainPrediction:
         """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
         return self.arm._states.of_joints(self.seen(joint_actions), agent, 1)[0]
 
-    def states_of_all(self, joint_actions: IntArray) -> FloatArray:
-        """Return the next states ``(n, m, d)`` of all agents for joint actions ``(m, n)``."""
-        return self.arm._states.of_joints(self.seen(joint_actions), 0, len(self.angles))
+    def states_by_group(self, joint_actions: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Return the speeds ``(n, m, 1)`` and the other variables ``(n, m, d - 1)`` of all."""
+        states = self.arm._states.of_joints(self.seen(joint_actions), 0, len(self.angles))
+        return states[:, :, :1], states[self._joints, :, 1:]
 
     def rewards(self, joint_actions: IntArray) -> FloatArray:
         """Return the rewards ``(m,)`` of joint actions ``(m, n)``."""

@@ -167,10 +167,6 @@ class MatrixGamePrediction:
         """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
         return self._game.states_after(joint_actions)[:, agent]
 
-    def states_of_all(self, joint_actions: IntArray) -> FloatArray:
-        """Return the next states ``(n, m, d)`` of all agents for joint actions ``(m, n)``."""
-        return self._game.states_after(joint_actions).swapaxes(0, 1)
-
     def rewards(self, joint_actions: IntArray) -> FloatArray:
         """Return the expected payoffs ``(m,)`` of joint actions ``(m, n)``; for planners."""
         expected: FloatArray = self._game.payoffs.mean(axis=0)[tuple(joint_actions.T)]

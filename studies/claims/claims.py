@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..results.results import Results, from_arrays
+from ..results.results import NOTHING, Results
 from . import measures as measured
 from .measures import Measured
 
@@ -227,7 +227,7 @@ def judge(results: Mapping[str, Results]) -> tuple[Finding, ...]:
     """Decide every claim by the results of its study, by name."""
     findings = []
     for claim in CLAIMS:
-        found = claim.compute(results.get(claim.study, from_arrays({})))
+        found = claim.compute(results.get(claim.study, NOTHING()))
         if found is None or not np.isfinite(found.estimate.value):
             findings.append(Finding(claim, None, "not decided"))
             continue

@@ -13,7 +13,7 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from ..results.results import Results, from_arrays, read
+from ..results.results import NOTHING, Results, read
 from ..store.store import Store
 from ..workers.progress import Progress, progress
 from .standing import describe, warnings
@@ -49,7 +49,7 @@ def frame(directory: Path) -> tuple[Group, bool]:
     with Store.open(directory) as store:
         now = progress(store)
         lines = Text("\n".join([*describe(store, now), *warnings(now)]))
-        results = from_arrays({}) if now.damaged else read(store)
+        results = NOTHING() if now.damaged else read(store)
         failed = store.failed()
         planned = Counter(trial.condition for trial in store.planned())
     shown = [f"failed: {c}, seed {s}: {(e.strip() or '-').splitlines()[-1]}" for c, s, e in failed]

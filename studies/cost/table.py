@@ -71,15 +71,9 @@ def scientific(value: int | Fraction | None) -> str:
 def _record(row: CostRow) -> dict[str, Any]:
     """Return a row with integers as integers; Eq. 21 is rounded to the nearest one."""
     asymptotic = row.nested_asymptotic
-    record: dict[str, Any] = {
-        "agents": row.agents,
-        "topology": row.topology,
-        "nested_exact": row.nested_exact,
-        "nested_closed_form": row.nested_closed_form,
-        "nested_asymptotic": None if asymptotic is None else round(asymptotic),
-        "single_agent": row.single_agent,
-        "ratio": _ratio(row.ratio),
-    }
+    record = {name: getattr(row, name) for name in ("agents", "topology", *dict(FORMULAS))}
+    record["nested_asymptotic"] = None if asymptotic is None else round(asymptotic)
+    record["ratio"] = _ratio(row.ratio)
     if row.measured is None:
         return record
     for count in COUNTS:
@@ -117,18 +111,12 @@ def _table(rows: Sequence[CostRow]) -> str:
         cells.append([str(row.agents), row.topology, *values])
     lines = [*aligned(cells, "><>>>>>"), ""]
     lines.append("Operations: nested by Eq. 18, chains by Eq. 19 and 21; single agent by Eq. 23.")
-    lines += _printed(rows)
+    if any(row.agents == 4 and row.nested_closed_form == OF_THE_PAPER for row in rows):
+        nested, single = PRINTED
+        lines.append(f"The paper prints {nested} (nested) and {single} (single agent) for n = 4.")
     if any(row.measured is not None for row in rows):
         lines += ["", *_measured(rows)]
     return "\n".join(lines)
-
-
-def _printed(rows: Sequence[CostRow]) -> list[str]:
-    """Return what the paper prints, if its case is among the rows."""
-    own = {row.nested_closed_form for row in rows if row.agents == 4}
-    if OF_THE_PAPER not in own:
-        return []
-    return [f"The paper prints {PRINTED[0]} (nested) and {PRINTED[1]} (single agent) for n = 4."]
 
 
 def _measured(rows: Sequence[CostRow]) -> list[str]:

@@ -48,7 +48,7 @@ def _functions(explained: Explanation, block: slice) -> Figure:
     size = 2.45 * columns, 2.2 * rows + 0.7
     figure, panels = figures.panels(rows, columns, size, sharey=True)
     panels = panels.ravel()
-    times, unit_of_f = _scale(explained)
+    power = exponent(explained.parts)
     names, parts = explained.agents[block], explained.parts[block]
     bodies = list(dict.fromkeys(name.partition(".")[0] for name in names))
     for j, (variable, partition) in enumerate(
@@ -68,7 +68,7 @@ def _functions(explained: Explanation, block: slice) -> Figure:
             number = bodies.index(body)
             style = look(number) | {"ls": look(member)["ls"], "marker": marker(number), "ms": 3}
             at = np.searchsorted(x, partition.centres).tolist()
-            y = times * strengths @ part.singles[j]
+            y = 10.0**power * strengths @ part.singles[j]
             axes.plot(turn * x, y, lw=1.4, markevery=at, label=name, **style)
         share = float(np.mean([p.share(p.singles[j]) for p in parts]))
         unit = {"rad": " [°]", "1": ""}.get(variable.unit, f" [{variable.unit}]")
@@ -76,16 +76,11 @@ def _functions(explained: Explanation, block: slice) -> Figure:
         axes.axhline(0.0, color="#cccccc", lw=0.8, zorder=0)
     for axes in panels[d:]:
         axes.set_visible(False)
-    figure.supylabel(f"adds to f{unit_of_f}", fontsize=9)
+    scale = rf" [$\times 10^{{{-power}}}$]" if power else ""
+    figure.supylabel(f"adds to f{scale}", fontsize=9)
     title = "markers: rules, less their mean; in the titles the share of the variance of f"
     add_legend(figure, panels[0].get_lines()[: len(names)], title)
     return figure
-
-
-def _scale(explained: Explanation) -> tuple[float, str]:
-    """Return what consequents are multiplied by to be read, and what an axis says of it."""
-    power = exponent(explained.parts)
-    return 10.0**power, rf" [$\times 10^{{{-power}}}$]" if power else ""
 
 
 def _bodies(actuators: tuple[str, ...], bodies: Bodies) -> Figure:

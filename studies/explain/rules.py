@@ -160,12 +160,14 @@ def table(
     )
     heads = [name.replace(".", "\n").replace("-", "-\n") for name in agents]
     wide, _ = headed(heads, 8)
-    lines = [
-        (f"IF {v.name} is {word}", place(v, centre))
+    conditions = [
+        [
+            (f"IF {v.name} is {word}", place(v, centre))
+            for word, centre in zip(labels(v, p), p.centres, strict=True)
+        ]
         for v, p in zip(variables, rules.partitions, strict=True)
-        for word, centre in zip(labels(v, p), p.centres, strict=True)
     ]
-    first, second = (max(len(line[i]) for line in lines) for i in (0, 1))
+    first, second = (max(len(c[i]) for own in conditions for c in own) for i in (0, 1))
     margin = first + second + 8
     fit = max(1, (80 - margin) // wide)
     for begin in range(0, len(agents), fit):
@@ -176,12 +178,10 @@ def table(
             shares = [p.share(p.singles[j]) for p in parts[block]]
             row = "".join(percent(s).rjust(wide) for s in shares)
             yield f"{variables[j].name}, share of the variance"[: margin - 1].ljust(margin) + row
-            partition = rules.partitions[j]
-            for k, word in enumerate(labels(variables[j], partition)):
-                head = f"IF {variables[j].name} is {word}".ljust(first)
-                at = place(variables[j], partition.centres[k]).rjust(second + 1)
+            for k, (condition, at) in enumerate(conditions[j]):
                 values = (f"{p.singles[j][k] * 10**power:+.2f}" for p in parts[block])
-                yield f"{head} {at}  THEN" + "".join(value.rjust(wide) for value in values)
+                row = "".join(value.rjust(wide) for value in values)
+                yield f"{condition.ljust(first)} {at.rjust(second + 1)}  THEN{row}"
             yield ""
 
 

@@ -97,20 +97,21 @@ def explain(store: Store, trial: Trial) -> Explanation:
         that is kept.
     """
     with trial.sources.active():
-        return _explain(store, trial)
-
-
-def _explain(store: Store, trial: Trial) -> Explanation:
-    team, scenario, bodies = _train(store, trial)
-    learner = trial.settings.learner
-    assert isinstance(learner, LearnerSettings), "of fuzzy agents, see _train"
-    rules = RuleBase.build(scenario.state_space, learner.rule_base)
-    taken = [explain_rules.take_apart(rules, theta) for theta in team.learner.theta]
-    parts = tuple(taken[row] for row in team.rows)
-    variables = scenario.state_space.variables
-    actuators = trial.settings.scenario.build().agents
-    policy = _policy(team, scenario)
-    return Explanation(trial, scenario.agents, actuators, rules, variables, parts, policy, bodies)
+        team, scenario, bodies = _train(store, trial)
+        learner = trial.settings.learner
+        assert isinstance(learner, LearnerSettings), "of fuzzy agents, see _train"
+        rules = RuleBase.build(scenario.state_space, learner.rule_base)
+        taken = [explain_rules.take_apart(rules, theta) for theta in team.learner.theta]
+        return Explanation(
+            trial=trial,
+            agents=scenario.agents,
+            actuators=trial.settings.scenario.build().agents,
+            rules=rules,
+            variables=scenario.state_space.variables,
+            parts=tuple(taken[row] for row in team.rows),
+            policy=_policy(team, scenario),
+            bodies=bodies,
+        )
 
 
 def _policy(team: Team, scenario: Any) -> Any:

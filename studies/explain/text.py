@@ -53,8 +53,7 @@ def _functions(explained: Explanation, agents: int) -> Iterator[str]:
     mean = [sum(p.share(p.singles[j]) for p in parts) / len(parts) for j in range(len(names))]
     order = sorted(range(len(names)), key=lambda j: -mean[j])
     shares = ", ".join(f"{names[j]} {percent(mean[j])}" for j in order)
-    pairs = explain_rules.strongest_pairs(parts, len(names) ** 2)
-    both = sum(p.share(p.pairs[pair]) for p in parts for pair in pairs) / len(parts)
+    both = sum(p.share(pair) for p in parts for pair in p.pairs.values()) / len(parts)
     rest = sum(p.rest for p in parts) / len(parts)
     yield from _wrapped(f"What f depends on (share of its variance, mean over agents): {shares}.")
     if explained.rules.terms == tuple((j,) for j in range(len(names))):

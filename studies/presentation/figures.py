@@ -112,7 +112,7 @@ def add_legend(figure: Figure, handles: Sequence[Line2D], title: str = "", ncols
     """Name what is drawn, above the panels."""
     figure.legend(
         handles=handles, title=title or None, loc="outside upper center", ncols=ncols,
-        frameon=False,
+        frameon=False, handlelength=3,
     )  # fmt: skip
 
 

@@ -95,9 +95,7 @@ def loads(text: str) -> Published:
         for key, prefix in (("numbers", str), ("usage", _prefixed))
     )
     columns = content["columns"]
-    results = from_arrays(
-        phases, seeds=seeds, numbers=numbers, usage=usage, columns=columns, measures=measures
-    )
+    results = from_arrays(phases, seeds, numbers, usage, columns, measures)
     return Published(
         Outline.noted(content["spec"], columns), results, int(content["results_version"])
     )

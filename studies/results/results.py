@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -171,16 +171,12 @@ class Results:
 
 def read(store: Store) -> Results:
     """Read all that has been run; what has failed is in the frame of trials alone."""
-    measures, columns = store.measures(), store.columns()
-    usage = tuple(dict.fromkeys(row[2] for row in store.numbers() if not row[4]))
-    swept = tuple(next(iter(columns.values()), ()))
-    episodes = _frame(store.episodes()).drop(columns="position", errors="ignore")
-    trials = _frame(store.trials())
-    seconds = tuple(name for name in trials.columns if name.startswith(SECONDS))
-    return Results(
-        _described_episodes(episodes, measures, swept), _described_trials(trials, swept),
-        tuple(store.phases()), columns, measures, seconds + usage,
-    )  # fmt: skip
+    episodes, trials = _frame(store.episodes()), _frame(store.trials())
+    seconds = [name for name in trials.columns if name.startswith(SECONDS)]
+    usage = [row[2] for row in store.numbers() if not row[4]]
+    return assemble(
+        [episodes], [trials], store.phases(), store.columns(), store.measures(), seconds + usage
+    )
 
 
 def _frame(table: NamesAndRows) -> DataFrame:
@@ -188,46 +184,60 @@ def _frame(table: NamesAndRows) -> DataFrame:
     return pd.DataFrame(list(rows), columns=names)
 
 
-def _described_episodes(
-    frame: DataFrame, measures: Iterable[Measure], swept: Iterable[str]
-) -> DataFrame:
-    """Return a frame of episodes whose rates are truth values, and whose columns are described."""
-    known = {key: ("", "a swept key") for key in swept}
+def assemble(
+    episodes: Sequence[DataFrame],
+    trials: Sequence[DataFrame],
+    phases: Iterable[str],
+    columns: Mapping[str, Mapping[str, Any]],
+    measures: tuple[Measure, ...],
+    usage: Iterable[str],
+) -> Results:
+    """Return results whose frames are those given, below each other, their columns described.
+
+    Rates are truth values. The other arguments are attributes of `Results`.
+    """
+    swept = {key: ("", "a swept key") for row in columns.values() for key in row}
+    names = [measure.name for measure in measures]
+    all_episodes = _joined(
+        episodes, ["condition", *swept, "seed", "phase", "episode", "steps", *names, "return"]
+    )
+    all_trials = _joined(trials, ["condition", *swept, "seed", "state"])
+    measured = {}
     for measure in measures:
-        known[measure.name] = measure.unit, f"{measure.title}, {measure.gathering} of its steps"
+        measured[measure.name] = measure.unit, f"{measure.title}, {measure.gathering} of its steps"
         if measure.is_rate:
-            is_whole = frame[measure.name].notna().all()
-            frame[measure.name] = frame[measure.name].astype(bool if is_whole else "boolean")
-    return _described(frame, known | EPISODE_COLUMNS)
+            is_whole = all_episodes[measure.name].notna().all()
+            kind = bool if is_whole else "boolean"
+            all_episodes[measure.name] = all_episodes[measure.name].astype(kind)
+    seconds = {name: ("s", "time spent") for name in all_trials if name.startswith(SECONDS)}
+    _describe(all_episodes, swept | measured | EPISODE_COLUMNS)
+    _describe(all_trials, swept | seconds | NUMBERS | TRIAL_COLUMNS)
+    return Results(
+        all_episodes, all_trials, tuple(phases), columns, measures, tuple(dict.fromkeys(usage))
+    )
 
 
-def _described_trials(frame: DataFrame, swept: Iterable[str]) -> DataFrame:
-    known: dict[str, tuple[str, str]] = {key: ("", "a swept key") for key in swept}
-    for name in frame.columns:
-        if name.startswith(SECONDS):
-            known[name] = "s", "time spent"
-        elif name in NUMBERS:
-            known[name] = NUMBERS[name]
-    return _described(frame, known | TRIAL_COLUMNS)
+def _joined(frames: Sequence[DataFrame], names: Sequence[str]) -> DataFrame:
+    """Return frames below each other, with columns of these names first."""
+    whole = pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=[*names])
+    return whole.reindex(columns=[*names, *(n for n in whole.columns if n not in names)])
 
 
-def _described(frame: DataFrame, known: Mapping[str, tuple[str, str]]) -> DataFrame:
+def _describe(frame: DataFrame, known: Mapping[str, tuple[str, str]]) -> None:
     of_studies = "1", "a number of the study's own"
     frame.attrs["columns"] = {
         name: dict(zip(("unit", "meaning"), known.get(name, of_studies), strict=True))
         for name in frame.columns
     }
-    return frame
 
 
 def from_arrays(
     phases: Mapping[str, Mapping[str, Mapping[str, ArrayLike]]],
-    *,
-    seeds: Mapping[str, Sequence[int]] | None = None,
-    numbers: Mapping[str, Mapping[str, ArrayLike]] | None = None,
-    usage: Mapping[str, Mapping[str, ArrayLike]] | None = None,
-    columns: Mapping[str, Mapping[str, Any]] | None = None,
-    measures: tuple[Measure, ...] = (SUCCESS,),
+    seeds: Mapping[str, Sequence[int]],
+    numbers: Mapping[str, Mapping[str, ArrayLike]],
+    usage: Mapping[str, Mapping[str, ArrayLike]],
+    columns: Mapping[str, Mapping[str, Any]],
+    measures: tuple[Measure, ...],
 ) -> Results:
     """Return results as frames, given as arrays.
 
@@ -237,53 +247,32 @@ def from_arrays(
         By phase, condition and name of a measure, ``steps`` or ``return``, the values
         ``(n_seeds, n_episodes)``.
     seeds
-        By condition; from 0 on unless said otherwise.
+        By condition, in the order of the arrays' rows.
     numbers, usage
         By condition and name, numbers of whole trials ``(n_seeds,)``; usage differs from run to
         run.
-    columns
-        By condition, what tells it from the others.
-    measures
-        What is measured of an episode.
+    columns, measures
+        See `Results`.
     """
-    numbers, usage, columns = numbers or {}, usage or {}, columns or {}
-    conditions = dict.fromkeys(c for of in (*phases.values(), numbers, usage) for c in of)
-    known = {c: tuple((seeds or {}).get(c, ())) or _counted(c, phases, numbers) for c in conditions}
-    names = ["steps", *(m.name for m in measures), "return"]
-    swept = tuple(dict.fromkeys(key for row in columns.values() for key in row))
     episodes, trials = [], []
-    for condition, own in known.items():
-        told = {"condition": condition, **columns.get(condition, {})}
+    for condition, own in seeds.items():
+        label = {"condition": condition, **columns.get(condition, {})}
         for phase, by_condition in phases.items():
-            arrays = {n: np.asarray(a) for n, a in by_condition.get(condition, {}).items()}
+            arrays = {name: np.asarray(a) for name, a in by_condition.get(condition, {}).items()}
             if arrays:
                 count = next(iter(arrays.values())).shape[1]
                 where = {"seed": np.repeat(own, count), "phase": phase}
                 where["episode"] = np.tile(np.arange(count), len(own))
-                values = {n: arrays[n].ravel() for n in names if n in arrays}
-                episodes.append(pd.DataFrame({**told, **where, **values}))
+                values = {name: array.ravel() for name, array in arrays.items()}
+                episodes.append(pd.DataFrame({**label, **where, **values}))
         kept = {**numbers.get(condition, {}), **usage.get(condition, {})}
-        trials.append(pd.DataFrame({**told, "seed": own, "state": DONE, **kept}))
-    columns_of_episodes = ["condition", *swept, "seed", "phase", "episode", *names]
-    return Results(
-        _described_episodes(_joined(episodes, columns_of_episodes), measures, swept),
-        _described_trials(_joined(trials, ["condition", *swept, "seed", "state"]), swept),
-        tuple(phases), columns, measures,
-        tuple(dict.fromkeys(name for own in usage.values() for name in own)),
-    )  # fmt: skip
+        trials.append(pd.DataFrame({**label, "seed": own, "state": DONE, **kept}))
+    names = [name for own in usage.values() for name in own]
+    return assemble(episodes, trials, phases, columns, measures, names)
 
 
-def _counted(condition: str, *given: Mapping[str, Any]) -> tuple[int, ...]:
-    """Return the seeds of a condition, from 0 on, by the length of its arrays."""
-    phases, numbers = given
-    arrays = (a for by in (*phases.values(), numbers) for a in by.get(condition, {}).values())
-    return tuple(range(len(next(arrays, ()))))
-
-
-def _joined(frames: Sequence[DataFrame], names: Sequence[str]) -> DataFrame:
-    """Return frames below each other, with columns of these names first."""
-    whole = pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=[*names])
-    return whole.reindex(columns=[*names, *(n for n in whole.columns if n not in names)])
+NOTHING = partial(from_arrays, {}, {}, {}, {}, {}, (SUCCESS,))
+"""Returns results of no trials."""
 
 
 def select(results: Results, keep: NDArray[np.bool_]) -> Results:
@@ -317,18 +306,16 @@ def join(
     columns, measures
         Of the whole, see `Results`.
     """
-    swept = dict.fromkeys(key for row in columns.values() for key in row)
     frames: dict[str, list[DataFrame]] = {"episodes": [], "trials": []}
     for part, new in zip(parts, labels, strict=True):
         for name, kept in frames.items():
             frame = getattr(part, name)
-            condition = frame["condition"].map(new)
-            told = {key: condition.map(lambda c, k=key: columns[c][k]) for key in swept}
-            kept.append(frame.assign(condition=condition, **told))
-    episodes, trials = (_joined(kept, ["condition", *swept]) for kept in frames.values())
+            label = frame["condition"].map(new)
+            swept = {
+                key: label.map(lambda c, k=key: columns[c][k])
+                for key in dict.fromkeys(key for row in columns.values() for key in row)
+            }
+            kept.append(frame.assign(condition=label, **swept))
     phases = dict.fromkeys(phase for part in parts for phase in part.phases)
-    usage = dict.fromkeys(name for part in parts for name in part.usage)
-    return Results(
-        _described_episodes(episodes, measures, swept), _described_trials(trials, swept),
-        tuple(phases), columns, measures, tuple(usage),
-    )  # fmt: skip
+    usage = (name for part in parts for name in part.usage)
+    return assemble(frames["episodes"], frames["trials"], phases, columns, measures, usage)

@@ -19,7 +19,6 @@ from ...core.interface.scenario import Scenario
 from ...core.learners import LearnerSettings, TeamSettings
 from ...core.numerics.arrays import IntArray
 from ...core.plugins.settings import ScenarioSettings
-from ...core.policies.seen import SeenScenario
 from ..errors import SpecError
 from ..spec.conditions import Condition, ConditionSettings
 from ..spec.curriculum import Stage
@@ -86,7 +85,6 @@ def arrange(settings: ConditionSettings, seed: int) -> Arrangement:
     if isinstance(learner, LearnerSettings):
         team: Actors = Team(learner, scenario, hierarchy, source)
     else:
-        scenario = SeenScenario(scenario)
         team = learner.build(scenario, source)
     return Arrangement(world, scenario, team)
 

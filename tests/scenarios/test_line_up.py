@@ -34,4 +34,5 @@ def test_the_states_of_all_agents_are_those_of_each() -> None:
     scenario.reset(0)
     prediction, joint = scenario.predict(), np.random.default_rng(0).integers(4, size=(9, 3))
     expected = np.stack([prediction.states(agent, joint) for agent in range(3)])
-    np.testing.assert_array_equal(prediction.states_of_all(joint), expected)
+    together = np.concatenate(prediction.states_by_group(joint), axis=2)
+    np.testing.assert_array_equal(together, expected)

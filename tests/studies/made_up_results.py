@@ -27,10 +27,13 @@ class Arrays:
     def frames(self) -> Results:
         own = {"training": self.training, "evaluation": self.evaluation}
         phases = {phase: arrays for phase, arrays in (own | self.phases).items() if arrays}
-        return from_arrays(
-            phases, seeds=self.seeds, numbers=self.numbers, usage=self.usage,
-            columns=self.columns, measures=self.measures,
-        )  # fmt: skip
+        rows = {
+            c: len(next(iter(arrays.values())))
+            for by in (self.usage, self.numbers, *reversed(phases.values()))
+            for c, arrays in by.items()
+        }
+        seeds = {c: self.seeds.get(c) or tuple(range(count)) for c, count in rows.items()}
+        return from_arrays(phases, seeds, self.numbers, self.usage, self.columns, self.measures)
 
 
 NOTHING = Arrays().frames()

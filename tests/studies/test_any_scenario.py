@@ -192,7 +192,7 @@ def test_what_is_not_recorded_is_not_replayed(study, capsys):
     with Store.open(study) as store:
         (remark,) = replays(store, trials_of(SPEC)).remarks
     assert list(display._replays(load(study))) == []
-    assert remark == "Not shown, as the scenario records no episodes: 1; 2: seeds 0, 1."
+    assert remark == "Not shown, as the scenario records no episodes: 1 (2 seeds), 2 (2 seeds)."
     assert "no replay: Carts does not draw its episodes" in capsys.readouterr().err
 
 

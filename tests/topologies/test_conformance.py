@@ -5,6 +5,7 @@ A topology that is added is covered from then on, with its defaults or the table
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -91,7 +92,7 @@ def test_it_acts_learns_saves_and_loads(case: tuple[LineUp, Hierarchy], tmp_path
 
 
 def test_listing_the_agents_otherwise_changes_nothing_but_the_order(
-    case: tuple[LineUp, Hierarchy],
+    case: tuple[LineUp, Hierarchy], permuted: Any
 ) -> None:
     scenario, hierarchy = case
     n = len(hierarchy)
@@ -110,9 +111,9 @@ def test_listing_the_agents_otherwise_changes_nothing_but_the_order(
     other._places = scenario._places[permutation]
     other._commands = scenario._commands[permutation]
     other._speeds = scenario._speeds[permutation]
-    team = team_of(other, hierarchy.permuted(permutation.tolist()))
-    permuted = decided_values(team, theta[permutation], other.predict())
-    np.testing.assert_allclose(permuted, values[permutation], atol=1e-12)
+    team = team_of(other, permuted(hierarchy, permutation))
+    found = decided_values(team, theta[permutation], other.predict())
+    np.testing.assert_allclose(found, values[permutation], atol=1e-12)
 
 
 def predicted(scenario: LineUp, rng: np.random.Generator):

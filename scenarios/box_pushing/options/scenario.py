@@ -159,10 +159,6 @@ class PushingPointsPrediction:
         """Return the states ``(m, d)`` of a robot after joint choices ``(m, M)``."""
         return self._scenario.states_after(joint_actions)[agent]
 
-    def states_of_all(self, joint_actions: IntArray) -> FloatArray:
-        """Return the states ``(M, m, d)`` of all robots after joint choices ``(m, M)``."""
-        return self._scenario.states_after(joint_actions)
-
 
 def _state_space(
     settings: PushingPointsSettings, agents: tuple[str, ...], points: tuple[str, ...]

@@ -11,7 +11,6 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import ceil, radians
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -244,17 +243,13 @@ def _draw(axes: Axes, field: Field, box: BoxSpec, radius: float) -> None:
         *field.points[:, :2].T, *ways.T, color=colours,
         angles="xy", scale_units="xy", scale=1.0, width=0.006, headwidth=4, headlength=4.5,
     )  # fmt: skip
-    for move, turning in (("turns", True), ("rests", False)):
-        here = moves == move
-        if not here.any():
-            continue
-        look: dict[str, Any] = {"color": COLOURS[move], "ls": ""}
-        if not turning:
-            axes.plot(*field.points[here, :2].T, marker=".", ms=3, **look)
-            continue
-        for sign, marker in ((1, r"$\circlearrowleft$"), (-1, r"$\circlearrowright$")):
-            own = here & (np.sign(field.turns) == sign)
-            axes.plot(*field.points[own, :2].T, marker=marker, ms=7, **look)
+    for move, marker, size, here in (
+        ("turns", r"$\circlearrowleft$", 7, field.turns > 0),
+        ("turns", r"$\circlearrowright$", 7, field.turns < 0),
+        ("rests", ".", 3, True),
+    ):
+        places = field.points[(moves == move) & here, :2]
+        axes.plot(*places.T, marker=marker, ms=size, color=COLOURS[move], ls="")
     axes.arrow(0, 0, 0.6 * box.reach, 0, width=0.004, head_width=0.02, color="black")
     axes.text(0.25 * box.reach, 0.03, "to the goal", ha="center", fontsize=7)
     axes.set_xlim(-reach - spacing, reach + spacing)

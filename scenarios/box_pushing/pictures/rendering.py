@@ -19,17 +19,14 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from matplotlib.artist import Artist
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.colors import to_rgba
-from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Patch, PathPatch, Polygon, Rectangle
 from matplotlib.path import Path as Curve
 from matplotlib.transforms import Affine2D
 
 from ....core.numerics.arrays import FloatArray
-from ...movies import Pixels, film
+from ...movies import DPI, Pixels, Stage, film
 from ..world.boxes import BoxSpec, box_for
 from ..world.infrared import infrared_readings, sensor_directions
 from ..world.robots import robot_for
@@ -41,7 +38,6 @@ SIDES = (800, 480)
 """Width and height of a picture in pixels: multiples of 16, as video codecs want them."""
 AXES = (0.09, 0.11, 0.89, 0.81)
 """Left, bottom, width and height of the axes as fractions of the picture."""
-DPI = 100
 LEAST_RADIUS, WHEELS_FROM = 3.5, 6.0
 """Radius of a robot in pixels, at least, and from which on its wheels are drawn."""
 MARGIN = 0.04
@@ -58,10 +54,11 @@ def _pointer(box: BoxSpec) -> FloatArray:
     return size * np.array([[-0.6, 0.0], [0.6, 0.0], [0.3, 0.2], [0.6, 0.0], [0.3, -0.2]])
 
 
-class _Stage:
+class _Stage(Stage):
     """A figure on which any moment of a recording can be drawn."""
 
     def __init__(self, recording: Recording, *, sensors: bool = False) -> None:
+        super().__init__(SIDES, AXES)
         self.recording = recording
         self.robot: RobotSettings = robot_for(str(recording["robot"]))
         robots = recording["robot_poses"].shape[1]
@@ -70,10 +67,6 @@ class _Stage:
         if sensors:
             described = str(recording.get("infrared", "{}"))
             self.infrared = InfraredSettings.model_validate_json(described)
-        self.figure = Figure(figsize=(SIDES[0] / DPI, SIDES[1] / DPI), dpi=DPI)
-        self.canvas = FigureCanvasAgg(self.figure)
-        self.axes = self.figure.add_axes(AXES)
-        self.axes.set_aspect("equal")
         low, high = self._extent()
         # One metre is as long both ways: widen what is too narrow for the picture.
         room = np.array([SIDES[0] * AXES[2], SIDES[1] * AXES[3]])
@@ -81,14 +74,11 @@ class _Stage:
         half, middle = 0.5 * metres_per_pixel * room, 0.5 * (low + high)
         self.axes.set_xlim(middle[0] - half[0], middle[0] + half[0])
         self.axes.set_ylim(middle[1] - half[1], middle[1] + half[1])
-        self.axes.set_xlabel("x [m]")
-        self.axes.set_ylabel("y [m]")
         self.axes.grid(color="#eeeeee")
         self.axes.set_axisbelow(True)
         # Robots that would be dots are drawn larger than they are.
         self.pixels_of_robot = max(self.robot.radius / metres_per_pixel, LEAST_RADIUS)
         self.radius = self.pixels_of_robot * metres_per_pixel
-        self._moving: list[Artist] = []
         goal = recording["goal_pose"]
         line = {"fill": False, "lw": 1.5, "ec": GOAL_COLOUR, "zorder": 3}
         self._patch(PathPatch(curve(self.box), ls="--", **line), goal)
@@ -107,11 +97,7 @@ class _Stage:
         )
         return places.min(axis=0), places.max(axis=0)
 
-    def draw(self, step: int) -> None:
-        """Draw the moment after `step` steps."""
-        for artist in self._moving:
-            artist.remove()
-        self._moving = []
+    def _add(self, step: int) -> None:
         box = self.recording["box_pose"]
         fill = to_rgba(BOX_COLOUR, 0.75)
         self._patch(PathPatch(curve(self.box), fc=fill, ec="black", zorder=1), box[step])
@@ -196,11 +182,6 @@ class _Stage:
         past = poses[: step + 1, :2].T
         self._moving += self.axes.plot(*past, color=colour, lw=1, alpha=0.7, zorder=0.9)
 
-    def pixels(self) -> Pixels:
-        """Return what is drawn as ``(height, width, 3)`` bytes."""
-        self.canvas.draw()
-        return np.asarray(self.canvas.buffer_rgba())[..., :3].copy()
-
 
 def _at(pose: FloatArray) -> Affine2D:
     return Affine2D().rotate(float(pose[2])).translate(float(pose[0]), float(pose[1]))
@@ -213,9 +194,7 @@ def curve(box: BoxSpec) -> Curve:
 
 def picture(recording: Recording, step: int, *, sensors: bool = False) -> Pixels:
     """Return the moment after `step` steps as ``(height, width, 3)`` bytes."""
-    stage = _Stage(recording, sensors=sensors)
-    stage.draw(step)
-    return stage.pixels()
+    return _Stage(recording, sensors=sensors).pixels(step)
 
 
 def snapshot(recording: Recording, step: int, path: Path, *, sensors: bool = False) -> None:
@@ -245,9 +224,4 @@ def animate(recording: Recording, path: Path, speed: float = 4.0, *, sensors: bo
         If the suffix is neither ``.gif`` nor ``.mp4``.
     """
     stage = _Stage(recording, sensors=sensors)
-
-    def drawn(step: int) -> Pixels:
-        stage.draw(step)
-        return stage.pixels()
-
-    film(drawn, len(recording["box_pose"]) - 1, float(recording["dt"]) / speed, path)
+    film(stage.pixels, len(recording["box_pose"]) - 1, float(recording["dt"]) / speed, path)

@@ -139,11 +139,6 @@ class BoxPrediction:
         shared = self.premises.space.shared_of(view, [self.situation.places[agent][0]])[0]
         return np.concatenate([self._own_after(agent, choices, view), shared], axis=1)
 
-    def states_of_all(self, joint_actions: IntArray) -> FloatArray:
-        """Return the next states ``(n, m, d)`` of all agents for joint actions ``(m, n)``."""
-        own, shared = self.states_by_group(joint_actions)
-        return np.concatenate([own, shared[[robot for robot, _ in self.situation.places]]], axis=2)
-
     def states_by_group(self, joint_actions: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return the next own variables of all agents and the shared ones of all robots.
 

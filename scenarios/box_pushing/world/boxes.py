@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import cos, isfinite, pi, sin, sqrt
+from math import cos, pi, sin, sqrt
 
 import numpy as np
 from shapely.geometry import Polygon
@@ -19,7 +19,7 @@ from shapely.geometry import Polygon
 from ....core.numerics.arrays import FloatArray
 from ....core.plugins.messages import closest
 from .geometry import Outline
-from .polygons import LARGEST, Moments, Vertices, centred, convex_pieces, moments, polygon_edges
+from .polygons import Moments, Vertices, centred, convex_pieces, moments, polygon_edges
 from .settings import GRAVITY, BoxSettings
 
 AREA = 0.04
@@ -52,7 +52,7 @@ class BoxSpec:
     Raises
     ------
     ValueError
-        If the outline is not a simple polygon, or a quantity out of range.
+        If the outline is not a simple polygon. Quantities are checked by `BoxSettings`.
 
     Examples
     --------
@@ -70,16 +70,8 @@ class BoxSpec:
     contact_friction: float = 0.3
 
     def __post_init__(self) -> None:
-        for name in ("mass", "friction", "contact_friction", "radius"):
-            value = getattr(self, name)
-            if not (isfinite(value) and (value > 0 or (value == 0 and name != "mass"))):
-                raise ValueError(f"box {self.name!r}: {name} = {value}, out of range")
         if bool(self.vertices) == bool(self.radius):
             raise ValueError(f"box {self.name!r}: needs either vertices or a radius")
-        if 2 * self.radius > LARGEST:
-            raise ValueError(
-                f"box {self.name!r}: radius = {self.radius}, allowed: up to {LARGEST / 2:g} m"
-            )
         _ = self.polygon  # what cannot be one is refused at once
 
     @cached_property

@@ -12,7 +12,7 @@ computes first, once more: for `LANES` points side by side, without a branch.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import hypot, inf, pi, sqrt
+from math import hypot, pi, sqrt
 from typing import Any
 
 import numpy as np
@@ -55,12 +55,6 @@ class Outline:
 
     edges: FloatArray
     rounding: float = 0.0
-
-    def __post_init__(self) -> None:
-        if self.edges.ndim != 2 or self.edges.shape[1] != 4 or not len(self.edges):
-            raise ValueError(f"outline: edges have shape {self.edges.shape}, allowed (n >= 1, 4)")
-        if not (np.isfinite(self.edges).all() and 0 <= self.rounding < inf):
-            raise ValueError("outline: edges and rounding must be finite, rounding not negative")
 
     @property
     def radius(self) -> float:

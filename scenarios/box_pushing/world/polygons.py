@@ -91,8 +91,9 @@ def centred(name: str, vertices: Vertices, holes: Sequence[Vertices] = ()) -> Po
     Raises
     ------
     ValueError
-        If the polygon has fewer than 3 vertices or more than `MOST_VERTICES`, is not finite or too
-        large, has two vertices at one place, crosses or touches itself, or has no area.
+        If the polygon has more than `MOST_VERTICES`, is too large, has two vertices at one place,
+        crosses or touches itself, or has no area. Fewer than 3 vertices and numbers that are not
+        finite are refused by `BoxSettings`.
     """
     for ring in (vertices, *holes):
         _check_ring(f"box {name!r}", ring)
@@ -115,11 +116,7 @@ def centred(name: str, vertices: Vertices, holes: Sequence[Vertices] = ()) -> Po
 
 def _check_ring(box: str, vertices: Vertices) -> None:
     """Refuse an outline that no body can have."""
-    if len(vertices) < 3:
-        raise ValueError(f"{box}: an outline needs at least 3 vertices")
     ring = np.asarray(vertices, dtype=float)
-    if not np.isfinite(ring).all():
-        raise ValueError(f"{box}: vertices must be finite")
     # Halved before they are subtracted: the difference of two numbers may overflow.
     extent = 2 * float(np.ptp(ring / 2, axis=0).max())
     if extent > LARGEST:

@@ -29,8 +29,6 @@ GRID = 64
 PRECISION = 1e-9
 """Of the gap to the box [m]."""
 
-Gap = tuple[float, float]
-
 
 @dataclass(frozen=True)
 class Start:
@@ -53,7 +51,7 @@ class Start:
     bearing: float
     angle: float
     heading: float
-    gaps: Gap
+    gaps: tuple[float, float]
     around: bool = False
 
 
@@ -94,7 +92,7 @@ def place(
     Raises
     ------
     ValueError
-        If the distribution is unknown or the robots do not fit.
+        If the robots do not fit.
 
     Examples
     --------
@@ -105,8 +103,6 @@ def place(
     >>> round(float(np.hypot(*(goal - box)[:2])), 9), bool((robots[:, 0] < box[0]).all())
     (0.6, True)
     """
-    if start not in STARTS:
-        raise ValueError(f"start = {start!r}, allowed {', '.join(STARTS)}")
     spec = STARTS[start]
     bearing = rng.uniform(-spec.bearing, spec.bearing)
     angle = rng.uniform(-spec.angle, spec.angle)

@@ -24,15 +24,15 @@ def warnings(settings: Any) -> Iterator[str]:
     """Yield a line for every size of `BoxTaskSettings` that is surely meant in another unit."""
     box, robot = settings.box, settings.robot
     if not isinstance(box, str):
-        places = list(zip(*box.vertices, strict=True))
-        width = max(max(axis) - min(axis) for axis in places)
+        width = max(max(axis) - min(axis) for axis in zip(*box.vertices, strict=True))
         yield from _length("box.vertices", width, LARGEST_BOX)
-        yield from _mass("box.mass", box.mass)
     if not isinstance(robot, str):
         yield from _length("robot.radius", robot.radius, LARGEST_RADIUS)
-        yield from _mass("robot.mass", robot.mass)
         if robot.max_speed > FASTEST:
             yield _meant("robot.max_speed", robot.max_speed, "m/s", "mm/s", 1e-3)
+    for name, body in (("box", box), ("robot", robot)):
+        if not isinstance(body, str) and body.mass > HEAVIEST:
+            yield _meant(f"{name}.mass", body.mass, "kg", "g", 1e-3)
     yield from _length("infrared.reach", settings.infrared.reach, LARGEST_REACH)
     yield from _length("tolerance", settings.tolerance, LARGEST_BOX)
     if settings.tolerance < NEAREST_GOAL:
@@ -47,11 +47,6 @@ def _length(key: str, value: float, most: float) -> Iterator[str]:
     if value > most:
         unit, factor = ("mm", 1e-3) if value * 1e-2 > most / 10.0 else ("cm", 1e-2)
         yield _meant(key, value, "m", unit, factor)
-
-
-def _mass(key: str, value: float) -> Iterator[str]:
-    if value > HEAVIEST:
-        yield _meant(key, value, "kg", "g", 1e-3)
 
 
 def _meant(key: str, value: float, unit: str, other: str, factor: float) -> str:

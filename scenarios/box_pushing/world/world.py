@@ -116,8 +116,6 @@ class World:
         substeps: int = 4,
         infrared: InfraredSettings | None = None,
     ) -> None:
-        if not robots:
-            raise ValueError("robots: none, must be at least one")
         if substeps < 1:
             raise ValueError(f"substeps = {substeps}, must be at least 1")
         self.robots = tuple(robots)

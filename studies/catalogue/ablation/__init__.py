@@ -58,10 +58,9 @@ def draw(analysis: Analysis) -> dict[str, Figure]:
     """Return the figures of an analysis by name."""
     from ...presentation import forest
 
-    panels = [
-        forest.Panel(title, [d for d in analysis.differences if d.measure == title])
-        for title in analysis.cases
-    ]
+    panels = {
+        title: [d for d in analysis.differences if d.measure == title] for title in analysis.cases
+    }
     figure = forest.draw(panels, "difference from the first condition")
     return {} if figure is None else {"ablation": figure}
 

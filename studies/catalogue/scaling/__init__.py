@@ -117,10 +117,11 @@ def messages(below: Iterable[tuple[int, ...]]) -> int:
 
 def _of_a_step(session: Session) -> int:
     """Return the most memory that one decision holds beside what is held already [bytes]."""
-    prediction = session.team.predict(session.scenario)
+    team = of_fuzzy_agents(session.team)
+    prediction = team.predict(session.scenario)
     tracemalloc.start()
     try:
-        session.team.act(prediction, explore=False)
+        team.act(prediction, explore=False)
         return tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()

@@ -133,8 +133,8 @@ def draw(analysis: Analysis) -> dict[str, Figure]:
     """Return the figures of an analysis by name."""
     from ...presentation import forest
 
-    panels = [forest.Panel(condition, ratios, null=1.0) for condition, ratios in analysis.cases]
-    figure = forest.draw(panels, "success over that with the box of training")
+    unit = "success over that with the box of training"
+    figure = forest.draw(dict(analysis.cases), unit, null=1.0)
     return {} if figure is None else {"shapes": figure}
 
 

@@ -148,7 +148,7 @@ class Remembered:
     """A prediction that leads to the same states whatever is done."""
 
     def __init__(self, states: FloatArray) -> None:
-        self.states_of_all = lambda joint_actions: states
+        self.states = lambda agent, joint_actions: states[agent]
 
 
 @pytest.mark.parametrize("membership", ["triangular", "sigmoid"])

@@ -1,6 +1,7 @@
 """Evaluators against brute force over every joint action, one at a time."""
 
 from itertools import product
+from typing import Any
 
 import numpy as np
 import pytest
@@ -195,13 +196,13 @@ def test_without_structure_too(teammates: str, rng: np.random.Generator, rules: 
 @pytest.mark.parametrize("teammates", TEAMMATES)
 @pytest.mark.parametrize("name", EDGES)
 def test_permuting_agents_permutes_values(
-    name: str, teammates: str, rng: np.random.Generator, rules: RuleBase
+    name: str, teammates: str, rng: np.random.Generator, rules: RuleBase, permuted: Any
 ) -> None:
     flat = RuleBase(rules.partitions, rules.terms)
     prediction = Tabled(rng.uniform(-1, 2, (4, A**4, 3)), rng.normal(size=A**4))
     frequencies, theta = frequencies_of(rng), rng.normal(size=(4, flat.n_rules))
     hierarchy, permutation = hierarchy_of(name), [2, 0, 3, 1]
-    other = hierarchy.permuted(permutation)
+    other = permuted(hierarchy, permutation)
     joint = rng.integers(A, size=4)
     here = ExactEnumeration(problem_of(flat, hierarchy, "reward-and-value", teammates))
     there = ExactEnumeration(problem_of(flat, other, "reward-and-value", teammates))

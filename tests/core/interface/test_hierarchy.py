@@ -1,6 +1,7 @@
 """Who is above, below and unseen; what is refused."""
 
 from itertools import pairwise
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -83,10 +84,12 @@ def test_everybody_else_is_above_below_or_unseen(hierarchy: Hierarchy) -> None:
 
 
 @given(hierarchies(), st.data())
-def test_permuting_agents_permutes_the_hierarchy(hierarchy: Hierarchy, data: st.DataObject) -> None:
+def test_permuting_agents_permutes_the_hierarchy(
+    permuted: Any, hierarchy: Hierarchy, data: st.DataObject
+) -> None:
     n = len(hierarchy)
     permutation = data.draw(st.permutations(range(n)))
-    other = hierarchy.permuted(permutation)
+    other = permuted(hierarchy, permutation)
     for k, i in enumerate(permutation):
         assert other.agents[k] == hierarchy.agents[i]
         assert {permutation[j] for j in other.below(k)} == set(hierarchy.below(i))

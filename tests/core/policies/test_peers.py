@@ -9,8 +9,6 @@ from nested_agents.core.interface.scenario import Transition
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.core.learners import LEARNERS
 from nested_agents.core.policies.inputs import FARTHEST, Inputs, RewardScale
-from nested_agents.core.policies.seen import Seen, SeenScenario
-from nested_agents.scenarios.line_up import LineUpSettings
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import check
@@ -76,18 +74,6 @@ def test_rewards_are_scaled_by_the_spread_of_returns() -> None:
     assert scale.scaled(np.ones(1))[0] == pytest.approx(np.sqrt(1 - 0.25), rel=0.05)
 
 
-def test_what_is_seen_is_the_present_and_what_may_follow() -> None:
-    plain, scenario = LineUpSettings(carts=2).build(), None
-    scenario = SeenScenario(LineUpSettings(carts=2).build())
-    assert (scenario.reset(3) == plain.reset(3)).all()
-    seen = scenario.predict()
-    assert isinstance(seen, Seen)
-    joint = np.array([[0, 1], [2, 3]])
-    assert (seen.states(1, joint) == plain.predict().states(1, joint)).all()
-    entered = scenario.step(joint[0]).states
-    assert (scenario.predict().present == entered).all()
-
-
 def test_an_extra_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "nested_agents.core.policies.ppo", None)
     with pytest.raises(SpecError, match=r"'ippo': needs the extra peers, pip install") as raised:
@@ -125,7 +111,7 @@ def test_they_learn(kind: str) -> None:
         paid = 0.0
         for _ in range(episodes):
             peer.begin_episode()
-            joint = peer.act(Seen(world.reset(), world), explore=learn)  # type: ignore[arg-type]
+            joint = peer.act(world.reset(), explore=learn)
             transition = world.step(joint)
             paid += np.mean(transition.reward)
             if learn:

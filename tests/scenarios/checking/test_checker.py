@@ -270,8 +270,9 @@ def off_by(distance: float, *, together: bool = False) -> Callable[[], Scenario]
     """Return a factory of line-ups that predict other places, of all agents at once or of each."""
 
     class Changed(LineUpPrediction):
-        def states_of_all(self, joint_actions: Any) -> Any:
-            return super().states_of_all(joint_actions) + (distance if together else 0.0)
+        def states_by_group(self, joint_actions: Any) -> Any:
+            own, shared = super().states_by_group(joint_actions)
+            return own + (distance if together else 0.0), shared
 
     def predict(self: Any) -> Any:
         return Changed(LineUp.predict(self)._places + (0.0 if together else distance))
@@ -398,7 +399,7 @@ FAULTS: dict[str, tuple[Callable[[], Scenario], str]] = {
     ),
     "all together elsewhere": (
         off_by(1e-3, together=True),
-        "predictions: states_of_all and states differ in distance of agent 0",
+        "predictions: states_by_group and states differ in distance of agent 0",
     ),
     "several periods": (
         perceiving(per_period),

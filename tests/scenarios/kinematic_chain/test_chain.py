@@ -54,7 +54,8 @@ def test_predictions_come_true(table: dict[str, object]) -> None:
     actions = rng.integers(4, size=(20, 8))
     for action in actions:
         prediction = scenario.predict()
-        predicted, rewards = prediction.states_of_all(actions), prediction.rewards(actions)
+        predicted = np.concatenate(prediction.states_by_group(actions), axis=2)
+        rewards = prediction.rewards(actions)
         k = int(np.flatnonzero((actions == action).all(axis=1))[0])
         transition = scenario.step(action)
         assert predicted[:, k] == pytest.approx(transition.states, abs=1e-9)

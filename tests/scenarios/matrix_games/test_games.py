@@ -74,7 +74,6 @@ def test_it_keeps_the_promises_of_a_scenario(name, observed):
     prediction = game.predict()
     for i in range(len(game.agents)):
         assert (prediction.states(i, joint[None])[0] == entered[i]).all()
-    assert (prediction.states_of_all(joint[None])[:, 0] == entered).all()
 
 
 def test_an_agent_sees_what_it_is_told():

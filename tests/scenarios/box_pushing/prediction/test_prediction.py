@@ -132,7 +132,9 @@ def test_the_states_of_all_agents_are_those_of_each(settings: dict) -> None:
     n = len(scenario.agents)
     joint = np.random.default_rng(0).integers(4, size=(20, n))
     expected = np.stack([scenario.predict().states(agent, joint) for agent in range(n)])
-    np.testing.assert_array_equal(scenario.predict().states_of_all(joint), expected)
+    own, shared = scenario.predict().states_by_group(joint)
+    together = np.concatenate([own, np.repeat(shared, n // len(shared), axis=0)], axis=2)
+    np.testing.assert_array_equal(together, expected)
 
 
 def test_wheel_commands_that_come_to_the_same_are_known_to_best_responses() -> None:

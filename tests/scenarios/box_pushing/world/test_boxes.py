@@ -177,8 +177,6 @@ def test_clockwise_is_turned_around_with_a_word() -> None:
         ({"vertices": ((0, 0), (1, 1), (1, 0), (0, 1))}, "not a simple polygon"),
         ({"vertices": ((0, 0), (1, 0), (2, 0))}, "simple|degenerate"),
         ({"vertices": ((0, 0), (1, 0), (0.5, 1e-7))}, "degenerate"),
-        ({"vertices": ((0, 0), (1, 0))}, "at least 3"),
-        ({"vertices": ((0, 0), (1, 0), (float("nan"), 1))}, "finite"),
         ({"vertices": FRAME, "radius": 0.1}, "either"),
         ({"vertices": (*FRAME, FRAME[0])}, r"vertices \d+ and 1 are at the same place"),
         ({"vertices": (FRAME[0], *FRAME)}, "vertices 1 and 2 are at the same place"),
@@ -189,11 +187,7 @@ def test_clockwise_is_turned_around_with_a_word() -> None:
         ({"vertices": ((-1e308, 0), (1e308, 0), (0, 1))}, "allowed: up to 100 m"),
         ({"vertices": FRAME, "holes": [((0, 0), (1e-9, 0), (0, 1e-9))]}, "at the same place"),
         ({"vertices": regular(1001)}, "1001 vertices, allowed: 1000 or fewer"),
-        ({"radius": 1e9}, r"radius = 1000000000\.0, allowed: up to 50 m"),
         ({}, "either"),
-        ({"radius": 0.1, "mass": 0.0}, "mass"),
-        ({"radius": 0.1, "friction": -1.0}, "friction"),
-        ({"radius": float("inf")}, "radius"),
     ],
 )
 def test_bad_boxes_are_refused(arguments: dict[str, object], word: str) -> None:

@@ -104,12 +104,6 @@ def test_ray_equals_its_reference(x: float, y: float, angle: float, which: int) 
         assert abs(surface(edges, rounding, *point)[0]) < 1e-6
 
 
-@pytest.mark.parametrize("edges", [np.zeros((0, 4)), np.zeros((3, 2)), np.full((1, 4), np.nan)])
-def test_bad_outlines_are_refused(edges: FloatArray) -> None:
-    with pytest.raises(ValueError, match="outline"):
-        Outline(edges)
-
-
 def test_radius_reaches_the_farthest_point() -> None:
     assert Outline(SQUARE).radius == pytest.approx(0.1 * np.sqrt(2))
     assert Outline(DISC, 0.1).radius == pytest.approx(0.1)

@@ -77,7 +77,6 @@ def test_equal_seeds_give_equal_starts() -> None:
     [
         ("medium", 3, BOXES["square"], "3 of 0.228 m in all do not fit side by side"),
         ("hard", 30, BoxSpec("small", radius=0.05), "do not fit around box 'small'"),
-        ("simple", 2, BOXES["square"], "start = 'simple', allowed easy, medium, hard"),
     ],
 )
 def test_refusals(start: str, robots: int, box: BoxSpec, word: str) -> None:
