@@ -10,7 +10,7 @@ from ..interface.scenario import Scenario, Transition
 from ..numerics.arrays import FloatArray, IntArray
 from .inputs import Inputs, RewardScale
 from .networks import Layers, drawing_from, prepare, weights_of
-from .peer import Peer
+from .peer import Peer, Seen
 from .settings import DQNSettings
 
 
@@ -61,9 +61,9 @@ class DeepQ(Peer):
         share = min(1.0, self._decisions / s.exploration_decisions)
         return s.exploration_begin + share * (s.exploration_end - s.exploration_begin)
 
-    def act(self, prediction: FloatArray, *, explore: bool = True) -> IntArray:
+    def act(self, prediction: Seen, *, explore: bool = True) -> IntArray:
         """Return the action ``(1,)`` of the greatest value, or a random one."""
-        seen = self._inputs.joint(prediction)[None].astype(np.float32)
+        seen = self._inputs.joint(prediction.present)[None].astype(np.float32)
         if explore and self.rng.random() < self.exploration_rate:
             action = int(self.rng.integers(self._n_actions))
         else:

@@ -2,10 +2,32 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ..interface.scenario import Scenario, Transition
 from ..numerics.arrays import FloatArray, IntArray
+
+
+@dataclass(frozen=True)
+class Seen:
+    """The present states, and what could follow, for those who ask.
+
+    Attributes
+    ----------
+    present
+        ``(n, d)`` states of all agents.
+    scenario
+        Where they are.
+    """
+
+    present: FloatArray
+    scenario: Scenario
+
+    def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
+        """Return the next states ``(m, d)`` of `agent` as the scenario predicts them."""
+        return self.scenario.predict().states(agent, joint_actions)
 
 
 class Peer:
@@ -23,14 +45,14 @@ class Peer:
     def begin_episode(self) -> None:
         """Note that an episode begins."""
 
-    def predict(self, scenario: Scenario, states: FloatArray) -> FloatArray:
-        """Return the present states: nothing is predicted, and it costs nothing."""
-        return states
+    def predict(self, scenario: Scenario, states: FloatArray) -> Seen:
+        """Return the present states: nothing is predicted unless asked, and it costs nothing."""
+        return Seen(states, scenario)
 
-    def check(self, prediction: FloatArray) -> None:
+    def check(self, prediction: Seen) -> None:
         """Refuse nothing."""
 
-    def adapt(self, prediction: FloatArray, joint_action: IntArray, transition: Transition) -> None:
+    def adapt(self, prediction: Seen, joint_action: IntArray, transition: Transition) -> None:
         """Revise nothing: nothing was predicted."""
 
     def learn(self, transition: Transition) -> None:

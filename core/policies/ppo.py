@@ -22,7 +22,7 @@ from ..numerics.arrays import FloatArray, IntArray
 from .central_critic import CentralCriticPolicy
 from .inputs import Inputs, RewardScale
 from .networks import Layers, drawing_from, prepare, weights_of
-from .peer import Peer
+from .peer import Peer, Seen
 from .settings import PolicyGradientSettings
 
 
@@ -72,9 +72,9 @@ class IndependentPPO(Peer):
         """Return the inputs ``(n_envs, n_inputs)``."""
         return self.inputs.each(states)
 
-    def act(self, prediction: FloatArray, *, explore: bool = True) -> IntArray:
+    def act(self, prediction: Seen, *, explore: bool = True) -> IntArray:
         """Return a joint action ``(n,)``: drawn from the policy, or the most probable."""
-        seen = self._seen(prediction).astype(np.float32)
+        seen = self._seen(prediction.present).astype(np.float32)
         logits = self._actor(seen).reshape(self._n, self._n_actions)
         if not explore:
             return logits.argmax(axis=1)

@@ -9,6 +9,8 @@ from nested_agents.core.interface.scenario import Transition
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.core.learners import LEARNERS
 from nested_agents.core.policies.inputs import FARTHEST, Inputs, RewardScale
+from nested_agents.core.policies.peer import Peer, Seen
+from nested_agents.scenarios.line_up import LineUpSettings
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import check
@@ -67,6 +69,16 @@ def test_inputs_by_hand() -> None:
     assert (inputs.n_own, inputs.n_joint) == (5, 4)
 
 
+def test_what_is_seen_is_the_present_and_what_may_follow() -> None:
+    scenario = LineUpSettings(carts=2).build()
+    states = scenario.reset(3)
+    seen = Peer(np.random.SeedSequence(0)).predict(scenario, states)
+    assert isinstance(seen, Seen)
+    assert seen.present is states
+    joint = np.array([[0, 1], [2, 3]])
+    assert (seen.states(1, joint) == scenario.predict().states(1, joint)).all()
+
+
 def test_rewards_are_scaled_by_the_spread_of_returns() -> None:
     scale, rng = RewardScale(0.5, 1), np.random.default_rng(0)
     for _ in range(5000):
@@ -111,7 +123,7 @@ def test_they_learn(kind: str) -> None:
         paid = 0.0
         for _ in range(episodes):
             peer.begin_episode()
-            joint = peer.act(world.reset(), explore=learn)
+            joint = peer.act(Seen(world.reset(), world), explore=learn)  # type: ignore[arg-type]
             transition = world.step(joint)
             paid += np.mean(transition.reward)
             if learn:
