@@ -143,8 +143,12 @@ class Hierarchy:
 
     @property
     def messages(self) -> int:
-        """How many decided actions are told in one decision of all agents."""
-        return sum(map(len, self._above))
+        """How many messages there are in one decision of all agents.
+
+        An agent is told by each agent above it what was decided; neighbours tell each other what
+        they have done, or what would be best.
+        """
+        return sum(map(len, self._above)) + 2 * len(self.neighbours) * (self.told != "none")
 
     def joint_actions(self, n_actions: int) -> int:
         """Return how many joint actions one decision of all agents enumerates (exact integer)."""

@@ -29,7 +29,6 @@ from ...results.summary import EVALUATED, Summary, evaluated
 from ...spec.spec import Spec
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
-from ..scaling import messages
 from ..study import check_evaluated, check_rule_bases
 
 if TYPE_CHECKING:
@@ -79,7 +78,7 @@ def measure(trial: Trial) -> TrialResult:
     numbers = {
         "agents": float(len(hierarchy)),
         "memory": 1e-3 * team.learner.theta.nbytes,
-        "messages": float(messages(hierarchy.below(i) for i in range(len(hierarchy)))),
+        "messages": float(hierarchy.messages),
         "formula": float(tried * n_rules),
         "counted": counted / len(session.deciding),
     }
