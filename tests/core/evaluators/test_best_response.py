@@ -247,7 +247,7 @@ def test_who_is_told_answers(plan) -> None:
 
 
 def test_agents_with_a_common_plan_agree_without_a_word() -> None:
-    """All who do the same are equally good: private plans break ties apart, a common one does not."""
+    """All are equally good who do the same: private plans break ties apart, a common one not."""
     silent = Hierarchy(NAMES, PAIRS, told="none")
 
     def chosen(plan: str, seed: int) -> int:
