@@ -274,7 +274,7 @@ def test_evaluations_may_change_the_hierarchy_and_the_decision():
     assert not silent.acts_as(condition.settings)
     assert (silent.topology.kind, silent.topology.told) == ("chain", "none")
     assert (silent.learner.decision.unseen, tree.learner.decision.unseen) == ("last", "maintain")
-    assert (tree.topology.kind, tree.topology.told) == ("tree", "ancestors")
+    assert (tree.topology.kind, tree.topology.told) == ("tree", "parents")
     assert silent.scenario == condition.settings.scenario
 
 
