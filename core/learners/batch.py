@@ -249,13 +249,13 @@ class BatchTD(Replay):
         if self._regressed == len(self._states):
             return
         rows = range(len(self.theta))
-        found = [self.rules.active(self.states_of(row, self._regressed)) for row in rows]
+        active = [self.rules.active(self.states_of(row, self._regressed)) for row in rows]
         if self._active:
-            found = [
+            active = [
                 (np.concatenate([old[0], new[0]]), np.concatenate([old[1], new[1]]))
-                for old, new in zip(self._active, found, strict=True)
+                for old, new in zip(self._active, active, strict=True)
             ]
-        self._active, self._regressed = found, len(self._states)
+        self._active, self._regressed = active, len(self._states)
 
     def restore(self, arrays: Mapping[str, FloatArray]) -> None:
         """Continue from `arrays`."""

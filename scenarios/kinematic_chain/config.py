@@ -78,7 +78,7 @@ class KinematicChainSettings(ScenarioSettings):
     failures: tuple[Failure, ...] = ()
     """Failures of joints, as ``[[scenario.failures]]`` tables."""
     predictor: Literal["nominal", "informed"] = "nominal"
-    """Whether predictions take every joint for what it was built as, or are told of failures."""
+    """Whether predictions take every joint for what it was built as, or know of failures."""
     state_space: tuple[str, ...] = ("bearing", "distance", "approach")
     """State variables beside the speed of the own joint, by name, one's own included; see
     `kinematic_chain.variables`."""

@@ -5,7 +5,7 @@ A recording is a mapping of arrays: ``angles (T + 1, n)`` [rad], ``speeds (T + 1
 [m], ``top_speed`` [rad/s], ``dt`` [s].
 
 Links are drawn from the base, a black square, to the tip, an orange dot with the trail of where it
-has been. Joints are the darker the faster they are told to turn; failed ones are crossed out. The
+has been. Joints are the darker the faster their command; failed ones are crossed out. The
 dashed ring is the goal, as wide as the tolerance; the pale circle is the reach of the arm.
 """
 

@@ -148,11 +148,11 @@ class Plan:
         if self.comparisons:
             lines = power_text(len(o.seeds), self.comparisons, self.deviation, self.smallest)
             yield from ("", *lines)
-            said = (
+            text = (
                 f"Differences of success rates, every condition with the first, p adjusted; "
                 f"differences of single seeds are taken to deviate by {self.deviation:g}."
             )
-            yield from wrap(said, WIDTH)
+            yield from wrap(text, WIDTH)
         yield from self.warnings
 
 
@@ -171,7 +171,7 @@ def plan(
     spec
         A `Spec`, a table, or the path of a TOML file.
     jobs
-        Trials at a time; one for every core unless said otherwise.
+        Trials at a time; by default one for every core.
     deviation
         Standard deviation that is supposed of the differences of single seeds.
     smallest

@@ -227,11 +227,11 @@ def judge(results: Mapping[str, Results]) -> tuple[Finding, ...]:
     """Decide every claim by the results of its study, by name."""
     findings = []
     for claim in CLAIMS:
-        found = claim.compute(results.get(claim.study, NOTHING()))
-        if found is None or not np.isfinite(found.estimate.value):
+        measured = claim.compute(results.get(claim.study, NOTHING()))
+        if measured is None or not np.isfinite(measured.estimate.value):
             findings.append(Finding(claim, None, "not decided"))
             continue
-        enough = found.seeds == 0 or found.seeds >= LEAST_SEEDS
-        verdict = claim.criterion.decide(found) if enough else "not decided"
-        findings.append(Finding(claim, found, verdict))
+        enough = measured.seeds == 0 or measured.seeds >= LEAST_SEEDS
+        verdict = claim.criterion.decide(measured) if enough else "not decided"
+        findings.append(Finding(claim, measured, verdict))
     return tuple(findings)

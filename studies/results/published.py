@@ -63,7 +63,7 @@ class Published(NamedTuple):
 
     @property
     def note(self) -> str | None:
-        """What must be said of results of another version than this, in one line."""
+        """What must be noted of results of another version than this, in one line."""
         if self.version == RESULTS_VERSION:
             return None
         return f"results of version {self.version}, this is version {RESULTS_VERSION}"

@@ -109,5 +109,5 @@ def lengths(curricula: Iterable[Sequence[int]], episodes: int) -> str:
     >>> lengths([[10, 6], [10, 6]], 8), lengths([[10, 6], []], 8), lengths([[]], 1)
     ('10 + 6 + 8 episodes', '10 + 6 + 8 or 8 episodes', '1 episode')
     """
-    told = dict.fromkeys(" + ".join(map(str, [*stages, episodes])) for stages in curricula)
-    return f"{' or '.join(told)} episode{'' if list(told) == ['1'] else 's'}"
+    sums = dict.fromkeys(" + ".join(map(str, [*stages, episodes])) for stages in curricula)
+    return f"{' or '.join(sums)} episode{'' if list(sums) == ['1'] else 's'}"

@@ -91,8 +91,8 @@ def arrange(settings: ConditionSettings, seed: int) -> Arrangement:
 
 def build(settings: ConditionSettings, seed: int) -> tuple[Scenario, Team]:
     """Return the scenario and the untrained team of fuzzy agents of a condition; see `arrange`."""
-    found = arrange(settings, seed)
-    return found.scenario, of_fuzzy_agents(found.team)
+    arrangement = arrange(settings, seed)
+    return arrangement.scenario, of_fuzzy_agents(arrangement.team)
 
 
 def teach(
@@ -163,8 +163,8 @@ def check(spec: Spec) -> tuple[Measure, ...]:
             except ValueError as error:
                 raise SpecError(f"{error}{where}") from None
             except SystemExit as error:
-                said = f"the scenario or topology calls sys.exit({error.code})"
-                raise SpecError(f"{said}{where}") from None
+                problem = f"the scenario or topology calls sys.exit({error.code})"
+                raise SpecError(f"{problem}{where}") from None
     return joined(measures, conditions[0].columns)
 
 

@@ -21,7 +21,7 @@ from ...results.results import Results
 from ...results.statistics import Estimate, rate
 from ...results.summary import Summary, two_figures
 from ...results.verdicts import WIDTH
-from ...store.schema import ELSEWHERE
+from ...store.schema import EVALUATION
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..study import check_evaluated as check
@@ -33,7 +33,7 @@ PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
 TIMED = False
 """Trials are too short for their times to say anything."""
-AFTER_ONE = f"{ELSEWHERE}after one episode"
+AFTER_ONE = f"{EVALUATION}after one episode"
 """Phase of the evaluation after the first episode of training."""
 COLUMNS = 3
 """Panels of the figure that stand beside each other."""
@@ -51,7 +51,7 @@ def measure(trial: Trial) -> TrialResult:
     generator.state = state
     session.train(trial.episodes - 1, first=1)
     session.evaluate()
-    session.evaluate_elsewhere()
+    session.run_other_evaluations()
     return session.result()
 
 

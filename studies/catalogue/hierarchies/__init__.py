@@ -5,7 +5,7 @@ the same worlds, seed by seed. One measure was fixed beforehand: evaluation succ
 of robots and each choice of whose value decides, every hierarchy is compared with the chain (with
 the first hierarchy if there is no chain) by permutation of signs; p is adjusted by Holm's method
 over all of these comparisons. Few seeds cannot give a small p whatever the outcome: what they
-leave undecided is called so, and how many seeds it takes is said.
+leave undecided is called so, and how many seeds it takes is printed.
 
 A trial is measured as one of the scaling study, messages included: one for every edge of the
 hierarchy's transitive closure. Decisions to the goal are those of successful episodes alone: a
@@ -250,7 +250,7 @@ def _verdict_lines(verdicts: Sequence[Verdict]) -> Iterator[str]:
         yield f"{verdict.setting}: {count} found to differ"
         yield from (f"  {d.condition} differs by {d.shown}" for d in verdict.different)
         yield from _listed("no difference found", verdict.alike)
-        yield from _listed("cannot be told", verdict.undecided)
+        yield from _listed("undecided", verdict.undecided)
     yield from power_lines([d for verdict in verdicts for d in verdict.comparisons])
 
 

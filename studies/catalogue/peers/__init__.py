@@ -60,7 +60,7 @@ def measure(trial: Trial) -> TrialResult:
             session.evaluate(phase=f"{AFTER}{count}")
             generator.state = state
     session.evaluate()
-    session.evaluate_elsewhere()
+    session.run_other_evaluations()
     return session.result(usage=usage)
 
 

@@ -87,7 +87,7 @@ def measure(trial: Trial) -> TrialResult:
     if period is not None:
         numbers["period"] = float(period)
     session.evaluate()
-    session.evaluate_elsewhere()
+    session.run_other_evaluations()
     return session.result(numbers, {"decision_median": float(np.median(session.deciding))})
 
 
