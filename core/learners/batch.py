@@ -82,7 +82,7 @@ class Earlier(NamedTuple):
     """``(m,)`` index of the next after-state among them, `TERMINAL` or `CUT_OFF`."""
 
 
-class Replay(ABC):
+class ReplayLearner(ABC):
     """What the batch learners share: a memory of after-states, and the regression.
 
     Raises
@@ -204,13 +204,13 @@ class Replay(ABC):
             for row in range(len(self.theta))
         ]
 
-    def continue_from(self, former: Replay, rows: IntArray) -> None:
+    def continue_from(self, former: ReplayLearner, rows: IntArray) -> None:
         """Begin with weights and experience of another team, of which no episode is under way."""
         self.theta = former.theta[rows]
         self._earlier = [Earlier(former.states_of(row), *former._outcomes(row)) for row in rows]
 
 
-class BatchTD(Replay):
+class BatchTD(ReplayLearner):
     """Batch TD(lambda)."""
 
     def __init__(self, settings: BatchTDSettings, rules: RuleBase, rows: IntArray) -> None:

@@ -22,7 +22,7 @@ from ..errors import SpecError
 from ..presentation.words import count, duration
 from ..results.power import SMALLEST, USUAL_DEVIATION, detectable, seeds_for
 from ..results.verdicts import WIDTH, power_text
-from ..spec.outline import Outline
+from ..spec.outline import StudyOutline
 from ..spec.spec import Spec
 from ..trials.session import Session
 from ..trials.trial import Trial, trials_of
@@ -105,7 +105,7 @@ class Plan:
         What looks wrong and is not refused, a line each.
     """
 
-    outline: Outline
+    outline: StudyOutline
     trials: int
     processes: int
     seconds: tuple[float, float] | None
@@ -197,7 +197,7 @@ def plan(
     if timed:
         seconds, memory = _taken(made, trials, processes)
     return Plan(
-        Outline.of(made), len(trials), processes, seconds, memory, len(made.conditions()) - 1,
+        StudyOutline.of(made), len(trials), processes, seconds, memory, len(made.conditions()) - 1,
         deviation, smallest, made.warnings(),
     )  # fmt: skip
 

@@ -35,7 +35,7 @@ from ..results.power import SMALLEST, USUAL_DEVIATION
 from ..results.results import Results, read
 from ..results.selection import Where, chosen, together
 from ..results.verdicts import power_text
-from ..spec.outline import Outline, sources_of
+from ..spec.outline import StudyOutline, sources_of
 from ..store import durable
 from ..store.store import Store
 from ..workers.workers import Backend
@@ -71,7 +71,7 @@ class StudyResults:
         What must be said of the results, in lines.
     """
 
-    outline: Outline
+    outline: StudyOutline
     results: Results
     failed: tuple[tuple[str, int, str], ...] = ()
     remarks: tuple[str, ...] = ()
@@ -383,7 +383,7 @@ def _loaded(path: Path) -> StudyResults:
 
 
 def _of(store: Store) -> StudyResults:
-    outline = Outline.kept(store)
+    outline = StudyOutline.kept(store)
     return StudyResults(
         outline, read(store), tuple(store.failed()), (), sources_of(store), store.settings(),
         (store.directory,),

@@ -15,7 +15,7 @@ from ..presentation.tables import tabulate
 from ..presentation.words import count
 from ..results.contrasts import contrasts
 from ..results.results import Results, read
-from ..spec.outline import Outline, sources_of
+from ..spec.outline import StudyOutline, sources_of
 from ..spec.toml import dumps
 from ..store.schema import RESULTS_VERSION
 from ..store.store import Store
@@ -36,7 +36,7 @@ def page(directory: Path) -> str:
     """
     with Store.open(directory) as store:
         store.verify()
-        outline, results, counts = Outline.kept(store), read(store), store.counts()
+        outline, results, counts = StudyOutline.kept(store), read(store), store.counts()
         failed = [
             (condition, seed, words.without_places(error.rstrip()))
             for condition, seed, error in store.failed()

@@ -56,7 +56,7 @@ def measure(trial: Trial) -> TrialResult:
 
 
 @dataclass(frozen=True)
-class Case:
+class GameCase:
     """One condition.
 
     Attributes
@@ -85,7 +85,7 @@ def analyse(results: Results) -> Analysis:
         if results.has(condition, AFTER_ONE) and steps.shape[1] > 1:
             optimal[int(steps[0, 0])] = rate(results.success(condition, AFTER_ONE))
         optimal[int(steps[0].sum())] = rate(results.success(condition, "evaluation"))
-        cases.append(Case(str(columns.get("name", condition)), setting, optimal))
+        cases.append(GameCase(str(columns.get("name", condition)), setting, optimal))
         estimates = {titled(plays): estimate for plays, estimate in optimal.items()}
         table.append(Summary(condition, len(steps), estimates))
     return Analysis(tuple(table), tuple(_side_by_side(cases)), cases)
@@ -100,7 +100,7 @@ def titled(plays: int) -> str:
     return f"optimal, {plays:,} plays"
 
 
-def _side_by_side(cases: Sequence[Case]) -> Iterator[str]:
+def _side_by_side(cases: Sequence[GameCase]) -> Iterator[str]:
     """Yield the systems as columns, the settings as rows, for each number of plays."""
     systems = list(dict.fromkeys(case.system for case in cases))
     settings = list(dict.fromkeys(case.setting for case in cases))
