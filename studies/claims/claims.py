@@ -227,11 +227,11 @@ def judge(results: Mapping[str, Results]) -> tuple[Finding, ...]:
     """Decide every claim by the results of its study, by name."""
     findings = []
     for claim in CLAIMS:
-        measured = claim.compute(results.get(claim.study, NOTHING()))
-        if measured is None or not np.isfinite(measured.estimate.value):
+        measurement = claim.compute(results.get(claim.study, NOTHING()))
+        if measurement is None or not np.isfinite(measurement.estimate.value):
             findings.append(Finding(claim, None, "not decided"))
             continue
-        enough = measured.seeds == 0 or measured.seeds >= LEAST_SEEDS
-        verdict = claim.criterion.decide(measured) if enough else "not decided"
-        findings.append(Finding(claim, measured, verdict))
+        enough = measurement.seeds == 0 or measurement.seeds >= LEAST_SEEDS
+        verdict = claim.criterion.decide(measurement) if enough else "not decided"
+        findings.append(Finding(claim, measurement, verdict))
     return tuple(findings)
