@@ -15,6 +15,7 @@ from typing import Literal
 
 import numpy as np
 
+from ..presentation.cells import ends
 from ..results.results import NOTHING, Results
 from . import measures as measured
 from .measures import Measured
@@ -221,6 +222,21 @@ class Finding:
     claim: Claim
     measured: Measured | None
     verdict: Verdict
+
+    @property
+    def result(self) -> str:
+        """The value with its interval and number of seeds, as text."""
+        if self.measured is None:
+            return "no results"
+        value, low, high = ends(self.measured.estimate)
+        text = f"{value:.2f}" if self.measured.seeds else f"{value:.2g}"
+        if self.measured.seeds:
+            text += f" ({low:.2f} to {high:.2f}), {self.measured.seeds} seeds"
+        else:
+            text += ", computed"
+        if self.measured.p is not None:
+            text += f", p = {self.measured.p:.2g}"
+        return text + (f", {self.measured.note}" if self.measured.note else "")
 
 
 def judge(results: Mapping[str, Results]) -> tuple[Finding, ...]:

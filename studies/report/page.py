@@ -10,7 +10,6 @@ from markupsafe import Markup
 
 from ..catalogue.study import analysed, drawn, load_study
 from ..claims.claims import judge
-from ..claims.table import result
 from ..presentation.tables import tabulate
 from ..presentation.words import count
 from ..results.contrasts import contrasts
@@ -56,7 +55,7 @@ def page(directory: Path) -> str:
         notes=getattr(analysis, "notes", ()) or _compared(results),
         table=tabulate(analysis.table),
         claims=[
-            (finding.claim, result(finding), finding.verdict)
+            (finding.claim, finding.result, finding.verdict)
             for finding in judge({outline.study: results})
             if finding.claim.study == outline.study and finding.measured is not None
         ],

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from ...core.agents.loop import policy_seed
 from ...core.agents.rows import carried_rows
@@ -22,8 +22,10 @@ from ...core.plugins.settings import ScenarioSettings
 from ..errors import SpecError
 from ..spec.conditions import Condition, ConditionSettings
 from ..spec.curriculum import Stage
-from ..spec.spec import Spec
 from .measures import joined
+
+if TYPE_CHECKING:
+    from ..spec.spec import Spec
 
 Evaluations = Sequence[tuple[str, ScenarioSettings]]
 """Names and scenarios in which a trained team is evaluated beside its own."""
