@@ -130,9 +130,7 @@ def test_enumerate(base: RuleBase, rng: np.random.Generator, agent: int, average
 
 
 @pytest.mark.parametrize("discount", [0.95, 0.0])
-def test_td_update(
-    base: RuleBase, rng: np.random.Generator, discount: float
-) -> None:
+def test_td_update(base: RuleBase, rng: np.random.Generator, discount: float) -> None:
     theta, trace = rng.normal(size=(2, 3, base.n_rules))
     theta_expected, trace_expected, lengths = theta.copy(), trace.copy(), np.array([1.0, 2.0, 0.5])
     rewards = np.array([-0.3, 0.0, 0.7])
