@@ -106,3 +106,35 @@ def test_watching_ends_when_nothing_is_to_come(study) -> None:
     assert not is_going_on
     assert Console(width=60, record=True).render_lines(shown)
     assert curve([0.0] * 100) == "▁" * 24
+
+
+READING = ["results", "table", "compare", "status", "watch", "export", "report"]
+
+
+@pytest.mark.parametrize("command", READING)
+def test_a_database_of_another_study_is_noted_by_all_that_read_it(
+    study, command, tmp_path, capsys, monkeypatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "400")
+    own = tmp_path / "own"
+    shutil.copytree(study[0], own)
+    once = ["--once"] if command == "watch" else []
+    said_by(capsys, command, own, *once)
+    assert "is not the spec" not in " ".join(said_by(capsys, command, own, *once)[1:])
+    text = (own / "study.toml").read_text()
+    (own / "study.toml").write_text(text.replace("steps = 5", "steps = 6"))
+    said = " ".join(" ".join(said_by(capsys, command, own, *once)[1:]).split())
+    assert "study.toml: is not the spec of results.sqlite beside it, whose results these" in said
+    assert "steps = 6 here, 5 there" in said
+
+
+def test_a_copy_of_the_spec_that_means_the_same_is_not_noted(study, tmp_path, capsys) -> None:
+    own = tmp_path / "own"
+    shutil.copytree(study[0], own)
+    (own / "study.toml").write_text(
+        "# by hand\nseeds = [0, 1, 2]\nepisodes = 4\nsteps = 5\nevaluation = 2\n"
+        'sweep.preset = ["default", "frozen"]\n'
+    )
+    assert "is not the spec" not in " ".join(said_by(capsys, "status", own)[1:])
+    (own / "study.toml").unlink()
+    assert "is not the spec" not in " ".join(said_by(capsys, "status", own)[1:])
