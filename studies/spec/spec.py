@@ -151,6 +151,10 @@ class Spec(Settings):
                 return cls._of(table, sources)
         except RecursionError:
             raise SpecError("spec: is nested too deeply") from None
+        except SpecError:
+            raise
+        except ValueError as error:  # a number of more digits than Python writes
+            raise SpecError(f"spec: {error}") from None
 
     @classmethod
     def _of(cls, table: Mapping[str, Any], sources: Sources) -> Spec:
@@ -223,7 +227,7 @@ class Spec(Settings):
         """
         try:
             table = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
+        except ValueError as error:  # also of a number of too many digits
             raise SpecError(f"{source}: is not valid TOML: {error}") from None
         except RecursionError:
             raise SpecError(f"{source}: is nested too deeply") from None

@@ -1,7 +1,10 @@
 """Results are read and watched without running again: commands, with made-up results."""
 
+import os
 import shutil
 import sqlite3
+import subprocess
+import sys
 from contextlib import closing
 
 import made_up
@@ -138,3 +141,27 @@ def test_a_copy_of_the_spec_that_means_the_same_is_not_noted(study, tmp_path, ca
     assert "is not the spec" not in " ".join(said_by(capsys, "status", own)[1:])
     (own / "study.toml").unlink()
     assert "is not the spec" not in " ".join(said_by(capsys, "status", own)[1:])
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
+@pytest.mark.parametrize("command", ["table", "watch", "results", "compare"])
+def test_what_a_terminal_cannot_write_has_a_sign_in_its_place(study, command, encoding) -> None:
+    line = [sys.executable, "-c", MAIN, command, str(study[0])]
+    environment = os.environ | {"PYTHONIOENCODING": encoding}
+    done = subprocess.run(line, capture_output=True, check=False, env=environment)
+    assert (done.returncode, done.stderr) == (0, b"")
+    if command == "table":
+        assert ("0–" if encoding == "utf-8" else "0-") in done.stdout.decode(encoding)
+
+
+@pytest.mark.parametrize("command", ["table", "watch", "results"])
+def test_a_reader_that_goes_away_is_told_by_the_status(study, command) -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    line = [sys.executable, "-u", "-c", MAIN, command, str(study[0])]
+    done = subprocess.run(line, stdout=writing, stderr=subprocess.PIPE, check=False)
+    os.close(writing)
+    assert (done.returncode, done.stderr) == (141, b"")
+
+
+MAIN = "import sys; from nested_agents.studies.cli.main import main; sys.exit(main())"

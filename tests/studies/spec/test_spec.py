@@ -503,3 +503,22 @@ def test_no_key_is_proposed_that_the_kinds_of_the_spec_have_not(table) -> None:
         Spec.of(table)
     assert "did you mean 'scenario." not in str(refusal.value)
     assert "did you mean 'learner." not in str(refusal.value)
+
+
+HUGE = f"0x{'f' * 5000}"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        f"seeds = {'1' * 5000}",
+        f"seeds = {HUGE}",
+        f"seeds = [{HUGE}]",
+        f"episodes = {HUGE}",
+        f'sweep."scenario.robots" = [{HUGE}]',
+    ],
+)
+def test_numbers_of_thousands_of_digits_are_refused_in_one_line(text: str) -> None:
+    with pytest.raises(SpecError, match="digits|must be|e\\+6020") as refusal:
+        Spec.parse(text)
+    assert len(str(refusal.value)) < 300
