@@ -91,9 +91,9 @@ class CrossEntropy(Aggregation):
             plans = (draws >= ladder).sum(axis=3)
             if best is not None:
                 plans[0] = best
-            found = np.zeros(s.samples)
-            self._follow(deliberation.agent, prediction, plans, np.arange(s.samples), found)
-            elite = plans[np.argsort(-found, kind="stable")[:n_elite]]
+            returns = np.zeros(s.samples)
+            self._follow(deliberation.agent, prediction, plans, np.arange(s.samples), returns)
+            elite = plans[np.argsort(-returns, kind="stable")[:n_elite]]
             best = elite[0]
             seen = (elite[..., None] == np.arange(self.n_actions)).mean(axis=0)
             probabilities = s.smoothing / self.n_actions + (1.0 - s.smoothing) * seen
@@ -106,15 +106,15 @@ class CrossEntropy(Aggregation):
         prediction: Any,
         plans: IntArray,
         rows: IntArray,
-        found: FloatArray,
+        returns: FloatArray,
         step: int = 0,
     ) -> None:
-        """Add to `found` ``(samples,)`` what some rows of the plans are paid from a step on."""
+        """Add to `returns` ``(samples,)`` what some rows of the plans are paid from a step on."""
         tried, which = np.unique(plans[rows, step], axis=0, return_inverse=True)
         which = which.reshape(-1)
         self.count(agent, len(tried))
-        found[rows] += self.problem.discount**step * prediction.rewards(tried)[which]
+        returns[rows] += self.problem.discount**step * prediction.rewards(tried)[which]
         if step + 1 < self.settings.horizon:
             for k, joint_action in enumerate(tried):
                 onward = prediction.after(joint_action)
-                self._follow(agent, onward, plans, rows[which == k], found, step + 1)
+                self._follow(agent, onward, plans, rows[which == k], returns, step + 1)

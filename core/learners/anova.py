@@ -38,7 +38,7 @@ from ..numerics.arrays import FloatArray, IntArray
 from ..plugins.settings import Fraction
 from ..rules.kernels import regression
 from ..rules.rule_base import RuleBase
-from .batch import REWARD_SCALE, Replay, ReplaySettings
+from .batch import REWARD_SCALE, ReplayLearner, ReplaySettings
 from .dictionary import Dictionary
 
 MOST_RULES = 5**9
@@ -60,7 +60,7 @@ class AnovaTDSettings(ReplaySettings):
     """After-states that all others are described by, at most."""
 
 
-class AnovaTD(Replay):
+class AnovaTD(ReplayLearner):
     """Batch TD(lambda) of one product of all variables.
 
     Raises
@@ -147,7 +147,7 @@ class AnovaTD(Replay):
         self._coefficients = arrays["coefficients"].copy()
         self._dictionaries, self._described = self._empty(), 0
 
-    def continue_from(self, former: Replay, rows: IntArray) -> None:
+    def continue_from(self, former: ReplayLearner, rows: IntArray) -> None:
         """Begin with weights and experience of another team, of which no episode is under way."""
         super().continue_from(former, rows)
         assert isinstance(former, AnovaTD)

@@ -51,7 +51,7 @@ class DeepQ(Peer):
         )  # fmt: skip
         prepare(model, self._inputs.n_joint, Discrete(self._n_actions), 1, self.rng)
         self._model, self._decisions = model, 0
-        self._q = Layers([model.q_net], lambda found: np.maximum(found, 0.0))
+        self._q = Layers([model.q_net], lambda sums: np.maximum(sums, 0.0))
         self._rewards = RewardScale(settings.discount, 1)
 
     @property

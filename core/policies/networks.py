@@ -40,10 +40,10 @@ class Layers:
     def __call__(self, inputs: FloatArray) -> FloatArray:
         """Return the outputs ``(m, k)`` for inputs ``(m, d)``."""
         *hidden, (weights, biases) = self._layers
-        found = inputs[:, : len(self._layers[0][0])]
+        outputs = inputs[:, : len(self._layers[0][0])]
         for into, shift in hidden:
-            found = self._activation(found @ into + shift)
-        return found @ weights + biases
+            outputs = self._activation(outputs @ into + shift)
+        return outputs @ weights + biases
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""The schedule of failures: what an actuator does instead of what it is told, and when.
+"""The schedule of failures: what an actuator does instead of its command, and when.
 
 Of several failures of an actuator delays act first, then the others in the order of the spec, each
 on what the one before it holds, see `FailureSettings.held`. A world without failures never comes
@@ -28,7 +28,7 @@ class Failures:
         Names of the ``n`` actuators.
     limits
         ``(n,)`` greatest speed of every actuator, in units of its speed.
-    said
+    key
         What the failures are called in complaints.
 
     Raises
@@ -55,16 +55,14 @@ class Failures:
         settings: Sequence[FailureSettings],
         agents: Sequence[str],
         limits: FloatArray,
-        said: str = "scenario.failures",
+        key: str = "scenario.failures",
     ) -> None:
         self._settings = tuple(settings)
         self._delays_first = sorted(
             range(len(settings)), key=lambda i: not isinstance(settings[i], Delayed)
         )
         self._limits = limits
-        self._masks = [
-            _named(f"{said}[{i}]", failure, agents) for i, failure in enumerate(settings)
-        ]
+        self._masks = [_named(f"{key}[{i}]", failure, agents) for i, failure in enumerate(settings)]
         delays = [f.periods for f in settings if isinstance(f, Delayed)]
         self._memory = max(delays, default=0)
         self.begin(0, 0)
@@ -103,16 +101,16 @@ class Failures:
             Control periods; they are remembered as past.
         """
         speeds = np.tile(commands, (periods, 1))
-        told = np.vstack([self._commands, speeds])
+        remembered = np.vstack([self._commands, speeds])
         for i in self._active:
             mask, failure = self._masks[i], self._settings[i]
             if isinstance(failure, Delayed):
                 first = self._memory - failure.periods
-                speeds[:, mask] = told[first : first + periods, mask]
+                speeds[:, mask] = remembered[first : first + periods, mask]
             else:
                 limits, stream = self._limits[mask], self._streams[i]
                 speeds[:, mask] = failure.held(speeds[:, mask], limits, stream)
-        self._commands = told[len(told) - self._memory :]
+        self._commands = remembered[len(remembered) - self._memory :]
         return speeds
 
     def active(self) -> Iterator[tuple[Any, BoolArray]]:
@@ -135,7 +133,7 @@ def _lasts(failure: FailureSettings, now: tuple[int, int]) -> bool:
     return now >= (failure.episode, failure.step) and not over
 
 
-def _named(said: str, failure: FailureSettings, agents: Sequence[str]) -> BoolArray:
+def _named(key: str, failure: FailureSettings, agents: Sequence[str]) -> BoolArray:
     """Return the mask ``(n,)`` of what a failure names."""
     mask = np.zeros(len(agents), dtype=bool)
     for name in failure.names:
@@ -144,7 +142,7 @@ def _named(said: str, failure: FailureSettings, agents: Sequence[str]) -> BoolAr
             shown = ", ".join(agents[:8]) + (", ..." if len(agents) > 8 else "")
             head, dot, _ = agents[0].rpartition(".")
             raise ValueError(
-                f"{said}.{failure.part} = {name!r}: no such "
+                f"{key}.{failure.part} = {name!r}: no such "
                 f"{failure.part.removesuffix('s')}, allowed {shown} or a pattern such as "
                 f"{head}{dot}*"
             )

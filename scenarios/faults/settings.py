@@ -68,7 +68,7 @@ class FailureSettings(Settings):
         Parameters
         ----------
         commands
-            ``(periods, k)`` speeds that they are told.
+            ``(periods, k)`` commanded speeds.
         limits
             ``(k,)`` their greatest speeds.
         rng

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..presentation.words import count, duration
-from ..spec.outline import Outline, other_spec
+from ..spec.outline import StudyOutline, other_spec
 from ..store.store import Store
 from ..workers.progress import Progress
 
@@ -20,7 +20,7 @@ def describe(store: Store, now: Progress) -> Iterator[str]:
     now
         How far its study is.
     """
-    outline = Outline.kept(store)
+    outline = StudyOutline.kept(store)
     extent = f"{count(len(outline.columns), 'condition')} x {count(len(outline.seeds), 'seed')}"
     yield f"study    {outline.study}: {extent}"
     yield f"done     {now.done} of {now.total} trials"

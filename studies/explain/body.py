@@ -77,7 +77,7 @@ def verdicts(bodies: Bodies, actuators: Sequence[str]) -> Iterator[str]:
     """Yield, for every actuator whose drive is not what it was built with, what it is taken for.
 
     Its drive is the part of its effect that is along the one it was built with; a change within
-    two of its standard deviations is said to be uncertain.
+    two of its standard deviations is called uncertain.
     """
     built, last = bodies.moments["built"], bodies.moments["after"]
     for r, names in enumerate(by_body(bodies, actuators)):

@@ -34,7 +34,7 @@ class Group:
     Attributes
     ----------
     setting
-        What they have in common, as a label; empty if nothing is told.
+        What they have in common, as a label; empty if there is nothing in common.
     reference
         The label of the one that the others are compared with.
     differences
@@ -89,12 +89,12 @@ class Contrasts:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """The verdicts, and what the comparisons could have found."""
+        """The verdicts, and what the comparisons could have detected."""
         return tuple(self._notes())
 
     def _notes(self) -> Iterator[str]:
-        found = self.differences
-        if not found:
+        differences = self.differences
+        if not differences:
             yield "Nothing to compare: no two conditions share two seeds."
             return
         words = {"higher": WORDS, "lower": WORDS[::-1]}.get(
@@ -106,9 +106,9 @@ class Contrasts:
                 text = f"{where}{self.title}, less that of {group.reference}:"
                 yield from wrap(text, WIDTH, break_on_hyphens=False)
                 yield from verdict_lines(group.differences, words)
-        counted = f"{len(found)} comparison{'s' * (len(found) > 1)}"
+        counted = f"{len(differences)} comparison{'s' * (len(differences) > 1)}"
         yield f"p: permutation of signs over seeds, adjusted over {counted} (Holm)."
-        yield from power_lines(found, of_rates=self.measure.is_rate)
+        yield from power_lines(differences, of_rates=self.measure.is_rate)
 
 
 def contrasts(
@@ -127,7 +127,7 @@ def contrasts(
     measure
         A measure of episodes, ``steps``, ``return``, or a number of whole trials, by name.
     phase
-        Which episodes: ``evaluation`` unless said otherwise, or where there is none, ``training``.
+        Which episodes: by default ``evaluation``, or where there is none, ``training``.
     by
         A swept key, or the last part of it: conditions that agree in all others are compared, each
         with that of the first value. None: all conditions with the first one.
@@ -196,12 +196,12 @@ def _groups(
     key = next((k for k in keys if by in (k, k.rpartition(".")[2])), None)
     if key is None:
         raise SpecError(f"by = {by!r}: {closest(by, keys)}")
-    found: dict[str, Members] = {}
+    groups: dict[str, Members] = {}
     for c in conditions:
         level = _level(key, columns[c][key])
         rest = ", ".join(_level(k, v) for k, v in columns[c].items() if k != key and v != "")
-        found.setdefault(rest, []).append((level, c))
-    return [(setting, _led(members, reference, "reference")) for setting, members in found.items()]
+        groups.setdefault(rest, []).append((level, c))
+    return [(setting, _led(members, reference, "reference")) for setting, members in groups.items()]
 
 
 def _level(key: str, value: object) -> str:

@@ -88,8 +88,8 @@ class Where:
         SpecError
             If the text names what the trial has not, or compares what cannot be compared.
         """
-        told = {key: value for key, value in columns.items() if value != ""}
-        known = {"condition": condition, "seed": seed, **dict(flat(settings)), **told}
+        filled = {key: value for key, value in columns.items() if value != ""}
+        known = {"condition": condition, "seed": seed, **dict(flat(settings)), **filled}
         return bool(self._value(self._tree, known))
 
     def _value(self, node: ast.expr, known: Mapping[str, Any]) -> bool:
@@ -101,13 +101,13 @@ class Where:
         if not isinstance(node, ast.Compare) or len(node.ops) > 1:
             raise self._refusal(node, "is no comparison, such as robots == 8")
         key = ast.unparse(node.left)
-        own, other = self._found(key, known), self._constant(node.comparators[0])
+        own, other = self._look_up(key, known), self._constant(node.comparators[0])
         try:
             return COMPARISONS[type(node.ops[0])](own, other)
         except (KeyError, TypeError):
             raise self._refusal(node, f"{key} is {own!r}, which cannot be compared so") from None
 
-    def _found(self, key: str, known: Mapping[str, Any]) -> Any:
+    def _look_up(self, key: str, known: Mapping[str, Any]) -> Any:
         if key in known:
             return _plain(known[key])
         ends = {name: _plain(value) for name, value in known.items() if name.endswith(f".{key}")}

@@ -124,9 +124,9 @@ class Condition:
     @property
     def tables(self) -> list[Any]:
         """Its settings and those of its evaluations and stages, as tables."""
-        elsewhere = [scenario.model_dump(mode="json") for _, scenario in self.evaluations]
+        others = [scenario.model_dump(mode="json") for _, scenario in self.evaluations]
         stages = [stage.table() for stage in self.curriculum]
-        return [self.settings.model_dump(mode="json"), *elsewhere, *stages]
+        return [self.settings.model_dump(mode="json"), *others, *stages]
 
 
 def layer_of(settings: Settings) -> TomlTable:
@@ -197,12 +197,12 @@ def grid(
         labels.add(name)
         columns: dict[str, Any] = {"name": override.name} if override else {}
         columns |= {key: scalar(point[key]) if key in point else "" for key in keys}
-        elsewhere = tuple(
+        others = tuple(
             (other, _beside(settings, changes, f" (evaluation {other!r}){where}"))
             for other, changes in (evaluations or {}).items()
         )
         columns = columns or {"preset": preset}
-        conditions.append(Condition(name, columns, settings, elsewhere, stages))
+        conditions.append(Condition(name, columns, settings, others, stages))
     return tuple(conditions)
 
 

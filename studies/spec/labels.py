@@ -48,8 +48,8 @@ def label_but(columns: Mapping[str, Any], keys: Collection[str]) -> str:
 def _brief(value: object) -> str:
     """Return a value for a label.
 
-    A table is called by its name; a long one without is told from others by a checksum, as is a
-    list that is cut.
+    A table is called by its name; a long one without is distinguished by a checksum, as is
+    a list that is cut.
 
     Examples
     --------

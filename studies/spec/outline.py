@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Outline:
+class StudyOutline:
     """A spec as plain words and numbers.
 
     Attributes
@@ -49,12 +49,12 @@ class Outline:
         return lengths(([s["episodes"] for s in stages] for stages in curricula), self.episodes)
 
     @classmethod
-    def of(cls, spec: Spec) -> Outline:
+    def of(cls, spec: Spec) -> StudyOutline:
         """Return the outline of a spec."""
         return cls.noted(spec.table(), {c.label: c.columns for c in spec.conditions()})
 
     @classmethod
-    def kept(cls, store: Reading) -> Outline:
+    def kept(cls, store: Reading) -> StudyOutline:
         """Return the outline of a kept study, as it was noted; nothing is run for it.
 
         Raises
@@ -70,7 +70,9 @@ class Outline:
             ) from None
 
     @classmethod
-    def noted(cls, table: Mapping[str, Any], columns: Mapping[str, Mapping[str, Any]]) -> Outline:
+    def noted(
+        cls, table: Mapping[str, Any], columns: Mapping[str, Mapping[str, Any]]
+    ) -> StudyOutline:
         """Return the outline that `Spec.table` and the columns of its conditions tell.
 
         Raises
@@ -138,5 +140,5 @@ def lengths(curricula: Iterable[Sequence[int]], episodes: int) -> str:
     >>> lengths([[10, 6], [10, 6]], 8), lengths([[10, 6], []], 8), lengths([[]], 1)
     ('10 + 6 + 8 episodes', '10 + 6 + 8 or 8 episodes', '1 episode')
     """
-    told = dict.fromkeys(" + ".join(map(str, [*stages, episodes])) for stages in curricula)
-    return f"{' or '.join(told)} episode{'' if list(told) == ['1'] else 's'}"
+    sums = dict.fromkeys(" + ".join(map(str, [*stages, episodes])) for stages in curricula)
+    return f"{' or '.join(sums)} episode{'' if list(sums) == ['1'] else 's'}"

@@ -35,11 +35,11 @@ def explain(
     below
         Model and table of all that a misplaced key may belong to; none: `model` and `data`.
     """
-    found = [(place(e["loc"], data), e) for e in error.errors(include_url=False)]
+    problems = [(place(e["loc"], data), e) for e in error.errors(include_url=False)]
     # Where a name or a table may stand and a table does, what is wrong is in the table.
-    start = found[0][0]
-    inside = [f for f in found if len(f[0]) > len(start) and f[0][: len(start)] == start]
-    (keys, first) = (inside or found)[0]
+    start = problems[0][0]
+    inside = [f for f in problems if len(f[0]) > len(start) and f[0][: len(start)] == start]
+    (keys, first) = (inside or problems)[0]
     path = dotted(keys) or "spec"
     if first["type"] == "extra_forbidden":
         owner = _owner(keys[:-1], model, data)
@@ -62,7 +62,7 @@ def explain(
         kinds = [kind_of(m) for m in models_of(getattr(slot, "annotation", slot))]
         return f"{path} = {show(value)}: {closest(value, [k for k in kinds if k])}"
     # The members of a union complain one by one about the same place: say what any would take.
-    rules = dict.fromkeys(rule(e["msg"]) for there, e in found if there == keys)
+    rules = dict.fromkeys(rule(e["msg"]) for there, e in problems if there == keys)
     owner = _owner(keys[:-1], model, data) if keys else None
     other = mistaken(keys[-1], owner.model_fields) if owner is not None else ""
     return f"{path} = {show(value)}: {', or '.join(rules)}{other}"
@@ -83,8 +83,8 @@ def misplaced(path: str, model: type[BaseModel], data: Mapping[str, Any]) -> str
     """
     key = path.rpartition(".")[2]
     places = (name for name in _places(key, model, data) if not f".{path}".endswith(f".{name}"))
-    found = dict.fromkeys(places)
-    return f"did you mean {' or '.join(map(repr, found))}?" if found and key != "kind" else ""
+    matches = dict.fromkeys(places)
+    return f"did you mean {' or '.join(map(repr, matches))}?" if matches and key != "kind" else ""
 
 
 def _places(key: str, model: type[BaseModel], data: object, name: str = "") -> Iterator[str]:
@@ -105,7 +105,7 @@ def _places(key: str, model: type[BaseModel], data: object, name: str = "") -> I
 
 
 def _slot(keys: Sequence[int | str], model: type[BaseModel], data: Any) -> Slot:
-    """Return what the value at `keys` is meant for."""
+    """Return the model or field that the value at `keys` is for."""
     slot: Slot = model
     for key in keys:
         if isinstance(key, int):  # an item of a list is one of the models that the list may hold

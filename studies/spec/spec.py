@@ -72,11 +72,11 @@ class Spec(Settings):
     evaluation: Annotated[int, Field(ge=0, le=1_000_000)] = 10
     """Episodes after training in which nothing is explored and nothing learned."""
     evaluation_steps: Length | None = None
-    """Most decisions in an episode of evaluation; as in training unless it is said."""
+    """Most decisions in an episode of evaluation; as in training by default."""
     scenario: Mapping[str, Any] = Field(default_factory=dict)
     """Laid over the preset's scenario."""
     agents: Agents | None = None
-    """What there is one agent for: each actuator (unless said otherwise), each body, the team."""
+    """What there is one agent for: each actuator (the default), each body, the team."""
     topology: Mapping[str, Any] = Field(default_factory=dict)
     """Laid over the preset's topology; may be written as a string."""
     learner: Mapping[str, Any] = Field(default_factory=dict)

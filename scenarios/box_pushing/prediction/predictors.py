@@ -42,7 +42,7 @@ def push_model(
     box: BoxSpec,
     belief: BeliefSettings = BeliefSettings(),  # noqa: B008 - frozen
 ) -> PushModel:
-    """Return what a predictor believes of robots and box, the constants being off as told."""
+    """Return what a predictor believes of robots and box, with the given errors of constants."""
     model = PushModel(
         edges=box.outline.edges,
         rounding=box.outline.rounding,

@@ -87,12 +87,12 @@ def measure(trial: Trial) -> TrialResult:
     if period is not None:
         numbers["period"] = float(period)
     session.evaluate()
-    session.evaluate_elsewhere()
+    session.run_other_evaluations()
     return session.result(numbers, {"decision_median": float(np.median(session.deciding))})
 
 
 @dataclass(frozen=True)
-class Case:
+class RelatedCase:
     """One condition.
 
     Attributes
@@ -124,7 +124,7 @@ def analyse(results: Results) -> Analysis:
         values = evaluated(results, condition)
         values |= {title: bootstrap(cost, bounds=NOT_NEGATIVE) for title, cost in costs.items()}
         columns = results.columns.get(condition, {})
-        cases.append(Case(str(columns.get("name", condition)), _world(columns), values))
+        cases.append(RelatedCase(str(columns.get("name", condition)), _world(columns), values))
         table.append(Summary(condition, len(steps), values))
     return Analysis(tuple(table), NOTES, cases)
 

@@ -87,7 +87,7 @@ def measure(trial: Trial) -> TrialResult:
         numbers["period_s"] = period
     contact = ContactShares()
     session.evaluate(contact)
-    session.evaluate_elsewhere()
+    session.run_other_evaluations()
     shares = contact.shares
     if len(shares):
         numbers["least_touching"] = float(shares.min(axis=1).mean())

@@ -44,7 +44,7 @@ def measure(trial: Trial) -> TrialResult:
     session.train(trial.episodes)
     contacts = {name: ContactShares() for name in (TRAINED, *dict(trial.evaluations))}
     session.evaluate(contacts[TRAINED])
-    session.evaluate_elsewhere(contacts)
+    session.run_other_evaluations(contacts)
     numbers = {
         f"touching.{name}.robot{r + 1}": float(share)
         for name, contact in contacts.items()

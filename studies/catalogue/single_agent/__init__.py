@@ -64,7 +64,7 @@ def measure(trial: Trial) -> TrialResult:
         "rule_evaluations": evaluations / steps,
     }
     session.evaluate()
-    session.evaluate_elsewhere()
+    session.run_other_evaluations()
     return session.result(numbers)
 
 

@@ -77,7 +77,7 @@ def measure(trial: Trial) -> TrialResult:
     session.train(trial.episodes - onset, onset)
     session.train(trial.episodes - onset, onset, phase=KEPT, team=kept)
     session.evaluate()
-    session.evaluate_elsewhere()
+    session.run_other_evaluations()
     begun = sorted({f.episode for f in getattr(trial.settings.scenario, "failures", ())} - {onset})
     later = {f"onset.{k}": float(episode) for k, episode in enumerate(begun, 2)}
     return session.result({"onset": float(onset), **later})

@@ -14,11 +14,9 @@ from .. import options
 @click.option(
     "--condition",
     metavar="LABEL",
-    help="Label of the condition; the first one unless said otherwise.",
+    help="Label of the condition; by default the first one.",
 )
-@click.option(
-    "--seed", type=int, metavar="SEED", help="The seed; the first one unless said otherwise."
-)
+@click.option("--seed", type=int, metavar="SEED", help="The seed; by default the first one.")
 @options.trust
 def command(directory: Path, condition: str | None, seed: int | None, trust: bool) -> int:
     """Explain a trained team: its rules in words, its policy, its self-model.

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     "--out",
     type=options.PATH,
     metavar="PATH",
-    help="Folder of the files; export in the study's own unless said otherwise.",
+    help="Folder of the files; by default export in the study's own.",
 )
 @click.option("--overwrite", is_flag=True, help="Replace files that are there.")
 def command(directory: Path, form: Form, out: Path | None, overwrite: bool) -> int:

@@ -104,7 +104,7 @@ def test_equal_seeds_give_equal_bits(kind: str) -> None:
     session.train(1, 2)
     before = np.random.get_state()[1].copy()  # noqa: NPY002
     session.evaluate()
-    session.evaluate_elsewhere()
+    session.run_other_evaluations()
     assert session.result().rows == first.rows
     assert (np.random.get_state()[1] == before).all()  # noqa: NPY002
     assert all(np.isfinite(array).all() for array in session.team.arrays().values())
