@@ -24,6 +24,8 @@ from .learner import LearnerSettings
 
 REWARD_SCALE = 100.0
 """Rewards are of the order of 0.01; the ridge weighs against rewards times this."""
+MOST_RULES = 4096
+"""Of one agent: more make normal equations that take too long to be solved densely."""
 
 TERMINAL, CUT_OFF = -1, -2
 """In place of the index of the next after-state: it is entered for ever; it is not known."""
@@ -91,14 +93,11 @@ class ReplayLearner(ABC):
         If the rule base is too large for its normal equations to be solved densely.
     """
 
-    largest = 4096
-    remedy = "lower learner.rule_base.order"
-
     def __init__(self, settings: ReplaySettings, rules: RuleBase, rows: IntArray) -> None:
-        if rules.n_rules > self.largest:
+        if rules.n_rules > MOST_RULES:
             raise ValueError(
                 f"learner.kind: batch learners solve for all rules at once: {rules.n_rules} rules, "
-                f"allowed up to {self.largest}; {self.remedy}"
+                f"allowed up to {MOST_RULES}; lower learner.rule_base.order"
             )
         self.settings, self.rules = settings, rules
         self.members = [np.flatnonzero(rows == row) for row in range(int(rows.max()) + 1)]

@@ -150,12 +150,15 @@ class Sources:
                 if kept.exists():
                     path, self._brought[name] = kept, str(study)
                     break
+        if path.exists() and not path.is_file():
+            raise ValueError(f"{name}: is no file")
         try:
-            content = path.read_bytes()
+            with path.open("rb") as file:
+                content = file.read(MOST_BYTES + 1)
         except OSError as error:
             raise ValueError(f"{name}: {error.strerror or error}") from None
         if len(content) > MOST_BYTES:
-            raise ValueError(f"{name}: {len(content)} bytes, allowed: {MOST_BYTES} or fewer")
+            raise ValueError(f"{name}: is larger than allowed, {MOST_BYTES} bytes")
         try:
             text = content.decode("utf-8-sig").replace("\r\n", "\n")
         except UnicodeDecodeError:
@@ -311,7 +314,15 @@ def format_error(error: BaseException) -> str:
     >>> format_error(ValueError("two\nlines"))
     'ValueError: two lines'
     """
-    return f"{type(error).__name__}: {' '.join(str(error).split())}"
+    return f"{type(error).__name__}: {message(error)}"
+
+
+def message(error: BaseException) -> str:
+    """Return the words of an exception in one line; none if it cannot even say them."""
+    try:
+        return " ".join(str(error).split())
+    except Exception:
+        return ""
 
 
 def _sha256(text: str) -> str:

@@ -35,7 +35,7 @@ from ..results.power import SMALLEST, USUAL_DEVIATION
 from ..results.results import Results, read
 from ..results.selection import Where, chosen, together
 from ..results.verdicts import power_text
-from ..spec.outline import StudyOutline, sources_of
+from ..spec.outline import StudyOutline, other_spec, sources_of
 from ..store import durable
 from ..store.store import Store
 from ..workers.workers import Backend
@@ -383,8 +383,8 @@ def _loaded(path: Path) -> StudyResults:
 
 
 def _of(store: Store) -> StudyResults:
-    outline = StudyOutline.kept(store)
+    outline, remark = StudyOutline.kept(store), other_spec(store)
     return StudyResults(
-        outline, read(store), tuple(store.failed()), (), sources_of(store), store.settings(),
-        (store.directory,),
+        outline, read(store), tuple(store.failed()), (remark,) if remark else (),
+        sources_of(store), store.settings(), (store.directory,),
     )  # fmt: skip

@@ -7,6 +7,7 @@ module of that name in `commands`, which offers a click command called ``command
 
 from __future__ import annotations
 
+import codecs
 import os
 import sys
 import warnings
@@ -84,6 +85,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     # SVG files keep names as text, in any script; PNG files have boxes for what the font lacks.
     warnings.filterwarnings("ignore", message=r"Glyph .* missing from font")
+    for stream in (sys.stdout, sys.stderr):
+        if getattr(stream, "errors", None) == "strict":
+            stream.reconfigure(errors=PLAIN)  # type: ignore[union-attr]
     return run_to_status(PROGRAM, lambda: _run(arguments or ["--help"]))
 
 
@@ -119,7 +123,21 @@ def _run(arguments: list[str]) -> int:
         command = error.ctx.command_path if error.ctx else f"{PROGRAM} {arguments[0]}"
         raise SpecError(f"{error.format_message().rstrip('.')}; see {command} --help") from None
     except SystemExit as error:
+        if isinstance(error.__context__, BrokenPipeError):  # a table of rich ends the program so
+            raise error.__context__ from None
         # No command of ours does: it is code of a file of the user.
         raise SpecError(
             f"code of a file that the spec names calls sys.exit({error.code})"
         ) from None
+
+
+def _plain(error: UnicodeError) -> tuple[str, int]:
+    """Return what stands for characters that a terminal has not, such as dashes."""
+    assert isinstance(error, UnicodeEncodeError)
+    signs = error.object[error.start : error.end]
+    return "".join("-" if sign in "–—−" else "?" for sign in signs), error.end
+
+
+PLAIN = "nested-agents-plain"
+"""Name of the way in which text is written where it cannot be encoded."""
+codecs.register_error(PLAIN, _plain)

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import json
+import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ...core.plugins.sources import Sources
-from ..errors import SpecError
-from ..store.database import DATABASE
+from ..errors import SpecError, show
+from ..store.database import DATABASE, SPEC_FILE
 
 if TYPE_CHECKING:
     from ..store.reading import Reading
@@ -94,6 +96,33 @@ class StudyOutline:
 def sources_of(store: Reading) -> Sources:
     """Return the files of users that a kept study names, as they were when it began."""
     return Sources(None, store.sources(), brought_by=str(store.directory))
+
+
+def other_spec(store: Reading) -> str | None:
+    """Return how the copy of the spec beside a database differs from it, in one line.
+
+    One of the two may have come from another study. None if they mean the same, or there is no
+    copy. Files of users are run only if they are trusted, and if the copy is written otherwise.
+    """
+    path, own = store.directory / SPEC_FILE, store.spec()
+    if not path.exists():
+        return None
+    try:
+        copy = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        if copy != own:
+            from .spec import Spec
+
+            copy = json.loads(json.dumps(Spec.of(copy, sources_of(store)).table()))
+    except (OSError, ValueError, RecursionError) as error:
+        return f"{path}: is not the spec of {DATABASE} beside it: {error}"
+    for key in sorted(own.keys() | copy.keys()):
+        here, there = copy.get(key, "absent"), own.get(key, "absent")
+        if here != there:
+            return (
+                f"{path}: is not the spec of {DATABASE} beside it, whose results these are: "
+                f"{key} = {show(here)} here, {show(there)} there"
+            )
+    return None
 
 
 def lengths(curricula: Iterable[Sequence[int]], episodes: int) -> str:

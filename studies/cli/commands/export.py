@@ -36,9 +36,9 @@ def command(directory: Path, form: Form, out: Path | None, overwrite: bool) -> i
     to be published with a paper; `nested-agents table` reads it.
     """
     from ...api.export import export
-    from ...store.store import Store
+    from ..loading import opened
 
-    with Store.open(directory) as store:
+    with opened(directory) as store:
         folder = directory / "export" if out is None else out
         for path in export(store, folder, form, overwrite=overwrite):
             print(path)
