@@ -25,7 +25,6 @@ LEARNERS = SettingsRegistry(
         "ppo": f"{PEERS}:PPOSettings",
         "ippo": f"{PEERS}:IPPOSettings",
         "mappo": f"{PEERS}:MAPPOSettings",
-        "dqn": f"{PEERS}:DQNSettings",
     },
     LearnerSettings,
     TeamSettings,

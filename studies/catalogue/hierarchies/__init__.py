@@ -287,8 +287,6 @@ def draw(analysis: Analysis) -> dict[str, Figure]:
     from ...presentation import by_robots, figures  # matplotlib takes its time
 
     cases = analysis.cases
-    if not cases:
-        return {}
     hierarchies = list(dict.fromkeys(case.hierarchy for case in cases))
     whose = list(dict.fromkeys(case.value_of for case in cases))
     size = (max(5.6, 0.6 + 2.8 * len(whose)), 5.2)

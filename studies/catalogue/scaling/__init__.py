@@ -301,8 +301,6 @@ def draw(analysis: Analysis) -> dict[str, Figure]:
     from ...presentation import by_robots, figures  # matplotlib takes its time
 
     points = analysis.cases
-    if not points:
-        return {}
     evaluators = list(dict.fromkeys(p.evaluator for p in points))
     figure, panels = figures.panels(2, 3, (8.4, 5.2), sharex=True)
     for axes, (name, title, logarithmic) in zip(panels.flat, PANELS, strict=False):

@@ -16,6 +16,7 @@ from nested_agents.studies.catalogue.hierarchies import (
     seeds_needed,
     verdicts_of,
 )
+from nested_agents.studies.catalogue.study import drawn
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.presentation.tables import tabulate
@@ -141,7 +142,7 @@ def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
         assert len(figure.axes) == 2 * columns
     paths = save({"hierarchies": figure}, tmp_path)
     assert all(path.stat().st_size > 0 for path in paths)
-    assert draw(analyse(NOTHING)) == {}
+    assert drawn(module, analyse(NOTHING)) == {}
 
 
 @pytest.mark.parametrize(
