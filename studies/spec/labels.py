@@ -42,7 +42,7 @@ def aliases(condition: str, columns: Mapping[str, Any]) -> set[str]:
     ['8', 'robots=8', 'scenario.robots=8']
     """
     own = {key: str(value) for key, value in columns.items() if value != ""}
-    spelt = [own.values()]
+    spelt = [list(own.values())]
     for keys in (own, [key.rpartition(".")[2] for key in own]):
         spelt.append([f"{key}={value}" for key, value in zip(keys, own.values(), strict=True)])
     return {condition, *map(", ".join, spelt)}
