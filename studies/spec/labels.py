@@ -33,6 +33,21 @@ def label(point: Mapping[str, Any], name: str = "") -> str:
     return ", ".join(parts)
 
 
+def aliases(condition: str, columns: Mapping[str, Any]) -> set[str]:
+    """Return all that a condition may be called by: its label, its columns with and without keys.
+
+    Examples
+    --------
+    >>> sorted(aliases("8", {"scenario.robots": 8, "topology": ""}))
+    ['8', 'robots=8', 'scenario.robots=8']
+    """
+    own = {key: str(value) for key, value in columns.items() if value != ""}
+    spelt = [list(own.values())]
+    for keys in (own, [key.rpartition(".")[2] for key in own]):
+        spelt.append([f"{key}={value}" for key, value in zip(keys, own.values(), strict=True)])
+    return {condition, *map(", ".join, spelt)}
+
+
 def label_but(columns: Mapping[str, Any], keys: Collection[str]) -> str:
     """Return the label that a condition of these columns would have without some swept keys.
 

@@ -44,7 +44,7 @@ VALUE_OF = "learner.decision.value_of"
 """What is swept to vary whose value decides."""
 REFERENCE = "chain"
 """The hierarchy that others are compared with, if it is there."""
-DECIDING, MESSAGES = "decide [ms]", "messages"
+DECIDING, MESSAGES = "decision [ms]", "messages"
 """Titles of what a decision costs."""
 UNBROKEN = "\N{NO-BREAK SPACE}"
 
