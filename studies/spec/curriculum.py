@@ -7,7 +7,7 @@ otherwise.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from typing import Annotated, Any, NamedTuple
 
 from pydantic import AfterValidator, Field
@@ -59,22 +59,3 @@ class Stage(NamedTuple):
     def table(self) -> dict[str, Any]:
         """Return it as a table, fit for JSON."""
         return {**self._asdict(), "scenario": self.scenario.model_dump(mode="json")}
-
-
-def lengths(curricula: Iterable[Sequence[int]], episodes: int) -> str:
-    """Return in words the episodes of training, stage by stage, that there are.
-
-    Parameters
-    ----------
-    curricula
-        Of every condition, the episodes of its stages.
-    episodes
-        Those after them.
-
-    Examples
-    --------
-    >>> lengths([[10, 6], [10, 6]], 8), lengths([[10, 6], []], 8), lengths([[]], 1)
-    ('10 + 6 + 8 episodes', '10 + 6 + 8 or 8 episodes', '1 episode')
-    """
-    sums = dict.fromkeys(" + ".join(map(str, [*stages, episodes])) for stages in curricula)
-    return f"{' or '.join(sums)} episode{'' if list(sums) == ['1'] else 's'}"

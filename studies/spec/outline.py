@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ...core.plugins.sources import Sources
 from ..errors import SpecError, show
 from ..store.database import DATABASE, SPEC_FILE
-from .curriculum import lengths
+from .labels import lengths
 
 if TYPE_CHECKING:
     from ..store.reading import Reading
