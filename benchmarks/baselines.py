@@ -16,7 +16,7 @@ from numba import njit
 from nested_agents.core.learners.td import TDLambda
 from nested_agents.core.numerics.arrays import FloatArray, IntArray
 
-from .situations import Situation
+from .situations import Moment
 
 CHUNK = 1
 """Joint actions whose feature vectors are built at once; more are slower, they leave the caches."""
@@ -29,7 +29,7 @@ class Baselines:
     bases of one term over all variables.
     """
 
-    def __init__(self, situation: Situation) -> None:
+    def __init__(self, situation: Moment) -> None:
         learner = situation.team.learner
         assert isinstance(learner, TDLambda)
         self.situation, self.settings, self.rules = situation, learner.settings, learner.rules

@@ -15,7 +15,7 @@ import numpy as np
 from nested_agents.core.numerics.arrays import FloatArray
 
 from .baselines import Baselines
-from .situations import ADDITIVE, COMPACT, DENSE, Situation, situation
+from .situations import ADDITIVE, COMPACT, DENSE, Moment, situation
 from .timing import paired
 
 Row = dict[str, Any]
@@ -90,7 +90,7 @@ def steps(kind: str, n_agents: int, budget: float) -> Row:
     }
 
 
-def _check(moment: Situation, baselines: Baselines) -> None:
+def _check(moment: Moment, baselines: Baselines) -> None:
     rng = np.random.default_rng(0)
     last = len(moment.scenario.agents) - 1
     for agent in {0, last}:
@@ -128,7 +128,7 @@ def large(kind: str, n_agents: int, budget: float) -> Row:
     }  # fmt: skip
 
 
-def memory_per_agent(moment: Situation) -> int:
+def memory_per_agent(moment: Moment) -> int:
     """Return the bytes that the team holds per agent in arrays."""
     arrays: dict[str, FloatArray] = moment.team.arrays()
     return sum(array.nbytes for array in arrays.values()) // len(moment.scenario.agents)

@@ -30,7 +30,7 @@ ADDITIVE: dict[str, Any] = {"membership": "triangular", "memberships": 5, "order
 
 
 @dataclass
-class Situation:
+class Moment:
     """A team, the world it acts in, and the moment at which it is timed.
 
     Attributes
@@ -82,7 +82,7 @@ def situation(
     rule_base: Mapping[str, Any],
     decision: Mapping[str, Any] | None = None,
     seed: int = 6,
-) -> Situation:
+) -> Moment:
     """Bring `n_agents` wheel agents, two to an e-puck, into the middle of an episode."""
     scenario = BoxPushingSettings(robots=n_agents // 2, state_space="paper").build()
     hierarchy = Hierarchy(scenario.agents, list(pairwise(scenario.agents)))
@@ -104,4 +104,4 @@ def situation(
         row[:] = rng.normal(scale=0.01, size=row.shape)
     states = np.array([states for states, _ in history[-2:]])
     rewards = np.array([reward for _, reward in history[-2:]])
-    return Situation(scenario, hierarchy, team, scenario.predict(), states, rewards)
+    return Moment(scenario, hierarchy, team, scenario.predict(), states, rewards)

@@ -61,7 +61,7 @@ class Pendulum:
 
     def predict(self):
         """Predict from the present state."""
-        return Forecast(self)
+        return PendulumForecast(self)
 
     def with_exact_prediction(self):
         """Return this pendulum: its predictions are exact."""
@@ -77,7 +77,7 @@ class Pendulum:
         return -0.01 * (angle**2 + 0.1 * speed**2) / WORST
 
 
-class Forecast:
+class PendulumForecast:
     """What torques would lead to."""
 
     def __init__(self, pendulum):

@@ -23,7 +23,6 @@ __version__: str
 _PLACES = {
     "ActionSet": ("core.interface.spaces", "ActionSet"),
     "Analysis": ("studies.results.analysis", "Analysis"),
-    "AnovaTDSettings": ("core.learners.anova", "AnovaTDSettings"),
     "BatchTDSettings": ("core.learners.batch", "BatchTDSettings"),
     "Blocks": ("core.interface.prediction", "Blocks"),
     "BoxPushing": ("scenarios.box_pushing.scenario", "BoxPushing"),
@@ -35,7 +34,6 @@ _PLACES = {
     "EvaluatorSettings": ("core.evaluators", "EvaluatorSettings"),
     "ExplorationSettings": ("core.decision.exploration", "ExplorationSettings"),
     "FrozenSettings": ("core.learners.frozen", "FrozenSettings"),
-    "GradientTDSettings": ("core.learners.gradient", "GradientTDSettings"),
     "Hierarchy": ("core.interface.hierarchy", "Hierarchy"),
     "KinematicChain": ("scenarios.kinematic_chain.scenario", "KinematicChain"),
     "KinematicChainSettings": ("scenarios.kinematic_chain.config", "KinematicChainSettings"),

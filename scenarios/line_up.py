@@ -198,8 +198,8 @@ def advance(
     places: FloatArray, speeds: FloatArray, commands: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return places [m] and speeds [m/s] one period on, commands [m/s] being held."""
-    slip, decay = speeds - commands, np.exp(-PERIOD / TAU)
-    return places + commands * PERIOD + slip * TAU * (1.0 - decay), commands + slip * decay
+    lag, decay = speeds - commands, np.exp(-PERIOD / TAU)
+    return places + commands * PERIOD + lag * TAU * (1.0 - decay), commands + lag * decay
 
 
 def reward(places: FloatArray) -> FloatArray:

@@ -20,7 +20,7 @@ MOST_FRAMES = 120
 DPI = 100
 
 
-class Stage:
+class Scene:
     """A figure in metres on which any moment of an episode can be drawn.
 
     Parameters

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from decimal import Decimal
 
 LONGEST = 1200
 """Characters of a message; of a longer one the middle is left out."""
@@ -24,6 +25,8 @@ def show(value: object, width: int | None = 60) -> str:
     """Return a value as TOML would write it, shortened to `width` characters if that is given."""
     if isinstance(value, bool):
         text = str(value).lower()
+    elif isinstance(value, int) and abs(value) >= 10**100:
+        text = f"{Decimal(value):.3e}"  # Python writes some thousand digits at most
     elif isinstance(value, str):
         text = repr(value)
     elif isinstance(value, Mapping):

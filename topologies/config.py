@@ -119,6 +119,11 @@ def parse(text: str | Mapping[str, Any]) -> TopologySettings:
         raise ValueError(f"topology {text!r}: {error.problem}") from None
     except ValueError as error:
         raise ValueError(f"topology {text!r}: {error}") from None
+    if "." in kind or "/" in kind:
+        folder = sources.active().folder
+        is_there = folder is not None and (folder / text).exists()
+        suffixes = f"suffix must be {', '.join(sources.GRAPHS)} or .py:NAME"
+        raise ValueError(f"topology {text!r}: {'' if is_there else 'no such file; '}{suffixes}")
     known = closest(kind, TOPOLOGIES.names())
     raise ValueError(f"topology {text!r}: {known}, or a file")
 
@@ -222,6 +227,8 @@ def read(path: str) -> nx.DiGraph | TopologySettings:
         return content
     try:
         return parse(content)
+    except RecursionError:
+        raise ValueError(f"{path}: is nested too deeply") from None
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
 

@@ -10,15 +10,20 @@ from __future__ import annotations
 import json
 import tomllib
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Iterable
+from inspect import iscoroutine
+from itertools import islice
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from ..core.plugins import sources
+from ..core.plugins import plugged, sources
 from ..core.plugins.deferred import nx
 from .builders import Bodies, Names, independent
 from .checks import check_legible, shown, with_edges
+
+MOST_LEVELS = 100
+"""Of nested teams."""
 
 
 def read(path: str) -> nx.DiGraph | dict[str, Any]:
@@ -81,25 +86,43 @@ def call(build: Callable[..., Any], name: str, agents: Names, bodies: Bodies) ->
 
 
 def _called(build: Callable[..., Any], name: str, agents: Names, bodies: Bodies) -> nx.Graph:
+    most = len(agents) ** 2
     try:
         result = build(tuple(agents), tuple(tuple(body) for body in bodies))
+        if isinstance(result, nx.Graph):
+            list(map(str, result))  # an object of the user's may refuse to
+            return result
+        edges = _pairs(result, most)
     except Exception as error:
-        frame = traceback.extract_tb(error.__traceback__)[-1]
-        where = "" if frame.filename == __file__ else f" in line {frame.lineno}"
+        ours = {__file__, plugged.__file__}
+        frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename not in ours]
+        # Of the user's file, whatever library it has called.
+        lines = [f.lineno for f in frames if f.filename == frames[0].filename]
+        where = f" in line {lines[-1]}" if lines else ""
         raise ValueError(
             f"{name} raised {type(error).__name__}{where}, given {len(agents)} agents of "
-            f"{len(bodies)} bodies: {error}"
+            f"{len(bodies)} bodies: {sources.message(error)}"
         ) from None
-    if isinstance(result, nx.Graph):
-        return result
-    try:
-        edges = [(str(superior), str(subordinate)) for superior, subordinate in result]
-    except (TypeError, ValueError):
+    if edges is None:
         raise ValueError(
             f"{name} returned {type(result).__name__}, allowed: a networkx DiGraph, a Graph "
             "of neighbours, or pairs (superior, subordinate)"
-        ) from None
+        )
+    if len(edges) > most:
+        raise ValueError(f"{name} gave more than {most} pairs of {len(agents)} agents")
     return with_edges(independent(agents), edges)
+
+
+def _pairs(result: Any, most: int) -> list[tuple[str, str]] | None:
+    """Return pairs of names, one more than `most` at most; None if it holds something else."""
+    if not isinstance(result, Iterable):
+        if iscoroutine(result):
+            result.close()  # or Python says that nobody has awaited it
+        return None
+    pairs = list(islice(result, most + 1))
+    if not all(isinstance(pair, Collection) and len(pair) == 2 for pair in pairs):
+        return None
+    return [(str(superior), str(subordinate)) for superior, subordinate in pairs]
 
 
 def _table_of(content: Any) -> dict[str, Any] | None:
@@ -115,13 +138,15 @@ def _table_of(content: Any) -> dict[str, Any] | None:
     return content
 
 
-def _check_members(members: Any) -> None:
-    """Refuse nested teams that are not lists of lists of names."""
+def _check_members(members: Any, level: int = 1) -> None:
+    """Refuse nested teams that are not lists of lists of names, or deeper than `MOST_LEVELS`."""
+    if level > MOST_LEVELS:
+        raise ValueError(f"members: are nested more than {MOST_LEVELS} levels deep")
     if not isinstance(members, list) or not members:
         raise ValueError(f"members = {shown(members)}: must be a list of names and of such lists")
     for member in members:
         if not isinstance(member, str):
-            _check_members(member)
+            _check_members(member, level + 1)
     check_legible(member for member in members if isinstance(member, str))
 
 

@@ -51,7 +51,7 @@ LEAST_ADVANCE = 0.02
 pushing at all."""
 
 
-class Plan(NamedTuple):
+class PushPlan(NamedTuple):
     """Where everyone is to push; ``M`` robots.
 
     Attributes
@@ -117,7 +117,7 @@ class Crowd:
             local = self._push(robots, box, goal, plan, twists, local, stands)
         return [int(k) for k in local]
 
-    def _plan(self, robots: FloatArray, box: FloatArray, goal: FloatArray) -> Plan:
+    def _plan(self, robots: FloatArray, box: FloatArray, goal: FloatArray) -> PushPlan:
         """Return where everyone is to push, the way there weighed against the way of the box."""
         course = atan2(goal[1] - box[1], goal[0] - box[0])
         distance = float(np.hypot(*(goal[:2] - box[:2])))
@@ -135,7 +135,7 @@ class Crowd:
         _, side, error, slots = best
         beyond = max(abs(error) - self._turns(side, distance), 0.0)
         oblique = float(np.copysign(min(beyond, CONE), error))
-        one = Plan(
+        one = PushPlan(
             np.tile(side, (self._n, 1)), slots, course, error, oblique, np.zeros(self._n, bool)
         )
         other = self._other(side, error)
@@ -164,7 +164,7 @@ class Crowd:
         error: float,
         side: Side,
         other: Side,
-    ) -> Plan:
+    ) -> PushPlan:
         """Return the plan to push from two sides, in proportion to what each has to give."""
         between = abs(float(wrap(other.direction - side.direction)))
         mine, theirs = sin(between - abs(error)), sin(abs(error))
@@ -173,7 +173,7 @@ class Crowd:
         _, columns = self._assigned(robots, box, slots)
         second = columns >= self._n - count
         sides = np.where(second[:, None], np.array(other), np.array(side))
-        return Plan(sides, slots[columns], course, error, 0.0, second)
+        return PushPlan(sides, slots[columns], course, error, 0.0, second)
 
     def _slots(self, side: Side, count: int, box: FloatArray) -> FloatArray:
         """Return poses ``(count, 3)`` spread evenly along a side, in the world."""
@@ -201,7 +201,7 @@ class Crowd:
         rows, columns = linear_sum_assignment(costs)
         return float(costs[rows, columns].mean()), columns
 
-    def _stands(self, robots: FloatArray, box: FloatArray, plan: Plan) -> BoolArray:
+    def _stands(self, robots: FloatArray, box: FloatArray, plan: PushPlan) -> BoolArray:
         """Return who stands behind its side, facing it, ``(M,)``."""
         direction, depth, middle, half = plan.side.T
         heading = box[2] + direction
@@ -219,7 +219,7 @@ class Crowd:
         robots: FloatArray,
         box: FloatArray,
         goal: FloatArray,
-        plan: Plan,
+        plan: PushPlan,
         twists: FloatArray,
         driven: IntArray,
         free: BoolArray,
@@ -252,7 +252,7 @@ class Crowd:
         return choice
 
     def _patterns(
-        self, robots: FloatArray, box: FloatArray, plan: Plan, twists: FloatArray
+        self, robots: FloatArray, box: FloatArray, plan: PushPlan, twists: FloatArray
     ) -> IntArray:
         """Return robot actions ``(m, M)``: one speed left of a cut, one right, one at the side."""
         heading = box[2] + plan.side[:, 0]
@@ -275,7 +275,7 @@ class Crowd:
         gaps: FloatArray,
         box: FloatArray,
         goal: FloatArray,
-        plan: Plan,
+        plan: PushPlan,
     ) -> FloatArray:
         """Return how bad ``m`` predicted situations are, a sum over robots [m]."""
         ahead = goal[:2] - boxes[:, :2]

@@ -1,10 +1,10 @@
 """Max-plus: messages between agents and tables, round by round (Kok and Vlassis 2006).
 
-Every table tells each of its agents what each action would be worth with the best of the others, by
-what these have been told elsewhere. On a tree the messages settle at the exact maximum; on graphs
-with loops they may not, so the best joint action of all rounds is kept (anytime), and improved by
-best responses, agent by agent, until none gains alone. Cost is linear in the number of tables,
-whatever the width.
+Every table sends each of its agents what each action would be worth with the best of the others,
+given the messages of these from other tables. On a tree the messages settle at the exact maximum;
+on graphs with loops they may not, so the best joint action of all rounds is kept (anytime), and
+improved by best responses, agent by agent, until none gains alone. Cost is linear in the number of
+tables, whatever the width.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class MaxPlus:
         most_entries: int = 4**10,
     ) -> None:
         self.n, self.n_actions, self.rounds = n, n_actions, rounds
-        # Tables over the same agents are added up: passed on apart, they would be told their own.
+        # Tables over the same agents are added up: apart, they would receive their own messages.
         apart = list(dict.fromkeys(scopes))
         self._place = [apart.index(scope) for scope in scopes]
         k = max(map(len, apart))
@@ -70,7 +70,7 @@ class MaxPlus:
         self._of = [np.argwhere(self._members == i) for i in range(n)]
 
     def best(self, tables: Sequence[FloatArray]) -> IntArray:
-        """Return the best joint action ``(n,)`` that was found.
+        """Return the best joint action ``(n,)`` of all rounds.
 
         Parameters
         ----------
@@ -82,20 +82,20 @@ class MaxPlus:
         full = np.zeros((count, *[a] * k))
         for place, table in zip(self._place, tables, strict=True):
             full[place] += self._filled(table)
-        told = np.zeros((count, k, a))  # by tables to agents
+        to_agents = np.zeros((count, k, a))  # messages of tables
         best, greatest = np.zeros(self.n, dtype=np.int64), -np.inf
         for _ in range(self.rounds):
             sums = np.zeros((self.n + 1, a))
-            np.add.at(sums, members, told)
+            np.add.at(sums, members, to_agents)
             joint = np.append(sums[:-1].argmax(axis=1), 0)
             worth = self._worth(full, joint)
             if worth > greatest:
                 best, greatest = joint[:-1].copy(), worth
-            asked = sums[members] - told  # by agents to tables: what they were told elsewhere
-            asked[members == self.n] = 0.0
-            new = self._messages(full, asked)
-            change = np.abs(new - told).max()
-            told = self.damping * told + (1.0 - self.damping) * new
+            to_tables = sums[members] - to_agents  # what agents heard of other tables
+            to_tables[members == self.n] = 0.0
+            new = self._messages(full, to_tables)
+            change = np.abs(new - to_agents).max()
+            to_agents = self.damping * to_agents + (1.0 - self.damping) * new
             if change < 1e-9:
                 break
         return self._improved(full, best)
@@ -106,16 +106,16 @@ class MaxPlus:
         shape = (self.n_actions,) * self._members.shape[1]
         return np.broadcast_to(table[(..., *[None] * missing)], shape)
 
-    def _messages(self, full: FloatArray, asked: FloatArray) -> FloatArray:
+    def _messages(self, full: FloatArray, to_tables: FloatArray) -> FloatArray:
         """Return what tables tell their agents ``(tables, k, A)``, with the mean taken away."""
-        count, k, a = asked.shape
+        count, k, a = to_tables.shape
         total = full.copy()
         for p in range(k):
-            total += asked[:, p].reshape(count, *(a if q == p else 1 for q in range(k)))
-        new = np.empty_like(asked)
+            total += to_tables[:, p].reshape(count, *(a if q == p else 1 for q in range(k)))
+        new = np.empty_like(to_tables)
         for p in range(k):
             others = tuple(1 + q for q in range(k) if q != p)
-            new[:, p] = total.max(axis=others) - asked[:, p]
+            new[:, p] = total.max(axis=others) - to_tables[:, p]
         return new - new.mean(axis=2, keepdims=True)
 
     def _worth(self, full: FloatArray, joint: IntArray) -> float:

@@ -1,6 +1,6 @@
 """From the values of an agent's actions to one action (Section V).
 
-An explorer serves all agents of a team. It is told when an episode begins and when a step has
+An explorer serves all agents of a team. It is notified when an episode begins and when a step has
 been decided; it is asked for one action at a time. Everything random comes from the generator that
 is passed in; exact ties are broken at random, since they are common (maintaining and zeroing a
 resting wheel lead to the same state).

@@ -38,13 +38,13 @@ CUTS = (0.25, 0.5, 0.75)
 
 
 class _Known(NamedTuple):
-    """What the agents of one body have last been found to be able to bring about."""
+    """What the joint actions of one body's agents were last found to be worth."""
 
     concerned: IntArray
     plan: IntArray
     free: tuple[int, ...]
     tried: IntArray
-    found: FloatArray
+    worths: FloatArray
 
 
 class BestResponse(Aggregation):
@@ -98,11 +98,11 @@ class BestResponse(Aggregation):
         if first or deliberation.prediction is not self._prediction:
             self._prediction, self._plans, self._known = deliberation.prediction, {}, None
         plan, free = self._plan(deliberation), self._own[agent]
-        tried, found = self._valued(deliberation, plan, free)
+        tried, worths = self._valued(deliberation, plan, free)
         best = np.full(self.n_actions, -np.inf)
-        np.maximum.at(best, tried[:, free.index(agent)], found)
+        np.maximum.at(best, tried[:, free.index(agent)], worths)
         # What its body does is kept in the plan; what it takes in the end may be told.
-        plan[list(free)] = tried[greatest(found, deliberation.rng)]
+        plan[list(free)] = tried[greatest(worths, deliberation.rng)]
         return best
 
     def _plan(self, deliberation: Deliberation) -> IntArray:
@@ -131,13 +131,13 @@ class BestResponse(Aggregation):
             if all(i in known.free for i in changed):
                 places = [known.free.index(i) for i in free]
                 decided = [k for k in range(len(known.free)) if k not in places]
-                told = plan[[known.free[k] for k in decided]]
-                same = (known.tried[:, decided] == told).all(axis=1)
-                return known.tried[same][:, places], known.found[same]
+                actions = plan[[known.free[k] for k in decided]]
+                same = (known.tried[:, decided] == actions).all(axis=1)
+                return known.tried[same][:, places], known.worths[same]
         tried = self._actions[len(free)]
-        found = self.worth(deliberation, _with(plan, free, tried))
-        self._known = _Known(concerned, plan.copy(), free, tried, found)
-        return tried, found
+        worths = self.worth(deliberation, _with(plan, free, tried))
+        self._known = _Known(concerned, plan.copy(), free, tried, worths)
+        return tried, worths
 
     def _planned(self, deliberation: Deliberation) -> IntArray:
         """Return a plan ``(n,)`` for the agent and those that it plans for."""

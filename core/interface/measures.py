@@ -1,4 +1,4 @@
-"""What an episode is told by: the columns of results that a scenario declares."""
+"""What is measured of an episode: the columns of results that a scenario declares."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .scenario import Scenario
 
 @dataclass(frozen=True)
 class Measure:
-    """A number by which an episode is told: a column of results.
+    """A number that describes an episode: a column of results.
 
     Attributes
     ----------
@@ -69,10 +69,10 @@ SUCCESS = Measure("success", "success", source="terminated", better="higher", is
 
 
 def measures_of(scenario: Scenario) -> tuple[Measure, ...]:
-    """Return what an episode of a scenario is told by, success first.
+    """Return what is measured of an episode of a scenario, success first.
 
     Of a scenario without ``measures`` it is success alone, see `SUCCESS`.
     """
-    found: tuple[Measure, ...] = tuple(getattr(scenario, "measures", ()))
-    own = [m for m in found if m.name == SUCCESS.name] or [SUCCESS]
-    return (*own, *(m for m in found if m.name != SUCCESS.name))
+    declared: tuple[Measure, ...] = tuple(getattr(scenario, "measures", ()))
+    own = [m for m in declared if m.name == SUCCESS.name] or [SUCCESS]
+    return (*own, *(m for m in declared if m.name != SUCCESS.name))

@@ -16,8 +16,6 @@ LEARNERS = SettingsRegistry(
     {
         "batch-td": f"{__name__}.batch:BatchTDSettings",
         "td-lambda": f"{__name__}.td:TDLambdaSettings",
-        "gradient-td": f"{__name__}.gradient:GradientTDSettings",
-        "anova-td": f"{__name__}.anova:AnovaTDSettings",
         "optimistic-td": f"{__name__}.optimistic:OptimisticTDSettings",
         "fmq": f"{__name__}.fmq:FMQSettings",
         "sparse-cooperative": f"{__name__}.sparse_cooperative:SparseCooperativeSettings",
@@ -27,7 +25,6 @@ LEARNERS = SettingsRegistry(
         "ppo": f"{PEERS}:PPOSettings",
         "ippo": f"{PEERS}:IPPOSettings",
         "mappo": f"{PEERS}:MAPPOSettings",
-        "dqn": f"{PEERS}:DQNSettings",
     },
     LearnerSettings,
     TeamSettings,

@@ -24,6 +24,8 @@ from .learner import LearnerSettings
 
 REWARD_SCALE = 100.0
 """Rewards are of the order of 0.01; the ridge weighs against rewards times this."""
+MOST_RULES = 4096
+"""Of one agent: more make normal equations that take too long to be solved densely."""
 
 TERMINAL, CUT_OFF = -1, -2
 """In place of the index of the next after-state: it is entered for ever; it is not known."""
@@ -82,7 +84,7 @@ class Earlier(NamedTuple):
     """``(m,)`` index of the next after-state among them, `TERMINAL` or `CUT_OFF`."""
 
 
-class Replay(ABC):
+class ReplayLearner(ABC):
     """What the batch learners share: a memory of after-states, and the regression.
 
     Raises
@@ -91,14 +93,11 @@ class Replay(ABC):
         If the rule base is too large for its normal equations to be solved densely.
     """
 
-    largest = 4096
-    remedy = "lower learner.rule_base.order"
-
     def __init__(self, settings: ReplaySettings, rules: RuleBase, rows: IntArray) -> None:
-        if rules.n_rules > self.largest:
+        if rules.n_rules > MOST_RULES:
             raise ValueError(
                 f"learner.kind: batch learners solve for all rules at once: {rules.n_rules} rules, "
-                f"allowed up to {self.largest}; {self.remedy}"
+                f"allowed up to {MOST_RULES}; lower learner.rule_base.order"
             )
         self.settings, self.rules = settings, rules
         self.members = [np.flatnonzero(rows == row) for row in range(int(rows.max()) + 1)]
@@ -204,13 +203,13 @@ class Replay(ABC):
             for row in range(len(self.theta))
         ]
 
-    def continue_from(self, former: Replay, rows: IntArray) -> None:
+    def continue_from(self, former: ReplayLearner, rows: IntArray) -> None:
         """Begin with weights and experience of another team, of which no episode is under way."""
         self.theta = former.theta[rows]
         self._earlier = [Earlier(former.states_of(row), *former._outcomes(row)) for row in rows]
 
 
-class BatchTD(Replay):
+class BatchTD(ReplayLearner):
     """Batch TD(lambda)."""
 
     def __init__(self, settings: BatchTDSettings, rules: RuleBase, rows: IntArray) -> None:
@@ -249,13 +248,13 @@ class BatchTD(Replay):
         if self._regressed == len(self._states):
             return
         rows = range(len(self.theta))
-        found = [self.rules.active(self.states_of(row, self._regressed)) for row in rows]
+        active = [self.rules.active(self.states_of(row, self._regressed)) for row in rows]
         if self._active:
-            found = [
+            active = [
                 (np.concatenate([old[0], new[0]]), np.concatenate([old[1], new[1]]))
-                for old, new in zip(self._active, found, strict=True)
+                for old, new in zip(self._active, active, strict=True)
             ]
-        self._active, self._regressed = found, len(self._states)
+        self._active, self._regressed = active, len(self._states)
 
     def restore(self, arrays: Mapping[str, FloatArray]) -> None:
         """Continue from `arrays`."""

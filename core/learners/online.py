@@ -55,8 +55,8 @@ class Online(ABC):
             met[:, 0], met[:, 1] = states, entered
         values = self.rules.each(self.of_agents(weights), met)
         ahead = 0.0 if entered is None else self.discount * values[:, 1]
-        found: FloatArray = rewards + ahead - values[:, 0]
-        return found
+        td_errors: FloatArray = rewards + ahead - values[:, 0]
+        return td_errors
 
     def begin_episode(self) -> None:
         """Clear the traces."""

@@ -103,9 +103,9 @@ class Kernel:
         with _threads:
             compiled = self.compiled
             with _alone(_cache_file(compiled)), _hoarding():
-                found = compiled(*args)
+                result = compiled(*args)
             self._ready = compiled
-        return found
+        return result
 
     def __getattr__(self, name: str) -> Any:
         """Return what the compiled function has, as its statistics."""
@@ -162,13 +162,13 @@ def _hoarding() -> Iterator[None]:
 
 def stamp(path: Path) -> str:
     """Return a digest of a file and of all files that it imports, directly or not."""
-    found, left = {path}, [path]
+    paths, left = {path}, [path]
     while left:
-        new = set(_imported(left.pop())) - found
-        found |= new
+        new = set(_imported(left.pop())) - paths
+        paths |= new
         left += new
     texts = hashlib.sha256()
-    for each in sorted(found):
+    for each in sorted(paths):
         texts.update(_text(each).encode() + b"\0")
     return texts.hexdigest()
 

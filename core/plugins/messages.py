@@ -22,8 +22,8 @@ def near(name: object, known: Iterable[str], cutoff: float = 0.6) -> str:
     >>> near("chian", ["chain", "tree"]), near("ring", ["chain", "tree"])
     ("did you mean 'chain'?", '')
     """
-    found = difflib.get_close_matches(str(name), list(known), n=1, cutoff=cutoff)
-    return f"did you mean {found[0]!r}?" if found else ""
+    matches = difflib.get_close_matches(str(name), list(known), n=1, cutoff=cutoff)
+    return f"did you mean {matches[0]!r}?" if matches else ""
 
 
 def closest(name: object, known: Iterable[str]) -> str:
@@ -93,8 +93,8 @@ def one_line(error: ValidationError, data: Mapping[str, object], known: Collecti
         return f"{path} = {first['input']!r}: unknown key; {top}".removesuffix("; ")
     # The members of a union complain one by one about the same place: say what any would take.
     rules = dict.fromkeys(rule(e["msg"]) for keys_, e in problems if keys_ == keys)
-    said = ", or ".join(rules) + (mistaken(keys[0], known) if len(keys) == 1 else "")
-    return f"{path} = {first['input']!r}: {said}" if keys else said
+    message = ", or ".join(rules) + (mistaken(keys[0], known) if len(keys) == 1 else "")
+    return f"{path} = {first['input']!r}: {message}" if keys else message
 
 
 def place(loc: Sequence[int | str], data: object) -> Keys:

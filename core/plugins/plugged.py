@@ -177,11 +177,11 @@ class Plugged:
         kind = value.get("kind")
         if not isinstance(kind, str):
             known = closest(kind, self.registry.names())
-            raise PydanticCustomError("plugged_kind", cast(Any, "{said}"), {"said": known})
+            raise PydanticCustomError("plugged_kind", cast(Any, "{message}"), {"message": known})
         try:
             model = self.registry.model(kind)
         except ValueError as error:
             raise PydanticCustomError(
-                "plugged_kind", cast(Any, "{said}"), {"said": str(error)}
+                "plugged_kind", cast(Any, "{message}"), {"message": str(error)}
             ) from None
         return model.model_validate(tuples(value), strict=True, context=info.context)

@@ -69,13 +69,13 @@ class Registry:
         """
         from importlib.metadata import entry_points
 
-        found: dict[str, str] = {}
+        places: dict[str, str] = {}
         for point in entry_points(group=self.group):
-            known = self.built_in.get(point.name) or found.get(point.name)
+            known = self.built_in.get(point.name) or places.get(point.name)
             if known is not None and known != point.value:
                 raise ValueError(f"{point.name!r} is offered twice: {known}, {point.value}")
-            found[point.name] = point.value
-        return found
+            places[point.name] = point.value
+        return places
 
     def names(self) -> list[str]:
         """Return the names of all that is built in or installed."""
@@ -99,12 +99,11 @@ class Registry:
         if place is None:
             raise ValueError(f"{closest(name, self.names())}, or one of your own as file.py:NAME")
         try:
-            found = located(place)
+            return located(place)
         except Exception as error:
             if name in self.built_in:
                 raise
-            raise ValueError(f"cannot be loaded: {sources.told(error)}") from None
-        return found
+            raise ValueError(f"cannot be loaded: {sources.format_error(error)}") from None
 
     def reference_to(self, thing: Any) -> str:
         """Return the name of an object: the registered one, or where it is defined.

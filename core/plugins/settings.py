@@ -40,7 +40,7 @@ else:
 
 
 class _Made(ModelMetaclass):
-    """What calling a settings class does: what is refused is told in one line, not in pydantic's.
+    """What calling a settings class does: errors are one line of ours, not several of pydantic.
 
     Tables are validated without being called, so nothing changes there.
     """
@@ -110,8 +110,9 @@ class ScenarioSettings(PartSettings):
     def scenario_defaults(self, preset: str) -> Mapping[str, Any]:
         """Return what this scenario lays over a preset: its ``learner`` and ``topology`` tables.
 
-        A preset is made for box pushing; what learns best elsewhere may be something else, and
-        depend on the settings. What a spec says itself lies over both. Nothing by default.
+        A preset is made for box pushing; what learns best in another scenario may be something
+        else, and depend on the settings. What a spec says itself lies over both. Nothing by
+        default.
         """
         return {}
 

@@ -86,9 +86,9 @@ class Sources:
 
     def only(self, names: set[str]) -> Sources:
         """Return the files of some names alone."""
-        found = Sources(None, {name: self.text(name) for name in sorted(names)})
-        found._brought = {name: by for name, by in self._brought.items() if name in names}
-        return found
+        sources = Sources(None, {name: self.text(name) for name in sorted(names)})
+        sources._brought = {name: by for name, by in self._brought.items() if name in names}
+        return sources
 
     def text(self, name: str) -> str:
         """Return the text of a file.
@@ -123,13 +123,13 @@ class Sources:
         """
         path, name = split(reference)
         module = self._module(path)
-        found: Any = module
+        thing: Any = module
         for part in name.split("."):
-            found = getattr(found, part, None)
-        if found is None:
+            thing = getattr(thing, part, None)
+        if thing is None:
             own = [n for n, f in vars(module).items() if _belongs(f, module)]
             raise ValueError(f"{path} has no {name!r}, it has: {', '.join(own) or 'nothing'}")
-        return found
+        return thing
 
     @contextmanager
     def active(self) -> Iterator[None]:
@@ -150,12 +150,15 @@ class Sources:
                 if kept.exists():
                     path, self._brought[name] = kept, str(study)
                     break
+        if path.exists() and not path.is_file():
+            raise ValueError(f"{name}: is no file")
         try:
-            content = path.read_bytes()
+            with path.open("rb") as file:
+                content = file.read(MOST_BYTES + 1)
         except OSError as error:
             raise ValueError(f"{name}: {error.strerror or error}") from None
         if len(content) > MOST_BYTES:
-            raise ValueError(f"{name}: {len(content)} bytes, allowed: {MOST_BYTES} or fewer")
+            raise ValueError(f"{name}: is larger than allowed, {MOST_BYTES} bytes")
         try:
             text = content.decode("utf-8-sig").replace("\r\n", "\n")
         except UnicodeDecodeError:
@@ -193,7 +196,7 @@ class Sources:
             exec(compile(text, module.__file__, "exec"), module.__dict__)
         except (Exception, SystemExit) as error:
             del sys.modules[key]
-            raise ValueError(f"{name} cannot be run: {told(error)}") from None
+            raise ValueError(f"{name} cannot be run: {format_error(error)}") from None
         return module
 
 
@@ -282,7 +285,7 @@ def meaning(text: str, name: str) -> str:
     try:
         tree = ast.dump(ast.parse(text, name))
     except (SyntaxError, ValueError, RecursionError) as error:
-        raise ValueError(f"{name} cannot be run: {told(error)}") from None
+        raise ValueError(f"{name} cannot be run: {format_error(error)}") from None
     return _sha256(tree)
 
 
@@ -303,15 +306,23 @@ def imported(text: str) -> set[str]:
     return {name.partition(".")[0] for name in names}
 
 
-def told(error: BaseException) -> str:
+def format_error(error: BaseException) -> str:
     r"""Return what an exception says, in one line.
 
     Examples
     --------
-    >>> told(ValueError("two\nlines"))
+    >>> format_error(ValueError("two\nlines"))
     'ValueError: two lines'
     """
-    return f"{type(error).__name__}: {' '.join(str(error).split())}"
+    return f"{type(error).__name__}: {message(error)}"
+
+
+def message(error: BaseException) -> str:
+    """Return the words of an exception in one line; none if it cannot even say them."""
+    try:
+        return " ".join(str(error).split())
+    except Exception:
+        return ""
 
 
 def _sha256(text: str) -> str:

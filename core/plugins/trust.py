@@ -1,4 +1,4 @@
-"""Which Python files of users may be run: what they ran themselves, or said that they trust.
+"""Which Python files of users may be run: what they ran themselves, or declared that they trust.
 
 A study keeps the files that its spec names, and runs them again when it is explained or continued.
 Of a study that came from somebody else, nothing may be run unasked; a digest inside it would

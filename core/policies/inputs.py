@@ -67,8 +67,8 @@ class Inputs:
         place = (states - self._low) / self._span
         linear = np.clip(2.0 * place - 1.0, -FARTHEST, FARTHEST)
         angles = 2.0 * np.pi * place[:, self._periodic]
-        found = np.where(self._periodic, np.sin(2.0 * np.pi * place), linear)
-        return np.hstack([found, np.cos(angles)])
+        columns = np.where(self._periodic, np.sin(2.0 * np.pi * place), linear)
+        return np.hstack([columns, np.cos(angles)])
 
 
 def _columns(space: StateSpace) -> FloatArray:
@@ -100,8 +100,8 @@ class RewardScale:
             before = value - self._mean
             self._mean += before / self._count
             self._squares += before * (value - self._mean)
-        found: FloatArray = np.clip(rewards / np.sqrt(self._squares / self._count), -10.0, 10.0)
-        return found
+        clipped: FloatArray = np.clip(rewards / np.sqrt(self._squares / self._count), -10.0, 10.0)
+        return clipped
 
     def end_episode(self) -> None:
         """Begin anew."""

@@ -58,8 +58,8 @@ class IndependentPPO(Peer):
         self._model, self._discount = model, settings.discount
         model.policy.set_training_mode(False)
         hidden = model.policy.mlp_extractor
-        self._actor = Layers([hidden.policy_net, model.policy.action_net], np.tanh)
-        self._critic = Layers([hidden.value_net, model.policy.value_net], np.tanh)
+        self._actor = Layers([hidden.policy_net, model.policy.action_net])
+        self._critic = Layers([hidden.value_net, model.policy.value_net])
         self._n_actions = len(scenario.action_set)
         self._rewards = RewardScale(settings.discount, n_envs)
         self._starts: FloatArray = np.ones(n_envs)

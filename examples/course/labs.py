@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from nested_agents.core.agents.cost import Problem, below_counts
 from nested_agents.topologies import build
 
-from questions import Choice, Edges, Number, Question
+from questions import Choice, Edges, Numeric, Question
 
 WHEELS = tuple(f"robot{robot}.{side}" for robot in (1, 2, 3, 4) for side in ("left", "right"))
 
@@ -42,11 +42,11 @@ def _tried(topology: str, agents: int) -> int:
 CLIMBING_GAME = Lab(
     "The climbing game: what nesting buys",
     {
-        "optimum": Number(
+        "optimum": Numeric(
             "What are both agents paid for the best joint action of the game?", 11,
             hint="look for the greatest payment of the table",
         ),
-        "expected": Number(
+        "expected": Numeric(
             "While the second agent plays a, b and c equally often, what is action a of the first"
             " one worth on average?", (11 - 30 + 0) / 3, 0.05,
             hint="average the first line of the table",
@@ -56,11 +56,11 @@ CLIMBING_GAME = Lab(
             {"a": "a", "b": "b", "c": "c"}, "c",
             hint="average the other two lines, too",
         ),
-        "nested": Number(
+        "nested": Numeric(
             "In which share of climbing games does 'nested, maximum' end at the optimum?", 1.0,
             0.05, hint="read the line 'nested, maximum' of the table of climbing",
         ),
-        "averaging": Number(
+        "averaging": Numeric(
             "And 'nested, observed', which passes decisions down, too?", 0.0, 0.05,
             hint="read the line 'nested, observed' of the table of climbing",
         ),
@@ -75,7 +75,7 @@ CLIMBING_GAME = Lab(
             }, "b",
             hint="ask what the first agent knows when it decides",
         ),
-        "values": Number(
+        "values": Numeric(
             "Nesting has a price. How many joint actions does each of five agents with three"
             " actions have to value?", 3**5,
             hint="the actions of all agents are combined",
@@ -86,24 +86,24 @@ CLIMBING_GAME = Lab(
 COSTS = Lab(
     "What a chain, a tree and a graph cost",
     {
-        "chain": Number(
+        "chain": Numeric(
             "How many joint actions does a decision of a chain of eight agents try?",
             _tried("chain", 8), hint="add 4 ** (1 + below) over the agents",
         ),
-        "tree": Number(
+        "tree": Numeric(
             "And of a binary tree of eight agents?", _tried("tree:2", 8),
             hint="print the line of tree:2 with eight agents",
         ),
-        "graph": Number(
+        "graph": Numeric(
             "And of a coordination graph that is a line of eight?",
             _tried("coordination-graph", 8),
             hint="an agent of a line has one neighbour or two",
         ),
-        "factor": Number(
+        "factor": Numeric(
             "By which factor does one more agent multiply the work of a long chain?", 4, 0.1,
             hint="divide the joint actions of nine agents by those of eight",
         ),
-        "step": Number(
+        "step": Numeric(
             "How many joint actions does one more agent add to a long line?", 4**3,
             hint="the new agent is an end; the old end has now two neighbours",
         ),
@@ -122,7 +122,7 @@ COSTS = Lab(
 WHEEL_FAILURE = Lab(
     "A wheel fails",
     {
-        "episode": Number(
+        "episode": Numeric(
             "Episodes are counted from 0. In which episode does the wheel begin to fail?", 10,
             hint="read the table scenario.failures of the spec",
         ),
@@ -160,15 +160,15 @@ WHEEL_FAILURE = Lab(
 OWN_HIERARCHY = Lab(
     "Your own hierarchy",
     {
-        "chain": Number(
+        "chain": Numeric(
             "How many joint actions does a decision of the four wheels of two e-Pucks try in a"
             " chain?", _tried("chain", 4), hint="run nested-agents topology show chain --robots 2",
         ),
-        "independent": Number(
+        "independent": Numeric(
             "And if nobody sees anybody?", _tried("independent", 4),
             hint="each agent tries its own four actions",
         ),
-        "seeds": Number(
+        "seeds": Numeric(
             "With how many seeds can one comparison reach p < .05 at all? The test flips the signs"
             " of n differences, so p is a multiple of 2 ** (1 - n).", 6,
             hint="find the least n with 2 ** (1 - n) < .05",

@@ -46,12 +46,12 @@ class Question(Protocol):
 
 
 @dataclass(frozen=True)
-class Number:
+class Numeric:
     """A number, right between two bounds.
 
     Examples
     --------
-    >>> Number("How many wheels have two e-Pucks?", 4).is_right(4.0)
+    >>> Numeric("How many wheels have two e-Pucks?", 4).is_right(4.0)
     True
     """
 

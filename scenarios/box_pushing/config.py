@@ -55,7 +55,7 @@ class BoxTaskSettings(ScenarioSettings):
     """Orientation error that still counts as reached [rad]; none: any."""
 
     def warnings(self) -> tuple[str, ...]:
-        """Return sizes that are surely meant in another unit, a line each.
+        """Return sizes that are probably given in another unit, a line each.
 
         Examples
         --------
@@ -95,7 +95,7 @@ class BoxPushingSettings(BoxTaskSettings):
     """What predictions take the world for: robots that yield to the box, robots that do not
     (``rigid``), a box that does not move (``static``), or the world itself."""
     belief: BeliefSettings = BeliefSettings()
-    """What the predictor `push` is told of constants that robots cannot see."""
+    """Which constants that robots cannot see the predictor `push` knows."""
     reward: RewardSettings = RewardSettings()
     """The constants of the reward, and whose contact it asks for."""
     prediction_horizon: Periods = 24

@@ -35,7 +35,7 @@ RENDER_MODES = ["rgb_array", "human"]
 SettingsLike = BoxPushingSettings | Mapping[str, Any] | None
 
 
-def meant(settings: SettingsLike) -> BoxPushingSettings:
+def as_settings(settings: SettingsLike) -> BoxPushingSettings:
     """Return the settings that a ``[scenario]`` table stands for; none: the default ones."""
     if isinstance(settings, BoxPushingSettings):
         return settings
@@ -113,7 +113,7 @@ class Game:
             raise ValueError(f"steps = {steps}, must be at least 1")
         if render_mode not in (None, *RENDER_MODES):
             raise ValueError(f"render_mode = {render_mode!r}, allowed None, {RENDER_MODES}")
-        settings = meant(settings)
+        settings = as_settings(settings)
         self.scenario = BoxPushing(settings)
         self.steps = steps
         self.screen = Screen(settings.drawn, render_mode, sensors=sensors) if render_mode else None
@@ -216,7 +216,7 @@ class WheelsEnv(ParallelEnv):
         """Start an episode, see `Game.reset`; return observations and infos by agent."""
         states = self.game.reset(seed, options)
         self.agents = list(self.possible_agents)
-        return self._told(states, self.game.scenario.measure())
+        return self._observe(states, self.game.scenario.measure())
 
     def step(self, actions: Mapping[str, Any]) -> tuple[dict[str, Any], ...]:
         """Carry out one action of every agent.
@@ -231,13 +231,13 @@ class WheelsEnv(ParallelEnv):
             return {}, {}, {}, {}, {}
         if set(actions) != set(self.agents):
             missing = [name for name in self.agents if name not in actions]
-            said = f"{missing[0]!r} is missing" if missing else "there are agents that do not act"
-            raise ValueError(f"step: actions of {list(actions)}: {said}; agents: {self.agents}")
+            problem = f"{missing[0]!r} is missing" if missing else "some of these do not act"
+            raise ValueError(f"step: actions of {list(actions)}: {problem}; agents: {self.agents}")
         joint = np.empty(len(self.game.scenario.agents), dtype=np.int64)
         for name in self.agents:
             joint[self.seats[name].wheels] = actions[name]
         transition, truncated = self.game.step(joint)
-        observations, infos = self._told(transition.states, transition.info)
+        observations, infos = self._observe(transition.states, transition.info)
         rewards = {name: self.seats[name].paid(transition.reward) for name in self.agents}
         ends, breaks = (
             dict.fromkeys(self.agents, value) for value in (transition.terminated, truncated)
@@ -246,7 +246,7 @@ class WheelsEnv(ParallelEnv):
             self.agents = []
         return observations, rewards, ends, breaks, infos
 
-    def _told(
+    def _observe(
         self, states: FloatArray, measured: Mapping[str, Any]
     ) -> tuple[dict[str, FloatArray], dict[str, dict[str, Any]]]:
         return (

@@ -57,7 +57,7 @@ MEASURES = (
         better="higher", least=0.0, greatest=1.0,
     ),
 )  # fmt: skip
-"""What an episode is told by: whether the box came within the tolerance of the goal at whatever
+"""What is measured of an episode: whether the box came within the tolerance of the goal at whatever
 speed, whether it was there once the robots had stopped, ..."""
 
 
@@ -339,7 +339,7 @@ class BoxPushing:
         return self._failures.failed
 
     def _advance(self, commands: FloatArray) -> None:
-        """Let the world go on for one decision period, the wheels being told `commands`."""
+        """Let the world go on for one decision period, the wheels being commanded `commands`."""
         if self._failures is None:
             self.world.advance(commands, self.settings.action_repeat)
         else:

@@ -43,7 +43,7 @@ MEMBERS = ("agents", "state_space", "action_set", "reset", "step", "predict")
 STEPS_AT_REST = 3
 """Steps that are waited for a scenario to be at rest."""
 LEAST_STEPS = 2
-"""Steps of the shortest episodes by which equal and different seeds can be told."""
+"""Steps of the shortest episodes by which equal and different seeds can be distinguished."""
 
 
 class ScenarioError(ValueError):
@@ -186,8 +186,8 @@ def _measures(of: Examination) -> str | None:
         if source != "terminated" and np.ndim(info[source]):
             return f"{measure.name}: info[{source!r}] must be one number"
     kept = scenario.recorded if isinstance(scenario, RecordedScenario) else ()
-    for place, found in (("info", info), ("measure", measured(scenario))):
-        missing = [name for name in kept if name not in found]
+    for place, reported in (("info", info), ("measure", measured(scenario))):
+        missing = [name for name in kept if name not in reported]
         if missing:
             return f"recorded is {missing[0]!r}, which {place} has not"
     return None
@@ -287,7 +287,7 @@ def _predicts(of: Examination) -> str | None:
 
 
 def _senses(of: Examination) -> str | None:
-    """Check that variables mean the same in sensing and prediction, where that can be told."""
+    """Check that variables mean the same in sensing and prediction, where that can be checked."""
     for seed, episode in product(of.seeds, of.episodes):
         scenario: Any = of.factory()
         if not hasattr(scenario, "with_exact_prediction"):

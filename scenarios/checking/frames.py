@@ -72,17 +72,17 @@ def fields(transition: Transition) -> Iterator[tuple[str, Any]]:
     return _flat({name: getattr(transition, name) for name in FIELDS})
 
 
-def difference(expected: Iterable[Frame], found: Iterable[Frame], first: int = 0) -> str | None:
+def difference(expected: Iterable[Frame], actual: Iterable[Frame], first: int = 0) -> str | None:
     """Return from which step on two runs differ and in what, or None if in no bit.
 
     Parameters
     ----------
-    expected, found
+    expected, actual
         The frames of the two runs.
     first
         Number of the first frame; 0 is the start of an episode.
     """
-    for step, (one, other) in enumerate(zip_longest(expected, found), first):
+    for step, (one, other) in enumerate(zip_longest(expected, actual), first):
         if one is None or other is None:
             return f"{at(step)}: one of them has ended"
         if one.keys() != other.keys():

@@ -107,15 +107,15 @@ def _wrong_tables(scenario: Scenario, prediction: Any, rng: np.random.Generator)
             fault = _misshapen(blocks, n_actions ** len(group), count, scenario)
             if fault is not None:
                 return f"blocks of agent {agent}: {fault}"
-            expected, found = prediction.states(agent, joint_actions), blocks.states(indices)
-            wrong = _differs(scenario, found, np.asarray(expected))
+            expected, actual = prediction.states(agent, joint_actions), blocks.states(indices)
+            wrong = _differs(scenario, actual, np.asarray(expected))
             if blocks.alone:
                 wrong[:, : scenario.state_space.n_own] = False
             if wrong.any():
                 row, j = np.argwhere(wrong)[0]
                 return (
                     f"blocks of agent {agent}: {scenario.state_space.variables[j].name} = "
-                    f"{found[row, j]:.6g} after joint action {joint_actions[row].tolist()}, "
+                    f"{actual[row, j]:.6g} after joint action {joint_actions[row].tolist()}, "
                     f"states has {expected[row, j]:.6g}"
                 )
     return _wrong_rewards(prediction, indices, joint_actions, count)
@@ -152,12 +152,12 @@ def _wrong_rewards(
     table, expected = prediction.reward_table(), np.asarray(prediction.rewards(joint_actions))
     if np.shape(table) != (count,):
         return f"reward_table of shape {np.shape(table)}, must be {(count,)}"
-    found = np.asarray(table)[indices]
-    wrong = ~_is_close(found - expected, expected)
+    actual = np.asarray(table)[indices]
+    wrong = ~_is_close(actual - expected, expected)
     if not wrong.any():
         return None
     row = wrong.argmax()
     return (
-        f"reward_table: {found[row]:.6g} after joint action {joint_actions[row].tolist()}, "
+        f"reward_table: {actual[row]:.6g} after joint action {joint_actions[row].tolist()}, "
         f"rewards has {expected[row]:.6g}"
     )

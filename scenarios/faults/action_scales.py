@@ -26,7 +26,7 @@ class ActionScale:
         The action space: a bounded Box, Discrete or MultiDiscrete.
     rest
         The action in which actuators rest; None: 0 where a Box has it, else the middle.
-    said
+    name
         What the space is called in complaints.
 
     Attributes
@@ -49,14 +49,14 @@ class ActionScale:
     """
 
     def __init__(
-        self, space: gymnasium.Space[Any], rest: Any = None, said: str = "action space"
+        self, space: gymnasium.Space[Any], rest: Any = None, name: str = "action space"
     ) -> None:
         self.space = space
         if isinstance(space, Box):
             self._low, self._high = (b.ravel().astype(float) for b in (space.low, space.high))
             if not np.isfinite([self._low, self._high]).all():
                 raise ValueError(
-                    f"{said} = {space}: faults need finite bounds; "
+                    f"{name} = {space}: faults need finite bounds; "
                     "gymnasium.wrappers.RescaleAction or ClipAction gives them"
                 )
         elif isinstance(space, Discrete | MultiDiscrete):
@@ -64,7 +64,7 @@ class ActionScale:
             self._low = np.ravel(space.start).astype(float)
             self._high = self._low + np.ravel(counts) - 1.0
         else:
-            raise ValueError(f"{said} = {space}: allowed: Box, Discrete, MultiDiscrete")
+            raise ValueError(f"{name} = {space}: allowed: Box, Discrete, MultiDiscrete")
         if rest is None:
             has_zero = isinstance(space, Box) & (self._low <= 0) & (self._high >= 0)
             self._rest = np.where(has_zero, 0.0, (self._low + self._high) / 2)
@@ -82,14 +82,14 @@ class ActionScale:
         """Return where an action lies from rest, ``(k,)``."""
         return np.ravel(action).astype(float) - self._rest
 
-    def action(self, place: FloatArray, told: Any, changed: BoolArray, drawn: FloatArray) -> Any:
+    def action(self, place: FloatArray, chosen: Any, changed: BoolArray, drawn: FloatArray) -> Any:
         """Return the action at a place.
 
         Parameters
         ----------
         place
             ``(k,)`` from rest; what is out of bounds is cut.
-        told
+        chosen
             The action that was chosen; of its entries remain those that are not `changed`.
         changed
             ``(k,)`` which do not.
@@ -97,13 +97,13 @@ class ActionScale:
             ``(k,)`` uniform random numbers for what lies between two actions.
         """
         if not changed.any():
-            return told
+            return chosen
         values = np.clip(self._rest + place, self._low, self._high)
         if not isinstance(self.space, Box):
             below = np.floor(values + 1e-12)
             values = below + (drawn < values - below)
         elif np.issubdtype(self.space.dtype, np.integer):
             values = np.rint(values)
-        action = np.array(told, dtype=self.space.dtype)
+        action = np.array(chosen, dtype=self.space.dtype)
         action.ravel()[changed] = values[changed].astype(action.dtype)
         return action[()]  # a number, not an array, of Discrete

@@ -2,7 +2,7 @@
 
 The kinds are those of `nested_agents.scenarios.faults.settings`; what is added is the field that
 names actuators. A fault names them by pattern, ``"0"``, ``"walker_0.*"``, or by number. The policy
-is told nothing of it.
+is not informed of it.
 """
 
 from __future__ import annotations

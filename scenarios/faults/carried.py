@@ -1,4 +1,4 @@
-"""What faulty actuators carry out of the actions that they are told, step by step.
+"""What faulty actuators carry out of the actions that were chosen, step by step.
 
 What an action commands decides what a fault can do to it. An *effort*, such as a torque, is zero at
 a free actuator, but none holds a joint; a *velocity* is zero at a seized one, but none lets it
@@ -103,7 +103,7 @@ class Carried:
         self._rng = np.random.default_rng(root)
         self._held = np.zeros(len(self.names))
 
-    def carry(self, told: Mapping[str, Any], environment: Any) -> dict[str, Any]:
+    def carry(self, actions: Mapping[str, Any], environment: Any) -> dict[str, Any]:
         """Return what is carried out of the actions of one step, by prefix.
 
         Spaces whose action is missing rest.
@@ -111,7 +111,7 @@ class Carried:
         self._failures.strike(self._step)
         self._step += 1
         places = np.zeros(len(self.names))
-        for prefix, action in told.items():
+        for prefix, action in actions.items():
             places[self._spans[prefix]] = self.scales[prefix].place(action)
         drawn = self._rng.random(len(places))  # as many whatever fails: runs stay paired
         driven = self._failures.driven(places, 1)[0]
@@ -132,7 +132,7 @@ class Carried:
             prefix: self.scales[prefix].action(
                 driven[span], action, changed[span], drawn[span]
             )
-            for prefix, action in told.items()
+            for prefix, action in actions.items()
             for span in [self._spans[prefix]]
         }  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""The schedule of failures: what an actuator does instead of what it is told, and when.
+"""The schedule of failures: what an actuator does instead of its command, and when.
 
 Of several failures of an actuator delays act first, then the others in the order of the spec, each
 on what the one before it holds, see `FailureSettings.held`. A world without failures never comes
@@ -27,7 +27,7 @@ class Failures:
         Names of the ``n`` actuators.
     limits
         ``(n,)`` greatest speed of every actuator, in units of its speed.
-    said
+    key
         What the failures are called in complaints.
 
     Raises
@@ -54,14 +54,14 @@ class Failures:
         settings: Sequence[FailureSettings],
         agents: Sequence[str],
         limits: FloatArray,
-        said: str = "scenario.failures",
+        key: str = "scenario.failures",
     ) -> None:
         self._settings = tuple(settings)
         self._delays_first = sorted(
             range(len(settings)), key=lambda i: not isinstance(settings[i], Delayed)
         )
         self._limits = limits
-        self._masks = [failure.mask(agents, f"{said}[{i}]") for i, failure in enumerate(settings)]
+        self._masks = [failure.mask(agents, f"{key}[{i}]") for i, failure in enumerate(settings)]
         delays = [f.periods for f in settings if isinstance(f, Delayed)]
         self._memory = max(delays, default=0)
         self.begin(0, 0)
@@ -101,16 +101,16 @@ class Failures:
             Control periods; they are remembered as past.
         """
         speeds = np.tile(commands, (periods, 1))
-        told = np.vstack([self._commands, speeds])
+        remembered = np.vstack([self._commands, speeds])
         for i in self._active:
             mask, failure = self._masks[i], self._settings[i]
             if isinstance(failure, Delayed):
                 first = self._memory - failure.periods
-                speeds[:, mask] = told[first : first + periods, mask]
+                speeds[:, mask] = remembered[first : first + periods, mask]
             else:
                 limits, stream = self._limits[mask], self._streams[i]
                 speeds[:, mask] = failure.held(speeds[:, mask], limits, stream)
-        self._commands = told[len(told) - self._memory :]
+        self._commands = remembered[len(remembered) - self._memory :]
         return speeds
 
     def active(self) -> Iterator[tuple[Any, BoolArray]]:

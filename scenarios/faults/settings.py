@@ -36,7 +36,7 @@ class FailureSettings(Scheduled):
         Parameters
         ----------
         commands
-            ``(periods, k)`` speeds that they are told.
+            ``(periods, k)`` commanded speeds.
         limits
             ``(k,)`` their greatest speeds.
         rng

@@ -2,7 +2,7 @@
 
 Examples
 --------
-From episode 3 on, the motor of a pendulum does a third of what it is told.
+From episode 3 on, the motor of a pendulum does a third of what it is commanded.
 
 >>> import numpy as np
 >>> from nested_agents.scenarios.faults.actuators import Weak
@@ -25,7 +25,7 @@ from .carried import Carried, Commands, Mechanism
 
 
 class FaultyEnv(gymnasium.Wrapper):
-    """A Gymnasium environment whose actuators fail as scheduled, without the policy being told.
+    """A Gymnasium environment whose actuators fail as scheduled, without the policy being informed.
 
     Its worlds are those of the environment beneath, seed by seed, whatever fails. Steps and
     episodes are counted from 0; `reset` with a seed counts episodes afresh, and its option

@@ -30,7 +30,7 @@ DISCOUNT = 0.8
 """Discount that learns best: a goal is some twenty decisions away."""
 
 
-class RewardSettings(Settings):
+class ReachingRewardSettings(Settings):
     """The constants of the reward, in the spirit of Eq. 15-17; distances in metres.
 
     It is paid to all agents alike. Coming nearer must pay far less than being there: an arm that
@@ -78,11 +78,11 @@ class KinematicChainSettings(ScenarioSettings):
     failures: tuple[Failure, ...] = ()
     """Failures of joints, as ``[[scenario.failures]]`` tables."""
     predictor: Literal["nominal", "informed"] = "nominal"
-    """Whether predictions take every joint for what it was built as, or are told of failures."""
+    """Whether predictions take every joint for what it was built as, or know of failures."""
     state_space: tuple[str, ...] = ("bearing", "distance", "approach")
     """State variables beside the speed of the own joint, by name, one's own included; see
     `kinematic_chain.variables`."""
-    reward: RewardSettings = RewardSettings()
+    reward: ReachingRewardSettings = ReachingRewardSettings()
     """The constants of the reward."""
     speed: Positive = 0.6
     """Greatest speed of a joint [rad/s], in arms of few joints; in others 5 rad/s divided by

@@ -5,7 +5,7 @@ A recording is a mapping of arrays: ``angles (T + 1, n)`` [rad], ``speeds (T + 1
 [m], ``top_speed`` [rad/s], ``dt`` [s].
 
 Links are drawn from the base, a black square, to the tip, an orange dot with the trail of where it
-has been. Joints are the darker the faster they are told to turn; failed ones are crossed out. The
+has been. Joints are the darker the faster their command; failed ones are crossed out. The
 dashed ring is the goal, as wide as the tolerance; the pale circle is the reach of the arm.
 """
 
@@ -18,7 +18,7 @@ import numpy as np
 from matplotlib.patches import Circle
 
 from ...core.numerics.arrays import FloatArray
-from ..movies import Stage, film
+from ..movies import Scene, film
 from .kinematics import postures_of
 
 Recording = Mapping[str, FloatArray]
@@ -29,7 +29,7 @@ SIDE = 480
 LINK, TIP, GOAL, FAILED = "#0072B2", "#E69F00", "#555555", "#B00020"
 
 
-class _Stage(Stage):
+class _ChainScene(Scene):
     """A figure on which any moment of a recording can be drawn."""
 
     def __init__(self, recording: Recording) -> None:
@@ -81,4 +81,4 @@ def animate(recording: Recording, path: Path) -> None:
     ValueError
         If the suffix is neither ``.gif`` nor ``.mp4``.
     """
-    film(_Stage(recording).pixels, len(recording["angles"]) - 1, float(recording["dt"]), path)
+    film(_ChainScene(recording).pixels, len(recording["angles"]) - 1, float(recording["dt"]), path)

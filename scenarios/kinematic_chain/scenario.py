@@ -3,7 +3,7 @@
 An agent for every degree of freedom is the earlier application of the paper's method ([28, 29]).
 The scenario joins the arm, the task (goal, reward, end of an episode), the sensing (states) and the
 servo layer, which turns actions into speeds of joints. Joints are servo-driven and have no mass:
-they turn at the speed that they are told, unless they fail or reach their limit.
+they turn at the commanded speed, unless they fail or reach their limit.
 """
 
 from __future__ import annotations
@@ -141,7 +141,7 @@ class KinematicChain:
         return (np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]]),) * len(self.agents)
 
     def predict(self) -> ChainPrediction:
-        """Predict from the present state, by joints as built or, if told, as they are."""
+        """Predict from the present state, by joints as built or, failures known, as they are."""
         if self.settings.predictor == "nominal":
             return self.predict_with(self.nominal_effects)
         return self.predict_with(self._actual_effects())
@@ -161,7 +161,7 @@ class KinematicChain:
         )
 
     def with_exact_prediction(self) -> KinematicChain:
-        """Return an arm alike whose predictions are told of failures: the others are exact."""
+        """Return an arm alike whose predictions know of failures: all else is exact."""
         return type(self)(self.settings.model_copy(update={"predictor": "informed"}))
 
     def measure(self) -> dict[str, Any]:
@@ -291,12 +291,6 @@ class ChainPrediction:
         """Return the rewards ``(m,)`` of joint actions ``(m, n)``."""
         view = self.seen(joint_actions)
         return self.arm._reward(view.distance, view.approach)
-
-    def after(self, joint_action: IntArray) -> ChainPrediction:
-        """Return the prediction from where a joint action ``(n,)`` leads in one decision."""
-        reached, speeds = self.seen(joint_action[None]), self.commands(joint_action)
-        before = float(reached.distance[0])
-        return ChainPrediction(self.arm, self.effects, reached.angles[0], speeds, before)
 
     @cached_property
     def alike(self) -> IntArray:

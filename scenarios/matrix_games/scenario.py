@@ -136,8 +136,8 @@ class MatrixGame:
         every = np.repeat(played[..., None, :], n, axis=-2)
         if self.observed == "joint":
             return every
-        told = np.where(np.arange(n - 1) < np.arange(n)[:, None], every[..., :-1], 0.0)
-        return np.concatenate([played[..., None], told], axis=-1)
+        above = np.where(np.arange(n - 1) < np.arange(n)[:, None], every[..., :-1], 0.0)
+        return np.concatenate([played[..., None], above], axis=-1)
 
     def run_episode(
         self, team: Team, seed: np.random.SeedSequence, episode: int, steps: int, *, learn: bool
@@ -183,5 +183,5 @@ def _state_space(
     if observed == "joint":
         names = tuple(f"action_of_{agent}" for agent in agents)
         return StateSpace(observed, tuple(map(variable, names)), common=names)
-    told = tuple(f"told_by_{agent}" for agent in agents[:-1]) if observed == "above" else ()
-    return StateSpace(observed, tuple(map(variable, ("own_action", *told))), n_own=1)
+    above = tuple(f"told_by_{agent}" for agent in agents[:-1]) if observed == "above" else ()
+    return StateSpace(observed, tuple(map(variable, ("own_action", *above))), n_own=1)

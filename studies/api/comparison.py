@@ -35,7 +35,7 @@ class Comparison:
 
     @property
     def verdicts(self) -> tuple[str, ...]:
-        """What was found, and what could have been found, line by line."""
+        """What was found, and what could have been detected, line by line."""
         return self.contrasts.notes
 
     def __str__(self) -> str:

@@ -13,7 +13,7 @@ from ..errors import SpecError
 from ..presentation.csv_text import write_frame
 from ..results import published
 from ..results.results import read
-from ..spec.outline import Outline
+from ..spec.outline import StudyOutline
 from ..store.durable import replacing
 from ..store.store import Store
 
@@ -68,7 +68,7 @@ def _writers(store: Store, form: Form) -> dict[str, Callable[[Path], None]]:
     """Return what writes each file, by its name."""
     results = read(store)
     if form == "json":
-        outline = Outline.kept(store)
+        outline = StudyOutline.kept(store)
         kept = published_part(outline.study, results)
         return {"results": lambda path: published.write(path, outline, kept)}
     if form == "parquet" and not find_spec("pyarrow"):

@@ -22,7 +22,7 @@ from ..errors import SpecError
 from ..presentation.words import count, duration
 from ..results.power import SMALLEST, USUAL_DEVIATION, detectable, seeds_for
 from ..results.verdicts import WIDTH, power_text
-from ..spec.outline import Outline
+from ..spec.outline import StudyOutline
 from ..spec.spec import Spec
 from ..trials.session import Session
 from ..trials.trial import Trial, trials_of
@@ -105,7 +105,7 @@ class Plan:
         What looks wrong and is not refused, a line each.
     """
 
-    outline: Outline
+    outline: StudyOutline
     trials: int
     processes: int
     seconds: tuple[float, float] | None
@@ -148,11 +148,11 @@ class Plan:
         if self.comparisons:
             lines = power_text(len(o.seeds), self.comparisons, self.deviation, self.smallest)
             yield from ("", *lines)
-            said = (
+            text = (
                 f"Differences of success rates, every condition with the first, p adjusted; "
                 f"differences of single seeds are taken to deviate by {self.deviation:g}."
             )
-            yield from wrap(said, WIDTH)
+            yield from wrap(text, WIDTH)
         yield from self.warnings
 
 
@@ -171,7 +171,7 @@ def plan(
     spec
         A `Spec`, a table, or the path of a TOML file.
     jobs
-        Trials at a time; one for every core unless said otherwise.
+        Trials at a time; by default one for every core.
     deviation
         Standard deviation that is supposed of the differences of single seeds.
     smallest
@@ -197,7 +197,7 @@ def plan(
     if timed:
         seconds, memory = _taken(made, trials, processes)
     return Plan(
-        Outline.of(made), len(trials), processes, seconds, memory, len(made.conditions()) - 1,
+        StudyOutline.of(made), len(trials), processes, seconds, memory, len(made.conditions()) - 1,
         deviation, smallest, made.warnings(),
     )  # fmt: skip
 

@@ -36,7 +36,7 @@ Policy = Callable[[Any], Any]
 """What may act: a function of an observation, or of observations by agent, that returns the action.
 
 A model of stable-baselines3 will do, whose ``predict`` is asked without exploration. Whoever has
-``begin(seed)`` is told that a run begins, with or without faults; whoever has ``observe`` is told
+``begin(seed)`` is called when a run begins, with or without faults; whoever has ``observe`` gets
 reward, observation, terminated and truncated after every step, and may learn."""
 
 
@@ -140,8 +140,8 @@ class RecoveryTable:
         return tabulate([course.summary() for course in self.courses])
 
     def __str__(self) -> str:
-        said = f"Levels are mean returns of {BLOCK} episodes; recovery time is in episodes."
-        return f"{self.table}\n{said}"
+        legend = f"Levels are mean returns of {BLOCK} episodes; recovery time is in episodes."
+        return f"{self.table}\n{legend}"
 
     __repr__ = __str__
 
@@ -220,7 +220,7 @@ def returns(
     observe = getattr(policy, "observe", None)
     if hasattr(policy, "begin"):
         policy.begin(seed)
-    found = np.zeros(episodes)
+    totals = np.zeros(episodes)
     for episode, world in enumerate(np.random.SeedSequence(seed).generate_state(episodes)):
         seen, _ = env.reset(seed=int(world), options={"fault_episode": episode})
         for _ in range(steps):
@@ -228,15 +228,15 @@ def returns(
             if observe is not None:
                 observe(reward, seen, terminated, truncated)
             if is_parallel:
-                found[episode] += sum(reward.values()) / len(env.possible_agents)
+                totals[episode] += sum(reward.values()) / len(env.possible_agents)
                 over = not env.agents
             else:
-                found[episode] += float(reward)
+                totals[episode] += float(reward)
                 over = terminated or truncated
             if over:
                 break
     env.close()
-    return found
+    return totals
 
 
 def _predicting(model: Any) -> Callable[[Any], Any]:

@@ -49,11 +49,11 @@ def draw(
     directory
         Of a study.
     condition, seed
-        Which trial; the first one unless said otherwise.
+        Which trial; by default the first one.
     episode
         ``first`` or ``last``; ``before`` or ``after`` where something fails.
     path
-        Of the animation, GIF or MP4; in the folder ``replay`` of the study unless said otherwise.
+        Of the animation, GIF or MP4; by default in the folder ``replay`` of the study.
 
     Raises
     ------

@@ -49,7 +49,7 @@ def run_study(
     accept_code
         Whether to go on with a study although the installed code has changed.
     observer
-        Who is told how it goes; None: nobody.
+        Who is notified of progress; None: nobody.
 
     Yields
     ------

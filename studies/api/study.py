@@ -35,7 +35,7 @@ from ..results.power import SMALLEST, USUAL_DEVIATION
 from ..results.results import Results, read
 from ..results.selection import Where, chosen, together
 from ..results.verdicts import power_text
-from ..spec.outline import Outline, sources_of
+from ..spec.outline import StudyOutline, other_spec, sources_of
 from ..store import durable
 from ..store.store import Store
 from ..workers.workers import Backend
@@ -71,7 +71,7 @@ class StudyResults:
         What must be said of the results, in lines.
     """
 
-    outline: Outline
+    outline: StudyOutline
     results: Results
     failed: tuple[tuple[str, int, str], ...] = ()
     remarks: tuple[str, ...] = ()
@@ -107,7 +107,7 @@ class StudyResults:
         Parameters
         ----------
         columns
-            Headings of the columns, in this order; all unless said otherwise.
+            Headings of the columns, in this order; by default all.
         """
         return tabulate(self.analysis.table, columns)
 
@@ -139,7 +139,7 @@ class StudyResults:
         phase: str | None = None,
         reference: str | None = None,
     ) -> Comparison:
-        """Compare conditions seed by seed: effect, interval, p, and what could have been found.
+        """Compare conditions seed by seed: effect, interval, p, and what could have been detected.
 
         Parameters
         ----------
@@ -149,9 +149,9 @@ class StudyResults:
         measure
             A measure of episodes, ``steps``, ``return`` or a number of whole trials, by name.
         phase
-            Of the episodes; ``evaluation`` unless said otherwise.
+            Of the episodes; by default ``evaluation``.
         reference
-            What the others are compared with; the first unless said otherwise.
+            What the others are compared with; by default the first.
 
         Raises
         ------
@@ -213,11 +213,11 @@ class StudyResults:
         Parameters
         ----------
         condition, seed
-            Which trial; the first unless said otherwise.
+            Which trial; by default the first.
         episode
             ``first`` or ``last``; ``before`` or ``after`` where something fails.
         path
-            Where to write, GIF or MP4; the study's folder ``replay`` unless said otherwise.
+            Where to write, GIF or MP4; by default the study's folder ``replay``.
         """
         where = None if path is None else Path(path)
         return replay.draw(self.directory, condition, seed, episode, where)
@@ -228,7 +228,7 @@ class StudyResults:
         Parameters
         ----------
         path
-            Of the file; ``report.html`` in the study's directory unless said otherwise.
+            Of the file; by default ``report.html`` in the study's directory.
 
         Raises
         ------
@@ -279,7 +279,7 @@ def run(
     progress: bool = True,
     observer: Observer | None = None,
 ) -> StudyResults:
-    """Run what is left of a study and return what it found; the same call again continues it.
+    """Run what is left of a study and return its results; the same call again continues it.
 
     Parameters
     ----------
@@ -293,7 +293,7 @@ def run(
     progress
         Whether to show how it goes.
     observer
-        Who is told how it goes instead, see `nested_agents.studies.workers.runner.Observer`.
+        Who is notified of progress instead, see `nested_agents.studies.workers.runner.Observer`.
 
     Warns
     -----
@@ -311,17 +311,17 @@ def run(
 
     out = Path(out)
     spec = Spec.read(spec, study=out)
-    told = observer or (Terminal() if progress else Observer())
+    listener = observer or (Terminal() if progress else Observer())
     with run_study(
         spec, out, jobs=jobs, backend=backend, address=address, retry_failed=retry_failed,
-        accept_code=accept_code, observer=told,
+        accept_code=accept_code, observer=listener,
     ) as store:  # fmt: skip
-        found = _of(store)
-    if found.failed and observer is None:
+        study = _of(store)
+    if study.failed and observer is None:
         warnings.warn(
-            f"{count(len(found.failed), 'trial')} failed: study.failed says why", stacklevel=2
+            f"{count(len(study.failed), 'trial')} failed: study.failed says why", stacklevel=2
         )
-    return found
+    return study
 
 
 def load(*places: Place) -> StudyResults:
@@ -345,21 +345,24 @@ def load(*places: Place) -> StudyResults:
     twice = next((p for i, p in enumerate(paths) if p.resolve() in _resolved(paths[:i])), None)
     if twice is not None:
         raise SpecError(f"{twice}: is named more than once")
-    found = [_loaded(path) for path in paths]
-    if len(found) == 1:
-        return found[0]
+    loaded = [_loaded(path) for path in paths]
+    if len(loaded) == 1:
+        return loaded[0]
     names = [path.name if _distinct(paths) else str(path) for path in paths]
-    results, labels = together([(n, s.results) for n, s in zip(names, found, strict=True)])
+    results, labels = together(
+        [(n, s.results) for n, s in zip(names, loaded, strict=True)],
+        [study._settings for study in loaded],
+    )
     settings = {
-        new[c]: own for s, new in zip(found, labels, strict=True) for c, own in s._settings.items()
+        new[c]: own for s, new in zip(loaded, labels, strict=True) for c, own in s._settings.items()
     }
     failed = [
-        (new[c], *rest) for s, new in zip(found, labels, strict=True) for c, *rest in s.failed
+        (new[c], *rest) for s, new in zip(loaded, labels, strict=True) for c, *rest in s.failed
     ]
-    outline = replace(found[0].outline, columns=results.columns)
+    outline = replace(loaded[0].outline, columns=results.columns)
     return StudyResults(
-        outline, results, tuple(failed), tuple(r for s in found for r in s.remarks),  # type: ignore[arg-type]
-        found[0]._sources, settings, tuple(d for s in found for d in s._directories),
+        outline, results, tuple(failed), tuple(r for s in loaded for r in s.remarks),  # type: ignore[arg-type]
+        loaded[0]._sources, settings, tuple(d for s in loaded for d in s._directories),
         _is_whole=False,
     )  # fmt: skip
 
@@ -383,8 +386,8 @@ def _loaded(path: Path) -> StudyResults:
 
 
 def _of(store: Store) -> StudyResults:
-    outline = Outline.kept(store)
+    outline, remark = StudyOutline.kept(store), other_spec(store)
     return StudyResults(
-        outline, read(store), tuple(store.failed()), (), sources_of(store), store.settings(),
-        (store.directory,),
+        outline, read(store), tuple(store.failed()), (remark,) if remark else (),
+        sources_of(store), store.settings(), (store.directory,),
     )  # fmt: skip

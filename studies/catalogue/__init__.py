@@ -1,1 +1,1 @@
-"""The studies: what is measured of trials, how it is compared, drawn and told."""
+"""The studies: what is measured of trials, how it is compared, drawn and reported."""

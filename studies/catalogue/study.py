@@ -54,10 +54,10 @@ def load_study(name: str) -> Study:
         If there is none, it may not be run, or lacks a function that studies have; one line.
     """
     try:
-        found = STUDIES.find(name)
+        entry = STUDIES.find(name)
     except ValueError as error:
         raise SpecError(f"study = {name!r}: {error}") from None
-    study = found() if isinstance(found, type) else found
+    study = entry() if isinstance(entry, type) else entry
     missing = [part for part in PARTS if not callable(getattr(study, part, None))]
     if missing:
         raise SpecError(f"study = {name!r}: has no {missing[0]}, needs {', '.join(PARTS)}")

@@ -15,6 +15,7 @@ from typing import Literal
 
 import numpy as np
 
+from ..presentation.cells import ends
 from ..results.results import NOTHING, Results
 from . import measures as measured
 from .measures import Measured
@@ -222,16 +223,31 @@ class Finding:
     measured: Measured | None
     verdict: Verdict
 
+    @property
+    def result(self) -> str:
+        """The value with its interval and number of seeds, as text."""
+        if self.measured is None:
+            return "no results"
+        value, low, high = ends(self.measured.estimate)
+        text = f"{value:.2f}" if self.measured.seeds else f"{value:.2g}"
+        if self.measured.seeds:
+            text += f" ({low:.2f} to {high:.2f}), {self.measured.seeds} seeds"
+        else:
+            text += ", computed"
+        if self.measured.p is not None:
+            text += f", p = {self.measured.p:.2g}"
+        return text + (f", {self.measured.note}" if self.measured.note else "")
+
 
 def judge(results: Mapping[str, Results]) -> tuple[Finding, ...]:
     """Decide every claim by the results of its study, by name."""
     findings = []
     for claim in CLAIMS:
-        found = claim.compute(results.get(claim.study, NOTHING()))
-        if found is None or not np.isfinite(found.estimate.value):
+        measurement = claim.compute(results.get(claim.study, NOTHING()))
+        if measurement is None or not np.isfinite(measurement.estimate.value):
             findings.append(Finding(claim, None, "not decided"))
             continue
-        enough = found.seeds == 0 or found.seeds >= LEAST_SEEDS
-        verdict = claim.criterion.decide(found) if enough else "not decided"
-        findings.append(Finding(claim, found, verdict))
+        enough = measurement.seeds == 0 or measurement.seeds >= LEAST_SEEDS
+        verdict = claim.criterion.decide(measurement) if enough else "not decided"
+        findings.append(Finding(claim, measurement, verdict))
     return tuple(findings)

@@ -155,18 +155,18 @@ def optimal(system: str) -> Compute:
     """Return what measures how often a system ends in the optimum of its worst game."""
 
     def compute(results: Results) -> Measured | None:
-        found = {
+        estimates = {
             ", ".join(str(v) for k, v in columns.items() if k != "name"): rate(
                 results.success(condition, "evaluation")
             )
             for condition, columns in results.columns.items()
             if columns.get("name") == system and results.has(condition, "evaluation")
         }
-        if not found:
+        if not estimates:
             return None
-        worst = min(found, key=lambda game: float(found[game].value))
+        worst = min(estimates, key=lambda game: float(estimates[game].value))
         seeds = len(results.seeds(results.conditions[0]))
-        return Measured(found[worst], seeds, note=worst)
+        return Measured(estimates[worst], seeds, note=worst)
 
     return compute
 
@@ -176,8 +176,8 @@ def order_matters(results: Results) -> Measured | None:
 
     Intervals of the differences are simultaneous (Bonferroni); p is that of Friedman's test.
     """
-    found = [c for c in compare_orders(results) if c.title.startswith("evaluation")]
-    if not found:
+    comparisons = [c for c in compare_orders(results) if c.title.startswith("evaluation")]
+    if not comparisons:
         return None
     first, *others = (results.success(c, "evaluation") for c in results.of_phase("evaluation"))
     level = 1.0 - 0.05 / len(others)
@@ -185,7 +185,7 @@ def order_matters(results: Results) -> Measured | None:
     most = max(shifts, key=lambda e: abs(float(e.value)))
     low, high = min(float(e.low) for e in shifts), max(float(e.high) for e in shifts)
     widest = Estimate(most.value, np.asarray(low), np.asarray(high))
-    return Measured(widest, len(first), found[0].p, f"{1 + len(others)} orders")
+    return Measured(widest, len(first), comparisons[0].p, f"{1 + len(others)} orders")
 
 
 def _sizes(results: Results) -> dict[int, list[str]]:
@@ -262,12 +262,12 @@ def recovered(adapts: str) -> Compute:
     """Return what measures success at the end relative to before the failure, worst fault."""
 
     def compute(results: Results) -> Measured | None:
-        found = [c for c in courses_of(results) if c.fault in FAULTS and c.adapts == adapts]
-        ratios = {c.fault: ratio(c.end, c.before) for c in found}
+        courses = [c for c in courses_of(results) if c.fault in FAULTS and c.adapts == adapts]
+        ratios = {c.fault: ratio(c.end, c.before) for c in courses}
         if not ratios:
             return None
         worst = min(ratios, key=lambda fault: float(np.nan_to_num(ratios[fault].value)))
-        return Measured(ratios[worst], len(found[0].success), note=worst)
+        return Measured(ratios[worst], len(courses[0].success), note=worst)
 
     return compute
 

@@ -37,28 +37,12 @@ def _print_table(findings: Sequence[Finding]) -> None:
         table.add_row(
             f"{claim.text} [dim]({claim.place})[/]",
             f"{claim.measure}: [dim]{claim.criterion.text}[/]",
-            result(finding),
+            finding.result,
             f"[{colour}]{finding.verdict}[/]",
         )
     Console().print(table)
     print("Values with their 95 % intervals. A claim holds if the whole interval meets the")
     print("criterion, does not if none of it does, and is not decided in between.")
-
-
-def result(finding: Finding) -> str:
-    """Return the value with its interval and number of seeds as text."""
-    if finding.measured is None:
-        return "no results"
-    measured = finding.measured
-    value, low, high = ends(measured.estimate)
-    text = f"{value:.2f}" if measured.seeds else f"{value:.2g}"
-    if measured.seeds:
-        text += f" ({low:.2f} to {high:.2f}), {measured.seeds} seeds"
-    else:
-        text += ", computed"
-    if measured.p is not None:
-        text += f", p = {measured.p:.2g}"
-    return text + (f", {measured.note}" if measured.note else "")
 
 
 def markdown(findings: Sequence[Finding]) -> str:
@@ -68,7 +52,7 @@ def markdown(findings: Sequence[Finding]) -> str:
     for finding in findings:
         c = finding.claim
         cells = (
-            c.text, c.place, c.study, c.measure, c.criterion.text, result(finding),
+            c.text, c.place, c.study, c.measure, c.criterion.text, finding.result,
             f"**{finding.verdict}**",
         )  # fmt: skip
         lines.append("| " + " | ".join(str(cell) for cell in cells) + " |")

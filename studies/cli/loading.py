@@ -2,19 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ...core.plugins import trust
-from ..api.study import StudyResults, load
 from ..presentation.progress import say
+from ..spec.outline import other_spec
 from ..store.store import Store
+
+if TYPE_CHECKING:
+    from ..api.study import StudyResults
+
+
+@contextmanager
+def opened(directory: Path) -> Iterator[Store]:
+    """Open a study to read it, and say so if the spec beside its database is another one."""
+    with Store.open(directory) as store:
+        if (remark := other_spec(store)) is not None:
+            say(remark)
+        yield store
 
 
 def load_results(
     sources: Sequence[Path], study: str | None, where: str | None, *, is_trusted: bool
 ) -> StudyResults:
     """Return the results at some places, as a study analyses them, or a choice of the trials."""
+    from ..api.study import load
+
     if is_trusted:
         for source in sources:
             if source.is_dir():

@@ -65,7 +65,7 @@ jobs = click.option(
     "--jobs",
     type=int,
     metavar="N",
-    help="Trials at a time; one for every core unless said otherwise.",
+    help="Trials at a time; by default one for every core.",
 )
 """Number of worker processes."""
 

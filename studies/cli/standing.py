@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..presentation.words import count, duration
-from ..spec.outline import Outline
+from ..spec.outline import StudyOutline, other_spec
 from ..store.store import Store
 from ..workers.progress import Progress
 
@@ -20,7 +20,7 @@ def describe(store: Store, now: Progress) -> Iterator[str]:
     now
         How far its study is.
     """
-    outline = Outline.kept(store)
+    outline = StudyOutline.kept(store)
     extent = f"{count(len(outline.columns), 'condition')} x {count(len(outline.seeds), 'seed')}"
     yield f"study    {outline.study}: {extent}"
     yield f"done     {now.done} of {now.total} trials"
@@ -31,6 +31,8 @@ def describe(store: Store, now: Progress) -> Iterator[str]:
     yield f"left     {now.left}"
     if now.seconds:
         yield f"time     about {duration(now.seconds)} with {count(now.processes, 'process', 'es')}"
+    if (remark := other_spec(store)) is not None:
+        yield f"spec     {remark}"
     if (versions := store.versions_of_code()) > 1:
         yield f"code     finished trials are of {versions} versions of the installed code"
 

@@ -10,8 +10,8 @@ import numpy as np
 from ...core.adaptation.self_model import SelfModel
 from ...core.numerics.arrays import FloatArray
 
-ROWS = (("ahead", "m/s"), ("left", "m/s"), ("turning", "rad/s"))
-"""The rows of an effect, in units per unit of commanded speed."""
+ROWS = ("ahead", "left", "turning")
+"""The rows of an effect [m/s, m/s, rad/s], per unit of commanded speed."""
 LEAST_CHANGE = 0.25
 """A smaller change of an actuator's drive is not spoken of."""
 Effects = tuple[FloatArray, ...]
@@ -46,7 +46,7 @@ def table(bodies: Bodies, actuators: Sequence[str]) -> Iterator[str]:
         wide, lines = headed([*names, "constant"], 8)
         for i, line in enumerate(lines):
             yield ((body_name(own) if i == len(lines) - 1 else "").ljust(16) + line).rstrip()
-        for row, (name, _) in enumerate(ROWS):
+        for row, name in enumerate(ROWS):
             if not any(effects[r][row].any() for effects in bodies.moments.values()):
                 continue  # a joint can but turn
             for moment, effects in bodies.moments.items():
@@ -77,7 +77,7 @@ def verdicts(bodies: Bodies, actuators: Sequence[str]) -> Iterator[str]:
     """Yield, for every actuator whose drive is not what it was built with, what it is taken for.
 
     Its drive is the part of its effect that is along the one it was built with; a change within
-    two of its standard deviations is said to be uncertain.
+    two of its standard deviations is called uncertain.
     """
     built, last = bodies.moments["built"], bodies.moments["after"]
     for r, names in enumerate(by_body(bodies, actuators)):

@@ -21,7 +21,7 @@ from ..store.durable import replacing
 SUFFIXES = (".svg", ".png", ".pdf")
 """Formats that figures are written in."""
 USUAL = ("png", "svg")
-"""Those that figures of a study are written in unless said otherwise."""
+"""Those that figures of a study are written in by default."""
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Distinct to colour-blind readers (Okabe and Ito 2008); the palest is left out."""
 STYLES = (

@@ -9,7 +9,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..spec.outline import Outline
+from ..spec.outline import StudyOutline
 from ..workers.runner import Observer
 from ..workers.worker import Outcome
 from .words import count, duration
@@ -37,7 +37,7 @@ class Terminal(Observer):
         conditions, seeds = len(spec.conditions()), len(spec.seeds)
         say(
             f"{spec.study}: {count(conditions, 'condition')} x {count(seeds, 'seed')}, "
-            f"{Outline.of(spec).lengths} of up to {count(spec.steps, 'step')}, "
+            f"{StudyOutline.of(spec).lengths} of up to {count(spec.steps, 'step')}, "
             f"{count(processes, 'process', 'es')}, kept in {directory}"
         )
 

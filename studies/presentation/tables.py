@@ -81,10 +81,10 @@ class SummaryTable:
             first = f"<th>{escape(condition)}<br><small>{count(seeds, 'seed')}</small></th>"
             lines.append(f"<tr>{first}{''.join(f'<td>{cell}</td>' for cell in shown)}</tr>")
         body = "".join(lines) or f"<tr><td>{NOTHING}</td></tr>"
-        said = escape(" ".join(self.legend)) if self.rows else ""
+        legend = escape(" ".join(self.legend)) if self.rows else ""
         return (
             f"<table><thead><tr>{heads}</tr></thead><tbody>{body}</tbody></table>"
-            f"<p><small>{said}</small></p>"
+            f"<p><small>{legend}</small></p>"
         )
 
     def _repr_html_(self) -> str:

@@ -47,7 +47,7 @@ def text_of(titles: Sequence[str], rows: Sequence[Row], width: int = 80) -> str:
 def _blocks(titles: Sequence[str], rows: Sequence[Row], width: int) -> list[dict[int, int]]:
     """Return which columns stand side by side, and how wide each is: in as few blocks as fit.
 
-    Where titles fit in one line there is one block; elsewhere they are broken between words.
+    Where titles fit in one line there is one block; otherwise they are broken between words.
     """
     label = max(max(len(c), len(count(seeds, "seed"))) for c, seeds, _ in rows)
     texts = [

@@ -10,12 +10,11 @@ from markupsafe import Markup
 
 from ..catalogue.study import analysed, drawn, load_study
 from ..claims.claims import judge
-from ..claims.table import result
 from ..presentation.tables import tabulate
 from ..presentation.words import count
 from ..results.contrasts import contrasts
 from ..results.results import Results, read
-from ..spec.outline import Outline, sources_of
+from ..spec.outline import StudyOutline, sources_of
 from ..spec.toml import dumps
 from ..store.schema import RESULTS_VERSION
 from ..store.store import Store
@@ -36,7 +35,7 @@ def page(directory: Path) -> str:
     """
     with Store.open(directory) as store:
         store.verify()
-        outline, results, counts = Outline.kept(store), read(store), store.counts()
+        outline, results, counts = StudyOutline.kept(store), read(store), store.counts()
         failed = [
             (condition, seed, words.without_places(error.rstrip()))
             for condition, seed, error in store.failed()
@@ -56,7 +55,7 @@ def page(directory: Path) -> str:
         notes=getattr(analysis, "notes", ()) or _compared(results),
         table=tabulate(analysis.table),
         claims=[
-            (finding.claim, result(finding), finding.verdict)
+            (finding.claim, finding.result, finding.verdict)
             for finding in judge({outline.study: results})
             if finding.claim.study == outline.study and finding.measured is not None
         ],

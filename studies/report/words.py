@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable
 
 from ..presentation.words import count
-from ..spec.outline import Outline
+from ..spec.outline import StudyOutline
 from ..workers.worker import installed
 
 PACKAGES = (
@@ -44,7 +44,7 @@ def runs(values: Iterable[int]) -> str:
     return ", ".join(parts)
 
 
-def extent(outline: Outline) -> str:
+def extent(outline: StudyOutline) -> str:
     """Return what a study consists of."""
     after = ""
     if outline.evaluation:

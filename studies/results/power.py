@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 WANTED = 0.8
 """The power that studies are planned for (Cohen 1988)."""
 SMALLEST = 0.2
-"""The smallest difference of success rates that is of interest unless said otherwise."""
+"""The smallest difference of success rates that is of interest by default."""
 USUAL_DEVIATION = 0.25
 """Standard deviation of the paired differences of success rates that is supposed before any are
 known. In the published studies of 20 and 30 seeds nine conditions in ten have less."""

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import SpecError
-from ..spec.outline import Outline
+from ..spec.outline import StudyOutline
 from ..store import durable
 from ..store.schema import RESULTS_VERSION, measures_from, tables
 from ..store.schema import SECONDS as PARTS
@@ -26,7 +26,7 @@ FEW = 100
 """Fewer rows, or values, are always written one by one."""
 
 
-def dumps(outline: Outline, results: Results) -> str:
+def dumps(outline: StudyOutline, results: Results) -> str:
     """Return results of this version, and their spec, as JSON text."""
     measures = [m for m in results.measures if m.name in results.episodes]
     rates = {"steps": False} | {measure.name: measure.is_rate for measure in measures}
@@ -57,13 +57,13 @@ def dumps(outline: Outline, results: Results) -> str:
 class Published(NamedTuple):
     """Results with their spec as a table, and the version of the code that they are of."""
 
-    outline: Outline
+    outline: StudyOutline
     results: Results
     version: int
 
     @property
     def note(self) -> str | None:
-        """What must be said of results of another version than this, in one line."""
+        """What must be noted of results of another version than this, in one line."""
         if self.version == RESULTS_VERSION:
             return None
         return f"results of version {self.version}, this is version {RESULTS_VERSION}"
@@ -97,11 +97,11 @@ def loads(text: str) -> Published:
     columns = content["columns"]
     results = from_arrays(phases, seeds, numbers, usage, columns, measures)
     return Published(
-        Outline.noted(content["spec"], columns), results, int(content["results_version"])
+        StudyOutline.noted(content["spec"], columns), results, int(content["results_version"])
     )
 
 
-def write(path: Path, outline: Outline, results: Results) -> None:
+def write(path: Path, outline: StudyOutline, results: Results) -> None:
     """Write the same to a file, which is there whole or not at all."""
     durable.write(path, dumps(outline, results).encode())
 

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from ...core.interface.measures import SUCCESS, Measure
 from ...core.plugins.deferred import pd
 from ..store.reading import NamesAndRows
-from ..store.schema import ELSEWHERE
+from ..store.schema import EVALUATION
 from ..store.store import Store
 from .numbers import NUMBERS
 
@@ -134,9 +134,9 @@ class Results:
     def other_evaluations(self, condition: str) -> dict[str, str]:
         """Return the phases of a condition's evaluations beside its own, by their names."""
         return {
-            phase.removeprefix(ELSEWHERE): phase
+            phase.removeprefix(EVALUATION): phase
             for phase in self.phases
-            if phase.startswith(ELSEWHERE) and self.has(condition, phase)
+            if phase.startswith(EVALUATION) and self.has(condition, phase)
         }
 
     @cached_property

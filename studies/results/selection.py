@@ -11,6 +11,7 @@ import numpy as np
 
 from ...core.plugins.messages import near
 from ..errors import SpecError
+from ..spec.labels import label
 from ..spec.overlay import flat
 from ..trials.measures import joined as joined_measures
 from .results import Results, join, select
@@ -88,8 +89,8 @@ class Where:
         SpecError
             If the text names what the trial has not, or compares what cannot be compared.
         """
-        told = {key: value for key, value in columns.items() if value != ""}
-        known = {"condition": condition, "seed": seed, **dict(flat(settings)), **told}
+        filled = {key: value for key, value in columns.items() if value != ""}
+        known = {"condition": condition, "seed": seed, **dict(flat(settings)), **filled}
         return bool(self._value(self._tree, known))
 
     def _value(self, node: ast.expr, known: Mapping[str, Any]) -> bool:
@@ -101,13 +102,13 @@ class Where:
         if not isinstance(node, ast.Compare) or len(node.ops) > 1:
             raise self._refusal(node, "is no comparison, such as robots == 8")
         key = ast.unparse(node.left)
-        own, other = self._found(key, known), self._constant(node.comparators[0])
+        own, other = self._look_up(key, known), self._constant(node.comparators[0])
         try:
             return COMPARISONS[type(node.ops[0])](own, other)
         except (KeyError, TypeError):
             raise self._refusal(node, f"{key} is {own!r}, which cannot be compared so") from None
 
-    def _found(self, key: str, known: Mapping[str, Any]) -> Any:
+    def _look_up(self, key: str, known: Mapping[str, Any]) -> Any:
         if key in known:
             return _plain(known[key])
         ends = {name: _plain(value) for name, value in known.items() if name.endswith(f".{key}")}
@@ -156,11 +157,29 @@ def relabelled(results: Results, name: str, taken: Iterable[str]) -> dict[str, s
     return {c: f"{c} ({name})" if c in known else c for c in results.columns}
 
 
-def together(studies: Sequence[tuple[str, Results]]) -> tuple[Results, list[dict[str, str]]]:
+def _apart(name: str, tables: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return labels of conditions of one name, by one or two settings that tell all apart; or none.
+
+    Examples
+    --------
+    >>> _apart("default", [{"scenario": {"robots": n, "box": "disc"}} for n in (2, 4)])
+    ['default, robots=2', 'default, robots=4']
+    """
+    own = [dict(flat(table)) for table in tables]
+    keys = dict.fromkeys(key for table in own for key in table)
+    other = [key for key in keys if len({repr(table.get(key)) for table in own}) > 1]
+    labels = [label({key: table.get(key, "") for key in other}, name) for table in own]
+    return labels if len(other) <= 2 and len(set(labels)) == len(labels) else []
+
+
+def together(
+    studies: Sequence[tuple[str, Results]], settings: Sequence[Mapping[str, Any]] = ()
+) -> tuple[Results, list[dict[str, str]]]:
     """Return the results of several studies as those of one, and the new labels of each.
 
-    Conditions whose label occurs more than once get the name of their study. Their columns tell
-    it, too, as `DIRECTORY`.
+    Conditions whose label occurs more than once are told apart by their `settings`, where one or
+    two of these differ, else by the name of their study. Their columns tell it, too, as
+    `DIRECTORY`.
 
     Raises
     ------
@@ -170,6 +189,12 @@ def together(studies: Sequence[tuple[str, Results]]) -> tuple[Results, list[dict
     times = Counter(condition for _, results in studies for condition in results.columns)
     several = [condition for condition, count in times.items() if count > 1]
     labels = [relabelled(results, name, several) for name, results in studies]
+    for condition in several if settings else ():
+        at = [i for i, (_, results) in enumerate(studies) if condition in results.columns]
+        apart = _apart(condition, [settings[i].get(condition, {}) for i in at])
+        if not times.keys() & set(apart):
+            for i, text in zip(at, apart, strict=False):
+                labels[i][condition] = text
     keys = dict.fromkeys(k for _, r in studies for row in r.columns.values() for k in row)
     columns = {
         new[condition]: {**{key: row.get(key, "") for key in keys}, DIRECTORY: name}

@@ -112,13 +112,13 @@ def bootstrap(
         half = _student(arrays, level) * SPREAD[statistic]
         return _bounded(value, value - half, value + half, bounds, level, sum(map(len, arrays)))
     drawn = _drawn(tuple(map(len, arrays)), resamples, seed)
-    n_runs, found = sum(map(len, arrays)), []
+    n_runs, statistics = sum(map(len, arrays)), []
     for part in _parts(resamples, sum(array.size for array in arrays)):
         samples = [_taken(array, runs[part]) for array, runs in zip(arrays, drawn, strict=True)]
         pooled = samples[0] if len(samples) == 1 else np.concatenate(samples)
-        found.append(compute(np.moveaxis(pooled, 0, -1)))
+        statistics.append(compute(np.moveaxis(pooled, 0, -1)))
     tail = _tail(level, n_runs)
-    low, high = np.quantile(np.concatenate(found), [tail, 1.0 - tail], axis=0)
+    low, high = np.quantile(np.concatenate(statistics), [tail, 1.0 - tail], axis=0)
     return _bounded(value, low, high, bounds, level, n_runs)
 
 

@@ -1,4 +1,4 @@
-"""What is said of comparisons: what they found, and what they could have found."""
+"""Verdicts on comparisons: what they found, and what they could have detected."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def power_lines(
     of_rates
         Whether they are differences of success rates.
     smallest
-        The smallest difference of interest; of rates `SMALLEST` unless said otherwise.
+        The smallest difference of interest; of rates by default `SMALLEST`.
     """
     if not differences:
         return []
@@ -101,7 +101,7 @@ def power_sentence(
         text += "."
     elif deviation is None:
         text = f"{counted}{among} that deviate by nothing: how small a difference they would find "
-        text += "cannot be told."
+        text += "cannot be determined."
     else:
         least = two_figures(detectable(deviation, seeds, comparisons))
         text = f"with {counted}{among}, a difference of {least} is found with probability "

@@ -18,7 +18,7 @@ from pydantic import Field, SerializerFunctionWrapHandler, ValidationError, mode
 from ...core.agents.joint_agents import Agents, join_agents
 from ...core.interface.hierarchy import Hierarchy
 from ...core.interface.scenario import Scenario, groups_of
-from ...core.learners import LEARNERS, TeamSettings
+from ...core.learners import LEARNERS, LearnerSettings, TeamSettings
 from ...core.learners.batch import BatchTDSettings
 from ...core.plugins.messages import closest
 from ...core.plugins.plugged import Plugged
@@ -129,9 +129,9 @@ class Condition:
     @property
     def tables(self) -> list[Any]:
         """Its settings and those of its evaluations and stages, as tables."""
-        elsewhere = [other.model_dump(mode="json") for _, other in self.evaluations]
+        others = [other.model_dump(mode="json") for _, other in self.evaluations]
         stages = [stage.table() for stage in self.curriculum]
-        return [self.settings.model_dump(mode="json"), *elsewhere, *stages]
+        return [self.settings.model_dump(mode="json"), *others, *stages]
 
 
 def layer_of(settings: Settings) -> TomlTable:
@@ -139,6 +139,16 @@ def layer_of(settings: Settings) -> TomlTable:
     layer: TomlTable = {name: dict(getattr(settings, name)) for name in SECTIONS}
     agents = getattr(settings, "agents", None)
     return layer if agents is None else layer | {"agents": agents}
+
+
+def below(table: Mapping[str, Any]) -> tuple[type[Settings], TomlTable]:
+    """Return the model of conditions, and what they have at least of a spec's table and preset.
+
+    Nothing is known of the kinds of an override's, whose table is empty here.
+    """
+    preset = PRESETS.get(str(table.get("preset", "default")), PRESETS["default"])
+    own = {name: table[name] for name in SECTIONS if isinstance(table.get(name), Mapping)}
+    return ConditionSettings, _laid([preset.table, own]) if table else {}
 
 
 def grid(
@@ -193,12 +203,12 @@ def grid(
         labels.add(name)
         columns: dict[str, Any] = {"name": override.name} if override else {}
         columns |= {key: scalar(point[key]) if key in point else "" for key in keys}
-        elsewhere = tuple(
+        others = tuple(
             (other, _reevaluation(settings, changes, f" (evaluation {other!r}){where}"))
             for other, changes in (evaluations or {}).items()
         )
         columns = columns or {"preset": preset}
-        conditions.append(Condition(name, columns, settings, elsewhere, stages))
+        conditions.append(Condition(name, columns, settings, others, stages))
     return tuple(conditions)
 
 
@@ -223,6 +233,8 @@ def resolve(
     name = point.get("preset", preset if own is None else own)
     if not isinstance(name, str) or name not in PRESETS:
         raise SpecError(f"preset = {show(name)}: {closest(name, PRESETS)}{where}")
+    if own is not None or "preset" in point:
+        tables = _for_preset(name, tables)
     own_layers = [tables, layer_of(override) if override else {}]
     own_layers += [nested(key, value) for key, value in point.items() if key != "preset"]
     table = _laid([PRESETS[name].table, *own_layers])
@@ -230,6 +242,15 @@ def resolve(
     if scenario_defaults := scenario.scenario_defaults(name):
         table = _laid([PRESETS[name].table, scenario_defaults, *own_layers])
     return _validated(table, where)
+
+
+def _for_preset(name: str, tables: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return a spec's tables without what tunes learning, if a preset is a control: it has not."""
+    learner = tables.get("learner", {})
+    if "kind" in learner or PRESETS[name].table["learner"]["kind"] != "frozen":
+        return tables
+    kept = {key: v for key, v in learner.items() if key in LearnerSettings.model_fields}
+    return {**tables, "learner": kept}
 
 
 def _laid(layers: Sequence[Mapping[str, Any]]) -> TomlTable:

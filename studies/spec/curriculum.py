@@ -1,7 +1,8 @@
 """Curricula: what a team is trained on before the scenario of its condition.
 
-A stage is a number of episodes in a scenario, which is told by what is laid over the condition's
-own: what a sweep or an override says of it holds in the stages, too, unless they say otherwise.
+A stage is a number of episodes in a scenario. It is described by changes of the condition's
+own scenario: what a sweep or an override says of it holds in the stages, too, unless they say
+otherwise.
 """
 
 from __future__ import annotations

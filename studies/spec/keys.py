@@ -130,7 +130,7 @@ def keys_below(prefix: str) -> tuple[Table, ...]:
     >>> [key.default for table in keys_below("topology.order") for key in table.keys]
     ['"listed"']
     """
-    found = []
+    below = []
     for table in tables():
         kept = tuple(
             key
@@ -138,8 +138,8 @@ def keys_below(prefix: str) -> tuple[Table, ...]:
             if not prefix or f"{name}.".startswith(f"{prefix}.")
         )
         if kept:
-            found.append(replace(table, keys=kept))
-    return tuple(found)
+            below.append(replace(table, keys=kept))
+    return tuple(below)
 
 
 def _below(model: type[Settings], name: str, within: str, seen: set[Any]) -> Iterator[Table]:
@@ -156,7 +156,7 @@ def _below(model: type[Settings], name: str, within: str, seen: set[Any]) -> Ite
 
 
 def _held(info: FieldInfo) -> Iterator[tuple[str, type[Settings], Mapping[str, FieldInfo]]]:
-    """Yield what a field may hold: kind, model, and the fields told of the model that it inherits.
+    """Yield what a field may hold: kind, model, and fields of the model that it inherits.
 
     What all kinds inherit comes first, if it has keys.
     """
@@ -210,16 +210,16 @@ def _laid_over(key: Key, table: Mapping[str, Any]) -> Key:
 
 
 def nearest(prefix: str) -> str:
-    """Return which keys a prefix that begins none may have meant, in words.
+    """Return which keys a prefix that begins none may stand for, in words.
 
     Examples
     --------
     >>> nearest("value_of")
     "did you mean 'learner.decision.value_of'?"
     """
-    found = tables()
-    full = dict.fromkeys(name for table in found for name in table.full_names)
-    names = [*dict.fromkeys(table.name for table in found if table.name), *full]
+    all_tables = tables()
+    full = dict.fromkeys(name for table in all_tables for name in table.full_names)
+    names = [*dict.fromkeys(table.name for table in all_tables if table.name), *full]
     ending = [name for name in full if name.endswith(f".{prefix}")]
     if ending:
         return f"did you mean {' or '.join(map(repr, ending))}?"

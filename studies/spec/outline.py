@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import json
+import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ...core.plugins.sources import Sources
-from ..errors import SpecError
-from ..store.database import DATABASE
+from ..errors import SpecError, show
+from ..store.database import DATABASE, SPEC_FILE
+from .labels import lengths
 
 if TYPE_CHECKING:
     from ..store.reading import Reading
@@ -16,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Outline:
+class StudyOutline:
     """A spec as plain words and numbers.
 
     Attributes
@@ -47,12 +50,12 @@ class Outline:
         return lengths(([s["episodes"] for s in stages] for stages in curricula), self.episodes)
 
     @classmethod
-    def of(cls, spec: Spec) -> Outline:
+    def of(cls, spec: Spec) -> StudyOutline:
         """Return the outline of a spec."""
         return cls.noted(spec.table(), {c.label: c.columns for c in spec.conditions()})
 
     @classmethod
-    def kept(cls, store: Reading) -> Outline:
+    def kept(cls, store: Reading) -> StudyOutline:
         """Return the outline of a kept study, as it was noted; nothing is run for it.
 
         Raises
@@ -68,7 +71,9 @@ class Outline:
             ) from None
 
     @classmethod
-    def noted(cls, table: Mapping[str, Any], columns: Mapping[str, Mapping[str, Any]]) -> Outline:
+    def noted(
+        cls, table: Mapping[str, Any], columns: Mapping[str, Mapping[str, Any]]
+    ) -> StudyOutline:
         """Return the outline that `Spec.table` and the columns of its conditions tell.
 
         Raises
@@ -94,20 +99,28 @@ def sources_of(store: Reading) -> Sources:
     return Sources(None, store.sources(), brought_by=str(store.directory))
 
 
-def lengths(curricula: Iterable[Sequence[int]], episodes: int) -> str:
-    """Return in words the episodes of training, stage by stage, that there are.
+def other_spec(store: Reading) -> str | None:
+    """Return how the copy of the spec beside a database differs from it, in one line.
 
-    Parameters
-    ----------
-    curricula
-        Of every condition, the episodes of its stages.
-    episodes
-        Those after them.
-
-    Examples
-    --------
-    >>> lengths([[10, 6], [10, 6]], 8), lengths([[10, 6], []], 8), lengths([[]], 1)
-    ('10 + 6 + 8 episodes', '10 + 6 + 8 or 8 episodes', '1 episode')
+    One of the two may have come from another study. None if they mean the same, or there is no
+    copy. Files of users are run only if they are trusted, and if the copy is written otherwise.
     """
-    told = dict.fromkeys(" + ".join(map(str, [*stages, episodes])) for stages in curricula)
-    return f"{' or '.join(told)} episode{'' if list(told) == ['1'] else 's'}"
+    path, own = store.directory / SPEC_FILE, store.spec()
+    if not path.exists():
+        return None
+    try:
+        copy = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        if copy != own:
+            from .spec import Spec
+
+            copy = json.loads(json.dumps(Spec.of(copy, sources_of(store)).table()))
+    except (OSError, ValueError, RecursionError) as error:
+        return f"{path}: is not the spec of {DATABASE} beside it: {error}"
+    for key in sorted(own.keys() | copy.keys()):
+        here, there = copy.get(key, "absent"), own.get(key, "absent")
+        if here != there:
+            return (
+                f"{path}: is not the spec of {DATABASE} beside it, whose results these are: "
+                f"{key} = {show(here)} here, {show(there)} there"
+            )
+    return None

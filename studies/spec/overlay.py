@@ -21,7 +21,7 @@ TomlTable = dict[str, Any]
 
 
 Slot = type[BaseModel] | FieldInfo | None
-"""What a table is meant for: a model, or a field that holds one of several."""
+"""What a table is for: a model, or a field that holds one of several."""
 
 
 def models_of(annotation: Any) -> list[type[BaseModel]]:
@@ -44,7 +44,7 @@ def registry_of(slot: Slot) -> SettingsRegistry | None:
 
 
 def model_at(slot: Slot, table: object) -> type[BaseModel] | None:
-    """Return the model that `table` is meant for; none if its kind is unknown or missing."""
+    """Return the model that `table` is for; none if its kind is unknown or missing."""
     kind = table.get("kind") if isinstance(table, Mapping) else None
     registry = registry_of(slot)
     if registry is not None:
@@ -71,7 +71,7 @@ def overlay(base: Mapping[str, Any], table: Mapping[str, Any], slot: Slot = None
     base, table
         The lower and the upper table.
     slot
-        What the result is meant for. None: plain tables without kinds.
+        What the result is for. None: plain tables without kinds.
 
     Examples
     --------

@@ -20,11 +20,13 @@ from typing import Annotated, Any
 from pydantic import Field, PrivateAttr, ValidationError, field_validator
 
 from ...core.agents.joint_agents import Agents
+from ...core.learners import LearnerSettings
 from ...core.plugins.messages import closest
 from ...core.plugins.settings import Settings, tuples
 from ...core.plugins.sources import Sources, is_reference, named
+from ...topologies.checks import listed
 from ..errors import SpecError, show
-from .conditions import SECTIONS, Condition, ConditionSettings, Override, grid, layer_of, section
+from .conditions import SECTIONS, Condition, Override, below, grid, layer_of, section
 from .curriculum import Curriculum, Length, Name
 from .objects import plain
 from .overlay import TomlTable, assignment, flat, overlay
@@ -70,11 +72,11 @@ class Spec(Settings):
     evaluation: Annotated[int, Field(ge=0, le=1_000_000)] = 10
     """Episodes after training in which nothing is explored and nothing learned."""
     evaluation_steps: Length | None = None
-    """Most decisions in an episode of evaluation; as in training unless it is said."""
+    """Most decisions in an episode of evaluation; as in training by default."""
     scenario: Mapping[str, Any] = Field(default_factory=dict)
     """Laid over the preset's scenario."""
     agents: Agents | None = None
-    """What there is one agent for: each actuator (unless said otherwise), each body, the team."""
+    """What there is one agent for: each actuator (the default), each body, the team."""
     topology: Mapping[str, Any] = Field(default_factory=dict)
     """Laid over the preset's topology; may be written as a string."""
     learner: Mapping[str, Any] = Field(default_factory=dict)
@@ -150,6 +152,10 @@ class Spec(Settings):
                 return cls._of(table, sources)
         except RecursionError:
             raise SpecError("spec: is nested too deeply") from None
+        except SpecError:
+            raise
+        except ValueError as error:  # a number of more digits than Python writes
+            raise SpecError(f"spec: {error}") from None
 
     @classmethod
     def _of(cls, table: Mapping[str, Any], sources: Sources) -> Spec:
@@ -162,7 +168,7 @@ class Spec(Settings):
         try:
             spec = cls.model_validate(tuples(table), strict=True)
         except ValidationError as error:
-            raise SpecError(explain(error, cls, table, ConditionSettings)) from None
+            raise SpecError(explain(error, cls, table, below(table))) from None
         points = spec.n_conditions
         if points * len(spec.seeds) > MOST_TRIALS:
             grid_size = f"{points} conditions x {len(spec.seeds)} seeds"
@@ -222,7 +228,7 @@ class Spec(Settings):
         """
         try:
             table = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
+        except ValueError as error:  # also of a number of too many digits
             raise SpecError(f"{source}: is not valid TOML: {error}") from None
         except RecursionError:
             raise SpecError(f"{source}: is nested too deeply") from None
@@ -249,8 +255,17 @@ class Spec(Settings):
         return Spec.of({**self.table(), **(update or {})}, self.sources)
 
     def warnings(self) -> tuple[str, ...]:
-        """Return what looks wrong and is not refused, a line each: sizes in another unit."""
+        """Return what looks wrong and is not refused, a line each: sizes in another unit.
+
+        Also which keys of its learner are left out for controls, see `conditions`.
+        """
         lines: dict[str, None] = {}
+        controls = [c for c in self.conditions() if c.settings.learner.kind == "frozen"]
+        tuned = self.learner.keys() - LearnerSettings.model_fields.keys() - {"kind"}
+        if tuned and controls:
+            keys = ", ".join(f"learner.{key}" for key in sorted(tuned))
+            labels = listed((condition.label for condition in controls), 3)
+            lines[f"{keys}: left out for {labels}, which learn nothing"] = None
         for condition in self.conditions():
             scenarios = [
                 condition.settings.scenario,
@@ -293,16 +308,19 @@ def _read(table: Mapping[str, Any], where: str) -> TomlTable:
         if name in table:
             table[name] = section(f"{where}{name}", table[name])
     if isinstance(table.get("sweep"), Mapping):
-        table["sweep"] = dict(_sweep(table["sweep"], f"{where}sweep"))
+        reach = below({} if where else table)
+        table["sweep"] = dict(_sweep(table["sweep"], f"{where}sweep", reach))
     return table
 
 
-def _sweep(table: Mapping[str, Any], where: str) -> Iterable[tuple[str, Any]]:
+def _sweep(
+    table: Mapping[str, Any], where: str, reach: tuple[type[Settings], TomlTable]
+) -> Iterable[tuple[str, Any]]:
     for key, values in flat(table):
         head, _, tail = key.partition(".")
         if key not in ("preset", "agents", "topology") and not (head in SECTIONS and tail):
             known = [*(f"{name}.*" for name in SECTIONS), "preset", "agents", "topology"]
-            hint = misplaced(key, ConditionSettings) or closest(key, known)
+            hint = misplaced(key, *reach) or closest(key, known)
             raise SpecError(f"{where}.{key}: unknown key; {hint}")
         if not isinstance(values, list | tuple) or not values:
             raise SpecError(f"{where}.{key} = {show(values)}: must be a list of at least one value")

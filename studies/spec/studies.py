@@ -18,7 +18,6 @@ STUDIES = Registry(
         "games": f"{CATALOGUE}.games",
         "related": f"{CATALOGUE}.related",
         "peers": f"{CATALOGUE}.peers",
-        "single-agent": f"{CATALOGUE}.single_agent",
     },
 )
 """Studies by name; what they offer is in `nested_agents.studies.catalogue.study`."""

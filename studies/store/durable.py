@@ -97,13 +97,13 @@ def read_recording(path: Path, name: str, digest: str | None = None) -> Recordin
             raise SpecError(f"{path}: is damaged")
         with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
             keys = [key for key in arrays.files if key.startswith(prefix)]
-            found = {key.removeprefix(prefix): arrays[key] for key in keys}
+            recording = {key.removeprefix(prefix): arrays[key] for key in keys}
     except FileNotFoundError:
         raise SpecError(f"{path}: no such file") from None
     except OSError as error:
         raise SpecError(f"{path}: {error.strerror or error}") from None
     except (ValueError, EOFError, zipfile.BadZipFile, zlib.error, NotImplementedError):
         raise SpecError(f"{path}: is damaged") from None
-    if not found:
+    if not recording:
         raise NotRecordedError(f"{path}: holds no recording {name!r}")
-    return found
+    return recording

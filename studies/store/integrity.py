@@ -21,7 +21,7 @@ def damage(path: Path) -> str | None:
     SpecError
         If it cannot be read for another reason, is of another version, or is no study's.
     """
-    if bereft(path):
+    if is_orphaned(path):
         return "its log is there without it"
     if not path.exists():
         return None
@@ -32,7 +32,7 @@ def damage(path: Path) -> str | None:
         return error.reason
 
 
-def bereft(path: Path) -> bool:
+def is_orphaned(path: Path) -> bool:
     """Tell whether only the log is left of a database: SQLite would drop it without a word."""
     log = path.with_name(f"{path.name}-wal")
     return _size(log) > 0 and _size(path) == 0
@@ -108,7 +108,7 @@ def recover(damaged: Path, db: sqlite3.Connection) -> int:
     Returns
     -------
     int
-        How many trials were copied; none if episodes are told by other measures now.
+        How many trials were copied; none if episodes have other measures now.
     """
     copied = 0
     for tables in _sound(damaged, _columns(db)):
@@ -139,15 +139,15 @@ def _sound(path: Path, columns: list[str]) -> Iterator[dict[str, list[tuple[obje
     with database.copied(path) as db:
         db.execute("PRAGMA writable_schema = ON")
         for identity, noted in identities.items():
-            found: dict[str, list[tuple[object, ...]]] = {}
+            tables: dict[str, list[tuple[object, ...]]] = {}
             try:
                 if dict(trial_checksums(db, identity)) == {identity: noted}:
                     for table in ("trials", *OF_A_TRIAL):
                         query = f"SELECT * FROM {table} WHERE identity = ?"
-                        found[table] = db.execute(query, (identity,)).fetchall()
+                        tables[table] = db.execute(query, (identity,)).fetchall()
                     # The row that an index leads to may be another one.
-                    found["checksums"] = [(identity, noted)]
+                    tables["checksums"] = [(identity, noted)]
             except (sqlite3.Error, *database.ILL):
                 continue
-            if found:
-                yield found
+            if tables:
+                yield tables

@@ -14,7 +14,7 @@ from ..errors import SpecError
 from . import database, integrity
 from .database import DATABASE
 from .schema import (
-    ELSEWHERE,
+    EVALUATION,
     PLANNED,
     SECONDS,
     STAGE,
@@ -54,7 +54,7 @@ class Reading:
             rows see `verify`.
         """
         path = directory / DATABASE
-        if integrity.bereft(path):
+        if integrity.is_orphaned(path):
             raise SpecError(
                 f"{path}-wal: is the log of a database that is not there any more; nested-agents "
                 "run sets it aside"
@@ -112,10 +112,10 @@ class Reading:
 
     def meta(self, key: str) -> str:
         """Return what is noted under `key`, as ``spec`` or ``conditions``."""
-        found = self._db.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
-        if found is None:
+        row = self._db.execute("SELECT value FROM meta WHERE key = ?", (key,)).fetchone()
+        if row is None:
             raise SpecError(f"{self.directory / DATABASE}: is no study: it has no {key}")
-        return str(found[0])
+        return str(row[0])
 
     def _table(self, key: str) -> dict[str, Any]:
         try:
@@ -141,12 +141,12 @@ class Reading:
                 f"SELECT identity, condition, seed FROM {table}"
             )
         }
-        found = dict(trial_checksums(self._db))
+        actual = dict(trial_checksums(self._db))
         path = self.directory / DATABASE
         return {
             identity: f"{path}: {names.get(identity, identity)}: rows are damaged"
-            for identity in found | noted
-            if identity not in found or noted.get(identity, found[identity]) != found[identity]
+            for identity in actual | noted
+            if identity not in actual or noted.get(identity, actual[identity]) != actual[identity]
         }
 
     def failed(self) -> list[tuple[str, int, str]]:
@@ -170,11 +170,11 @@ class Reading:
         """
         known = ["training", "evaluation"]
         query = "SELECT phase, min(episode) FROM episodes GROUP BY phase ORDER BY 2, 1"
-        found = [phase for phase, _ in self._db.execute(query)]
-        stages = [phase for phase in found if phase.startswith(STAGE)]
-        evaluations = [f"{ELSEWHERE}{name}" for name in self._table("spec").get("evaluations", ())]
+        recorded = [phase for phase, _ in self._db.execute(query)]
+        stages = [phase for phase in recorded if phase.startswith(STAGE)]
+        evaluations = [f"{EVALUATION}{name}" for name in self._table("spec").get("evaluations", ())]
         ordered = [*known, *stages, *evaluations]
-        return [phase for phase in ordered if phase in found] + sorted({*found} - {*ordered})
+        return [phase for phase in ordered if phase in recorded] + sorted({*recorded} - {*ordered})
 
     def columns(self) -> dict[str, dict[str, Any]]:
         """Return what tells each condition from the others, by label; see `Condition`."""

@@ -1,7 +1,7 @@
 """A light mark of what is running: for the eye only, nothing is decided by it.
 
 ``running.json`` in the directory of a study names the trials that workers have been handed. Whether
-anything runs at all is told by the lock that the running process holds on ``.lock``, and which the
+anything runs at all is shown by the lock that the running process holds on ``.lock``, and which the
 system takes from it however it ends: a mark that outlived its process is passed over.
 """
 

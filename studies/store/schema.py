@@ -24,7 +24,7 @@ RESULTS_VERSION = 4
 
 STAGE = "training:"
 """With what the phase of a stage of a curriculum begins; the stage's name follows."""
-ELSEWHERE = "evaluation:"
+EVALUATION = "evaluation:"
 """With what the phase of an evaluation beside a trial's own begins; its name follows."""
 
 BEFORE = ("phase", "episode", "steps")
@@ -135,11 +135,11 @@ def measures_from(tables: Iterable[Mapping[str, Any]]) -> tuple[Measure, ...]:
 def prepare(db: sqlite3.Connection, noted: Noted) -> None:
     """Make the tables, and note what the study is and what computes it; within a transaction."""
     swept = [quoted(key) for key in next(iter(noted.columns.values()))]
-    told = ", ".join(["position INTEGER", "condition TEXT PRIMARY KEY", *swept])
+    definitions = ", ".join(["position INTEGER", "condition TEXT PRIMARY KEY", *swept])
     for statement in SCHEMA:
         db.execute(statement)
     db.execute(_episodes(noted.measures))
-    db.execute(f"CREATE TABLE IF NOT EXISTS conditions ({told})")
+    db.execute(f"CREATE TABLE IF NOT EXISTS conditions ({definitions})")
     db.execute("DELETE FROM conditions")
     by_condition = enumerate(noted.columns.items())
     insert(db, "conditions", [(i, label, *row.values()) for i, (label, row) in by_condition])

@@ -60,7 +60,7 @@ class Store(Reading):
     directory
         Where it is.
     notes
-        What was found damaged, and what was done about it; one line each.
+        What is damaged, and what was done about it; one line each.
     """
 
     def __init__(self, directory: Path, connection: sqlite3.Connection) -> None:
@@ -126,16 +126,16 @@ class Store(Reading):
 
     def damage(self) -> dict[str, str]:
         """Return by identity which trials are not as they were written, one line each."""
-        found = self._damaged_rows()
+        damaged = self._damaged_rows()
         query = (
             "SELECT identity, condition, seed, recording_sha256 FROM trials WHERE state = 'done'"
         )
         for identity, condition, seed, noted in self._db.execute(query).fetchall():
             path = self._recordings(identity)
-            if identity not in found and (digest := durable.sha256(path)) != noted:
+            if identity not in damaged and (digest := durable.sha256(path)) != noted:
                 what = "is missing" if digest is None else "is damaged"
-                found[identity] = f"{path}: {what} ({condition}, seed {seed})"
-        return found
+                damaged[identity] = f"{path}: {what} ({condition}, seed {seed})"
+        return damaged
 
     def save(
         self,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from ...core.agents.loop import policy_seed
 from ...core.agents.rows import carried_rows
@@ -21,8 +21,10 @@ from ...core.numerics.arrays import IntArray
 from ..errors import SpecError
 from ..spec.conditions import Condition, ConditionSettings
 from ..spec.curriculum import Stage
-from ..spec.spec import Spec
 from .measures import joined
+
+if TYPE_CHECKING:
+    from ..spec.spec import Spec
 
 Evaluations = Sequence[tuple[str, ConditionSettings]]
 """Names and settings under which a trained team is evaluated beside its own."""
@@ -75,8 +77,8 @@ def arrange(settings: ConditionSettings, seed: int) -> Arrangement:
 
 def build(settings: ConditionSettings, seed: int) -> tuple[Scenario, Team]:
     """Return the scenario and the untrained team of fuzzy agents of a condition; see `arrange`."""
-    found = arrange(settings, seed)
-    return found.scenario, of_fuzzy_agents(found.team)
+    arrangement = arrange(settings, seed)
+    return arrangement.scenario, of_fuzzy_agents(arrangement.team)
 
 
 def teach(
@@ -154,8 +156,8 @@ def check(spec: Spec) -> tuple[Measure, ...]:
             except ValueError as error:
                 raise SpecError(f"{error}{where}") from None
             except SystemExit as error:
-                said = f"the scenario or topology calls sys.exit({error.code})"
-                raise SpecError(f"{said}{where}") from None
+                problem = f"the scenario or topology calls sys.exit({error.code})"
+                raise SpecError(f"{problem}{where}") from None
     return joined(measures, conditions[0].columns)
 
 

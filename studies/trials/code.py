@@ -1,4 +1,4 @@
-"""The installed code that computes results: an edit of it is noticed, and told.
+"""The installed code that computes results: an edit of it is noticed, and reported.
 
 Every module on which a trial's numbers depend, of this package and of those that offer things to
 it, has a digest of its text, to see at once whether it may have changed, and one of its syntax
@@ -30,16 +30,16 @@ Code = dict[str, tuple[str, str]]
 
 def modules() -> dict[str, str]:
     """Return the text of every module that computes results, by its path in its package."""
-    found = {}
+    texts = {}
     for folder in COMPUTING:
         for path in sorted((PACKAGE / folder).rglob("*.py")):
             name = path.relative_to(PACKAGE).as_posix()
             if not set(name.split("/")) & set(SILENT):
-                found[name] = path.read_text(encoding="utf-8")
+                texts[name] = path.read_text(encoding="utf-8")
     for root in _offering():
         for path in sorted(root.rglob("*.py")) if root.is_dir() else [root]:
-            found[path.relative_to(root.parent).as_posix()] = path.read_text(encoding="utf-8")
-    return found
+            texts[path.relative_to(root.parent).as_posix()] = path.read_text(encoding="utf-8")
+    return texts
 
 
 def _offering() -> Iterator[Path]:
@@ -53,7 +53,7 @@ def _offering() -> Iterator[Path]:
         try:
             spec = find_spec(name)
         except (ImportError, ValueError):
-            continue  # what cannot be found is told when it is asked for
+            continue  # what cannot be found is reported when it is asked for
         if spec is not None and spec.origin is not None and spec.origin.endswith(".py"):
             origin = Path(spec.origin)
             yield origin.parent if origin.name == "__init__.py" else origin
@@ -61,12 +61,12 @@ def _offering() -> Iterator[Path]:
 
 def present(known: Mapping[str, tuple[str, str]] | None = None) -> Code:
     """Return the digests of the installed code; modules whose text is `known` are not parsed."""
-    found, known = {}, known or {}
+    digests, known = {}, known or {}
     for name, text in modules().items():
         digest = hashlib.sha256(text.encode()).hexdigest()[:16]
         is_same = name in known and known[name][0] == digest
-        found[name] = known[name] if is_same else (digest, meaning(text, name))
-    return found
+        digests[name] = known[name] if is_same else (digest, meaning(text, name))
+    return digests
 
 
 def changed(known: Mapping[str, tuple[str, str]]) -> list[str]:

@@ -21,7 +21,7 @@ class EpisodeRow(NamedTuple):
     """The measurements of one episode."""
 
     phase: str
-    """``training`` or ``evaluation``; or one that begins with `STAGE` or `ELSEWHERE`."""
+    """``training`` or ``evaluation``; or one that begins with `STAGE` or `EVALUATION`."""
     episode: int
     """Counted from 0 within its phase, or through all stages of a curriculum."""
     steps: int

@@ -18,15 +18,15 @@ def views(spec: Spec) -> list[HierarchyView]:
     SpecError
         If one cannot be built; one line.
     """
-    found: dict[tuple[object, ...], HierarchyView] = {}
+    distinct: dict[tuple[object, ...], HierarchyView] = {}
     with spec.sources.active():
         for condition in spec.conditions():
             try:
                 view = _view(condition)
             except ValueError as error:
                 raise SpecError(f"{error} (condition {condition.label!r})") from None
-            found.setdefault((view.hierarchy.agents, view.hierarchy.edges, view.tries), view)
-    return list(found.values())
+            distinct.setdefault((view.hierarchy.agents, view.hierarchy.edges, view.tries), view)
+    return list(distinct.values())
 
 
 def _view(condition: Condition) -> HierarchyView:

@@ -154,27 +154,27 @@ def _of_file(directory: Path, spec: Spec, noted: Noted, damage: str | None) -> s
     if damage is None:
         return f"{path}: is in the way of this study's own copy"
     try:
-        found = difference(noted_of(Spec.load(path)), noted)
+        mismatch = difference(noted_of(Spec.load(path)), noted)
     except SpecError as error:
         return (
             f"{path}: is no spec, and {DATABASE} beside it is damaged: which study this is cannot "
             f"be told ({error})"
         )
-    return f"{directory}: holds another study: {found}" if found else None
+    return f"{directory}: holds another study: {mismatch}" if mismatch else None
 
 
 def _of_study(store: Reading, spec: Spec, noted: Noted, accept_code: bool) -> str | None:
     """Return why a spec may not be added to an open study, in one line; None if it may."""
     if not accept_code and (refusal := code.outdated(store)) is not None:
         return refusal
-    found = difference(store.noted(), noted)
+    mismatch = difference(store.noted(), noted)
     copy = store.directory / SPEC_FILE
-    if found is not None and is_copy(copy, spec, noted):
+    if mismatch is not None and is_copy(copy, spec, noted):
         return (
-            f"{copy}: is not the spec of the study beside it: {found}; if you did not edit it, it "
-            f"is damaged: nested-agents retry {store.directory} goes on by the database"
+            f"{copy}: is not the spec of the study beside it: {mismatch}; if you did not edit it, "
+            f"it is damaged: nested-agents retry {store.directory} goes on by the database"
         )
-    return f"{store.directory}: holds another study: {found}" if found else None
+    return f"{store.directory}: holds another study: {mismatch}" if mismatch else None
 
 
 def difference(old: Noted, new: Noted) -> str | None:

@@ -36,18 +36,18 @@ def joined(
     ['energy_j', 'spread_m']
     """
     reserved = {name.lower() for name in (*RESERVED, *taken)}
-    found: dict[str, Measure] = {}
+    by_name: dict[str, Measure] = {}
     for measures in by_scenario:
         for measure in measures:
             if measure.name.lower() in reserved:
                 raise SpecError(f"measure {measure.name!r}: a column of results is called so")
-            known = found.setdefault(measure.name.lower(), measure)
+            known = by_name.setdefault(measure.name.lower(), measure)
             if column_of(known) != column_of(measure):
                 raise SpecError(
-                    f"measure {measure.name!r}: is declared as {_told(known)}, and by another "
-                    f"scenario of this study as {_told(measure)}"
+                    f"measure {measure.name!r}: is declared as {_describe(known)}, and by another "
+                    f"scenario of this study as {_describe(measure)}"
                 )
-    return tuple(found.values())
+    return tuple(by_name.values())
 
 
 def column_of(measure: Measure) -> tuple[str, str, str, bool]:
@@ -55,6 +55,6 @@ def column_of(measure: Measure) -> tuple[str, str, str, bool]:
     return measure.name, measure.unit, measure.gathering, measure.is_rate
 
 
-def _told(measure: Measure) -> str:
+def _describe(measure: Measure) -> str:
     kind = "rate" if measure.is_rate else "number"
     return f"{measure.name!r}, {measure.gathering} {kind} in {measure.unit!r}"

@@ -12,7 +12,7 @@ from ...core.interface.acting import Actors
 from ...core.interface.measures import Measure, measures_of
 from ...core.interface.scenario import RecordedScenario
 from ..store.durable import Recording
-from ..store.schema import ELSEWHERE, STAGE
+from ..store.schema import EVALUATION, STAGE
 from .arrangement import Arrangement, arrange, teach, transfer
 from .episodes import EpisodeMeter, EpisodeRecorder, EpisodeRow, Stopwatch
 from .measures import joined
@@ -110,7 +110,7 @@ class Session:
         self._go_through_curriculum()
         self._evaluate(self._own, phase, observe)
 
-    def evaluate_elsewhere(self, observers: Mapping[str, Observer] | None = None) -> None:
+    def run_other_evaluations(self, observers: Mapping[str, Observer] | None = None) -> None:
         """Evaluate in each of the trial's `evaluations`, whatever the others are.
 
         The same agents are the same team; others take over what it has learned. The steps of each
@@ -121,7 +121,7 @@ class Session:
         state = rng.state
         for name, there in transfer(self._own, trial.settings, trial.evaluations, trial.seed):
             self._note_measures(there)
-            self._evaluate(there, f"{ELSEWHERE}{name}", (observers or {}).get(name))
+            self._evaluate(there, f"{EVALUATION}{name}", (observers or {}).get(name))
             rng.state = state
 
     def _note_measures(self, there: Arrangement) -> None:
@@ -197,15 +197,16 @@ class Session:
         for episode in range(first, first + episodes):
             begin = perf_counter()
             seed = world_seed(self.trial.seed, episode)
-            found = scenario.run_episode(there.team, seed, episode, steps, learn=learn)
-            if found is None:
+            summary = scenario.run_episode(there.team, seed, episode, steps, learn=learn)
+            if summary is None:
                 return False
             if learn and there.team is self.team:
                 spent = perf_counter() - begin
                 self._watch.seconds["decision"] += spent
-                self.deciding += [spent / found.steps] * found.steps
+                self.deciding += [spent / summary.steps] * summary.steps
             number = episode if learn else episode - first
-            self._rows.append(EpisodeRow(phase, number, found.steps, found.measures, found.return_))
+            row = EpisodeRow(phase, number, summary.steps, summary.measures, summary.return_)
+            self._rows.append(row)
         return True
 
     def result(
@@ -228,7 +229,7 @@ def run_trial(trial: Trial) -> TrialResult:
     session = Session(trial)
     session.train(trial.episodes)
     session.evaluate()
-    session.evaluate_elsewhere()
+    session.run_other_evaluations()
     return session.result()
 
 

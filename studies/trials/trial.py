@@ -7,18 +7,20 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ...core.interface.measures import Measure
 from ...core.interface.scenario import Scenario
 from ...core.plugins.sources import Sources, named
 from ..spec.conditions import ConditionSettings
 from ..spec.curriculum import Stage
-from ..spec.outline import lengths
-from ..spec.spec import Spec
+from ..spec.labels import lengths
 from ..store.durable import Recording
 from ..store.schema import RESULTS_VERSION, Planned
 from .episodes import EpisodeRow
+
+if TYPE_CHECKING:
+    from ..spec.spec import Spec
 
 PLAIN = ("study", "condition", "seed", "episodes", "steps", "evaluation", "evaluation_steps")
 """What of a trial any process can read as it is."""

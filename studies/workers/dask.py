@@ -87,11 +87,11 @@ class DaskWorkers(Workers):
     def processes(self) -> int:
         """How many trials run at a time with the workers there are."""
         try:
-            found = len(self._client.nthreads())
+            workers = len(self._client.nthreads())
         except (OSError, ValueError) as error:
             raise self._gone() from error
         now = time.monotonic()
-        if found:
+        if workers:
             self._alone_since = None
         elif self._alone_since is None:
             self._alone_since = now
@@ -100,7 +100,7 @@ class DaskWorkers(Workers):
                 f"{self._name} has had no worker for {PATIENCE:.0f} s; what has finished "
                 "is kept, the same command continues"
             )
-        return found if self._most is None else min(found, self._most)
+        return workers if self._most is None else min(workers, self._most)
 
     def submit(self, run_trial: RunTrial, trial: Trial) -> Future:
         """See `Workers.submit`."""
@@ -136,7 +136,7 @@ class DaskWorkers(Workers):
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Keep to ourselves what the cluster logs and warns of: what matters is told in one line."""
+    """Silence the logs and warnings of the cluster: what matters is reported in one line."""
     loggers = [logging.getLogger(name) for name in ("distributed", "tornado", "asyncio")]
     levels = [logger.level for logger in loggers]
     for logger in loggers:

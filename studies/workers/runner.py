@@ -25,7 +25,7 @@ ATTEMPTS = 2
 
 
 class Observer:
-    """Is told how a study goes; this one tells nobody."""
+    """Is notified of a study's progress; this one does nothing with it."""
 
     def announce(self, spec: Spec, directory: Path, processes: int) -> None:
         """Learn what is about to be run, if anything is left to run."""

@@ -18,7 +18,7 @@ import labs
 import questions
 from grade import blank_sheet, grade, grade_sheet, main
 from labs import LABS, WHEELS
-from questions import Choice, Edges, Number
+from questions import Choice, Edges, Numeric
 
 FRUGAL = [
     [f"robot{n}.left", f"robot{m}.right"] for n in range(1, 5) for m in (n, n + 1) if m < 5
@@ -30,7 +30,7 @@ def right_answers(lab: str) -> dict[str, object]:
     answers: dict[str, object] = {}
     for key, question in LABS[lab].questions.items():
         match question:
-            case Number():
+            case Numeric():
                 answers[key] = question.answer
             case Choice():
                 answers[key] = question.right
@@ -59,9 +59,9 @@ def test_a_blank_sheet_is_a_sheet_without_answers(lab: str, tmp_path: Path) -> N
 @pytest.mark.parametrize("lab", LABS)
 def test_every_wrong_answer_gets_a_hint(lab: str) -> None:
     wrong = {
-        key: 0.5 if isinstance(question, Number) else next(o for o in "ab" if o != question.right)
+        key: 0.5 if isinstance(question, Numeric) else next(o for o in "ab" if o != question.right)
         for key, question in LABS[lab].questions.items()
-        if isinstance(question, Number | Choice)
+        if isinstance(question, Numeric | Choice)
     }
     marks = {mark.question: mark for mark in grade(lab, wrong).marks}
     assert all(marks[key].verdict == "wrong" and marks[key].hint for key in wrong)

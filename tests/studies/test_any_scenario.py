@@ -23,7 +23,7 @@ from nested_agents.studies.presentation.tables import tabulate
 from nested_agents.studies.report.replays import replays
 from nested_agents.studies.results import published
 from nested_agents.studies.results.results import read
-from nested_agents.studies.spec.outline import Outline
+from nested_agents.studies.spec.outline import StudyOutline
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store import integrity
 from nested_agents.studies.store.store import Store
@@ -140,7 +140,7 @@ def test_files_hold_what_is_missing_as_missing(study, tmp_path):
 def test_the_learning_curve_and_its_publication(study):
     with Store.open(study) as store:
         results = read(store)
-        again = published.loads(published.dumps(Outline.kept(store), results)).results
+        again = published.loads(published.dumps(StudyOutline.kept(store), results)).results
     learning = load_study("learning-curve")
     analysis = learning.analyse(results)
     assert tabulate(analysis.table).titles == (

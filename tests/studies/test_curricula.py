@@ -11,7 +11,7 @@ from nested_agents.studies.cli.main import main
 from nested_agents.studies.presentation.tables import tabulate
 from nested_agents.studies.report import words
 from nested_agents.studies.results.results import read
-from nested_agents.studies.spec.outline import Outline
+from nested_agents.studies.spec.outline import StudyOutline
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.arrangement import check
@@ -93,14 +93,14 @@ def test_a_team_is_trained_again_through_its_stages_to_be_explained(study, capsy
 def test_the_lengths_of_several_curricula_are_told():
     stages = [{"name": "more", "episodes": 9}]
     overrides = [{"name": "a"}, {"name": "b", "curriculum": stages}]
-    assert Outline.of(SPEC.model_copy(update={"overrides": overrides})).lengths == (
+    assert StudyOutline.of(SPEC.model_copy(update={"overrides": overrides})).lengths == (
         "2 + 1 + 3 or 9 + 3 episodes"
     )
 
 
 def test_extent(study):
     with Store.open(study) as store:
-        assert words.extent(Outline.kept(store)) == (
+        assert words.extent(StudyOutline.kept(store)) == (
             "1 condition × 2 seeds, each 2 + 1 + 3 training episodes of up to 4 steps, "
             "2 evaluation episodes after them and as many in each of 2 other scenarios"
         )

@@ -1,5 +1,6 @@
 """Files of graphs that nobody sound of mind would write: one line each, which names the file."""
 
+import os
 import random
 import re
 from pathlib import Path
@@ -32,6 +33,7 @@ HOSTILE = {
     "fraction.json": '{"edges": [["a", 0.5]]}',
     "truth.json": '{"edges": [["a", true]]}',
     "digits.json": '{"edges": [["a", ' + "1" * 5000 + "]]}",
+    "order.json": '{"kind": "chain", "order": ' + "[" * 900 + "]" * 900 + "}",
     "key.json": '{"' + "k" * 5000 + '": []}',
     "long.json": '{"edges": [["a", "' + "n" * 5000 + '"], ["a", "' + "n" * 5000 + '"]]}',
     "cut.json": '{"edges": [["a"',
@@ -58,6 +60,47 @@ def test_one_line_names_the_file(
     assert re.fullmatch(r"nested-agents: error: [ -~]{1,1300}\n", error), error
     assert name in error
     assert "has no attribute" not in error
+
+
+@pytest.mark.parametrize("suffix", [".json", ".toml", ".graphml", ".py:f"])
+@pytest.mark.parametrize("what", ["directory", "FIFO", "large", "latin-1", "absent"])
+def test_what_is_no_text_is_told_at_once(
+    suffix: str, what: str, tmp_path: Path, monkeypatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / f"ring{suffix}".removesuffix(":f")
+    if what == "directory":
+        path.mkdir()
+    elif what == "FIFO":
+        os.mkfifo(path)
+    elif what == "large":
+        path.write_bytes(b"[" * 1_000_001)
+    elif what == "latin-1":
+        path.write_bytes("# \xe4".encode("latin-1"))
+    assert main(["topology", "show", f"ring{suffix}"]) == 2
+    error = capsys.readouterr().err
+    assert re.fullmatch(r"nested-agents: error: [ -~]{1,1300}\n", error), error
+    words = {"large": "is larger than", "latin-1": "is not UTF-8 text", "absent": "No such file"}
+    assert words.get(what, "is no file") in error
+
+
+def test_a_file_that_is_not_there_is_told_so(tmp_path: Path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["topology", "show", "ring.jsn"]) == 2
+    assert "topology 'ring.jsn': no such file; suffix must be" in capsys.readouterr().err
+    (tmp_path / "ring.jsn").write_text("{}")
+    assert main(["topology", "show", "ring.jsn"]) == 2
+    assert "topology 'ring.jsn': suffix must be .graphml" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("levels", [99, 100, 900, 2000])
+def test_nested_teams_of_many_levels_are_made_or_told(levels, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    members = "".join(f'["a{i}", ' for i in range(levels)) + '["b"]' + "]" * levels
+    (tmp_path / "deep.json").write_text(f'{{"members": {members}}}')
+    assert main(["topology", "show", "deep.json"]) == (2 if levels > 99 else 0)
+    error = capsys.readouterr().err
+    assert levels < 100 or re.fullmatch(r"nested-agents: error: [ -~]{1,1300}\n", error), error
 
 
 def test_names_in_arguments_are_checked_too(capsys: pytest.CaptureFixture[str]) -> None:

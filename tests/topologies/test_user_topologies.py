@@ -56,6 +56,9 @@ def test_an_undirected_graph_is_one_of_neighbours(written) -> None:
     assert hierarchy.neighbours == ((0, 1), (0, 3), (1, 2), (2, 3))
 
 
+MUTE = "class Mute:\n    def __str__(self): raise RuntimeError('no name')\n"
+
+
 @pytest.mark.parametrize(
     ("source", "message"),
     [
@@ -78,8 +81,26 @@ def test_an_undirected_graph_is_one_of_neighbours(written) -> None:
             "import networkx as nx\ndef f(agents, groups): return nx.DiGraph([('a', 'b')])",
             "agent 'c' is missing from the graph",
         ),
+        ("async def f(agents, bodies): return []", "f returned coroutine, allowed:"),
+        ("async def f(agents, bodies): yield 'a', 'b'", "f returned async_generator, allowed:"),
+        (
+            "def f(agents, bodies):\n    while True: yield 'a', 'b'",
+            "f gave more than 16 pairs of 4 agents",
+        ),
+        (f"{MUTE}def f(agents, bodies): return [(Mute(), 'b')]", "f raised RuntimeError in line 2"),
+        (
+            f"{MUTE}import networkx as nx\ndef f(agents, bodies): return nx.DiGraph([(Mute(), 1)])",
+            "f raised RuntimeError in line 2",
+        ),
+        ("def f(agents, bodies):\n    yield 1 / 0", "f raised ZeroDivisionError in line 2"),
+        (
+            "import networkx as nx\n\ndef f(agents, bodies):\n"
+            "    return nx.relabel_nodes(nx.path_graph(2), {0: []})",
+            "f raised ValueError in line 4",
+        ),
     ],
 )
+@pytest.mark.filterwarnings("error")
 def test_a_bad_function_is_refused_in_one_line(written, source: str, message: str) -> None:
     text = written(source)
     with pytest.raises(ValueError, match=r".") as refusal:

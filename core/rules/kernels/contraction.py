@@ -214,12 +214,12 @@ def _triples(level, n_levels):  # type: ignore[no-untyped-def]
     count, n = len(level), 0
     triples = np.empty((count, 3), np.int64)
     for v in range(n_levels):
-        found = 0
+        slot = 0
         for b in range(count):
             if level[b] == v:
-                if found == 0:
+                if slot == 0:
                     triples[n, 1], triples[n, 2] = count, count + 1
                     n += 1
-                triples[n - 1, found] = b
-                found = (found + 1) % 3
+                triples[n - 1, slot] = b
+                slot = (slot + 1) % 3
     return triples[:n]

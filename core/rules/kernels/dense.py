@@ -88,7 +88,7 @@ def folded(theta, tables, indices: IntArray, lay: Layout) -> FloatArray:  # type
     strengths = _shared_strengths(shared[met[:n_met]], lay)
     partial = np.empty((count, total_width(lay)), theta.dtype)
     contract(theta, own[used], _peaks(strengths, lay), lay, partial)
-    room, one, two, found = _scratch(theta, lay)
+    room, one, two, sums = _scratch(theta, lay)
     rows = np.empty(LANES, np.int64)
     values = np.empty((count, n_rows))
     for b in range(count):
@@ -99,9 +99,9 @@ def folded(theta, tables, indices: IntArray, lay: Layout) -> FloatArray:  # type
                 _fill(strengths, k, lane, lay, room)
                 lane += 1
             if lane and (lane == LANES or k == n_met - 1):
-                fold(partial[b], room, lay, one, two, found, lane)
+                fold(partial[b], room, lay, one, two, sums, lane)
                 for i in range(lane):
-                    values[b, rows[i]] = found[i]
+                    values[b, rows[i]] = sums[i]
                 lane = 0
     out = np.empty(len(indices))
     for c in range(len(indices)):

@@ -204,16 +204,16 @@ def many_strengths(j: int, values: FloatArray, lay: Layout, out: FloatArray) -> 
     m, last, total = lay.counts[j], lay.n_knots[j] - 1, len(values)
     lanes = min(ROWS, (total + LANES - 1) // LANES * LANES)
     x, level, power, rising = np.zeros(lanes), np.empty(lanes), np.empty(lanes), np.empty(lanes)
-    found = np.empty((m, lanes))
+    strengths = np.empty((m, lanes))
     even = lay.series[j, 0] > 0.0
     for first in range(0, total, lanes):
         n = min(lanes, total - first)
         for i in range(n):
             x[i] = _wrapped(j, values[first + i], lay)
-        level[:], found[:] = 1.0, 0.0
+        level[:], strengths[:] = 1.0, 0.0
         for k in range(last):
             fresh, times = k == 0 or not even, lay.series[j, k] if even else 1.0
             _rise(x, fresh, lay.slopes[j, k], lay.bounds[j, k], times, power, rising)
-            _fall(level, rising, found[k % m])
-        found[last % m] += level
-        out[:m, first : first + n] = found[:, :n]
+            _fall(level, rising, strengths[k % m])
+        strengths[last % m] += level
+        out[:m, first : first + n] = strengths[:, :n]

@@ -74,19 +74,6 @@ def advance(theta, trace, reach, strengths, decay: float, step: float, lay: Layo
 
 
 @njit(cache=True)
-def td_update(  # type: ignore[no-untyped-def]
-    theta, rows: IntArray, trace, reach, states: FloatArray, steps: FloatArray, decay: float,
-    packed: Packed,
-) -> None:  # fmt: skip
-    """Do `advance` for all agents, agent i with row ``rows[i]`` of theta."""
-    lay = unpack(packed)
-    strengths, room = strengths_room(lay)
-    for i in range(len(states)):
-        all_strengths(states[i], lay, strengths, room)
-        advance(theta[rows[i]], trace[i], reach[i], strengths, decay, steps[i], lay)
-
-
-@njit(cache=True)
 def add_features(  # type: ignore[no-untyped-def]
     target, rows: IntArray, states: FloatArray, weights: FloatArray, packed: Packed
 ) -> None:

@@ -107,7 +107,7 @@ class PushingPoints:
         )
 
     def predict(self) -> PushingPointsPrediction:
-        """Return what can be told before robots choose: what they choose."""
+        """Return what can be predicted before robots choose: what they choose."""
         return PushingPointsPrediction(self)
 
     def with_exact_prediction(self) -> PushingPoints:

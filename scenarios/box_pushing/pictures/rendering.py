@@ -26,7 +26,7 @@ from matplotlib.path import Path as Curve
 from matplotlib.transforms import Affine2D
 
 from ....core.numerics.arrays import FloatArray
-from ...movies import DPI, Pixels, Stage, film
+from ...movies import DPI, Pixels, Scene, film
 from ..world.boxes import BoxSpec, box_for
 from ..world.infrared import infrared_readings, sensor_directions
 from ..world.robots import robot_for
@@ -54,7 +54,7 @@ def _pointer(box: BoxSpec) -> FloatArray:
     return size * np.array([[-0.6, 0.0], [0.6, 0.0], [0.3, 0.2], [0.6, 0.0], [0.3, -0.2]])
 
 
-class _Stage(Stage):
+class _BoxScene(Scene):
     """A figure on which any moment of a recording can be drawn."""
 
     def __init__(self, recording: Recording, *, sensors: bool = False) -> None:
@@ -194,14 +194,14 @@ def curve(box: BoxSpec) -> Curve:
 
 def picture(recording: Recording, step: int, *, sensors: bool = False) -> Pixels:
     """Return the moment after `step` steps as ``(height, width, 3)`` bytes."""
-    return _Stage(recording, sensors=sensors).pixels(step)
+    return _BoxScene(recording, sensors=sensors).pixels(step)
 
 
 def snapshot(recording: Recording, step: int, path: Path, *, sensors: bool = False) -> None:
     """Draw the moment after `step` steps (negative: from the end) to a picture file."""
-    stage = _Stage(recording, sensors=sensors)
-    stage.draw(range(len(recording["box_pose"]))[step])
-    stage.figure.savefig(path, dpi=DPI)
+    scene = _BoxScene(recording, sensors=sensors)
+    scene.draw(range(len(recording["box_pose"]))[step])
+    scene.figure.savefig(path, dpi=DPI)
 
 
 def animate(recording: Recording, path: Path, speed: float = 4.0, *, sensors: bool = False) -> None:
@@ -223,5 +223,5 @@ def animate(recording: Recording, path: Path, speed: float = 4.0, *, sensors: bo
     ValueError
         If the suffix is neither ``.gif`` nor ``.mp4``.
     """
-    stage = _Stage(recording, sensors=sensors)
-    film(stage.pixels, len(recording["box_pose"]) - 1, float(recording["dt"]) / speed, path)
+    scene = _BoxScene(recording, sensors=sensors)
+    film(scene.pixels, len(recording["box_pose"]) - 1, float(recording["dt"]) / speed, path)

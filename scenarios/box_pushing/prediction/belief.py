@@ -95,15 +95,15 @@ def outcomes(  # type: ignore[no-untyped-def]
         ``(k, M + 1, 3)`` mean twists of the box, and then of the robots, each in its own frame.
     """
     n = len(robots)
-    found = np.empty((len(constants), n + 1, 3))
+    moved = np.empty((len(constants), n + 1, 3))
     asked, choices = np.expand_dims(twists, 1), np.zeros((1, n), np.int64)
     for p in range(len(constants)):
         model = believing(belief, constants[p])
         after, boxes, _ = pushed(robots, box, asked, choices, seconds, model)
-        _twist(box, boxes[:, 0], seconds, found[p, 0])
+        _twist(box, boxes[:, 0], seconds, moved[p, 0])
         for r in range(n):
-            _twist(robots[r], after[r, :, 0], seconds, found[p, r + 1])
-    return found
+            _twist(robots[r], after[r, :, 0], seconds, moved[p, r + 1])
+    return moved
 
 
 @njit(cache=True)
@@ -115,8 +115,8 @@ def _twist(before, after, seconds, out) -> None:  # type: ignore[no-untyped-def]
     """
     half = 0.5 * (after[2] - before[2])
     # The chord of an arc is shorter than the arc by the sinc of half its angle.
-    told = min(max(half, -0.5 * pi), 0.5 * pi)
-    longer = told / np.sin(told) if abs(told) > 1e-9 else 1.0
+    clipped = min(max(half, -0.5 * pi), 0.5 * pi)
+    longer = clipped / np.sin(clipped) if abs(clipped) > 1e-9 else 1.0
     cos, sin = np.cos(before[2] + half), np.sin(before[2] + half)
     x, y = (after[0] - before[0]) * longer, (after[1] - before[1]) * longer
     out[0], out[1], out[2] = (cos * x + sin * y), (cos * y - sin * x), 2.0 * half

@@ -7,7 +7,6 @@ own block is the wheel speed that is exact.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cached_property
 from math import pi
 from typing import ClassVar
@@ -46,7 +45,7 @@ class BoxPrediction:
 
     @cached_property
     def wheel_commands(self) -> WheelCommands:
-        """What the wheels may be told."""
+        """What the wheels may be commanded."""
         speeds, actions = self.situation.speeds, self.premises.action_set
         limits = self.premises.limits[:, None]
         commands = actions.apply(
@@ -71,9 +70,9 @@ class BoxPrediction:
 
     def _view_again(self, choices: IntArray) -> View:
         """Return the view of `choices`: the last one, if they are the same."""
-        told = choices.tobytes()
-        if self._last is None or self._last[0] != told:
-            self._last = told, self._view(choices)
+        key = choices.tobytes()
+        if self._last is None or self._last[0] != key:
+            self._last = key, self._view(choices)
         return self._last[1]
 
     def _choices(self, joint_actions: IntArray) -> IntArray:
@@ -166,15 +165,6 @@ class BoxPrediction:
         """Return the situations that joint actions ``(m, n)`` lead to in a decision period."""
         return self._after(self._choices(joint_actions), self.premises.hold)
 
-    def after(self, joint_action: IntArray) -> BoxPrediction:
-        """Return the prediction from where a joint action ``(n,)`` leads in a decision period."""
-        view = self.poses(joint_action[None])
-        reached = replace(
-            self.situation,
-            robots=view.robots[0], box=view.box[0], speeds=self.commands(joint_action),
-        )  # fmt: skip
-        return BoxPrediction(reached, self.model, self.premises)
-
     @property
     def groups(self) -> tuple[tuple[int, ...], ...]:
         """Agents by robot."""
@@ -203,11 +193,11 @@ class BoxPrediction:
         """
         choices = self._choices(joint_action[None])[0]
         twists = self.wheel_commands.twists[np.arange(len(choices)), choices]
-        found: FloatArray = outcomes(
+        moved: FloatArray = outcomes(
             self.situation.robots, self.situation.box, twists,
             self.premises.hold, self.premises.belief, constants,
         )  # fmt: skip
-        return found
+        return moved
 
     def rewards(self, joint_actions: IntArray) -> FloatArray:
         """Return the predicted rewards ``(m,)`` of joint actions ``(m, n)``, the robots' mean."""

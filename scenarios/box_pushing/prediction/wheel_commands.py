@@ -1,4 +1,4 @@
-"""What the wheels of every robot may be told next, and how the robots would move under it.
+"""What the wheels of every robot may be commanded next, and how the robots would move under it.
 
 Several actions often command one speed (a resting wheel is maintained or zeroed, one at its limit
 is maintained or increased), so that the distinct *wheel commands* of a robot, the speeds of all its
@@ -34,7 +34,7 @@ class WheelCommands(NamedTuple):
     which
         ``(M, A ** w)`` the command of every robot-action index.
     n_levels
-        ``(M, w)`` number of speeds that each wheel may be told.
+        ``(M, w)`` number of speeds that each wheel may be commanded.
     levels
         ``(M, w, A)`` these speeds [m/s], increasing.
     level
@@ -74,7 +74,7 @@ def wheel_commands_of(commands: FloatArray, effects: FloatArray, merge: bool) ->
     """
     n, w, a = commands.shape
     # Per wheel the distinct speeds in increasing order, and which of them each action commands.
-    told, number = np.zeros((n, w, a)), np.empty((n, w, a), np.int64)
+    ordered, number = np.zeros((n, w, a)), np.empty((n, w, a), np.int64)
     sizes = np.empty((n, w), np.int64)
     counts = np.empty(n, np.int64)
     for r in range(n):
@@ -84,17 +84,17 @@ def wheel_commands_of(commands: FloatArray, effects: FloatArray, merge: bool) ->
             sizes[r, j] = 0
             for k in range(a):
                 speed, place = commands[r, j, k], sizes[r, j]
-                while place > 0 and told[r, j, place - 1] > speed:
+                while place > 0 and ordered[r, j, place - 1] > speed:
                     place -= 1
-                if place > 0 and told[r, j, place - 1] == speed:
+                if place > 0 and ordered[r, j, place - 1] == speed:
                     continue
                 for later in range(sizes[r, j], place, -1):
-                    told[r, j, later] = told[r, j, later - 1]
-                told[r, j, place] = speed
+                    ordered[r, j, later] = ordered[r, j, later - 1]
+                ordered[r, j, place] = speed
                 sizes[r, j] += 1
             for k in range(a):
                 for place in range(sizes[r, j]):
-                    if told[r, j, place] == commands[r, j, k]:
+                    if ordered[r, j, place] == commands[r, j, k]:
                         number[r, j, k] = place
             counts[r] *= sizes[r, j]
     most, n_indices = 0, a**w
@@ -109,7 +109,7 @@ def wheel_commands_of(commands: FloatArray, effects: FloatArray, merge: bool) ->
         for d in range(counts[r]):
             rest = d
             for j in range(w - 1, -1, -1):
-                speeds[r, d, j] = told[r, j, rest % sizes[r, j]]
+                speeds[r, d, j] = ordered[r, j, rest % sizes[r, j]]
                 rest //= sizes[r, j]
             for i in range(3):
                 twists[r, d, i] = effects[r, i, w]
@@ -129,7 +129,7 @@ def wheel_commands_of(commands: FloatArray, effects: FloatArray, merge: bool) ->
                 command = command * sizes[r, j] + level[r, j, c]
             which[r, c] = command
     return WheelCommands(
-        counts, speeds, twists, which, sizes, told, level, n_distinct, first, distinct
+        counts, speeds, twists, which, sizes, ordered, level, n_distinct, first, distinct
     )  # fmt: skip
 
 
@@ -165,12 +165,12 @@ def speeds_of(choices: IntArray, speeds: FloatArray) -> FloatArray:
     """Return the wheel speeds ``(n, m)`` of all agents under wheel commands ``(m, M)`` [m/s]."""
     m, n = choices.shape
     wheels = speeds.shape[2]
-    found = np.empty((n * wheels, m))
+    wheel_speeds = np.empty((n * wheels, m))
     for r in range(n):
         for j in range(wheels):
             for c in range(m):
-                found[r * wheels + j, c] = speeds[r, choices[c, r], j]
-    return found
+                wheel_speeds[r * wheels + j, c] = speeds[r, choices[c, r], j]
+    return wheel_speeds
 
 
 @njit(cache=True)

@@ -65,14 +65,14 @@ class Columns:
 
     def of(self, view: View, robots: Sequence[int]) -> FloatArray:
         """Return the variables ``(len(robots), m, columns)`` of robots in the view's situations."""
-        found: FloatArray = _relational(
+        states: FloatArray = _relational(
             np.ascontiguousarray(view.robots.transpose(1, 2, 0)),
             np.ascontiguousarray(view.box.T), np.ascontiguousarray(view.gaps.T),
             view.goal, view.origin, view.before, view.periods, view.outline.edges,
             view.friction_radius,
             np.array(robots), self.rows, *self._groups,
         )  # fmt: skip
-        return found
+        return states
 
 
 @njit(cache=True, fastmath=_EXACT)

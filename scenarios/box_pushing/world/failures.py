@@ -27,7 +27,7 @@ class WheelFailures(Failures):
         return grip
 
     def advance(self, world: World, commands: FloatArray, step: int, periods: int) -> None:
-        """Let a world go on through (a part of) a step, its wheels being told `commands`."""
+        """Let a world go on through (a part of) a step, its wheels being commanded `commands`."""
         if self.strike(step):
             world.set_grip(self.grip)
         touched = np.zeros(len(world.robots))

@@ -192,8 +192,8 @@ def _neighbours(rings: Sequence[FloatArray]) -> dict[int, set[int]]:
         points = [tuple(point) for point in ring.tolist()]
         for edge in zip(points, [*points[1:], points[0]], strict=True):
             by_edge.setdefault(frozenset(edge), []).append(index)
-    found: dict[int, set[int]] = {index: set() for index in range(len(rings))}
+    neighbours: dict[int, set[int]] = {index: set() for index in range(len(rings))}
     for both in by_edge.values():
         for one in both:
-            found[one].update(other for other in both if other != one)
-    return found
+            neighbours[one].update(other for other in both if other != one)
+    return neighbours

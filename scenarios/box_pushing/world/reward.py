@@ -6,7 +6,7 @@ C1 and C2 (all in contact), C3 (all within range), C5 (none), C4 (some not). The
 penalty term per robot, R2 and R3 for its two; here every robot has one, with the same constants.
 
 Of a large team one robot is hardly ever out of contact with nobody else, and one that has lost
-touch is not told apart from those that have not. So every robot may be paid by itself
+touch is not distinguished from those that have not. So every robot may be paid by itself
 (`RewardSettings.of`): the conditions then hold for its own contact and its own reading.
 
 A learner takes a terminal state for one that is entered for ever. By the conditions a goal that is

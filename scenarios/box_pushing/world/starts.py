@@ -22,7 +22,7 @@ from .settings import RobotSettings
 GOAL = (1.0, 0.0, 0.0)
 """Goal pose of the box [m, m, rad]."""
 ATTEMPTS = 500
-"""Draws of one robot's place before the robots are said not to fit."""
+"""Draws of one robot's place before the robots are refused as not fitting."""
 CLEARANCE = 0.002
 """Least gap between two robots [m]."""
 GRID = 64

@@ -35,7 +35,7 @@ PHASES = {"success, all training": "training", EVALUATED: "evaluation"}
 
 
 @dataclass(frozen=True)
-class Comparison:
+class OrderComparison:
     """All orders by one measure.
 
     Attributes
@@ -108,7 +108,7 @@ def _legend(orders: Sequence[str]) -> list[str]:
     return [f"agents: {', '.join(numbered)}"] if len(named) > 1 else []
 
 
-def compare_orders(results: Results) -> tuple[Comparison, ...]:
+def compare_orders(results: Results) -> tuple[OrderComparison, ...]:
     """Return the comparisons of all orders, one for each of `PHASES` that all orders have."""
     conditions = results.of_phase("training")
     made = []
@@ -124,12 +124,12 @@ def compare_orders(results: Results) -> tuple[Comparison, ...]:
     omnibus = holm([test.p for _, _, test, _ in made])
     adjusted = holm(np.concatenate([against for *_, against in made])).reshape(len(made), -1)
     return tuple(
-        Comparison(title, tuple(shortened(conditions)), values, test, float(p), ps)
+        OrderComparison(title, tuple(shortened(conditions)), values, test, float(p), ps)
         for (title, values, test, _), p, ps in zip(made, omnibus, adjusted, strict=True)
     )
 
 
-def _verdict(comparisons: Sequence[Comparison]) -> Iterator[str]:
+def _verdict(comparisons: Sequence[OrderComparison]) -> Iterator[str]:
     for c in comparisons:
         n, k = c.values.shape
         means = c.values.mean(axis=0)
@@ -171,7 +171,7 @@ def draw(analysis: Analysis) -> dict[str, Figure]:
     return {"chain-order": figure}
 
 
-def _panel(axes: Axes, comparison: Comparison, rank: NDArray[np.intp]) -> None:
+def _panel(axes: Axes, comparison: OrderComparison, rank: NDArray[np.intp]) -> None:
     from ...presentation.figures import COLOURS, draw_row
 
     rng = np.random.default_rng(0)  # spreads the seeds' dots, nothing else

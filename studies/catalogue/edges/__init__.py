@@ -69,7 +69,7 @@ def measure(trial: Trial) -> TrialResult:
     session.train(trial.episodes)
     deciding = {name: _Deciding() for name in (TRAINED, *dict(trial.evaluations))}
     session.evaluate(deciding[TRAINED])
-    session.evaluate_elsewhere(deciding)
+    session.run_other_evaluations(deciding)
     numbers = {"robots": float(len(groups_of(session.world)))}
     for name, settings in ((TRAINED, trial.settings), *trial.evaluations):
         _, hierarchy = settings.arrange(session.world)
@@ -147,10 +147,10 @@ def _compared(results: Results, conditions: Sequence[str]) -> dict[str, tuple[Di
                 estimate = paired_difference(own, base, of_rates=True)
                 made.append((condition, Difference.of(name, EVALUATED, own, base, estimate)))
     every = zip([c for c, _ in made], adjusted([d for _, d in made]), strict=True)
-    by_condition: dict[str, list[Difference]] = {}
+    compared: dict[str, tuple[Difference, ...]] = {}
     for condition, difference in every:
-        by_condition.setdefault(condition, []).append(difference)
-    return {condition: tuple(found) for condition, found in by_condition.items()}
+        compared[condition] = (*compared.get(condition, ()), difference)
+    return compared
 
 
 def _notes(compared: dict[str, tuple[Difference, ...]]) -> Iterator[str]:

@@ -21,7 +21,7 @@ from ...results.results import Results
 from ...results.statistics import Estimate, rate
 from ...results.summary import Summary, two_figures
 from ...results.verdicts import WIDTH
-from ...store.schema import ELSEWHERE
+from ...store.schema import EVALUATION
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..study import check_evaluated as check
@@ -33,7 +33,7 @@ PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
 TIMED = False
 """Trials are too short for their times to say anything."""
-AFTER_ONE = f"{ELSEWHERE}after one episode"
+AFTER_ONE = f"{EVALUATION}after one episode"
 """Phase of the evaluation after the first episode of training."""
 COLUMNS = 3
 """Panels of the figure that stand beside each other."""
@@ -51,12 +51,12 @@ def measure(trial: Trial) -> TrialResult:
     generator.state = state
     session.train(trial.episodes - 1, first=1)
     session.evaluate()
-    session.evaluate_elsewhere()
+    session.run_other_evaluations()
     return session.result()
 
 
 @dataclass(frozen=True)
-class Case:
+class GameCase:
     """One condition.
 
     Attributes
@@ -85,7 +85,7 @@ def analyse(results: Results) -> Analysis:
         if results.has(condition, AFTER_ONE) and steps.shape[1] > 1:
             optimal[int(steps[0, 0])] = rate(results.success(condition, AFTER_ONE))
         optimal[int(steps[0].sum())] = rate(results.success(condition, "evaluation"))
-        cases.append(Case(str(columns.get("name", condition)), setting, optimal))
+        cases.append(GameCase(str(columns.get("name", condition)), setting, optimal))
         estimates = {titled(plays): estimate for plays, estimate in optimal.items()}
         table.append(Summary(condition, len(steps), estimates))
     return Analysis(tuple(table), tuple(_side_by_side(cases)), cases)
@@ -100,7 +100,7 @@ def titled(plays: int) -> str:
     return f"optimal, {plays:,} plays"
 
 
-def _side_by_side(cases: Sequence[Case]) -> Iterator[str]:
+def _side_by_side(cases: Sequence[GameCase]) -> Iterator[str]:
     """Yield the systems as columns, the settings as rows, for each number of plays."""
     systems = list(dict.fromkeys(case.system for case in cases))
     settings = list(dict.fromkeys(case.setting for case in cases))
@@ -130,8 +130,6 @@ def draw(analysis: Analysis) -> dict[str, Figure]:
     from ...presentation import figures as f  # matplotlib takes its time
 
     cases = analysis.cases
-    if not cases:
-        return {}
     systems = list(dict.fromkeys(case.system for case in cases))
     games = list(dict.fromkeys(case.setting[:1] for case in cases))
     rests = list(dict.fromkeys(case.setting[1:] for case in cases))

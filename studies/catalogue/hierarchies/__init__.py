@@ -5,7 +5,7 @@ the same worlds, seed by seed. One measure was fixed beforehand: evaluation succ
 of robots and each choice of whose value decides, every hierarchy is compared with the chain (with
 the first hierarchy if there is no chain) by permutation of signs; p is adjusted by Holm's method
 over all of these comparisons. Few seeds cannot give a small p whatever the outcome: what they
-leave undecided is called so, and how many seeds it takes is said.
+leave undecided is called so, and how many seeds it takes is printed.
 
 A trial is measured as one of the scaling study, messages included: one for every edge of the
 hierarchy's transitive closure. Decisions to the goal are those of successful episodes alone: a
@@ -44,7 +44,7 @@ VALUE_OF = "learner.decision.value_of"
 """What is swept to vary whose value decides."""
 REFERENCE = "chain"
 """The hierarchy that others are compared with, if it is there."""
-DECIDING, MESSAGES = "decide [ms]", "messages"
+DECIDING, MESSAGES = "decision [ms]", "messages"
 """Titles of what a decision costs."""
 UNBROKEN = "\N{NO-BREAK SPACE}"
 
@@ -61,7 +61,7 @@ def check(spec: Spec) -> None:
 
 
 @dataclass(frozen=True)
-class Case:
+class HierarchyCase:
     """One condition.
 
     Attributes
@@ -151,7 +151,7 @@ def analyse(results: Results) -> Analysis:
     return Analysis(tuple(table), notes, cases, compared)
 
 
-def _cases(results: Results) -> tuple[Case, ...]:
+def _cases(results: Results) -> tuple[HierarchyCase, ...]:
     conditions = results.of_phase("evaluation")
     robots = {c: int(results.numbers(c)["robots"][0]) for c in conditions}
     apart = (VALUE_OF, *_sizes(results.columns, robots))
@@ -160,7 +160,7 @@ def _cases(results: Results) -> tuple[Case, ...]:
         columns = results.columns.get(condition, {"name": condition})
         hierarchy, value_of = label_but(columns, apart), str(columns.get(VALUE_OF, ""))
         values = _estimates(results, condition)
-        cases.append(Case(condition, hierarchy, value_of, robots[condition], values))
+        cases.append(HierarchyCase(condition, hierarchy, value_of, robots[condition], values))
     whose = list(dict.fromkeys(case.value_of for case in cases))
     return tuple(sorted(cases, key=lambda case: (case.robots, whose.index(case.value_of))))
 
@@ -200,7 +200,7 @@ def to_the_goal(success: Array, steps: Array) -> Array:
     return np.array([run[reached].mean() for reached, run in runs if reached.any()])
 
 
-def verdicts_of(results: Results, cases: Sequence[Case]) -> tuple[Verdict, ...]:
+def verdicts_of(results: Results, cases: Sequence[HierarchyCase]) -> tuple[Verdict, ...]:
     """Return where the hierarchy matters: the comparisons of each setting, p adjusted over all.
 
     Intervals are those of independent rates, which have a width even if all runs ended alike.
@@ -229,7 +229,7 @@ def _outcomes(results: Results, condition: str) -> Array:
     return results.success(condition, "evaluation").astype(float)
 
 
-def _legend(cases: Sequence[Case]) -> Iterator[str]:
+def _legend(cases: Sequence[HierarchyCase]) -> Iterator[str]:
     if any(case.value_of for case in cases):
         yield "Rows: number of robots, whose value decides, hierarchy."
 
@@ -250,7 +250,7 @@ def _verdict_lines(verdicts: Sequence[Verdict]) -> Iterator[str]:
         yield f"{verdict.setting}: {count} found to differ"
         yield from (f"  {d.condition} differs by {d.shown}" for d in verdict.different)
         yield from _listed("no difference found", verdict.alike)
-        yield from _listed("cannot be told", verdict.undecided)
+        yield from _listed("undecided", verdict.undecided)
     yield from power_lines([d for verdict in verdicts for d in verdict.comparisons])
 
 
@@ -263,7 +263,7 @@ def _listed(what: str, comparisons: Sequence[Difference]) -> Iterator[str]:
         yield from (line.replace(UNBROKEN, " ") for line in lines)
 
 
-def _highest(cases: Sequence[Case]) -> Iterator[str]:
+def _highest(cases: Sequence[HierarchyCase]) -> Iterator[str]:
     """Yield a line for every number of robots: the highest success, and what it costs."""
     if cases:
         yield "\nHighest evaluation success, the quickest of equals; what a decision costs:"
@@ -287,8 +287,6 @@ def draw(analysis: Analysis) -> dict[str, Figure]:
     from ...presentation import by_robots, figures  # matplotlib takes its time
 
     cases = analysis.cases
-    if not cases:
-        return {}
     hierarchies = list(dict.fromkeys(case.hierarchy for case in cases))
     whose = list(dict.fromkeys(case.value_of for case in cases))
     size = (max(5.6, 0.6 + 2.8 * len(whose)), 5.2)

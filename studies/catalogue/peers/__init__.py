@@ -60,12 +60,12 @@ def measure(trial: Trial) -> TrialResult:
             session.evaluate(phase=f"{AFTER}{count}")
             generator.state = state
     session.evaluate()
-    session.evaluate_elsewhere()
+    session.run_other_evaluations()
     return session.result(usage=usage)
 
 
 @dataclass(frozen=True)
-class Course:
+class LearningCourse:
     """How one condition fares with experience.
 
     Attributes
@@ -107,7 +107,7 @@ def analyse(results: Results) -> Analysis:
             estimates["CPU [s]"] = bootstrap(cpu[-1], bounds=NOT_NEGATIVE)
         table.append(Summary(condition, len(steps), estimates))
         courses.append(
-            Course(
+            LearningCourse(
                 condition,
                 np.array([steps[:, :count].sum(axis=1).mean() for count in every]),
                 np.array([np.nan if s is None else float(np.mean(s)) for s in cpu]),

@@ -86,12 +86,12 @@ def measure(trial: Trial) -> TrialResult:
     if period is not None:
         numbers["period"] = float(period)
     session.evaluate()
-    session.evaluate_elsewhere()
+    session.run_other_evaluations()
     return session.result(numbers, {"decision_median": float(np.median(session.deciding))})
 
 
 @dataclass(frozen=True)
-class Case:
+class RelatedCase:
     """One condition.
 
     Attributes
@@ -123,7 +123,7 @@ def analyse(results: Results) -> Analysis:
         values = evaluated(results, condition)
         values |= {title: bootstrap(cost, bounds=NOT_NEGATIVE) for title, cost in costs.items()}
         columns = results.columns.get(condition, {})
-        cases.append(Case(str(columns.get("name", condition)), _world(columns), values))
+        cases.append(RelatedCase(str(columns.get("name", condition)), _world(columns), values))
         table.append(Summary(condition, len(steps), values))
     return Analysis(tuple(table), NOTES, cases)
 
@@ -149,8 +149,6 @@ def draw(analysis: Analysis) -> dict[str, Figure]:
     from ...presentation import figures as f
 
     cases = analysis.cases
-    if not cases:
-        return {}
     systems = list(dict.fromkeys(case.system for case in cases))
     worlds = list(dict.fromkeys(case.world for case in cases))
     size = (2.2 + 2.0 * len(PANELS), 1.1 + 0.26 * len(systems))

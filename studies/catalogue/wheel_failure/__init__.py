@@ -77,7 +77,7 @@ def measure(trial: Trial) -> TrialResult:
     session.train(trial.episodes - onset, onset)
     session.train(trial.episodes - onset, onset, phase=KEPT, team=kept)
     session.evaluate()
-    session.evaluate_elsewhere()
+    session.run_other_evaluations()
     begun = sorted({f.episode for f in getattr(trial.settings.scenario, "failures", ())} - {onset})
     later = {f"onset.{k}": float(episode) for k, episode in enumerate(begun, 2)}
     return session.result({"onset": float(onset), **later})
@@ -271,8 +271,6 @@ def draw(analysis: Analysis) -> dict[str, Figure]:
     from ...presentation import figures as f  # matplotlib takes its time
 
     courses = analysis.cases
-    if not courses:
-        return {}
     faults = list(dict.fromkeys(course.fault for course in courses))
     cases = list(dict.fromkeys(course.adapts for course in courses))
     columns = min(COLUMNS, len(faults))

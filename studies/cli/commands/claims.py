@@ -68,7 +68,7 @@ def _run(out: Path, *, quick: bool, jobs: int | None) -> dict[str, Published]:
     from ...presentation.progress import Terminal
     from ...results import published
     from ...results.results import read
-    from ...spec.outline import Outline
+    from ...spec.outline import StudyOutline
     from ...spec.spec import Spec
 
     results = {}
@@ -82,5 +82,5 @@ def _run(out: Path, *, quick: bool, jobs: int | None) -> dict[str, Published]:
                     f"{out / study}: {len(failed)} trials failed: nested-agents status "
                     f"{out / study}"
                 )
-            results[study] = published.loads(published.dumps(Outline.kept(store), read(store)))
+            results[study] = published.loads(published.dumps(StudyOutline.kept(store), read(store)))
     return results

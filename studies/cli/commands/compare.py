@@ -15,7 +15,7 @@ from .. import options
     "--by",
     metavar="KEY",
     help="Compare conditions that differ in this swept key alone, as robots or topology; "
-    "directory compares studies. All conditions with the first unless said otherwise.",
+    "directory compares studies. By default all conditions with the first.",
 )
 @click.option(
     "--measure",
@@ -31,7 +31,7 @@ from .. import options
 @click.option(
     "--reference",
     metavar="LABEL",
-    help="What the others are compared with; the first unless said otherwise.",
+    help="What the others are compared with; by default the first.",
 )
 @options.where
 @options.form

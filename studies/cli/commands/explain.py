@@ -14,11 +14,9 @@ from .. import options
 @click.option(
     "--condition",
     metavar="LABEL",
-    help="Label of the condition; the first one unless said otherwise.",
+    help="Label of the condition; by default the first one.",
 )
-@click.option(
-    "--seed", type=int, metavar="SEED", help="The seed; the first one unless said otherwise."
-)
+@click.option("--seed", type=int, metavar="SEED", help="The seed; by default the first one.")
 @options.trust
 def command(directory: Path, condition: str | None, seed: int | None, trust: bool) -> int:
     """Explain a trained team: its rules in words, its policy, its self-model.
@@ -32,12 +30,11 @@ def command(directory: Path, condition: str | None, seed: int | None, trust: boo
     from ...presentation.figures import save
     from ...presentation.progress import say
     from ...store import durable
-    from ...store.store import Store
-    from ..loading import trust_files
+    from ..loading import opened, trust_files
 
     if trust:
         trust_files(directory)
-    with Store.open(directory) as store:
+    with opened(directory) as store:
         trial = team.choose(store, condition, seed)
         conditions = list(store.columns())
         say(f"training {trial.condition}, seed {trial.seed} again: {trial.lengths}")

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     "--out",
     type=options.PATH,
     metavar="PATH",
-    help="Folder of the files; export in the study's own unless said otherwise.",
+    help="Folder of the files; by default export in the study's own.",
 )
 @click.option("--overwrite", is_flag=True, help="Replace files that are there.")
 def command(directory: Path, form: Form, out: Path | None, overwrite: bool) -> int:
@@ -36,9 +36,9 @@ def command(directory: Path, form: Form, out: Path | None, overwrite: bool) -> i
     to be published with a paper; `nested-agents table` reads it.
     """
     from ...api.export import export
-    from ...store.store import Store
+    from ..loading import opened
 
-    with Store.open(directory) as store:
+    with opened(directory) as store:
         folder = directory / "export" if out is None else out
         for path in export(store, folder, form, overwrite=overwrite):
             print(path)

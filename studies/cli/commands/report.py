@@ -15,7 +15,7 @@ from .. import options
     "--out",
     type=options.PATH,
     metavar="FILE.html",
-    help="Where to write; report.html in the study's directory unless said otherwise.",
+    help="Where to write; by default report.html in the study's directory.",
 )
 @options.trust
 def command(directory: Path, out: Path | None, trust: bool) -> int:

@@ -39,9 +39,9 @@ def command(directory: Path, form: Format, phase: str) -> int:
     from ...errors import SpecError
     from ...presentation.row_formats import write_rows
     from ...results.results import read
-    from ...store.store import Store
+    from ..loading import opened
 
-    with Store.open(directory) as store:
+    with opened(directory) as store:
         store.verify()
         results = read(store)
     if results.phases and phase not in results.phases:

@@ -17,7 +17,7 @@ from .. import options
     "--columns",
     multiple=True,
     metavar="TITLE...",
-    help="Headings of the columns to print, in this order; all unless said otherwise.",
+    help="Headings of the columns to print, in this order; by default all.",
 )
 @options.form
 @options.trust

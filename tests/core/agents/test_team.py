@@ -31,10 +31,8 @@ TEAMS = {
         "decision": {"teammates": "empirical"},
     },
     "td-lambda, averaged": {"kind": "td-lambda", "step_size": 0.1, "averaging": 5.0},
-    "gradient-td": {"kind": "gradient-td", "exploration": PAPER},
     "batch-td": {"kind": "batch-td", "ridge": 0.1, "exploration": BURST},
     "batch-td, sigmoid": {"kind": "batch-td", "rule_base": {"membership": "sigmoid"}},
-    "anova-td": {"kind": "anova-td", "rule_base": {"order": 3}, "ridge": 0.1},
     "sampling": {
         "kind": "batch-td",
         "decision": {
@@ -154,7 +152,7 @@ def test_pickles_are_refused(world, tmp_path: Path) -> None:
         ("td-lambda, paper", "td-lambda, burst", r"explorer has shape \(1,\), this team's \(9,\)"),
         ("td-lambda, paper", "batch-td", "saved arrays .* are not this team's"),
         ("batch-td", "td-lambda, paper", "saved arrays .* are not this team's"),
-        ("frozen", "gradient-td", "saved arrays .* are not this team's"),
+        ("frozen", "td-lambda, paper", "saved arrays .* are not this team's"),
     ],
 )
 def test_what_another_team_saved_is_refused(
@@ -299,7 +297,7 @@ def test_a_hierarchy_over_other_agents_is_refused(world) -> None:
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("name", ["td-lambda, burst", "batch-td", "gradient-td"])
+@pytest.mark.parametrize("name", ["td-lambda, burst", "batch-td"])
 def test_permuting_agents_permutes_what_is_learned(name: str, line_world) -> None:
     # Every agent's cart has one wheel. Both worlds are stepped with the same actions; what agents
     # learn from them does not depend on the order in which they are listed.

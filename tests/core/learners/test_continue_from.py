@@ -65,7 +65,7 @@ def test_batch_td_regresses_on_all_experience_of_teams_of_any_size() -> None:
     settings = BatchTDSettings(
         ridge=0.5, discount=0.0, regression_iterations=1, target_averaging_rate=1.0
     )
-    rules = rules_of("batch-td")
+    rules = rules_of()
     states, rewards = experience()
     teams = [BatchTD(settings, rules, np.zeros(n, dtype=int)) for n in (1, 3, 2)]
     for before, after in zip([None, *teams], teams, strict=False):
@@ -82,7 +82,7 @@ def test_batch_td_regresses_on_all_experience_of_teams_of_any_size() -> None:
 
 def test_weights_that_never_learn_are_handed_on() -> None:
     former, successor = (
-        Frozen(FrozenSettings(), rules_of("batch-td"), rows) for rows in (ROLES, np.array([1, 0]))
+        Frozen(FrozenSettings(), rules_of(), rows) for rows in (ROLES, np.array([1, 0]))
     )
     former.theta[:] = [[1.0], [2.0]]
     successor.continue_from(former, np.array([1, 0]))

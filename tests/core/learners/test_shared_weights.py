@@ -17,25 +17,22 @@ from nested_agents.core.rules.rule_base import RuleBase
 
 LEARNING: dict[str, dict[str, Any]] = {
     "batch-td": {"kind": "batch-td", "ridge": 0.1, "interval": 4, "trace_decay": 0.5},
-    "anova-td": {"kind": "anova-td", "ridge": 0.1, "interval": 4, "tolerance": 1e-9},
     "td-lambda": {"kind": "td-lambda", "step_size": 0.2},
     "td-lambda, averaged": {"kind": "td-lambda", "step_size": 0.2, "averaging": 5.0},
-    "tdc": {"kind": "gradient-td", "correction": "tdc", "step_size": 0.1},
-    "gtd2": {"kind": "gradient-td", "correction": "gtd2", "step_size": 0.1},
 }
 N = 3
 ROLES = np.array([0, 1, 0])
 STEPS = 9
 
 
-def rules_of(name: str) -> RuleBase:
+def rules_of() -> RuleBase:
     partitions = [Partition((0.0, 0.4, 1.0), "sigmoid"), Partition((-1.0, 1.0), "sigmoid", 4.0)]
-    return RuleBase(partitions, [(0, 1)] if name == "anova-td" else [(0,), (0, 1)], 1)
+    return RuleBase(partitions, [(0,), (0, 1)], 1)
 
 
 def learner_of(name: str, rows: np.ndarray, **more: object) -> Learner:
     table = LEARNING[name] | more
-    return LEARNERS.model(table["kind"]).model_validate(table).build(rules_of(name), rows)
+    return LEARNERS.model(table["kind"]).model_validate(table).build(rules_of(), rows)
 
 
 def experience(n: int = N) -> tuple[np.ndarray, np.ndarray]:
@@ -97,7 +94,7 @@ def test_shared_weights_are_restored_to_the_bit(name: str) -> None:
     learner.begin_episode()
     for t in range(5):
         learner.observe(states[t], rewards[t], False)
-    assert learner.theta.shape == (2, rules_of(name).n_rules)
+    assert learner.theta.shape == (2, rules_of().n_rules)
     restored.restore({key: array.copy() for key, array in learner.arrays().items()})
     for each in (learner, restored):
         feed(each, states[5:], rewards[5:], begun=True)
@@ -105,7 +102,7 @@ def test_shared_weights_are_restored_to_the_bit(name: str) -> None:
     assert (learner.theta == restored.theta).all()
 
 
-@pytest.mark.parametrize("name", ["batch-td", "anova-td"], indirect=True)
+@pytest.mark.parametrize("name", ["batch-td"], indirect=True)
 def test_two_agents_of_a_role_are_one_agent_with_two_episodes(name: str) -> None:
     # The first episode is cut off at its end, as is the last after-state of either agent.
     states, rewards = experience(2)
@@ -120,9 +117,7 @@ def test_two_agents_of_a_role_are_one_agent_with_two_episodes(name: str) -> None
         for t in range(STEPS):
             alone.observe(states[t, i : i + 1], rewards[t, i : i + 1], False)
     alone.end_episode()
-    # The dictionary takes the states in another order, and leaves out 1e-9 of their variance.
-    tolerance = 1e-6 if name == "anova-td" else 1e-12
-    assert pooled.theta == pytest.approx(alone.theta, rel=0, abs=tolerance)
+    assert pooled.theta == pytest.approx(alone.theta, rel=0, abs=1e-12)
 
 
 def test_batch_td_of_a_role_is_the_ridge_regression_of_all_experience() -> None:
@@ -130,7 +125,7 @@ def test_batch_td_of_a_role_is_the_ridge_regression_of_all_experience() -> None:
     settings = BatchTDSettings(
         ridge=0.5, discount=0.0, regression_iterations=1, target_averaging_rate=1.0
     )
-    rules = rules_of("batch-td")
+    rules = rules_of()
     states, rewards = experience(2)
     learner = BatchTD(settings, rules, np.array([0, 0]))
     feed(learner, states, rewards)
@@ -142,7 +137,7 @@ def test_batch_td_of_a_role_is_the_ridge_regression_of_all_experience() -> None:
 
 @pytest.mark.parametrize("averaging", [1.0, 4.0])
 def test_td_lambda_of_a_role_changes_its_weights_in_turn(averaging: float) -> None:
-    rules = rules_of("td-lambda")
+    rules = rules_of()
     settings = TDLambdaSettings(step_size=0.3, discount=0.9, trace_decay=0.5, averaging=averaging)
     learner = TDLambda(settings, rules, ROLES)
     states, rewards = experience()

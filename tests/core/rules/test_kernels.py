@@ -18,7 +18,7 @@ from nested_agents.core.rules.kernels.few_states import each_dense
 from nested_agents.core.rules.kernels.fuzzy import Partition
 from nested_agents.core.rules.kernels.layout import layout, unpack
 from nested_agents.core.rules.kernels.strengths import exponential, many_strengths
-from nested_agents.core.rules.kernels.updates import add_features, td_update
+from nested_agents.core.rules.kernels.updates import add_features
 from nested_agents.core.rules.rule_base import RuleBase
 
 N_ACTIONS, N_AGENTS, GROUP = 4, 4, 2
@@ -129,27 +129,13 @@ def test_enumerate(base: RuleBase, rng: np.random.Generator, agent: int, average
     assert not base.enumerate(0.0 * theta, blocks, tried, joint, np.zeros((0, 0))).any()
 
 
-def test_td_update(base: RuleBase, rng: np.random.Generator) -> None:
-    theta, trace = rng.normal(size=(2, 3, base.n_rules))
-    theta_expected, trace_expected = theta.copy(), trace.copy()
-    reach = np.full((3, base.n_parts), 5.0)
-    for _ in range(60):
-        states, steps = states_of(rng, 3), 0.1 * rng.normal(size=3)
-        td_update(theta, ROWS, trace, reach, states, steps, 0.38, base.layout)
-        oracle.td_update(base, theta_expected, trace_expected, states, steps, 0.38)
-    assert trace == pytest.approx(trace_expected, rel=0, abs=1e-12)
-    assert theta == pytest.approx(theta_expected, rel=0, abs=1e-12)
-
-
 @pytest.mark.parametrize("discount", [0.95, 0.0])
-def test_td_updates_with_their_errors(
-    base: RuleBase, rng: np.random.Generator, discount: float
-) -> None:
+def test_td_update(base: RuleBase, rng: np.random.Generator, discount: float) -> None:
     theta, trace = rng.normal(size=(2, 3, base.n_rules))
     theta_expected, trace_expected, lengths = theta.copy(), trace.copy(), np.array([1.0, 2.0, 0.5])
     rewards = np.array([-0.3, 0.0, 0.7])
     reach = np.full((3, base.n_parts), 5.0)
-    for _ in range(5):
+    for _ in range(60):
         states, entered = states_of(rng, 6).reshape(2, 3, -1)
         now, ahead = (
             np.einsum("ij,ij->i", base.features(met), theta_expected) for met in (states, entered)
@@ -201,7 +187,7 @@ def test_each(base: RuleBase, rng: np.random.Generator, count: int) -> None:
 def test_single_precision(base: RuleBase, rng: np.random.Generator) -> None:
     theta, trace = rng.normal(size=(2, 3, base.n_rules)).astype(np.float32)
     blocks, indices = blocks_of(rng, base.n_own), rng.integers(N_ACTIONS**N_AGENTS, size=50)
-    states, steps = states_of(rng, 3), 0.1 * rng.normal(size=3)
+    states, rewards = states_of(rng, 3), rng.normal(size=3)
     wide = theta.astype(float), trace.astype(float)
     scale = float(np.abs(theta).max())
     for found, expected in (
@@ -215,8 +201,9 @@ def test_single_precision(base: RuleBase, rng: np.random.Generator) -> None:
         ),
     ):
         assert found == pytest.approx(expected, rel=1e-5, abs=1e-5 * scale)
-    reach = np.full((3, base.n_parts), 5.0)
-    td_update(theta, ROWS, trace, reach, states, steps, 0.38, base.layout)
+    reach, lengths = np.full((3, base.n_parts), 5.0), np.ones(3)
+    steps = 0.1 * (rewards - np.einsum("ij,ij->i", base.features(states), wide[0]))
+    base.td_update(theta, ROWS, trace, reach, states, states, rewards, 0.0, 0.1, lengths, 0.38)
     oracle.td_update(base, *wide, states, steps, 0.38)
     assert theta.dtype == trace.dtype == np.float32
     assert trace == pytest.approx(wide[1], rel=1e-5, abs=1e-5)
@@ -261,9 +248,12 @@ def test_the_papers_78125_rules(membership: str, rng: np.random.Generator) -> No
 
     theta, trace = rng.normal(size=(2, 2, base.n_rules))
     theta_expected, trace_expected = theta.copy(), trace.copy()
-    steps = np.array([0.01, -0.02])
+    rewards, lengths = np.array([1.0, -2.0]), np.ones(2)
     reach = np.full((2, base.n_parts), 5.0)
-    td_update(theta, ROWS[:2], trace, reach, states[:2], steps, 0.3996, base.layout)
+    steps = 0.01 * (rewards - np.einsum("ij,ij->i", base.features(states[:2]), theta))
+    base.td_update(
+        theta, ROWS[:2], trace, reach, states[:2], states[:2], rewards, 0.0, 0.01, lengths, 0.3996
+    )
     oracle.td_update(base, theta_expected, trace_expected, states[:2], steps, 0.3996)
     assert np.abs(trace - trace_expected).max() <= 1e-12
     assert np.abs(theta - theta_expected).max() <= 1e-12

@@ -27,7 +27,7 @@ from nested_agents.studies.cli.main import main
 from nested_agents.studies.results import published
 from nested_agents.studies.results.results import Results
 from nested_agents.studies.results.statistics import Estimate
-from nested_agents.studies.spec.outline import Outline
+from nested_agents.studies.spec.outline import StudyOutline
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.spec.studies import STUDIES
 from nested_agents.studies.trials.arrangement import check
@@ -168,7 +168,7 @@ def test_claims_name_studies_and_conditions_that_their_specs_have() -> None:
 def test_published_results_give_the_table_that_the_run_gave() -> None:
     results = everything(good=True)
     again = {
-        study: published.loads(published.dumps(Outline.of(spec_of(study)), found))
+        study: published.loads(published.dumps(StudyOutline.of(spec_of(study)), found))
         for study, found in results.items()
     }
     assert [p.outline.study for p in again.values()] == list(results)
@@ -248,7 +248,6 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "peers-100",
         "peers-arm-long",
         "peers-predictors",
-        "peers-plans",
         "locked-joint",
         "large-failures",
         "climbing",

@@ -1,7 +1,10 @@
 """Results are read and watched without running again: commands, with made-up results."""
 
+import os
 import shutil
 import sqlite3
+import subprocess
+import sys
 from contextlib import closing
 
 import made_up
@@ -106,3 +109,59 @@ def test_watching_ends_when_nothing_is_to_come(study) -> None:
     assert not is_going_on
     assert Console(width=60, record=True).render_lines(shown)
     assert curve([0.0] * 100) == "▁" * 24
+
+
+READING = ["results", "table", "compare", "status", "watch", "export", "report"]
+
+
+@pytest.mark.parametrize("command", READING)
+def test_a_database_of_another_study_is_noted_by_all_that_read_it(
+    study, command, tmp_path, capsys, monkeypatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "400")
+    own = tmp_path / "own"
+    shutil.copytree(study[0], own)
+    once = ["--once"] if command == "watch" else []
+    said_by(capsys, command, own, *once)
+    assert "is not the spec" not in " ".join(said_by(capsys, command, own, *once)[1:])
+    text = (own / "study.toml").read_text()
+    (own / "study.toml").write_text(text.replace("steps = 5", "steps = 6"))
+    said = " ".join(" ".join(said_by(capsys, command, own, *once)[1:]).split())
+    assert "study.toml: is not the spec of results.sqlite beside it, whose results these" in said
+    assert "steps = 6 here, 5 there" in said
+
+
+def test_a_copy_of_the_spec_that_means_the_same_is_not_noted(study, tmp_path, capsys) -> None:
+    own = tmp_path / "own"
+    shutil.copytree(study[0], own)
+    (own / "study.toml").write_text(
+        "# by hand\nseeds = [0, 1, 2]\nepisodes = 4\nsteps = 5\nevaluation = 2\n"
+        'sweep.preset = ["default", "frozen"]\n'
+    )
+    assert "is not the spec" not in " ".join(said_by(capsys, "status", own)[1:])
+    (own / "study.toml").unlink()
+    assert "is not the spec" not in " ".join(said_by(capsys, "status", own)[1:])
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
+@pytest.mark.parametrize("command", ["table", "watch", "results", "compare"])
+def test_what_a_terminal_cannot_write_has_a_sign_in_its_place(study, command, encoding) -> None:
+    line = [sys.executable, "-c", MAIN, command, str(study[0])]
+    environment = os.environ | {"PYTHONIOENCODING": encoding}
+    done = subprocess.run(line, capture_output=True, check=False, env=environment)
+    assert (done.returncode, done.stderr) == (0, b"")
+    if command == "table":
+        assert ("0–" if encoding == "utf-8" else "0-") in done.stdout.decode(encoding)
+
+
+@pytest.mark.parametrize("command", ["table", "watch", "results"])
+def test_a_reader_that_goes_away_is_told_by_the_status(study, command) -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    line = [sys.executable, "-u", "-c", MAIN, command, str(study[0])]
+    done = subprocess.run(line, stdout=writing, stderr=subprocess.PIPE, check=False)
+    os.close(writing)
+    assert (done.returncode, done.stderr) == (141, b"")
+
+
+MAIN = "import sys; from nested_agents.studies.cli.main import main; sys.exit(main())"

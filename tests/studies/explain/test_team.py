@@ -65,7 +65,7 @@ def test_the_first_trial_in_words_and_figures(study, capsys):
     folder = study / "explain" / "order-1-seed3"
     assert {path.name for path in folder.iterdir()} == {
         "explanation.txt",
-        *(f"{n}.{s}" for n in ("functions", "policy", "self-model") for s in ("png", "svg")),
+        *(f"{n}.{s}" for n in ("functions", "policy") for s in ("png", "svg")),
     }
     lines = [line for line in out.splitlines() if str(study) not in line]
     assert max(map(len, lines)) <= 80

@@ -93,7 +93,7 @@ def test_five_seeds_that_all_agree_are_told_what_they_lack() -> None:
 
 
 def test_without_deviation_nothing_is_promised() -> None:
-    assert "cannot be told" in " ".join(power_text(8, 1, None, None))
+    assert "cannot be determined" in " ".join(power_text(8, 1, None, None))
     assert power_lines([]) == []
 
 

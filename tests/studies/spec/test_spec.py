@@ -478,3 +478,86 @@ def test_who_the_agents_are_is_refused_in_one_line(table, message: str) -> None:
     with pytest.raises(SpecError, match=re.escape(message)) as refusal:
         Spec.of(table)
     assert "\n" not in str(refusal.value)
+
+
+TUNED = {"seeds": 2, "learner": {"ridge": 3.0, "discount": 0.9}}
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        {"sweep": {"preset": ["default", "frozen", "random"]}},
+        {"overrides": [{"name": n, "preset": n} for n in ("default", "frozen", "random")]},
+    ],
+)
+def test_what_tunes_learning_is_left_out_for_controls_with_one_remark(how) -> None:
+    spec = Spec.of({**TUNED, **how})
+    learned, *controls = (condition.settings.learner for condition in spec.conditions())
+    assert (learned.ridge, learned.discount) == (3.0, 0.9)
+    assert [(c.kind, c.discount) for c in controls] == [("frozen", 0.9)] * 2
+    assert spec.warnings() == ("learner.ridge: left out for frozen, random, which learn nothing",)
+    assert Spec.of(spec.table()) == spec
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        {**TUNED, "preset": "frozen"},
+        {"learner": {"rigde": 3.0}, "sweep": {"preset": ["default", "frozen"]}},
+        {"learner": {"step_size": 3.0}, "sweep": {"preset": ["default", "frozen"]}},
+    ],
+)
+def test_keys_that_no_learner_of_the_spec_has_are_refused(table) -> None:
+    with pytest.raises(SpecError, match="unknown key"):
+        Spec.of(table)
+
+
+@pytest.mark.parametrize(
+    ("table", "hint"),
+    [
+        ({"robots": 3}, "did you mean 'scenario.robots'?"),
+        ({"joints": 3, "scenario": {"kind": "kinematic-chain"}}, "mean 'scenario.joints' or"),
+        ({"sweep": {"robots": [2, 3]}}, "did you mean 'scenario.robots'?"),
+        ({"scenario": {"ridge": 3.0}}, "did you mean 'learner.ridge'?"),
+        ({"preset": "paper", "trace_decay": 0.3}, "did you mean 'learner.trace_decay'?"),
+    ],
+)
+def test_a_misplaced_key_is_told_its_place(table, hint: str) -> None:
+    with pytest.raises(SpecError, match=re.escape(hint)):
+        Spec.of(table)
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        {"joints": 3},
+        {"robots": 3, "scenario": {"kind": "kinematic-chain"}},
+        {"step_size": 0.3},
+        {"sweep": {"joints": [2, 3]}},
+        {"scenario": {"joints": 3}},
+    ],
+)
+def test_no_key_is_proposed_that_the_kinds_of_the_spec_have_not(table) -> None:
+    with pytest.raises(SpecError, match="unknown key") as refusal:
+        Spec.of(table)
+    assert "did you mean 'scenario." not in str(refusal.value)
+    assert "did you mean 'learner." not in str(refusal.value)
+
+
+HUGE = f"0x{'f' * 5000}"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        f"seeds = {'1' * 5000}",
+        f"seeds = {HUGE}",
+        f"seeds = [{HUGE}]",
+        f"episodes = {HUGE}",
+        f'sweep."scenario.robots" = [{HUGE}]',
+    ],
+)
+def test_numbers_of_thousands_of_digits_are_refused_in_one_line(text: str) -> None:
+    with pytest.raises(SpecError, match=r"digits|must be|e\+6020") as refusal:
+        Spec.parse(text)
+    assert len(str(refusal.value)) < 300

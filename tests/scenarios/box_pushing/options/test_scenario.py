@@ -62,7 +62,7 @@ def test_what_is_learned_on_a_square_is_evaluated_on_other_boxes() -> None:
     session = Session(trials_of(spec)[0])
     session.train(1)
     session.evaluate()
-    session.evaluate_elsewhere()
+    session.run_other_evaluations()
     phases = [row.phase for row in session.result().rows]
     assert phases == ["training", "evaluation", "evaluation:L", "evaluation:star"]
 
