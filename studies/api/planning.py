@@ -233,8 +233,8 @@ def _taken(
             held, more = pace.bytes
             largest = max(largest, held + more * trial.steps * sum(training))
     quick, slow = (float(seconds) for seconds in spent / processes)
-    seconds = FASTER * (started + quick), SLOWER * (started + loaded + slow)
-    return seconds, processes * (_resident() + largest)
+    whole = FASTER * (started + quick), SLOWER * (started + loaded + slow)
+    return whole, processes * (_resident() + largest)
 
 
 def paced(trial: Trial) -> Pace:
