@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -150,12 +150,6 @@ def chosen(results: Results, where: Where, settings: Mapping[str, Any]) -> Resul
     return select(results, np.array(keep, dtype=bool))
 
 
-def relabelled(results: Results, name: str, taken: Iterable[str]) -> dict[str, str]:
-    """Return new labels of conditions, by the old ones: with a name, where they are `taken`."""
-    known = set(taken)
-    return {c: f"{c} ({name})" if c in known else c for c in results.columns}
-
-
 def together(studies: Sequence[tuple[str, Results]]) -> tuple[Results, list[dict[str, str]]]:
     """Return the results of several studies as those of one, and the new labels of each.
 
@@ -168,8 +162,10 @@ def together(studies: Sequence[tuple[str, Results]]) -> tuple[Results, list[dict
         If two studies mean different things by the name of a measure.
     """
     times = Counter(condition for _, results in studies for condition in results.columns)
-    several = [condition for condition, count in times.items() if count > 1]
-    labels = [relabelled(results, name, several) for name, results in studies]
+    labels = [
+        {c: f"{c} ({name})" if times[c] > 1 else c for c in results.columns}
+        for name, results in studies
+    ]
     keys = dict.fromkeys(k for _, r in studies for row in r.columns.values() for k in row)
     columns = {
         new[condition]: {**{key: row.get(key, "") for key in keys}, DIRECTORY: name}
