@@ -14,7 +14,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import cycle
 from pathlib import Path
 from time import thread_time
@@ -159,11 +159,8 @@ def others(budget: float) -> tuple[list[Row], list[str]]:
     return rows, missing
 
 
-def _wheels(hold: int) -> Callable[[], None]:
-    env = WheelsEnv({"action_repeat": hold}, steps=RUN)
-    env.reset(seed=0)
-    rng = np.random.default_rng(1)
-    drawn = cycle([{agent: int(rng.integers(4)) for agent in env.agents} for _ in range(100)])
+def _stepping(env: Any, drawn: Iterator[Any]) -> Callable[[], None]:
+    """Return what steps a parallel environment, and begins anew when its episode is over."""
 
     def step() -> None:
         if not env.agents:
@@ -171,6 +168,15 @@ def _wheels(hold: int) -> Callable[[], None]:
         env.step(next(drawn))
 
     return step
+
+
+def _wheels(hold: int) -> Callable[[], None]:
+    env = WheelsEnv({"action_repeat": hold}, steps=RUN)
+    env.reset(seed=0)
+    rng = np.random.default_rng(1)
+    drawn = cycle([{agent: int(rng.integers(4)) for agent in env.agents} for _ in range(100)])
+
+    return _stepping(env, drawn)
 
 
 def _multiwalker() -> Callable[[], None]:
@@ -180,12 +186,7 @@ def _multiwalker() -> Callable[[], None]:
     env.reset(seed=0)
     drawn = cycle([{a: env.action_space(a).sample() for a in env.agents} for _ in range(100)])
 
-    def step() -> None:
-        if not env.agents:
-            env.reset()
-        env.step(next(drawn))
-
-    return step
+    return _stepping(env, drawn)
 
 
 def _bipedal() -> Callable[[], None]:

@@ -13,7 +13,6 @@ line on standard error names, 130 interrupted, 141 the reader of the output has 
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -23,6 +22,7 @@ from textwrap import fill
 from typing import Any, Literal, NoReturn
 
 from nested_agents.core.plugins.messages import closest
+from nested_agents.studies.cli.main import run_to_status
 from nested_agents.studies.errors import SpecError, show
 from nested_agents.studies.presentation.csv_text import write_csv
 
@@ -169,21 +169,7 @@ def _lab(name: Any) -> Lab:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """List the labs, print the questions of one, or grade sheets; return the exit status."""
-    try:
-        status = _run(_Parser().parse_intermixed_args(arguments))
-        sys.stdout.flush()
-        return status
-    except SpecError as error:
-        return _complain(str(error))
-    except BrokenPipeError:
-        # The reader went away, as `head` does; Python would complain again at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 141
-    except OSError as error:
-        where = f"{error.filename}: " if error.filename else ""
-        return _complain(f"{where}{error.strerror or error}")
-    except KeyboardInterrupt:
-        return 130
+    return run_to_status("grade.py", lambda: _run(_Parser().parse_intermixed_args(arguments)))
 
 
 class _Parser(argparse.ArgumentParser):
@@ -227,11 +213,6 @@ def _run(given: argparse.Namespace) -> int:
     else:
         print("\n\n".join(map(str, graded)))
     return 0 if all(m.right == len(m.marks) for m in graded) else 1
-
-
-def _complain(message: str) -> int:
-    print(f"grade.py: error: {' '.join(message.split())}", file=sys.stderr)
-    return 2
 
 
 if __name__ == "__main__":

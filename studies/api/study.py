@@ -349,7 +349,10 @@ def load(*places: Place) -> StudyResults:
     if len(loaded) == 1:
         return loaded[0]
     names = [path.name if _distinct(paths) else str(path) for path in paths]
-    results, labels = together([(n, s.results) for n, s in zip(names, loaded, strict=True)])
+    results, labels = together(
+        [(n, s.results) for n, s in zip(names, loaded, strict=True)],
+        [study._settings for study in loaded],
+    )
     settings = {
         new[c]: own for s, new in zip(loaded, labels, strict=True) for c, own in s._settings.items()
     }

@@ -11,7 +11,7 @@ import codecs
 import os
 import sys
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib import import_module
 
 import click
@@ -88,24 +88,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for stream in (sys.stdout, sys.stderr):
         if getattr(stream, "errors", None) == "strict":
             stream.reconfigure(errors=PLAIN)  # type: ignore[union-attr]
+    return run_to_status(PROGRAM, lambda: _run(arguments or ["--help"]))
+
+
+def run_to_status(program: str, run: Callable[[], int]) -> int:
+    """Return the exit status of a program; what goes wrong is one line on standard error."""
     try:
-        status = _run(arguments or ["--help"])
+        status = run()
         sys.stdout.flush()
         return status
-    except click.UsageError as error:
-        command = error.ctx.command_path if error.ctx else f"{PROGRAM} {arguments[0]}"
-        return _complain(f"{error.format_message().rstrip('.')}; see {command} --help")
     except SpecError as error:
-        return _complain(str(error))
+        message = str(error)
     except BrokenPipeError:
         # The reader went away, as `head` does; Python would complain again at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 141
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
-        return _complain(f"{where}{error.strerror or error}")
+        message = f"{where}{error.strerror or error}"
     except KeyboardInterrupt:
         return 130
+    print(f"{program}: error: {' '.join(message.split())}", file=sys.stderr)
+    return 2
 
 
 def _run(arguments: list[str]) -> int:
@@ -115,6 +119,9 @@ def _run(arguments: list[str]) -> int:
             return int(nested_agents.invoke(context))
     except click.exceptions.Exit as exit_:
         return exit_.exit_code
+    except click.UsageError as error:
+        command = error.ctx.command_path if error.ctx else f"{PROGRAM} {arguments[0]}"
+        raise SpecError(f"{error.format_message().rstrip('.')}; see {command} --help") from None
     except SystemExit as error:
         if isinstance(error.__context__, BrokenPipeError):  # a table of rich ends the program so
             raise error.__context__ from None
@@ -134,8 +141,3 @@ def _plain(error: UnicodeError) -> tuple[str, int]:
 PLAIN = "nested-agents-plain"
 """Name of the way in which text is written where it cannot be encoded."""
 codecs.register_error(PLAIN, _plain)
-
-
-def _complain(message: str) -> int:
-    print(f"{PROGRAM}: error: {' '.join(message.split())}", file=sys.stderr)
-    return 2

@@ -24,6 +24,7 @@ from ...core.learners import LearnerSettings
 from ...core.plugins.messages import closest
 from ...core.rules.rule_base import RuleBase
 from ..errors import SpecError
+from ..spec.labels import aliases
 from ..store.schema import STAGE, columns
 from ..store.store import Store
 from ..trials.keeping import spec_of
@@ -74,9 +75,13 @@ def choose(store: Store, condition: str | None, seed: int | None) -> Trial:
         If there is no such trial, or it has not finished.
     """
     spec = spec_of(store)
-    conditions = [c.label for c in spec.conditions()]
-    condition = conditions[0] if condition is None else condition
-    if condition not in conditions:
+    known = {c.label: aliases(c.label, c.columns) for c in spec.conditions()}
+    conditions = list(known)
+    if condition is None:
+        condition = conditions[0]
+    elif condition not in known and sum(condition in own for own in known.values()) == 1:
+        condition = next(label for label, own in known.items() if condition in own)
+    if condition not in known:
         raise SpecError(f"--condition {condition!r}: {closest(condition, conditions)}")
     seed = spec.seeds[0] if seed is None else seed
     if seed not in spec.seeds:

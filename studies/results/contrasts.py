@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from textwrap import wrap
 
@@ -11,7 +11,7 @@ import numpy as np
 from ...core.interface.measures import Measure
 from ...core.plugins.messages import closest
 from ..errors import SpecError
-from ..spec.labels import label
+from ..spec.labels import aliases, label
 from .comparison import Array, Difference, differences
 from .numbers import shown
 from .paired_tests import LEVEL
@@ -132,7 +132,7 @@ def contrasts(
         A swept key, or the last part of it: conditions that agree in all others are compared, each
         with that of the first value. None: all conditions with the first one.
     reference
-        Label of another one to compare with, or with `by` another value.
+        Another one to compare with, or with `by` another value; by any of its `aliases`.
 
     Raises
     ------
@@ -168,6 +168,7 @@ Members = list[tuple[str, str]]
 def _values(results: Results, name: str, phase: str) -> tuple[Measure, dict[str, Array], str]:
     """Return a measure, its means by condition ``(n_seeds,)``, and the phase that they are of."""
     measures = {m.name: m for m in (*results.measures, *EPISODES)}
+    name = next((m.name for m in measures.values() if m.heading == name), name)
     if name in measures:
         if phase not in results.phases:
             raise SpecError(f"phase = {phase!r}: {closest(phase, results.phases)}")
@@ -175,11 +176,12 @@ def _values(results: Results, name: str, phase: str) -> tuple[Measure, dict[str,
         means = {c: results.values(c, name, phase).mean(axis=1) for c in of_phase}
         return measures[name], means, phase
     numbers = {c: results.numbers(c) for c in results.conditions}
-    known = {n.removeprefix(SECONDS): n for own in numbers.values() for n in own}
-    if name not in known:
-        raise SpecError(f"measure = {name!r}: {closest(name, {*measures, *known})}")
-    measure, factor = shown(name)
-    column = known[name]
+    columns = dict.fromkeys(n for own in numbers.values() for n in own)
+    names = {c: (c, c.removeprefix(SECONDS), shown(c)[0].heading) for c in columns}
+    column = next((c for c in columns if name in names[c]), None)
+    if column is None:
+        raise SpecError(f"measure = {name!r}: {closest(name, {*measures, *columns})}")
+    measure, factor = shown(column)
     return measure, {c: factor * own[column] for c, own in numbers.items() if column in own}, ""
 
 
@@ -191,7 +193,8 @@ def _groups(
 ) -> list[tuple[str, Members]]:
     if by is None:
         members = [(c, c) for c in conditions]
-        return [("", _led(members, reference, "reference"))] if members else []
+        known = {c: aliases(c, columns[c]) for c in conditions}
+        return [("", _led(members, reference, known))] if members else []
     keys = dict.fromkeys(key for c in conditions for key in columns[c])
     key = next((k for k in keys if by in (k, k.rpartition(".")[2])), None)
     if key is None:
@@ -201,7 +204,8 @@ def _groups(
         level = _level(key, columns[c][key])
         rest = ", ".join(_level(k, v) for k, v in columns[c].items() if k != key and v != "")
         groups.setdefault(rest, []).append((level, c))
-    return [(setting, _led(members, reference, "reference")) for setting, members in groups.items()]
+    known = {c: aliases(c, {key: columns[c][key]}) for c in conditions}
+    return [(setting, _led(members, reference, known)) for setting, members in groups.items()]
 
 
 def _level(key: str, value: object) -> str:
@@ -213,14 +217,17 @@ def _level(key: str, value: object) -> str:
     return value if isinstance(value, str) else f"{key.rpartition('.')[2]}={label({key: value})}"
 
 
-def _led(members: Members, reference: str | None, what: str) -> Members:
-    """Return the members of a group, the reference first."""
+def _led(members: Members, reference: str | None, known: Mapping[str, Collection[str]]) -> Members:
+    """Return the members of a group, the reference first, by a name or another `known` one."""
     if reference is None:
         return members
     names = [name for name, _ in members]
-    if reference not in names:
-        raise SpecError(f"{what} = {reference!r}: {closest(reference, names)}")
-    first = names.index(reference)
+    matches = [i for i, (_, c) in enumerate(members) if reference in known[c]]
+    if reference in names:
+        matches = [names.index(reference)]
+    if len(matches) != 1:
+        raise SpecError(f"reference = {reference!r}: {closest(reference, names)}")
+    first = matches[0]
     return [members[first], *members[:first], *members[first + 1 :]]
 
 

@@ -55,7 +55,7 @@ NUMBERS = {
 _SHOWN = {
     name: (Measure(name, title, "ms", better="lower", least=0.0), 1e3)
     for name, title in (
-        ("decision_median", "time of a decision"),
+        ("decision_median", "decision"),
         ("decision_99", "99th percentile of decisions"),
     )
 }
@@ -74,4 +74,5 @@ def shown(name: str) -> tuple[Measure, float]:
     """
     if name in _SHOWN:
         return _SHOWN[name]
-    return Measure(name, name, NUMBERS[name].unit if name in NUMBERS else "1"), 1.0
+    unit = "s" if name.startswith("seconds.") else "1"
+    return Measure(name, name, NUMBERS[name].unit if name in NUMBERS else unit), 1.0

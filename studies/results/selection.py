@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import ast
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from ...core.plugins.messages import near
 from ..errors import SpecError
+from ..spec.labels import label
 from ..spec.overlay import flat
 from ..trials.measures import joined as joined_measures
 from .results import Results, join, select
@@ -150,11 +151,35 @@ def chosen(results: Results, where: Where, settings: Mapping[str, Any]) -> Resul
     return select(results, np.array(keep, dtype=bool))
 
 
-def together(studies: Sequence[tuple[str, Results]]) -> tuple[Results, list[dict[str, str]]]:
+def relabelled(results: Results, name: str, taken: Iterable[str]) -> dict[str, str]:
+    """Return new labels of conditions, by the old ones: with a name, where they are `taken`."""
+    known = set(taken)
+    return {c: f"{c} ({name})" if c in known else c for c in results.columns}
+
+
+def _apart(name: str, tables: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return labels of conditions of one name, by one or two settings that tell all apart; or none.
+
+    Examples
+    --------
+    >>> _apart("default", [{"scenario": {"robots": n, "box": "disc"}} for n in (2, 4)])
+    ['default, robots=2', 'default, robots=4']
+    """
+    own = [dict(flat(table)) for table in tables]
+    keys = dict.fromkeys(key for table in own for key in table)
+    other = [key for key in keys if len({repr(table.get(key)) for table in own}) > 1]
+    labels = [label({key: table.get(key, "") for key in other}, name) for table in own]
+    return labels if len(other) <= 2 and len(set(labels)) == len(labels) else []
+
+
+def together(
+    studies: Sequence[tuple[str, Results]], settings: Sequence[Mapping[str, Any]] = ()
+) -> tuple[Results, list[dict[str, str]]]:
     """Return the results of several studies as those of one, and the new labels of each.
 
-    Conditions whose label occurs more than once get the name of their study. Their columns tell
-    it, too, as `DIRECTORY`.
+    Conditions whose label occurs more than once are told apart by their `settings`, where one or
+    two of these differ, else by the name of their study. Their columns tell it, too, as
+    `DIRECTORY`.
 
     Raises
     ------
@@ -162,10 +187,14 @@ def together(studies: Sequence[tuple[str, Results]]) -> tuple[Results, list[dict
         If two studies mean different things by the name of a measure.
     """
     times = Counter(condition for _, results in studies for condition in results.columns)
-    labels = [
-        {c: f"{c} ({name})" if times[c] > 1 else c for c in results.columns}
-        for name, results in studies
-    ]
+    several = [condition for condition, count in times.items() if count > 1]
+    labels = [relabelled(results, name, several) for name, results in studies]
+    for condition in several if settings else ():
+        at = [i for i, (_, results) in enumerate(studies) if condition in results.columns]
+        apart = _apart(condition, [settings[i].get(condition, {}) for i in at])
+        if not times.keys() & set(apart):
+            for i, text in zip(at, apart, strict=False):
+                labels[i][condition] = text
     keys = dict.fromkeys(k for _, r in studies for row in r.columns.values() for k in row)
     columns = {
         new[condition]: {**{key: row.get(key, "") for key in keys}, DIRECTORY: name}

@@ -1,9 +1,9 @@
-"""How conditions are called: by the point of the sweeps that they are."""
+"""How conditions are called, by the point of the sweeps that they are, and how long they train."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 from ..errors import show
@@ -31,6 +31,21 @@ def label(point: Mapping[str, Any], name: str = "") -> str:
         value = _brief(point[key])
         parts.append(value if key == "preset" else f"{shown}={value}")
     return ", ".join(parts)
+
+
+def aliases(condition: str, columns: Mapping[str, Any]) -> set[str]:
+    """Return all that a condition may be called by: its label, its columns with and without keys.
+
+    Examples
+    --------
+    >>> sorted(aliases("8", {"scenario.robots": 8, "topology": ""}))
+    ['8', 'robots=8', 'scenario.robots=8']
+    """
+    own = {key: str(value) for key, value in columns.items() if value != ""}
+    spelt = [list(own.values())]
+    for keys in (own, [key.rpartition(".")[2] for key in own]):
+        spelt.append([f"{key}={value}" for key, value in zip(keys, own.values(), strict=True)])
+    return {condition, *map(", ".join, spelt)}
 
 
 def label_but(columns: Mapping[str, Any], keys: Collection[str]) -> str:
@@ -76,3 +91,22 @@ def scalar(value: object) -> object:
     """Return a value as it stands in a column: a number or text as it is, else in TOML."""
     is_scalar = isinstance(value, int | float | str) and not isinstance(value, bool)
     return value if is_scalar else show(value, width=None)
+
+
+def lengths(curricula: Iterable[Sequence[int]], episodes: int) -> str:
+    """Return in words the episodes of training, stage by stage, that there are.
+
+    Parameters
+    ----------
+    curricula
+        Of every condition, the episodes of its stages.
+    episodes
+        Those after them.
+
+    Examples
+    --------
+    >>> lengths([[10, 6], [10, 6]], 8), lengths([[10, 6], []], 8), lengths([[]], 1)
+    ('10 + 6 + 8 episodes', '10 + 6 + 8 or 8 episodes', '1 episode')
+    """
+    sums = dict.fromkeys(" + ".join(map(str, [*stages, episodes])) for stages in curricula)
+    return f"{' or '.join(sums)} episode{'' if list(sums) == ['1'] else 's'}"

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ...core.plugins.sources import Sources
 from ..errors import SpecError, show
 from ..store.database import DATABASE, SPEC_FILE
+from .labels import lengths
 
 if TYPE_CHECKING:
     from ..store.reading import Reading
@@ -123,22 +124,3 @@ def other_spec(store: Reading) -> str | None:
                 f"{key} = {show(here)} here, {show(there)} there"
             )
     return None
-
-
-def lengths(curricula: Iterable[Sequence[int]], episodes: int) -> str:
-    """Return in words the episodes of training, stage by stage, that there are.
-
-    Parameters
-    ----------
-    curricula
-        Of every condition, the episodes of its stages.
-    episodes
-        Those after them.
-
-    Examples
-    --------
-    >>> lengths([[10, 6], [10, 6]], 8), lengths([[10, 6], []], 8), lengths([[]], 1)
-    ('10 + 6 + 8 episodes', '10 + 6 + 8 or 8 episodes', '1 episode')
-    """
-    sums = dict.fromkeys(" + ".join(map(str, [*stages, episodes])) for stages in curricula)
-    return f"{' or '.join(sums)} episode{'' if list(sums) == ['1'] else 's'}"

@@ -15,7 +15,7 @@ from ...core.plugins.settings import ScenarioSettings
 from ...core.plugins.sources import Sources, named
 from ..spec.conditions import ConditionSettings
 from ..spec.curriculum import Stage
-from ..spec.outline import lengths
+from ..spec.labels import lengths
 from ..store.durable import Recording
 from ..store.schema import RESULTS_VERSION, Planned
 from .episodes import EpisodeRow

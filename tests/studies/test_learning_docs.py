@@ -4,6 +4,7 @@ import csv
 from pathlib import Path
 
 import pytest
+from published_tables import print_table
 
 from nested_agents.studies.claims import claims
 from nested_agents.studies.cli.main import main
@@ -37,9 +38,7 @@ COLUMNS = ("success last 5", "evaluation success", "evaluation steps")
     ],
 )
 def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
-    path = claims.PUBLISHED / f"{name}.json"
-    assert main(["table", str(path), "--columns", *columns, "--format", "markdown"]) == 0
-    table = capsys.readouterr().out
+    table = print_table(name, columns, capsys)
     assert table in PAGE.read_text(encoding="utf-8"), f"docs/learning.md: put in\n{table}"
 
 

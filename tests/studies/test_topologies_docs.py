@@ -8,7 +8,7 @@ from nested_agents.studies.claims import claims
 from nested_agents.studies.cli.main import main
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "topologies.md"
-COLUMNS = ("evaluation success", "decide [ms]", "messages")
+COLUMNS = ("evaluation success", "decision [ms]", "messages")
 
 
 def test_the_table(capsys: pytest.CaptureFixture[str]) -> None:

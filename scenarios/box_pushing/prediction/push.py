@@ -94,14 +94,7 @@ def push(
 
 
 @njit(cache=True)
-def pushed(  # type: ignore[no-untyped-def]
-    robots: FloatArray,
-    box: FloatArray,
-    twists: FloatArray,
-    choices: IntArray,
-    seconds: float,
-    model: PushModel,
-):
+def pushed(robots, box, twists, choices, seconds, model):  # type: ignore[no-untyped-def]
     """Return what `push` does with the combinations last: ``(M, 3, m)``, ``(3, m)``, ``(M, m)``.
 
     Transposing within a kernel would take as long to compile as half of the arithmetic.

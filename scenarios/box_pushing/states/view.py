@@ -89,15 +89,12 @@ class View:
     @cached_property
     def course(self) -> FloatArray:
         """Direction ``(m,)`` from the box to the goal [rad]."""
-        ahead = self.goal[:2] - self.box[:, :2]
-        return _fixed(np.arctan2(ahead[:, 1], ahead[:, 0]))
+        return _direction(self.goal[:2] - self.box[:, :2])
 
     @cached_property
     def push(self) -> FloatArray:
         """Direction ``(m,)`` in which the robots' middle would push the box [rad]."""
-        middle = self.robots[:, :, :2].mean(axis=1)
-        ahead = self.box[:, :2] - middle
-        return _fixed(np.arctan2(ahead[:, 1], ahead[:, 0]))
+        return _direction(self.box[:, :2] - self.robots[:, :, :2].mean(axis=1))
 
     @cached_property
     def contact_push(self) -> FloatArray:
@@ -105,8 +102,7 @@ class View:
 
         The weight of a robot is ``exp(-gap / CLOSE) + LEAST``: those that do not push do not count.
         """
-        ahead = self.box[:, :2] - self._contact
-        return _fixed(np.arctan2(ahead[:, 1], ahead[:, 0]))
+        return _direction(self.box[:, :2] - self._contact)
 
     @cached_property
     def _contact(self) -> FloatArray:
@@ -149,6 +145,11 @@ class View:
     def inward(self, robot: int) -> FloatArray:
         """Direction ``(m,)`` into the box at the point of its surface next to a robot [rad]."""
         return _inward(self.robots[:, robot], self.box, self.outline.edges, self.outline.rounding)
+
+
+def _direction(ways: FloatArray) -> FloatArray:
+    """Return the directions ``(m,)`` of ways ``(m, 2)`` [rad], read-only."""
+    return _fixed(np.arctan2(ways[:, 1], ways[:, 0]))
 
 
 def _fixed(array: FloatArray) -> FloatArray:

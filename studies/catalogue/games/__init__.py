@@ -130,8 +130,6 @@ def draw(analysis: Analysis) -> dict[str, Figure]:
     from ...presentation import figures as f  # matplotlib takes its time
 
     cases = analysis.cases
-    if not cases:
-        return {}
     systems = list(dict.fromkeys(case.system for case in cases))
     games = list(dict.fromkeys(case.setting[:1] for case in cases))
     rests = list(dict.fromkeys(case.setting[1:] for case in cases))

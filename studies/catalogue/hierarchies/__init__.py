@@ -44,7 +44,7 @@ VALUE_OF = "learner.decision.value_of"
 """What is swept to vary whose value decides."""
 REFERENCE = "chain"
 """The hierarchy that others are compared with, if it is there."""
-DECIDING = "decide [ms]"
+DECIDING = "decision [ms]"
 """Title of the time that a decision takes."""
 UNBROKEN = "\N{NO-BREAK SPACE}"
 
@@ -269,8 +269,6 @@ def draw(analysis: Analysis) -> dict[str, Figure]:
     from ...presentation import by_robots, figures  # matplotlib takes its time
 
     cases = analysis.cases
-    if not cases:
-        return {}
     hierarchies = list(dict.fromkeys(case.hierarchy for case in cases))
     whose = list(dict.fromkeys(case.value_of for case in cases))
     size = (max(5.6, 0.6 + 2.8 * len(whose)), 5.2)

@@ -150,8 +150,6 @@ def draw(analysis: Analysis) -> dict[str, Figure]:
     """
     from ...presentation import figures as f  # matplotlib takes its time
 
-    if not analysis.table:
-        return {}
     followed = analysis.cases
     columns = min(COLUMNS, len(followed))
     rows = -(-len(followed) // columns)

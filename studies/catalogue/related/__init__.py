@@ -150,8 +150,6 @@ def draw(analysis: Analysis) -> dict[str, Figure]:
     from ...presentation import figures as f
 
     cases = analysis.cases
-    if not cases:
-        return {}
     systems = list(dict.fromkeys(case.system for case in cases))
     worlds = list(dict.fromkeys(case.world for case in cases))
     size = (2.2 + 2.0 * len(PANELS), 1.1 + 0.26 * len(systems))

@@ -42,16 +42,16 @@ NUMBERS = ("robots", "agents", "messages", "team_bytes", "decision_median", "ste
 """What of whole trials the analysis rests on."""
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
-TIMES = {"deciding": "decide [ms]", "learning": "learn [ms]"}
+TIMES = {"deciding": "decision [ms]", "learning": "learning [ms]"}
 """Times whose growth with the number of agents is estimated, by what they are of."""
 COLUMNS = (
-    "success", "all touch", "decide [ms]", "learn [ms]", "team [MB]", "process [MB]",
+    "success", "all touch", "decision [ms]", "learning [ms]", "team [MB]", "process [MB]",
 )  # fmt: skip
 """What the table shows, and after the first of them the evaluations."""
 PANELS = (
     (EVALUATED, EVALUATED, False),
-    ("decide [ms]", "deciding, per step [ms]", True),
-    ("learn [ms]", "learning, per step [ms]", True),
+    ("decision [ms]", "deciding, per step [ms]", True),
+    ("learning [ms]", "learning, per step [ms]", True),
     ("team [MB]", "arrays of the team [MB]", True),
     ("process [MB]", "process, peak [MB]", False),
 )
@@ -198,8 +198,8 @@ def _point(results: Results, condition: str, sizes: Mapping[str, int], bodies: s
     numbers = results.numbers(condition)
     steps = results.values(condition, "steps").sum(axis=1)
     costs = {
-        "decide [ms]": 1e3 * numbers["decision_median"],
-        "learn [ms]": 1e3 * numbers["seconds.learning"] / steps,
+        "decision [ms]": 1e3 * numbers["decision_median"],
+        "learning [ms]": 1e3 * numbers["seconds.learning"] / steps,
         "world [ms]": 1e3 * (numbers["seconds.physics"] + numbers["seconds.sensors"]) / steps,
         "team [MB]": 1e-6 * numbers["team_bytes"],
         "step [MB]": 1e-6 * numbers["step_bytes"],
@@ -301,8 +301,6 @@ def draw(analysis: Analysis) -> dict[str, Figure]:
     from ...presentation import by_robots, figures  # matplotlib takes its time
 
     points = analysis.cases
-    if not points:
-        return {}
     evaluators = list(dict.fromkeys(p.evaluator for p in points))
     figure, panels = figures.panels(2, 3, (8.4, 5.2), sharex=True)
     for axes, (name, title, logarithmic) in zip(panels.flat, PANELS, strict=False):

@@ -271,8 +271,6 @@ def draw(analysis: Analysis) -> dict[str, Figure]:
     from ...presentation import figures as f  # matplotlib takes its time
 
     courses = analysis.cases
-    if not courses:
-        return {}
     faults = list(dict.fromkeys(course.fault for course in courses))
     cases = list(dict.fromkeys(course.adapts for course in courses))
     columns = min(COLUMNS, len(faults))

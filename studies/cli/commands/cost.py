@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,14 +15,16 @@ if TYPE_CHECKING:
 
 MOST_AGENTS = 10_000
 """Of one row: its integers have some fifty thousand digits."""
+RANGE = re.compile(r"(\d{1,6})(?::(\d{1,6})(?::(\*?)(\d{1,6}))?)?", re.ASCII)
+"""From, to, and what is added or multiplied from one number to the next."""
 
 
 @click.command()
 @click.option(
     "--agents",
-    metavar="N|RANGE",
+    metavar="N|RANGE,...",
     default="4",
-    help="Number of agents, or a range: 4, 1:16, 2:64:2.",
+    help="Numbers of agents and ranges: 4,8,16, 1:16, 2:64:2 (every second), 4:64:*2 (doubled).",
 )
 @click.option(
     "--topology",
@@ -78,22 +81,25 @@ def command(
     return 0
 
 
-def numbers(text: str) -> range:
-    """Return the numbers that ``"4"``, ``"1:16"`` (both ends included) or ``"2:64:2"`` name.
+def numbers(text: str) -> list[int]:
+    """Return the numbers that a list of numbers and ranges names, both ends of each included.
 
     Examples
     --------
-    >>> list(numbers("4")), list(numbers("1:3")), list(numbers("2:6:2"))
-    ([4], [1, 2, 3], [2, 4, 6])
+    >>> numbers("4,8,16"), numbers("1:3"), numbers("2:6:2"), numbers("4:64:*2")
+    ([4, 8, 16], [1, 2, 3], [2, 4, 6], [4, 8, 16, 32, 64])
     """
-    try:
-        parts = [int(part) for part in text.split(":")]
-        first, last = parts[0], parts[min(1, len(parts) - 1)]
-        chosen = range(first, last + 1, *parts[2:])
-    except (ValueError, TypeError):
-        chosen = range(0)
-    if not chosen or chosen[0] < 1 or chosen[-1] > MOST_AGENTS:
-        raise ValueError(
-            f"agents = {text!r}, allowed: 4, 1:16 or 2:64:2, from 1 to {MOST_AGENTS:,}"
-        )
-    return chosen
+    chosen: list[int] = []
+    for part in text.split(","):
+        match = RANGE.fullmatch(part.strip())
+        first, last, times, step = match.groups("") if match else ("0", "", "", "")
+        number, end, by = int(first), int(last or first), int(step or 1)
+        if not 1 <= number <= end <= MOST_AGENTS or by < (2 if times else 1):
+            raise ValueError(
+                f"agents = {text!r}, allowed: 4, 4,8,16, 1:16, 2:64:2 or 4:64:*2, from 1 to "
+                f"{MOST_AGENTS:,}"
+            )
+        while number <= end:
+            chosen.append(number)
+            number = number * by if times else number + by
+    return list(dict.fromkeys(chosen))

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from world_oracles import surface_numpy
 
-from nested_agents.core.numerics.arrays import FloatArray, IntArray
+from nested_agents.core.numerics.arrays import FloatArray
 from nested_agents.scenarios.box_pushing.prediction.push import SUBSTEPS, SWEEPS, PushModel
 from nested_agents.scenarios.box_pushing.prediction.push_lanes import CREEP, MARGIN, START_SPEED
 
@@ -36,14 +36,7 @@ class _Contact:
         return self.force[0] * self.normal + self.force[1] * self.tangent
 
 
-def push_one(
-    robots: FloatArray,
-    box: FloatArray,
-    twists: FloatArray,
-    choices: IntArray,
-    seconds: float,
-    model: PushModel,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
+def push_one(robots, box, twists, choices, seconds, model):
     """Return robot poses ``(M, 3)``, the box pose ``(3,)`` and gaps ``(M,)``, as `push` does.
 
     The arguments are those of `push`, but for `choices` ``(M,)``.

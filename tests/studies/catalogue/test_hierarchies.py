@@ -16,6 +16,7 @@ from nested_agents.studies.catalogue.hierarchies import (
     seeds_needed,
     verdicts_of,
 )
+from nested_agents.studies.catalogue.study import drawn
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.presentation.tables import tabulate
@@ -107,9 +108,9 @@ def test_costs_stand_beside_success() -> None:
         "2 robots, own, star", "2 robots, own, chain", "2 robots, own, tree:2",
     ]  # fmt: skip
     chain = by_name["8 robots, own, chain"]
-    assert list(chain) == ["evaluation success", "decisions to goal", "decide [ms]", "messages"]
+    assert list(chain) == ["evaluation success", "decisions to goal", "decision [ms]", "messages"]
     assert chain["messages"].value == 120.0
-    assert 1.4 < chain["decide [ms]"].low < 1.6 < chain["decide [ms]"].high < 1.8
+    assert 1.4 < chain["decision [ms]"].low < 1.6 < chain["decision [ms]"].high < 1.8
     assert 30.0 < chain["decisions to goal"].value < 90.0
     assert tabulate(analysis.table).csv.count("\n") == 13
 
@@ -136,7 +137,7 @@ def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
         assert len(figure.axes) == 2 * columns
     paths = save({"hierarchies": figure}, tmp_path)
     assert all(path.stat().st_size > 0 for path in paths)
-    assert draw(analyse(NOTHING)) == {}
+    assert drawn(module, analyse(NOTHING)) == {}
 
 
 @pytest.mark.parametrize(

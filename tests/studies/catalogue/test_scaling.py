@@ -6,6 +6,7 @@ from matplotlib.figure import Figure
 
 from nested_agents.studies.catalogue import scaling as module
 from nested_agents.studies.catalogue.scaling import analyse, draw, exponents_of, measure, messages
+from nested_agents.studies.catalogue.study import drawn
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import build, check
@@ -91,15 +92,15 @@ def test_the_figure_has_a_line_of_messages_by_topology(made: Arrays, lines: int)
     analysis = analyse(made.frames())
     axes = Figure().subplots()
     module.draw_messages(axes, analysis.cases)
-    drawn = [list(line.get_ydata()) for line in axes.get_lines()]
+    shown = [list(line.get_ydata()) for line in axes.get_lines()]
     counts = [[6, 120, 8128]] if lines == 1 else [list(c.values()) for c in PASSED.values()]
-    assert drawn == counts
+    assert shown == counts
 
 
 def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
     paths = save(draw(analyse(scaling(SIZES).frames())), tmp_path)
     assert [path.name for path in paths] == ["scaling.png", "scaling.svg"]
-    assert draw(analyse(NOTHING)) == {}
+    assert drawn(module, analyse(NOTHING)) == {}
 
 
 @pytest.mark.parametrize(("topology", "count"), [("chain", 6), ("star", 3), ("independent", 0)])

@@ -22,15 +22,7 @@ from nested_agents.studies.cli import commands
 from nested_agents.studies.cli.display import show_results
 from nested_agents.studies.cli.main import COMMANDS, main
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.spec.toml import dumps
 from nested_agents.studies.store.store import DATABASE
-
-
-@pytest.fixture(scope="module")
-def spec_file(tmp_path_factory):
-    path = tmp_path_factory.mktemp("spec") / "spec.toml"
-    path.write_text(dumps(made_up.SPEC.table()))
-    return path
 
 
 @pytest.fixture(scope="module")

@@ -34,13 +34,6 @@ sys.exit(main(sys.argv[1:]))
 
 
 @pytest.fixture(scope="module")
-def spec_file(tmp_path_factory):
-    path = tmp_path_factory.mktemp("spec") / "spec.toml"
-    path.write_text(dumps(made_up.SPEC.table()))
-    return path
-
-
-@pytest.fixture(scope="module")
 def whole(tmp_path_factory, spec_file):
     directory = tmp_path_factory.mktemp("whole") / "out"
     assert run_here(made_up.measure, "run", spec_file, "--out", directory)[0] == 0

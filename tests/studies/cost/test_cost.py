@@ -97,12 +97,17 @@ def test_the_table_fits_a_terminal(said) -> None:
 
 def test_numbers() -> None:
     assert list(numbers("5:7")) == [5, 6, 7]
+    assert numbers("4,8,16") == [4, 8, 16]
+    assert numbers("1:3, 2:64:*4, 3") == [1, 2, 3, 8, 32]
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--agents", "0"), "agents = '0', allowed: 4, 1:16 or 2:64:2"),
+        (("--agents", "0"), "agents = '0', allowed: 4, 4,8,16, 1:16, 2:64:2 or 4:64:*2"),
+        (("--agents", "4:64:*1"), "agents = '4:64:*1'"),
+        (("--agents", "4:64:0"), "agents = '4:64:0'"),
+        (("--agents", "4,,8"), "agents = '4,,8'"),
         (("--agents", "four"), "agents = 'four'"),
         (("--agents", "5:2"), "agents = '5:2'"),
         (("--agents", "1:10001"), "from 1 to 10,000"),

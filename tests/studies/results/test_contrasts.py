@@ -70,3 +70,19 @@ def test_what_there_is_not_is_refused(options: dict, complaint: str) -> None:
 def test_too_few_shared_seeds_leave_nothing_to_compare() -> None:
     results = hierarchies(CHANCES, seeds=1).frames()
     assert contrasts(results).notes == ("Nothing to compare: no two conditions share two seeds.",)
+
+
+def test_what_is_compared_goes_by_any_of_its_names() -> None:
+    results = hierarchies({("chain", "team", n): 0.5 for n in (2, 4)}).frames()
+    for name in ("robots=4", "4", "scenario.robots=4", results.conditions[1]):
+        assert contrasts(results, by="robots", reference=name).groups[0].reference == "robots=4"
+    label = results.conditions[1]
+    for name in (label, "chain, team, 4"):
+        assert contrasts(results, reference=name).groups[0].reference == label
+    with pytest.raises(SpecError, match="reference = 'chain'"):
+        contrasts(results, reference="chain")
+    times = contrasts(results, "decision_median")
+    assert times.title == contrasts(results, "decision [ms]").title == "decision [ms]"
+    times = scaling({2: 0.9, 4: 0.8}).frames()
+    for name in ("seconds.learning", "learning", "seconds.learning [s]"):
+        assert contrasts(times, name).title == "seconds.learning [s]"
