@@ -19,6 +19,7 @@ from pydantic import Field
 from ..numerics.arrays import FloatArray, IntArray
 from ..plugins.settings import Fraction, Positive
 from ..rules.kernels import regression
+from ..rules.kernels.regression import CUT_OFF, TERMINAL
 from ..rules.rule_base import RuleBase
 from .learner import LearnerSettings
 
@@ -26,9 +27,6 @@ REWARD_SCALE = 100.0
 """Rewards are of the order of 0.01; the ridge weighs against rewards times this."""
 MOST_RULES = 4096
 """Of one agent: more make normal equations that take too long to be solved densely."""
-
-TERMINAL, CUT_OFF = -1, -2
-"""In place of the index of the next after-state: it is entered for ever; it is not known."""
 
 
 class ReplaySettings(LearnerSettings):

@@ -64,8 +64,3 @@ def prepare(
     with drawing_from(rng):
         model._setup_model()
     model.set_logger(Logger(None, []))
-
-
-def weights_of(policy: torch.nn.Module) -> dict[str, FloatArray]:
-    """Return all weights of a network by name."""
-    return {name: value.numpy().copy() for name, value in policy.state_dict().items()}

@@ -21,7 +21,7 @@ from ..interface.scenario import Scenario, Transition
 from ..numerics.arrays import FloatArray, IntArray
 from .central_critic import CentralCriticPolicy
 from .inputs import Inputs, RewardScale
-from .networks import Layers, drawing_from, prepare, weights_of
+from .networks import Layers, drawing_from, prepare
 from .peer import Peer, Seen
 from .settings import PolicyGradientSettings
 
@@ -122,7 +122,8 @@ class IndependentPPO(Peer):
 
     def arrays(self) -> dict[str, FloatArray]:
         """Return the weights of policy and critic."""
-        return weights_of(self._model.policy)
+        weights = self._model.policy.state_dict()
+        return {name: value.numpy().copy() for name, value in weights.items()}
 
 
 class CentralPPO(IndependentPPO):

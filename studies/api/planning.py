@@ -2,13 +2,16 @@
 
 Two episodes of every condition are run to see what a step takes, on a seed that no study reports.
 Deciding and simulating take a time per step. Learning may take one per step, too, and one per step
-kept so far: a regression over all of training grows with the square of its length.
+kept so far: a regression over all of training grows with the square of its length. A worker has to
+start, too, and to load or compile what each condition needs: that is measured here once.
 """
 
 from __future__ import annotations
 
 import resource
+import subprocess
 import sys
+import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -36,6 +39,10 @@ EPISODES = 2
 """Tried of every condition; one that is cut short goes before them, in which code is compiled."""
 QUICK = 0.25
 """Share of its steps that an episode takes if the goal is reached early."""
+FASTER, SLOWER = 0.5, 2.5
+"""By what a machine is faster or slower than when it was tried: others use it, caches are cold."""
+WORKER = f"import {Session.__module__}, matplotlib.pyplot"
+"""What is imported by a worker, and at the end for the figures."""
 
 
 @dataclass(frozen=True)
@@ -52,12 +59,15 @@ class Pace:
         The same for every step that is kept by then.
     bytes
         What the team holds [bytes], and how much more for every step of training.
+    start
+        Seconds before the first step: what is imported, loaded and compiled.
     """
 
     acting: float
     learning: float
     regression: float
     bytes: tuple[float, float]
+    start: float = 0.0
 
     def seconds(self, steps: float, training: Sequence[int], evaluation: float) -> float:
         """Return the time of a trial whose episodes take so many steps.
@@ -92,9 +102,10 @@ class Plan:
     processes
         How many run at a time.
     seconds
-        Time of the whole study [s]: if episodes take `QUICK` of their steps, and if all take all.
+        Time of the whole study [s], from and to: from `QUICK` of the steps of its episodes on a
+        machine that is `FASTER` to all of them on one that is `SLOWER`.
     memory
-        Of all processes together [bytes], at most.
+        Of all processes together [bytes], about.
     comparisons
         With the first condition.
     deviation
@@ -138,13 +149,10 @@ class Plan:
         with_ = f"with {count(self.processes, 'process', 'es')}"
         if self.seconds is not None:
             quick, slow = map(duration, self.seconds)
-            share = f"{QUICK:.0%}".replace("%", " %")
-            yield (
-                f"time     {quick} if episodes take {share} of their steps, at most {slow}, {with_}"
-            )
-            yield "         once for an installation, compilation comes on top: half a minute"
+            yield f"time     {quick} to {slow} {with_}, the start of workers included:"
+            yield "         by how early episodes end, and by what else this machine does"
         if self.memory is not None:
-            yield f"memory   up to {self.memory / 1e9:.1f} GB {with_}"
+            yield f"memory   about {self.memory / 1e9:.1f} GB {with_}"
         if self.comparisons:
             lines = power_text(len(o.seeds), self.comparisons, self.deviation, self.smallest)
             yield from ("", *lines)
@@ -208,6 +216,10 @@ def _taken(
     """Return the time of a study [s], from and to, and its memory [bytes]."""
     spent = np.zeros(2)
     largest = 0.0
+    begin = time.perf_counter()
+    subprocess.run([sys.executable, "-c", WORKER], check=True)
+    started = 3 * (time.perf_counter() - begin)  # this process, a worker, and the figures
+    loaded = 0.0
     with spec.sources.active():
         for trial in trials[: len(spec.conditions())]:
             training = [*(stage.episodes for stage in trial.curriculum), trial.episodes]
@@ -217,18 +229,22 @@ def _taken(
             for i, share in enumerate((QUICK, 1.0)):
                 seconds = pace.seconds(share * trial.steps, training, share * evaluated)
                 spent[i] += len(spec.seeds) * seconds
+            loaded += pace.start
             held, more = pace.bytes
             largest = max(largest, held + more * trial.steps * sum(training))
-    longest = spent / processes
-    return (float(longest[0]), float(longest[1])), processes * (_resident() + largest)
+    quick, slow = (float(seconds) for seconds in spent / processes)
+    whole = FASTER * (started + quick), SLOWER * (started + loaded + slow)
+    return whole, processes * (_resident() + largest)
 
 
 def paced(trial: Trial) -> Pace:
     """Return what a condition's trials take, by trying one of them out."""
     alone = replace(trial, seed=SEED, curriculum=(), evaluations=(), evaluation_steps=None)
+    begin = time.perf_counter()
     warming = Session(replace(alone, episodes=1, steps=2, evaluation=1))
     warming.train(1)
     warming.evaluate()
+    start = time.perf_counter() - begin
     session = Session(replace(trial, seed=SEED, episodes=EPISODES, curriculum=()))
     held = _bytes(session)
     acting: list[float] = []
@@ -250,7 +266,9 @@ def paced(trial: Trial) -> Pace:
     )
     more = max(_bytes(session) - held, 0.0) / steps.sum()
     # The median: what else a machine does now and then is not the study's.
-    return Pace(float(np.median(acting)), float(per_step), float(per_kept), (held, float(more)))
+    return Pace(
+        float(np.median(acting)), float(per_step), float(per_kept), (held, float(more)), start
+    )
 
 
 def _bytes(session: Session) -> float:

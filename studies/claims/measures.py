@@ -13,7 +13,7 @@ import numpy as np
 
 from ...core.agents.cost import Problem
 from ..catalogue.chain_order import compare_orders
-from ..catalogue.shapes import least_ratio, ratios_of
+from ..catalogue.shapes import ratios_of
 from ..catalogue.wheel_failure import courses_of
 from ..results.comparison import difference, paired, ratio
 from ..results.results import Results
@@ -282,7 +282,7 @@ def worst_shape(condition: str = "") -> Compute:
         ratios = ratios_of(results, condition or learner_of(results))
         if not ratios:
             return None
-        worst = least_ratio(ratios)
+        worst = min(ratios, key=lambda d: float(np.nan_to_num(d.estimate.value)))
         return Measured(worst.estimate, worst.seeds, note=worst.condition)
 
     return compute

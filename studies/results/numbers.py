@@ -48,7 +48,6 @@ NUMBERS = {
         "share of evaluation episodes in which every robot is in contact for at least half of the "
         "time in which any robot is",
     ),
-    "touching.BOX.robotN": Number("1", "share of contact of a robot, in the evaluation with a box"),
     "onset": Number("1", "episode in which the first failure begins"),
 }
 """Numbers by the name of their column; those of a study of one's own are not among them."""

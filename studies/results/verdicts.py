@@ -40,9 +40,7 @@ def _line(verdict: str, d: Difference) -> list[str]:
     return wrap(text, WIDTH, initial_indent="  ", subsequent_indent="    ", break_on_hyphens=False)
 
 
-def power_lines(
-    differences: Sequence[Difference], *, of_rates: bool = True, smallest: float | None = None
-) -> list[str]:
+def power_lines(differences: Sequence[Difference], *, of_rates: bool = True) -> list[str]:
     """Return lines on which differences the comparisons could find, and how many seeds it takes.
 
     Parameters
@@ -50,17 +48,13 @@ def power_lines(
     differences
         All that were adjusted together, of one unit.
     of_rates
-        Whether they are differences of success rates.
-    smallest
-        The smallest difference of interest; of rates by default `SMALLEST`.
+        Whether they are differences of success rates, of which `SMALLEST` is of interest.
     """
     if not differences:
         return []
     seeds = min(d.seeds for d in differences)
     deviation = deviation_of([d.sample for d in differences], of_rates=of_rates)
-    return power_text(
-        seeds, len(differences), deviation, SMALLEST if of_rates and smallest is None else smallest
-    )
+    return power_text(seeds, len(differences), deviation, SMALLEST if of_rates else None)
 
 
 def power_text(

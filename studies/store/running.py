@@ -38,8 +38,8 @@ class Running:
         return self
 
     def __exit__(self, *_: object) -> None:
-        with contextlib.suppress(OSError):
-            self._path.unlink(missing_ok=True)
+        self._begun.clear()
+        self._write()
 
     def begin(self, identity: str) -> None:
         """Note that a trial has been handed to a worker."""
@@ -76,6 +76,15 @@ def look(directory: Path) -> tuple[int, dict[str, float]] | None:
         return mark["processes"], seconds
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return 1, {}  # begins or ends just now
+
+
+def last(directory: Path) -> int | None:
+    """Return how many trials the last run in a directory ran at a time; None if that is unknown."""
+    try:
+        processes = json.loads((directory / MARK).read_text())["processes"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    return processes if isinstance(processes, int) and processes > 0 else None
 
 
 def _locked(path: Path) -> bool:

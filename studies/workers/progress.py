@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from statistics import fmean
 
-from ..store.running import look
+from ..store.running import last, look
 from ..store.store import Store
 from ..trials.code import outdated
 from .worker import cores
@@ -23,8 +23,8 @@ class Progress:
     running
         Condition, seed, and seconds so far of the trials that are running.
     processes
-        How many trials run at a time; if none does, as many as would: the cores of this machine,
-        or none where nothing is left.
+        How many trials run at a time; if none does, as many as in the last run, or as would now:
+        the cores of this machine; or none where nothing is left.
     seconds
         Estimate of the time left [s]; None if nothing has finished to go by.
     damaged
@@ -54,7 +54,7 @@ def progress(store: Store) -> Progress:
     left = [trial for trial in pending if trial.identity not in begun]
     failed = [*states.values()].count("failed")
     finished = len(trials) - len(pending)
-    usual = cores() if left and refusal is None else 0
+    usual = (last(store.directory) or cores()) if left and refusal is None else 0
     processes = usual if now is None else now[0]
     seconds = _estimate(
         store.mean_seconds(),

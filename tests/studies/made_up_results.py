@@ -69,11 +69,6 @@ def shapes(chances: dict[str, float], trained: float = 0.95, seeds: int = SEEDS)
     rng = np.random.default_rng(2)
     for box, chance in chances.items():
         base.phases[f"evaluation:{box}"] = {"own-value": arrays(np.full(10, chance), rng, seeds)}
-    base.numbers["own-value"] = {
-        f"touching.{box}.robot{r}": rng.uniform(0.5, 0.9, seeds)
-        for box in ("trained on", *chances)
-        for r in (1, 2)
-    }
     return base
 
 

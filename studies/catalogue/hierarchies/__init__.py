@@ -28,7 +28,7 @@ from ...results.paired_tests import LEVEL
 from ...results.power import seeds_needed
 from ...results.results import Results
 from ...results.statistics import Estimate, bootstrap, rate
-from ...results.summary import EVALUATED, Summary, two_figures
+from ...results.summary import EVALUATED, Summary
 from ...results.verdicts import WIDTH, power_lines
 from ...spec.labels import label_but
 from ...spec.spec import Spec
@@ -44,8 +44,8 @@ VALUE_OF = "learner.decision.value_of"
 """What is swept to vary whose value decides."""
 REFERENCE = "chain"
 """The hierarchy that others are compared with, if it is there."""
-DECIDING, MESSAGES = "decision [ms]", "messages"
-"""Titles of what a decision costs."""
+DECIDING = "decision [ms]"
+"""Title of the time that a decision takes."""
 UNBROKEN = "\N{NO-BREAK SPACE}"
 
 
@@ -147,8 +147,9 @@ def analyse(results: Results) -> Analysis:
     ]
     verdicts = verdicts_of(results, cases)
     compared = tuple(d for verdict in verdicts for d in verdict.comparisons)
-    notes = (*_legend(cases), *_verdict_lines(verdicts), *_highest(cases))
-    return Analysis(tuple(table), notes, cases, compared)
+    legend = "Rows: number of robots, whose value decides, hierarchy."
+    notes = [legend] if any(case.value_of for case in cases) else []
+    return Analysis(tuple(table), (*notes, *_verdict_lines(verdicts)), cases, compared)
 
 
 def _cases(results: Results) -> tuple[HierarchyCase, ...]:
@@ -184,7 +185,7 @@ def _estimates(results: Results, condition: str) -> dict[str, Estimate]:
         values["decisions to goal"] = bootstrap(decisions)
     values[DECIDING] = bootstrap(1e3 * numbers["decision_median"])
     unknown = np.asarray(np.nan)  # a count has no interval
-    values[MESSAGES] = Estimate(numbers["messages"][0], unknown, unknown)
+    values["messages"] = Estimate(numbers["messages"][0], unknown, unknown)
     return values
 
 
@@ -229,11 +230,6 @@ def _outcomes(results: Results, condition: str) -> Array:
     return results.success(condition, "evaluation").astype(float)
 
 
-def _legend(cases: Sequence[HierarchyCase]) -> Iterator[str]:
-    if any(case.value_of for case in cases):
-        yield "Rows: number of robots, whose value decides, hierarchy."
-
-
 def _verdict_lines(verdicts: Sequence[Verdict]) -> Iterator[str]:
     """Yield lines that say where the hierarchy matters, and where that is undecided."""
     if not verdicts:
@@ -261,20 +257,6 @@ def _listed(what: str, comparisons: Sequence[Difference]) -> Iterator[str]:
         text = f"  {what}: " + ", ".join(one.replace(" ", UNBROKEN) for one in shown)
         lines = wrap(text, WIDTH, subsequent_indent="    ", break_on_hyphens=False)
         yield from (line.replace(UNBROKEN, " ") for line in lines)
-
-
-def _highest(cases: Sequence[HierarchyCase]) -> Iterator[str]:
-    """Yield a line for every number of robots: the highest success, and what it costs."""
-    if cases:
-        yield "\nHighest evaluation success, the quickest of equals; what a decision costs:"
-    for robots in dict.fromkeys(case.robots for case in cases):
-        best = min(
-            (case for case in cases if case.robots == robots),
-            key=lambda case: (-case.values[EVALUATED].value, case.values[DECIDING].value),
-        )
-        success, time = (two_figures(float(best.values[t].value)) for t in (EVALUATED, DECIDING))
-        passed = f"{best.values[MESSAGES].value:,.0f}"
-        yield f"{best.setting}, {best.hierarchy}: {success}; {time} ms, messages {passed}"
 
 
 def draw(analysis: Analysis) -> dict[str, Figure]:

@@ -2,9 +2,8 @@
 
 A team is trained with one box, and then acts greedily, without any further learning, with every box
 that the spec lists under ``[evaluations]``, on the same worlds. What is reported of each box is its
-success rate, the ratio to the rate with the box of training, and how much of the time in which any
-robot pushes each of them does. The agents' state holds nothing of the shape; the predictor by which
-they look ahead is given it (see docs/predictors.md).
+success rate, and the ratio to the rate with the box of training. The agents' state holds nothing of
+the shape; the predictor by which they look ahead is given it (see docs/predictors.md).
 """
 
 from __future__ import annotations
@@ -21,9 +20,7 @@ from ...results.statistics import Estimate, bootstrap, rate
 from ...results.summary import Summary
 from ...results.verdicts import power_lines
 from ...spec.spec import Spec
-from ...trials.session import Session
-from ...trials.trial import Trial, TrialResult
-from ..contact import ContactShares
+from ..study import run_training as measure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -36,22 +33,6 @@ def check(spec: Spec) -> None:
     """Raise `SpecError` unless there is another box to compare with."""
     if not spec.evaluations:
         raise SpecError('evaluations: missing; shapes needs one at least, as circle.box = "circle"')
-
-
-def measure(trial: Trial) -> TrialResult:
-    """Train a team with its own box, evaluate it with all; imported by name in workers."""
-    session = Session(trial)
-    session.train(trial.episodes)
-    contacts = {name: ContactShares() for name in (TRAINED, *dict(trial.evaluations))}
-    session.evaluate(contacts[TRAINED])
-    session.run_other_evaluations(contacts)
-    numbers = {
-        f"touching.{name}.robot{r + 1}": float(share)
-        for name, contact in contacts.items()
-        if len(contact.shares)
-        for r, share in enumerate(contact.shares.mean(axis=0))
-    }
-    return session.result(numbers)
 
 
 def analyse(results: Results) -> Analysis:
@@ -70,7 +51,7 @@ def analyse(results: Results) -> Analysis:
             label = box if len(ratios) == 1 else f"{condition}: {box}"
             success = results.success(condition, phase)
             estimates = {"success": rate(success), "ratio": by_box.get(box, bootstrap([own]))}
-            estimates |= _further(results, condition, phase, box)
+            estimates |= _further(results, condition, phase)
             table.append(Summary(label, len(success), estimates))
         if compared:
             notes += [f"\n{condition}, ratio to the box of training:", *map(_line, compared)]
@@ -96,24 +77,15 @@ def ratios_of(results: Results, condition: str) -> tuple[Difference, ...]:
     )
 
 
-def _further(results: Results, condition: str, phase: str, box: str) -> dict[str, Estimate]:
-    """Return how the box was left, and how long it and each robot were in contact."""
+def _further(results: Results, condition: str, phase: str) -> dict[str, Estimate]:
+    """Return how the box was left, and how long robots were in contact."""
     estimates = {}
     if results.has(condition, phase, "stopped_at_goal"):
         estimates["stopped"] = rate(results.values(condition, "stopped_at_goal", phase))
-    shares = {}
     if results.has(condition, phase, "contact_fraction"):
-        shares["contact"] = results.values(condition, "contact_fraction", phase).mean(axis=1)
-    start = f"touching.{box}.robot"
-    for name, values in results.numbers(condition).items():
-        if name.startswith(start):
-            shares[f"touches {name.removeprefix(start)}"] = values
-    return estimates | {title: bootstrap(v, bounds=(0, 1)) for title, v in shares.items()}
-
-
-def least_ratio(compared: tuple[Difference, ...]) -> Difference:
-    """Return the ratio of the box that comes off worst, of one box at least."""
-    return min(compared, key=lambda d: float(np.nan_to_num(d.estimate.value)))
+        shares = results.values(condition, "contact_fraction", phase).mean(axis=1)
+        estimates["contact"] = bootstrap(shares, bounds=(0, 1))
+    return estimates
 
 
 def _line(d: Difference) -> str:

@@ -115,11 +115,6 @@ def test_costs_stand_beside_success() -> None:
     assert tabulate(analysis.table).csv.count("\n") == 13
 
 
-def test_the_highest_success_is_told_with_its_cost() -> None:
-    analysis = analyse(hierarchies({("star", "own", 8): 0.1, ("chain", "own", 8): 1.0}).frames())
-    assert analysis.notes[-1] == "8 robots, own, chain: 1.0; 1.6 ms, messages 120"
-
-
 def test_who_never_succeeds_has_no_decisions_to_the_goal() -> None:
     results = hierarchies({("chain", "own", 2): 0.0, ("star", "own", 2): 0.0})
     for line in analyse(results.frames()).table:

@@ -4,7 +4,7 @@ import pytest
 from made_up_results import NOTHING, shapes
 
 from nested_agents.studies.catalogue import shapes as module
-from nested_agents.studies.catalogue.shapes import analyse, check, draw, least_ratio, measure
+from nested_agents.studies.catalogue.shapes import analyse, check, draw, measure
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
@@ -18,12 +18,12 @@ def test_ratios_to_the_box_of_training() -> None:
     analysis = analyse(shapes(CHANCES).frames())
     ((_, ratios),) = analysis.cases
     assert [d.condition for d in ratios] == list(CHANCES)
-    assert least_ratio(ratios).condition == "L"
+    assert min(ratios, key=lambda d: d.estimate.value).condition == "L"
     assert ratios[2].estimate.high < 0.5
     assert ratios[2].p < 0.001
     assert ratios[0].estimate.low > 0.9
     assert [line.condition for line in analysis.table] == ["trained on", *CHANCES]
-    assert {"touches 1", "touches 2", "contact"} <= analysis.table[1].estimates.keys()
+    assert "contact" in analysis.table[1].estimates
     assert any(note.startswith("  L: 0.") for note in analysis.notes)
 
 
@@ -46,9 +46,6 @@ def test_one_team_is_evaluated_with_every_box() -> None:
     assert [row.phase for row in result.rows] == [
         "training", "evaluation", "evaluation", "evaluation:circle", "evaluation:circle",
     ]  # fmt: skip
-    boxes = ("trained on", "circle")
-    assert set(result.numbers) == {f"touching.{b}.robot{r}" for b in boxes for r in (1, 2)}
-    assert all(0.0 <= share <= 1.0 for share in result.numbers.values())
 
 
 def test_the_spec_holds_the_shapes_of_the_claim() -> None:
