@@ -31,7 +31,7 @@ from ...results.verdicts import power_lines
 from ...spec.spec import Spec
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
-from ..hierarchies import DECIDING, MESSAGES, to_the_goal
+from ..hierarchies import DECIDING, to_the_goal
 from ..study import check_evaluated, check_rule_bases
 
 if TYPE_CHECKING:
@@ -132,7 +132,7 @@ def _cases(results: Results, condition: str) -> Iterator[Reevaluation]:
         if len(decisions):
             values["decisions to goal"] = bootstrap(decisions)
         values[DECIDING] = bootstrap(1e3 * numbers[f"decision.{name}"])
-        values[MESSAGES] = Estimate(numbers[f"messages.{name}"][0], unknown, unknown)
+        values["messages"] = Estimate(numbers[f"messages.{name}"][0], unknown, unknown)
         yield Reevaluation(condition, name, values)
 
 

@@ -6,6 +6,7 @@ from made_up_results import NOTHING, SEEDS, Arrays, shapes
 
 from nested_agents.studies.catalogue import edges as module
 from nested_agents.studies.catalogue.edges import TRAINED, analyse, check, draw, measure
+from nested_agents.studies.catalogue.hierarchies import DECIDING
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
@@ -34,7 +35,7 @@ def test_every_hierarchy_is_compared_with_that_of_training() -> None:
     (line,) = (note for note in analysis.notes if "considered only" in note)
     assert line.endswith("; no difference found")
     values = analysis.table[1].estimates
-    assert (float(values["messages"].value), float(values["decide [ms]"].value)) == (6.0, 8.0)
+    assert (float(values["messages"].value), float(values[DECIDING].value)) == (6.0, 8.0)
 
 
 def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
