@@ -8,6 +8,11 @@ Without the lock numba's cache is not safe: it numbers a file of code by an inde
 before, so that of two processes that compile one kernel for different types each may leave the
 other's code under its own type.
 
+A kernel is compiled by a process that does nothing else, and then taken from the cache. A process
+that compiles a kernel itself holds several versions of the kernels that it calls, each rounded in
+its own way, and runs others than a process that takes the code from the cache: the last bits of the
+first run would differ from those of later ones.
+
 numba takes a cached kernel for good as long as the file of the kernel is what it was. A kernel is
 also made of the kernels that it calls and of the constants that it reads, wherever they come from:
 here the files that its own file imports, and those that these import, count as well.
@@ -19,7 +24,12 @@ import contextlib
 import fcntl
 import gc
 import hashlib
+import importlib
+import os
+import pickle
 import re
+import subprocess
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from functools import cache, cached_property, update_wrapper
@@ -102,16 +112,61 @@ class Kernel:
             return self._ready(*args)
         with _threads:
             compiled = self.compiled
-            with _alone(_cache_file(compiled)), _hoarding():
+            file = _cache_file(compiled)
+            with _alone(file), _hoarding():
+                if file is not None:
+                    self._cache(compiled, args)
                 result = compiled(*args)
             self._ready = compiled
         return result
+
+    def _cache(self, compiled: Any, args: tuple[Any, ...]) -> None:
+        """See to it that the cache has the function for arguments of these types, if it can be."""
+        types = tuple(map(compiled.typeof_pyval, args))
+        key = compiled._cache._index_key(types, compiled.targetctx.codegen())
+        if key not in compiled._cache._cache_file._load_index():
+            with contextlib.suppress(OSError, pickle.PicklingError, AttributeError, TypeError):
+                child = _child(os.getpid())
+                assert child.stdin is not None
+                assert child.stdout is not None
+                place = self.py_func.__module__, self.py_func.__name__
+                pickle.dump((sys.path, *place, pickle.dumps(types)), child.stdin)
+                child.stdin.flush()
+                child.stdout.read(1)
 
     def __getattr__(self, name: str) -> Any:
         """Return what the compiled function has, as its statistics."""
         if name.startswith("__"):
             raise AttributeError(name)
         return getattr(self.compiled, name)
+
+
+@cache
+def _child(parent: int) -> subprocess.Popen[bytes]:
+    """Return the process that compiles for a process; it ends when that one does."""
+    program = f"from {__name__} import serve; serve()"
+    return subprocess.Popen(
+        [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+        start_new_session=True,
+    )  # fmt: skip
+
+
+def serve() -> None:
+    """Compile kernels into the cache as standard input asks for them, and answer with a byte each.
+
+    What cannot be compiled here is left to who asked.
+    """
+    while True:
+        try:
+            sys.path[:], module, name, types = pickle.load(sys.stdin.buffer)
+        except EOFError:
+            return
+        with contextlib.suppress(Exception):
+            kernel = getattr(importlib.import_module(module), name)
+            kernel.compiled.compile(pickle.loads(types))
+        sys.stdout.buffer.write(b".")
+        sys.stdout.buffer.flush()
 
 
 def njit(**options: Any) -> Callable[[F], F]:

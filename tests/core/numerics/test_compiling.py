@@ -44,28 +44,72 @@ def package(tmp_path: Path) -> Path:
     return tmp_path / "package"
 
 
-def called(package: Path) -> tuple[int, int]:
-    """Return what a kernel says in a new process, and how often it was found in the cache."""
+def called(package: Path) -> tuple[int, int, bool]:
+    """Return what a kernel says in a new process, its cache hits, and whether it was compiled."""
     code = (
         "from package.caller import caller\nprint(caller(3), sum(caller.stats.cache_hits.values()))"
     )
     command = [sys.executable, "-c", code]
+    before = {path: path.stat().st_mtime_ns for path in package.rglob("*.nb?")}
     done = subprocess.run(command, cwd=package.parent, capture_output=True, text=True, check=True)
+    after = {path: path.stat().st_mtime_ns for path in package.rglob("*.nb?")}
     value, hits = map(int, done.stdout.split())
-    return value, hits
+    return value, hits, before != after
 
 
 def test_an_edit_of_what_is_called_or_read_is_noticed(
     package: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
-    assert called(package) == (6, 0)
+    assert called(package) == (6, 1, True)  # by a process that only compiles
     (package / "other.py").write_text("N = 2\n")
-    assert called(package) == (6, 1)
+    assert called(package) == (6, 1, False)
     (package / "inner" / "called.py").write_text(FILES["inner/called.py"].replace("* x", "+ x"))
-    assert called(package) == (5, 0)
+    assert called(package) == (5, 1, True)
     (package / "constants.py").write_text("FACTOR = 7\n")
-    assert called(package) == (10, 0)
+    assert called(package) == (10, 1, True)
+
+
+def test_what_cannot_be_compiled_apart_is_compiled_all_the_same(
+    package: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    code = (
+        "import sys\nfrom package.inner.called import called\nsys.executable = '/nowhere'\n"
+        "print(called(3))"
+    )
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, cwd=package.parent, capture_output=True, text=True)
+    assert (done.stdout, done.returncode) == ("6\n", 0), done.stderr
+
+
+PUSH = """
+import sys
+import numpy as np
+from nested_agents.scenarios.box_pushing.prediction.predictors import push_model
+from nested_agents.scenarios.box_pushing.prediction.push import push
+from nested_agents.scenarios.box_pushing.world.boxes import BOXES
+from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
+
+rng = np.random.default_rng(0)
+model = push_model("push", [ROBOTS["e-puck"]] * 2, BOXES["square"])
+poses, twists = rng.normal(size=(2, 3)) * [0.15, 0.15, 9], rng.normal(size=(2, 9, 3)) * 0.1
+choices, box = rng.integers(9, size=(777, 2)), np.array([0.01, 0.02, 0.3])
+results = push(poses, box, twists, choices, 1.5, model)
+sys.stdout.write("".join(np.asarray(result).tobytes().hex() for result in results))
+"""
+
+
+@pytest.mark.slow
+def test_the_run_that_compiles_has_the_bits_of_later_ones(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    command = [sys.executable, "-c", PUSH]
+    first, later = (
+        subprocess.run(command, cwd=ROOT, capture_output=True, check=True).stdout for _ in range(2)
+    )
+    assert first == later != b""
 
 
 def test_a_stamp_is_of_all_that_is_imported() -> None:
