@@ -92,8 +92,8 @@ def centred(name: str, vertices: Vertices, holes: Sequence[Vertices] = ()) -> Po
     ------
     ValueError
         If the polygon has more than `MOST_VERTICES`, is too large, has two vertices at one place,
-        crosses or touches itself, or has no area. Fewer than 3 vertices and numbers that are not
-        finite are refused by `BoxSettings`.
+        crosses or touches itself, has no area, or a vertex is not finite. Fewer than 3 vertices are
+        refused by `BoxSettings`.
     """
     for ring in (vertices, *holes):
         _check_ring(f"box {name!r}", ring)
@@ -117,6 +117,8 @@ def centred(name: str, vertices: Vertices, holes: Sequence[Vertices] = ()) -> Po
 def _check_ring(box: str, vertices: Vertices) -> None:
     """Refuse an outline that no body can have."""
     ring = np.asarray(vertices, dtype=float)
+    if not np.isfinite(ring).all():
+        raise ValueError(f"{box}: a vertex that is not finite, allowed: numbers in metres")
     # Halved before they are subtracted: the difference of two numbers may overflow.
     extent = 2 * float(np.ptp(ring / 2, axis=0).max())
     if extent > LARGEST:
