@@ -12,6 +12,8 @@ from matplotlib.ticker import NullLocator
 from ..results.statistics import Estimate, stacked
 from .figures import add_legend, handle, look, marker
 
+CHARACTERS = 15
+"""Of a legend that have room in an inch."""
 APART = 0.06
 """How far neighbouring lines stand apart, in doublings of the number of robots."""
 
@@ -41,5 +43,7 @@ def scale_axis(axes: Axes, robots: Sequence[int]) -> None:
 
 
 def name_lines(figure: Figure, labels: Sequence[str], title: str) -> None:
-    """Name the lines above the panels."""
-    add_legend(figure, [handle(label, **style(i)) for i, label in enumerate(labels)], title)
+    """Name the lines above the panels, as many beside each other as there is room for."""
+    handles = [handle(label, **style(i)) for i, label in enumerate(labels)]
+    room = int(CHARACTERS * figure.get_figwidth() // (max(map(len, labels)) + 6))
+    add_legend(figure, handles, title, ncols=max(1, min(4, room)))

@@ -23,7 +23,7 @@ import numpy as np
 
 from ...errors import SpecError
 from ...results.analysis import Analysis
-from ...results.comparison import Array, Difference, adjusted, aligned, difference
+from ...results.comparison import Array, Difference, adjusted, difference, of_shared_seeds
 from ...results.paired_tests import LEVEL
 from ...results.power import seeds_needed
 from ...results.results import Results
@@ -62,7 +62,7 @@ def check(spec: Spec) -> None:
 
 @dataclass(frozen=True)
 class HierarchyCase:
-    """One condition.
+    """One hierarchy under which teams are evaluated.
 
     Attributes
     ----------
@@ -76,6 +76,8 @@ class HierarchyCase:
         Their number.
     values
         Estimates by title.
+    phase
+        Of its episodes.
     """
 
     condition: str
@@ -83,6 +85,7 @@ class HierarchyCase:
     value_of: str
     robots: int
     values: dict[str, Estimate]
+    phase: str = "evaluation"
 
     @property
     def setting(self) -> str:
@@ -140,19 +143,6 @@ def analyse(results: Results) -> Analysis:
     Cases are sorted by number of robots, whose value decides, and hierarchy. Times are of one
     decision of the whole team.
     """
-    cases = _cases(results)
-    table = [
-        Summary(f"{c.setting}, {c.hierarchy}", len(results.seeds(c.condition)), c.values)
-        for c in cases
-    ]
-    verdicts = verdicts_of(results, cases)
-    compared = tuple(d for verdict in verdicts for d in verdict.comparisons)
-    legend = "Rows: number of robots, whose value decides, hierarchy."
-    notes = [legend] if any(case.value_of for case in cases) else []
-    return Analysis(tuple(table), (*notes, *_verdict_lines(verdicts)), cases, compared)
-
-
-def _cases(results: Results) -> tuple[HierarchyCase, ...]:
     conditions = results.of_phase("evaluation")
     robots = {c: int(results.numbers(c)["robots"][0]) for c in conditions}
     apart = (VALUE_OF, *_sizes(results.columns, robots))
@@ -160,10 +150,27 @@ def _cases(results: Results) -> tuple[HierarchyCase, ...]:
     for condition in conditions:
         columns = results.columns.get(condition, {"name": condition})
         hierarchy, value_of = label_but(columns, apart), str(columns.get(VALUE_OF, ""))
-        values = _estimates(results, condition)
+        numbers = results.numbers(condition)
+        values = estimates(
+            results, condition, "evaluation", numbers["decision_median"], numbers["messages"]
+        )
         cases.append(HierarchyCase(condition, hierarchy, value_of, robots[condition], values))
+    return analysis_of(results, cases, REFERENCE)
+
+
+def analysis_of(results: Results, cases: Sequence[HierarchyCase], reference: str) -> Analysis:
+    """Compare cases with those of the reference hierarchy, or of the first one if it is missing."""
     whose = list(dict.fromkeys(case.value_of for case in cases))
-    return tuple(sorted(cases, key=lambda case: (case.robots, whose.index(case.value_of))))
+    cases = sorted(cases, key=lambda case: (case.robots, whose.index(case.value_of)))
+    table = [
+        Summary(f"{c.setting}, {c.hierarchy}", len(results.seeds(c.condition)), c.values)
+        for c in cases
+    ]
+    verdicts = verdicts_of(results, cases, reference)
+    compared = tuple(d for verdict in verdicts for d in verdict.comparisons)
+    legend = "Rows: number of robots, whose value decides, hierarchy."
+    notes = [legend] if any(case.value_of for case in cases) else []
+    return Analysis(tuple(table), (*notes, *_verdict_lines(verdicts)), cases, compared)
 
 
 def _sizes(columns: Mapping[str, Mapping[str, object]], robots: Mapping[str, int]) -> list[str]:
@@ -176,16 +183,18 @@ def _sizes(columns: Mapping[str, Mapping[str, object]], robots: Mapping[str, int
     ]
 
 
-def _estimates(results: Results, condition: str) -> dict[str, Estimate]:
-    success = results.success(condition, "evaluation")
-    numbers = results.numbers(condition)
+def estimates(
+    results: Results, condition: str, phase: str, deciding: Array, messages: Array
+) -> dict[str, Estimate]:
+    """Return success, decisions to the goal, time of a decision [s] and messages, by title."""
+    success = results.success(condition, phase)
     values = {EVALUATED: rate(success)}
-    decisions = to_the_goal(success, results.values(condition, "steps", "evaluation"))
+    decisions = to_the_goal(success, results.values(condition, "steps", phase))
     if len(decisions):
         values["decisions to goal"] = bootstrap(decisions)
-    values[DECIDING] = bootstrap(1e3 * numbers["decision_median"])
+    values[DECIDING] = bootstrap(1e3 * deciding)
     unknown = np.asarray(np.nan)  # a count has no interval
-    values["messages"] = Estimate(numbers["messages"][0], unknown, unknown)
+    values["messages"] = Estimate(messages[0], unknown, unknown)
     return values
 
 
@@ -201,19 +210,24 @@ def to_the_goal(success: Array, steps: Array) -> Array:
     return np.array([run[reached].mean() for reached, run in runs if reached.any()])
 
 
-def verdicts_of(results: Results, cases: Sequence[HierarchyCase]) -> tuple[Verdict, ...]:
+def verdicts_of(
+    results: Results, cases: Sequence[HierarchyCase], reference: str = REFERENCE
+) -> tuple[Verdict, ...]:
     """Return where the hierarchy matters: the comparisons of each setting, p adjusted over all.
 
     Intervals are those of independent rates, which have a width even if all runs ended alike.
     """
     hierarchies = list(dict.fromkeys(case.hierarchy for case in cases))
-    reference = REFERENCE if REFERENCE in hierarchies else next(iter(hierarchies), "")
-    bases = {case.setting: case.condition for case in cases if case.hierarchy == reference}
+    reference = reference if reference in hierarchies else next(iter(hierarchies), "")
+    bases = {case.setting: case for case in cases if case.hierarchy == reference}
     compared: list[tuple[str, Difference]] = []
     for case in cases:
-        base = bases.get(case.setting, case.condition)
-        own, other = aligned(results, (case.condition, base), _outcomes)
-        if base != case.condition and len(own) >= 2:
+        base = bases.get(case.setting, case)
+        own, other = of_shared_seeds(
+            [results.seeds(one.condition) for one in (case, base)],
+            [results.success(one.condition, one.phase).astype(float) for one in (case, base)],
+        )
+        if base is not case and len(own) >= 2:
             runs, estimate = (own.mean(axis=1), other.mean(axis=1)), difference(own, other)
             compared.append(
                 (case.setting, Difference.of(case.hierarchy, EVALUATED, *runs, estimate))
@@ -226,17 +240,13 @@ def verdicts_of(results: Results, cases: Sequence[HierarchyCase]) -> tuple[Verdi
     )
 
 
-def _outcomes(results: Results, condition: str) -> Array:
-    return results.success(condition, "evaluation").astype(float)
-
-
 def _verdict_lines(verdicts: Sequence[Verdict]) -> Iterator[str]:
     """Yield lines that say where the hierarchy matters, and where that is undecided."""
     if not verdicts:
         return
     reference, among = verdicts[0].reference, verdicts[0].among
     text = (
-        f"Does the hierarchy matter? Evaluation success less that of {reference}, seed by seed; p "
+        f"Does the hierarchy matter? Evaluation success less that of {reference!r}, seed by seed; p "
         f"is adjusted over {among} comparisons, so fewer than {seeds_needed(among)} seeds cannot "
         "tell."
     )

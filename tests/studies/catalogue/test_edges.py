@@ -1,4 +1,5 @@
 import pickle
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -7,6 +8,7 @@ from made_up_results import NOTHING, SEEDS, Arrays, shapes
 from nested_agents.studies.catalogue import edges as module
 from nested_agents.studies.catalogue.edges import TRAINED, analyse, check, draw, measure
 from nested_agents.studies.catalogue.hierarchies import DECIDING
+from nested_agents.studies.catalogue.study import drawn
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
@@ -21,19 +23,21 @@ def made_up(outcomes: dict[str, float] = OUTCOMES) -> Arrays:
     base = shapes(outcomes)
     names = (TRAINED, *outcomes)
     base.numbers["own-value"] = {f"messages.{name}": [6.0] * SEEDS for name in names}
+    base.numbers["own-value"]["robots"] = [2.0] * SEEDS
     base.usage["own-value"] = {f"decision.{name}": [0.008] * SEEDS for name in names}
     return base
 
 
 def test_every_hierarchy_is_compared_with_that_of_training() -> None:
     analysis = analyse(made_up().frames())
-    assert [line.condition for line in analysis.table] == [TRAINED, *OUTCOMES]
+    names = [TRAINED, *OUTCOMES]
+    assert [line.condition for line in analysis.table] == [f"2 robots, {n}" for n in names]
     told, considered = analysis.differences
     assert (told.condition, considered.condition) == tuple(OUTCOMES)
     assert told.estimate.high < -0.4
     assert told.p < 0.01 < considered.p
-    (line,) = (note for note in analysis.notes if "considered only" in note)
-    assert line.endswith("; no difference found")
+    assert any(note.startswith("  told only differs by -0.") for note in analysis.notes)
+    assert any("no difference found: considered only" in note for note in analysis.notes)
     values = analysis.table[1].estimates
     assert (float(values["messages"].value), float(values[DECIDING].value)) == (6.0, 8.0)
 
@@ -41,7 +45,14 @@ def test_every_hierarchy_is_compared_with_that_of_training() -> None:
 def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
     paths = save(draw(analyse(made_up().frames())), tmp_path)
     assert [path.name for path in paths] == ["edges.png", "edges.svg"]
-    assert draw(analyse(NOTHING)) == {}
+    assert drawn(module, analyse(NOTHING)) == {}
+
+
+def test_teams_of_several_sizes_are_drawn_by_their_size() -> None:
+    analysis = analyse(made_up().frames())
+    larger = [replace(case, robots=4) for case in analysis.cases]
+    (figure,) = draw(replace(analysis, cases=[*analysis.cases, *larger])).values()
+    assert figure.axes[1].get_xlabel() == "robots"
 
 
 def test_a_spec_without_another_hierarchy_is_refused() -> None:
