@@ -20,6 +20,7 @@ here the files that its own file imports, and those that these import, count as 
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import fcntl
 import gc
@@ -145,11 +146,13 @@ class Kernel:
 def _child(parent: int) -> subprocess.Popen[bytes]:
     """Return the process that compiles for a process; it ends when that one does."""
     program = f"from {__name__} import serve; serve()"
-    return subprocess.Popen(
+    child = subprocess.Popen(
         [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL, env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
         start_new_session=True,
     )  # fmt: skip
+    atexit.register(child.__exit__, None, None, None)
+    return child
 
 
 def serve() -> None:

@@ -159,7 +159,7 @@ def analyse(results: Results) -> Analysis:
 
 
 def analysis_of(results: Results, cases: Sequence[HierarchyCase], reference: str) -> Analysis:
-    """Compare cases with those of the reference hierarchy, or of the first one if it is missing."""
+    """Compare cases with those of the reference hierarchy; of the first one if it is missing."""
     whose = list(dict.fromkeys(case.value_of for case in cases))
     cases = sorted(cases, key=lambda case: (case.robots, whose.index(case.value_of)))
     table = [
