@@ -246,8 +246,8 @@ def _verdict_lines(verdicts: Sequence[Verdict]) -> Iterator[str]:
         return
     reference, among = verdicts[0].reference, verdicts[0].among
     text = (
-        f"Does the hierarchy matter? Evaluation success less that of {reference!r}, seed by seed; p "
-        f"is adjusted over {among} comparisons, so fewer than {seeds_needed(among)} seeds cannot "
+        f"Does the hierarchy matter? Evaluation success less that of {reference!r}, seed by seed; "
+        f"p is adjusted over {among} comparisons, so fewer than {seeds_needed(among)} seeds cannot "
         "tell."
     )
     yield from ("", *wrap(text, WIDTH, break_on_hyphens=False))
