@@ -17,7 +17,7 @@ from ...core.agents.team import Team
 from ...core.interface.measures import SUCCESS, Measure
 from ...core.interface.scenario import Transition
 from ...core.interface.spaces import ActionSet, StateSpace
-from ...core.numerics.arrays import BoolArray, FloatArray, IntArray
+from ...core.numerics.arrays import FloatArray, IntArray
 from .config import BoxPushingSettings
 from .prediction.belief import APART, CONSTANTS, PushBelief, believing, least_gap
 from .prediction.prediction import BoxPrediction, mean_twists
@@ -115,11 +115,7 @@ class BoxPushing:
         robots = [self.robot] * settings.robots
         self._model = push_model(settings.predictor, robots, self.box, settings.belief)
         self._playground = World(robots, self.box) if settings.predictor == "exact" else None
-        self._failures = (
-            WheelFailures(settings.failures, self.agents, self._limits)
-            if settings.failures
-            else None
-        )
+        self._failures = WheelFailures(settings.failures, self.agents, self._limits)
         paid = settings.reward.model_copy(update={"r1": settings.reward.r1 / self._unit})
         self._task = Task(paid, self._unit * settings.tolerance, settings.orientation_tolerance)
         self._belief = PushBelief.of(self._model, robots, settings.belief.stiffness)
@@ -190,9 +186,8 @@ class BoxPushing:
         self.world.place(robots, box)
         self._speeds = np.zeros(len(self.agents))
         self._step = 0
-        if self._failures is not None:
-            self._failures.begin(seed, episode)
-            self.world.set_grip(self._failures.grip)
+        self._failures.begin(seed, episode)
+        self.world.set_grip(self._failures.grip)
         self._save()
         return self._observe(self.world.box_pose)
 
@@ -227,7 +222,9 @@ class BoxPushing:
             paid = np.repeat(gained, [len(group) for group in self.groups])
         sensed = perf_counter()
         if terminated:
-            measured["stopped_at_goal"] = self._stays()
+            # Does the box come to rest within the tolerance when all wheels stop?
+            self._advance(np.zeros(len(self.agents)))
+            measured["stopped_at_goal"] = self._reached()
         self._step += 1
         self._save()
         measured["seconds"] = {"physics": moved - begin, "sensors": sensed - moved}
@@ -324,26 +321,16 @@ class BoxPushing:
             "contact": self.world.contact.copy(),
             "contact_time": self.world.contact_time.copy(),
             "contact_fraction": float(np.mean(self.world.contact_time)),
-            "failed": self.failed,
+            "failed": self._failures.failed,
             "distance_m": self._distance(),
             "orientation_rad": orientation,
             "orientation_error_rad": abs(orientation),
             "stopped_at_goal": False,
         }
 
-    @property
-    def failed(self) -> BoolArray:
-        """Whether each wheel is under a failure now, ``(n,)``."""
-        if self._failures is None:
-            return np.zeros(len(self.agents), dtype=bool)
-        return self._failures.failed
-
     def _advance(self, commands: FloatArray) -> None:
         """Let the world go on for one decision period, the wheels being commanded `commands`."""
-        if self._failures is None:
-            self.world.advance(commands, self.settings.action_repeat)
-        else:
-            self._failures.advance(self.world, commands, self._step, self.settings.action_repeat)
+        self._failures.advance(self.world, commands, self._step, self.settings.action_repeat)
 
     def _distance(self) -> float:
         ahead = self._goal[:2] - self.world.box_pose[:2]
@@ -355,11 +342,6 @@ class BoxPushing:
     def _reached(self) -> bool:
         distance, orientation = np.array([self._distance()]), np.array([self._orientation()])
         return bool(self._task.reached(distance, orientation)[0])
-
-    def _stays(self) -> bool:
-        """Stop all wheels and tell whether the box comes to rest within the tolerance."""
-        self._advance(np.zeros(len(self.agents)))
-        return self._reached()
 
     def _observe(self, origin: FloatArray) -> FloatArray:
         """Return the states ``(n, d)`` of all agents: the error observation layer.

@@ -20,7 +20,7 @@ from ...core.interface.measures import SUCCESS, Measure
 from ...core.interface.prediction import first_alike
 from ...core.interface.scenario import Transition
 from ...core.interface.spaces import ActionSet, StateSpace
-from ...core.numerics.arrays import BoolArray, FloatArray, IntArray
+from ...core.numerics.arrays import FloatArray, IntArray
 from ..faults.schedule import Failures
 from .config import PERIOD, REACH, KinematicChainSettings
 from .kinematics import postures_of
@@ -172,16 +172,11 @@ class KinematicChain:
         return {
             "angles": self._angles.copy(),
             "speeds": self._speeds.copy(),
-            "failed": self.failed,
+            "failed": self._failures.failed,
             "tip": self._places()[-1].copy(),
             "goal": self._goal,
             "distance_m": self._distance(),
         }
-
-    @property
-    def failed(self) -> BoolArray:
-        """Whether each joint is under a failure now, ``(n,)``."""
-        return self._failures.failed
 
     def constants_of_episode(self) -> Mapping[str, Any]:
         """Return the goal of the episode, and what is drawn."""

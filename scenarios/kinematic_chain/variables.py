@@ -20,7 +20,7 @@ import numpy as np
 from ...core.interface.spaces import StateSpace, Variable
 from ...core.numerics.arrays import FloatArray
 from ...core.plugins.registry import Registry
-from ..state_variables import find_variable
+from ..state_variables import find_variable, guarded
 from .kernels import COMPILED, columns
 from .view import ChainView
 
@@ -74,8 +74,8 @@ class ChainStates:
             view.places, view.angles, view.speeds, view.goal, view.before, first, count, self._rows
         )
         if self._own:
-            guarded = view.guarded()
+            safe = guarded(view)
             for column, thing in self._own:
                 for i in range(count):
-                    states[i, :, column] = thing.checked(guarded, first + i)
+                    states[i, :, column] = thing.checked(safe, first + i)
         return states

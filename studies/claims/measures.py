@@ -15,7 +15,7 @@ from ...core.agents.cost import Problem
 from ..catalogue.chain_order import compare_orders
 from ..catalogue.shapes import ratios_of
 from ..catalogue.wheel_failure import courses_of
-from ..results.comparison import difference, paired, ratio
+from ..results.comparison import aligned, difference, ratio
 from ..results.results import Results
 from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
 
@@ -242,7 +242,7 @@ def _compare(
     """
     if not all(results.has(c, phase, measure) for c in (condition, reference)):
         return None
-    base, own = paired(results, reference, condition, values)
+    base, own = aligned(results, (reference, condition), values)
     return Measured(estimate(own, base), len(own), note=note) if len(own) else None
 
 

@@ -70,8 +70,7 @@ def look(directory: Path) -> tuple[int, dict[str, float]] | None:
     if not _locked(directory / LOCK):
         return None
     try:
-        mark = json.loads((directory / MARK).read_text())
-        now = time.time()
+        mark, now = json.loads((directory / MARK).read_text()), time.time()
         seconds = {identity: max(now - begun, 0.0) for identity, begun in mark["begun"].items()}
         return mark["processes"], seconds
     except (OSError, ValueError, KeyError, TypeError, AttributeError):

@@ -53,10 +53,6 @@ class BoxPrediction:
         ).reshape(len(self.situation.groups), -1, len(actions))
         return wheel_commands_of(commands, np.array(self.situation.effects), self.merges)
 
-    def _view(self, choices: IntArray) -> View:
-        """Return where the robots' wheel commands ``(m, M)`` lead."""
-        return self._after(choices, self.premises.seconds)
-
     def _after(self, choices: IntArray, seconds: float) -> View:
         robots, box, gaps = push(
             self.situation.robots,
@@ -72,7 +68,7 @@ class BoxPrediction:
         """Return the view of `choices`: the last one, if they are the same."""
         key = choices.tobytes()
         if self._last is None or self._last[0] != key:
-            self._last = key, self._view(choices)
+            self._last = key, self._after(choices, self.premises.seconds)
         return self._last[1]
 
     def _choices(self, joint_actions: IntArray) -> IntArray:
@@ -88,7 +84,7 @@ class BoxPrediction:
     def _table(self) -> tuple[View, IntArray]:
         """Where all combinations of twists lead, and the row of every joint-action index."""
         choices, row = twist_table(self.wheel_commands)
-        return self._view(choices), row
+        return self._after(choices, self.premises.seconds), row
 
     @cached_property
     def _alone(self) -> list[FloatArray]:

@@ -76,7 +76,7 @@ class Future:
 
     world: World
     state: WorldState
-    failures: WheelFailures | None
+    failures: WheelFailures
     step: int
     hold: int
 
@@ -84,12 +84,9 @@ class Future:
         """Return poses ``(M + 1, 3)``, the box first, and gaps ``(M,)`` under held commands."""
         self.world.restore(self.state)
         failures = deepcopy(self.failures)
-        if failures is None:
-            self.world.advance(commands, periods)
-        else:
-            self.world.set_grip(failures.grip)
-            for number, past in enumerate(range(0, periods, self.hold), self.step):
-                failures.advance(self.world, commands, number, min(self.hold, periods - past))
+        self.world.set_grip(failures.grip)
+        for number, past in enumerate(range(0, periods, self.hold), self.step):
+            failures.advance(self.world, commands, number, min(self.hold, periods - past))
         return np.vstack([self.world.box_pose, self.world.robot_poses]), self.world.gaps.copy()
 
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ...results.analysis import Analysis
+from ...results.analysis import Analysis, Figures
 from ...results.comparison import aligned, mean_success
 from ...results.paired_tests import LEVEL, Friedman, friedman, holm, paired_permutation
 from ...results.results import Results
@@ -26,7 +26,6 @@ from ..study import run_training as measure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
@@ -150,7 +149,7 @@ def _verdict(comparisons: Sequence[OrderComparison]) -> Iterator[str]:
         )
 
 
-def draw(analysis: Analysis) -> dict[str, Figure]:
+def draw(analysis: Analysis) -> Figures:
     """Return the figure: every order with its interval, sorted, and every seed.
 
     Points are means over seeds, bars their 95 % intervals, grey the seeds; the first condition,

@@ -14,9 +14,8 @@ from dataclasses import dataclass
 from math import ceil
 from string import ascii_uppercase
 from textwrap import wrap
-from typing import TYPE_CHECKING
 
-from ...results.analysis import Analysis
+from ...results.analysis import Analysis, Figures
 from ...results.results import Results
 from ...results.statistics import Estimate, rate
 from ...results.summary import Summary, two_figures
@@ -25,9 +24,6 @@ from ...store.schema import EVALUATION
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..study import check_evaluated as check
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
@@ -120,7 +116,7 @@ def _side_by_side(cases: Sequence[GameCase]) -> Iterator[str]:
             yield f"{', '.join(setting):{widest}}{shown}"
 
 
-def draw(analysis: Analysis) -> dict[str, Figure]:
+def draw(analysis: Analysis) -> Figures:
     """Return the figure: probabilities of the optimum with their 95 % intervals.
 
     A panel for each game (the first thing that settings differ in), the systems one below the

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal
 
 from ....core.interface.measures import SUCCESS, Measure
 from ...errors import SpecError
-from ...results.analysis import Analysis
+from ...results.analysis import Analysis, Figures
 from ...results.results import Array, Results
 from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, rates
 from ...results.summary import EVALUATED, Summary, evaluated
@@ -20,7 +20,6 @@ from ..study import run_training as measure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
     from ...spec.spec import Spec
 
@@ -142,7 +141,7 @@ def analyse(results: Results) -> Analysis:
     return Analysis(tuple(table), cases=followed)
 
 
-def draw(analysis: Analysis) -> dict[str, Figure]:
+def draw(analysis: Analysis) -> Figures:
     """Return the figure, a panel for every measure that is followed.
 
     Lines are means over seeds, bands their 95 % intervals. A condition has a colour and a style of

@@ -25,7 +25,7 @@ from ....core.agents.team import Team
 from ....core.learners.frozen import FrozenSettings
 from ....core.learners.learner import LearnerSettings
 from ...errors import SpecError
-from ...results.analysis import Analysis
+from ...results.analysis import Analysis, Figures
 from ...results.comparison import Array, Difference, adjusted, of_shared_seeds
 from ...results.results import Results
 from ...results.statistics import NOT_NEGATIVE, bootstrap, rate
@@ -40,7 +40,6 @@ from ..study import check_rule_bases
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 NUMBERS = ("onset",)
 """What of whole trials the analysis rests on."""
@@ -262,7 +261,7 @@ def _gains(courses: Sequence[Course]) -> tuple[Difference, ...]:
     return adjusted(gains)
 
 
-def draw(analysis: Analysis) -> dict[str, Figure]:
+def draw(analysis: Analysis) -> Figures:
     """Return the figure: success from episode to episode, fault by fault.
 
     A panel for every fault, a line for what adapts; running means over seeds and episodes, bands

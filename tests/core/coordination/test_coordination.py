@@ -50,7 +50,7 @@ def test_the_order_has_the_width_that_is_told():
         assert widest <= width
         elimination = Elimination(pairwise(graph), 12, 2)
         assert max(elimination.beside) == widest
-        assert Problem(actions=2).elimination(elimination.beside) <= 12 * 2 ** (1 + width)
+        assert Problem(actions=2).decision(elimination.beside) <= 12 * 2 ** (1 + width)
 
 
 def test_max_plus_is_exact_on_trees():
