@@ -16,7 +16,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..core.interface.spaces import Variable
+from ..core.interface.spaces import StateSpace, Variable
 from ..core.numerics.arrays import FloatArray
 from ..core.plugins.registry import Registry
 
@@ -64,6 +64,24 @@ class StateVariable:
         if values.dtype.kind not in "fiu" or not np.isfinite(values).all():
             raise ValueError(f"state variable {name!r}: not all of its values are finite numbers")
         return values
+
+
+def space_of(name: str, own: Variable, things: Sequence[StateVariable]) -> StateSpace:
+    """Return the state space of an own variable and what is perceived beside it.
+
+    Raises
+    ------
+    ValueError
+        If that is nothing, or a variable occurs twice.
+    """
+    variables = (own, *(thing.variable for thing in things))
+    names = [variable.name for variable in variables]
+    if len(names) < 2 or len(set(names)) < len(names):
+        raise ValueError(
+            f"scenario.state_space = {names[1:]}: variables must be distinct and at least one"
+        )
+    common = tuple(thing.variable.name for thing in things if thing.common)
+    return StateSpace(name, variables, 1, common)
 
 
 def fixed(array: FloatArray) -> FloatArray:

@@ -16,7 +16,7 @@ import numpy as np
 from ...core.agents.team import Team
 from ...core.interface.measures import SUCCESS, Measure
 from ...core.interface.scenario import Transition
-from ...core.interface.spaces import ActionSet, StateSpace
+from ...core.interface.spaces import ActionSet
 from ...core.numerics.arrays import FloatArray, IntArray
 from .config import BoxPushingSettings
 from .prediction.belief import APART, CONSTANTS, PushBelief, believing, least_gap
@@ -95,8 +95,9 @@ class BoxPushing:
         self.box = box_for(settings.box, settings.robots)
         similar = settings.scaling == "similar"
         self._unit = growth(settings.box, settings.robots) if similar else 1.0
+        robots = [self.robot] * settings.robots
         # Whether they fit is better known now than in the middle of a study.
-        place(settings.start, np.random.default_rng(0), [self.robot] * settings.robots, self.box)
+        place(settings.start, np.random.default_rng(0), robots, self.box)
         wheels = len(self.robot.wheels)
         self.groups = tuple(
             tuple(range(r * wheels, (r + 1) * wheels)) for r in range(settings.robots)
@@ -108,11 +109,17 @@ class BoxPushing:
         )
         self.roles = self.robot.wheel_names * settings.robots
         self.action_set = ActionSet()
-        self.world = World([self.robot] * settings.robots, self.box, infrared=settings.infrared)
+        self.world = World(robots, self.box, infrared=settings.infrared)
         self._space = state_space_for(settings.state_space, self.robot.max_speed)
         self._limits: FloatArray = np.full(len(self.agents), self.robot.max_speed)
-        self._effects = (nominal_effect(self.robot),) * settings.robots
-        robots = [self.robot] * settings.robots
+        self.state_space = self._space.space
+        self.nominal_effects = (nominal_effect(self.robot),) * settings.robots
+        """Per robot the ``(3, w + 1)`` effect of its wheel speeds on its twist."""
+        self.constants = CONSTANTS if settings.predictor == "push" else ()
+        """Names of what the push predictor can calibrate; the other predictors have none."""
+        radii = [self.robot.radius] * settings.robots
+        self.levers: FloatArray = np.array([self.box.friction_radius, *radii])
+        """Speed per turning rate of the box and of every robot ``(M + 1,)`` [m]."""
         self._model = push_model(settings.predictor, robots, self.box, settings.belief)
         self._playground = World(robots, self.box) if settings.predictor == "exact" else None
         self._failures = WheelFailures(settings.failures, self.agents, self._limits)
@@ -129,11 +136,6 @@ class BoxPushing:
         self._speeds: FloatArray = np.zeros(len(self.agents))
         self._step = 0
         self._saved: WorldState | None = None
-
-    @property
-    def state_space(self) -> StateSpace:
-        """The state variables of every agent."""
-        return self._space.space
 
     @property
     def bounds(self) -> FloatArray:
@@ -232,25 +234,9 @@ class BoxPushing:
         truncated = not terminated and measured["distance_m"] > farthest
         return Transition(states, paid, terminated, truncated, measured, twists)
 
-    @property
-    def nominal_effects(self) -> tuple[FloatArray, ...]:
-        """Per robot the ``(3, w + 1)`` effect of its wheel speeds on its twist."""
-        return self._effects
-
     def predict(self) -> BoxPrediction:
         """Predict from the present state, every robot taken as nominal."""
-        return self.predict_with(self._effects)
-
-    @property
-    def constants(self) -> tuple[str, ...]:
-        """Names of what the push predictor can calibrate; the other predictors have none."""
-        return CONSTANTS if self.settings.predictor == "push" else ()
-
-    @property
-    def levers(self) -> FloatArray:
-        """Speed per turning rate of the box and of every robot ``(M + 1,)`` [m]."""
-        radii = [self.robot.radius] * self.settings.robots
-        return np.array([self.box.friction_radius, *radii])
+        return self.predict_with(self.nominal_effects)
 
     def predict_with(
         self, effects: Sequence[FloatArray], constants: FloatArray | None = None

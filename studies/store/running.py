@@ -18,7 +18,7 @@ LOCK = ".lock"
 MARK = "running.json"
 
 
-class Running:
+class Running(contextlib.AbstractContextManager["Running"]):
     """Keeps the mark while its context lasts.
 
     Parameters
@@ -33,9 +33,6 @@ class Running:
         self._path = directory / MARK
         self._processes = processes
         self._begun: dict[str, float] = {}
-
-    def __enter__(self) -> Running:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._begun.clear()

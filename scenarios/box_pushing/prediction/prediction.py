@@ -20,7 +20,7 @@ from ..world.reward import reward
 from .belief import outcomes
 from .push import PushModel, push
 from .situation import Premises, Situation
-from .wheel_commands import WheelCommands, choices_of, speeds_of, twist_table, wheel_commands_of
+from .wheel_commands import WheelCommands, choices_of, twist_table, wheel_commands_of
 
 
 class BoxPrediction:
@@ -41,6 +41,7 @@ class BoxPrediction:
 
     def __init__(self, situation: Situation, model: PushModel, premises: Premises) -> None:
         self.situation, self.model, self.premises = situation, model, premises
+        self.groups = situation.groups
         self._last: tuple[bytes, View] | None = None  # what was asked for last
 
     @cached_property
@@ -147,8 +148,10 @@ class BoxPrediction:
         if space.own_needs_pose:
             own = np.array([self._own_after(agent, choices, view) for agent in range(n)])
             return own, shared
-        speeds = speeds_of(choices, self.wheel_commands.speeds)
-        own = space.own(np.zeros((0, 3)), speeds.reshape(-1), self.situation.goal)
+        # (M, m, wheels)
+        speeds = self.wheel_commands.speeds[np.arange(len(shared))[:, None], choices.T]
+        speeds = speeds.transpose(0, 2, 1).reshape(-1)
+        own = space.own(np.zeros((0, 3)), speeds, self.situation.goal)
         return own.reshape(n, m, -1), shared
 
     def _own_after(self, agent: int, choices: IntArray, view: View) -> FloatArray:
@@ -160,11 +163,6 @@ class BoxPrediction:
     def poses(self, joint_actions: IntArray) -> View:
         """Return the situations that joint actions ``(m, n)`` lead to in a decision period."""
         return self._after(self._choices(joint_actions), self.premises.hold)
-
-    @property
-    def groups(self) -> tuple[tuple[int, ...], ...]:
-        """Agents by robot."""
-        return self.situation.groups
 
     def commands(self, joint_action: IntArray) -> FloatArray:
         """Return the wheel speeds ``(n,)`` that a joint action ``(n,)`` would command [m/s]."""

@@ -18,7 +18,7 @@ import numpy as np
 
 from ....core.interface.spaces import StateSpace, Variable
 from ....core.numerics.arrays import FloatArray
-from ...state_variables import StateVariable, find_variable, guarded, sensed
+from ...state_variables import StateVariable, find_variable, guarded, sensed, space_of
 from ..world.geometry import wrap
 from .kernels import COMPILED, Columns
 from .variables import STATE_VARIABLES
@@ -118,14 +118,8 @@ def listed(name: str, *shared: str) -> BoxStateSpace:
         If there is none, one is unknown or named twice.
     """
     functions = tuple(find_variable(STATE_VARIABLES, one) for one in shared)
-    variables = (_SPEED, *(function.variable for function in functions))
-    if not shared or len({variable.name for variable in variables}) != len(variables):
-        raise ValueError(
-            f"scenario.state_space = {list(shared)}: variables must be distinct and at least one"
-        )
-    common = tuple(function.variable.name for function in functions if function.common)
     return BoxStateSpace(
-        StateSpace(name, variables, 1, common),
+        space_of(name, _SPEED, functions),
         lambda poses, speeds, goal: speeds[:, None],
         own_needs_pose=False,
         functions=functions,

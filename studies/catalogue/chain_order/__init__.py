@@ -61,12 +61,6 @@ class OrderComparison:
     p: float
     against_first: NDArray[np.float64]
 
-    @property
-    def resolution(self) -> float:
-        """Half the median width of the 95 % intervals of the differences, unadjusted."""
-        shifts = bootstrap(self.values[:, 1:] - self.values[:, :1])
-        return float(np.median(shifts.high - shifts.low)) / 2.0
-
 
 def analyse(results: Results) -> Analysis:
     """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
@@ -134,6 +128,9 @@ def _verdict(comparisons: Sequence[OrderComparison]) -> Iterator[str]:
         means = c.values.mean(axis=0)
         best, worst = int(means.argmax()), int(means.argmin())
         differ = "differ" if c.p < LEVEL else "do not differ significantly"
+        # Half the median width of their 95 % intervals, unadjusted.
+        shifts = bootstrap(c.values[:, 1:] - c.values[:, :1])
+        reach = float(np.median(shifts.high - shifts.low)) / 2.0
         named = int((c.against_first < LEVEL).sum())
         yield (
             f"{c.title}: {k} orders {differ} (Friedman {c.test.statistic:.1f}, p = {c.test.p:.2g}, "
@@ -141,7 +138,7 @@ def _verdict(comparisons: Sequence[OrderComparison]) -> Iterator[str]:
         )
         yield (
             f"  {named} of {k - 1} differ from the first (least p {c.against_first.min():.2g}, "
-            f"adjusted); intervals of the differences reach {c.resolution:.2f} to either side"
+            f"adjusted); intervals of the differences reach {reach:.2f} to either side"
         )
         yield (
             f"  best {c.orders[best]}: {means[best]:.3f}; worst {c.orders[worst]}: "

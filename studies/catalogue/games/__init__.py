@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import ceil
 from string import ascii_uppercase
 from textwrap import wrap
 
@@ -131,9 +130,8 @@ def draw(analysis: Analysis) -> Figures:
     rests = list(dict.fromkeys(case.setting[1:] for case in cases))
     plays = sorted({count for case in cases for count in case.optimal})
     looks = [(rest, count) for rest in rests for count in plays]
-    rows, columns = ceil(len(games) / COLUMNS), min(COLUMNS, len(games))
-    size = (1.8 + 2.3 * columns, 0.9 + rows * (0.5 + 0.24 * len(systems)))
-    figure, panels = f.panels(rows, columns, size, sharex=True, sharey=True)
+    each = 2.3, 0.5 + 0.24 * len(systems)
+    figure, panels = f.grid(len(games), COLUMNS, each, (1.8, 0.9), sharex=True, sharey=True)
 
     def colours(rest: tuple[str, ...], count: int) -> dict[str, str]:
         colour = f.look(rests.index(rest))["color"]
@@ -156,8 +154,6 @@ def draw(analysis: Analysis) -> Figures:
         for line in range(len(systems) - 1):
             axes.axhline(line + 0.5, color="#e4e4e4", linewidth=0.6, zorder=0)
     f.name_rows(panels[0, 0], systems)
-    for axes in panels.flat[len(games) :]:
-        axes.set_axis_off()
     for axes in panels[-1]:
         axes.set_xlabel("P(optimal joint action)")
     handles = [

@@ -150,14 +150,11 @@ def draw(analysis: Analysis) -> Figures:
     from ...presentation import figures as f  # matplotlib takes its time
 
     followed = analysis.cases
-    columns = min(COLUMNS, len(followed))
-    rows = -(-len(followed) // columns)
-    figure, panels = f.panels(rows, columns, (3.6 * COLUMNS, 1.2 + 2.1 * rows), sharex=True)
+    width = 3.6 * COLUMNS
+    figure, panels = f.grid(len(followed), COLUMNS, (3.6, 2.1), (0.0, 1.2), width, sharex=True)
     for axes, own in zip(panels.flat, followed, strict=False):
         _panel(axes, own, [line.condition for line in analysis.table])
-    for axes in panels.flat[len(followed) :]:
-        axes.set_visible(False)
-    for axes in panels.flat[len(followed) - columns : len(followed)]:
+    for axes in panels.flat[len(followed) - panels.shape[1] : len(followed)]:
         f.as_episodes(axes)
     seeds = {line.condition: line.seeds for line in analysis.table}
     same = len(set(seeds.values())) == 1

@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from ....core.agents.cost import below_counts
 from ....core.agents.team import of_fuzzy_agents
 from ...results.analysis import Analysis, Figures
 from ...results.results import Results
@@ -29,7 +30,6 @@ from ...results.summary import EVALUATED, Summary, evaluated
 from ...spec.spec import Spec
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
-from ..scaling import messages
 from ..study import check_evaluated, check_rule_bases
 
 TITLES = {
@@ -76,7 +76,7 @@ def measure(trial: Trial) -> TrialResult:
     numbers = {
         "agents": float(len(hierarchy)),
         "memory": 1e-3 * team.learner.theta.nbytes,
-        "messages": float(messages(hierarchy.below(i) for i in range(len(hierarchy)))),
+        "messages": float(sum(below_counts(hierarchy))),
         "formula": float(tried * n_rules),
         "counted": counted / len(session.deciding),
     }

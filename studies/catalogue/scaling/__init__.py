@@ -13,13 +13,14 @@ from __future__ import annotations
 
 import re
 import tracemalloc
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ....core.agents.cost import below_counts
 from ....core.agents.team import of_fuzzy_agents
 from ....core.interface.scenario import groups_of
 from ...presentation.words import count
@@ -76,7 +77,7 @@ def measure(trial: Trial) -> TrialResult:
     numbers = {
         "robots": float(len(groups_of(session.world))),
         "agents": float(len(hierarchy)),
-        "messages": float(messages(hierarchy.below(i) for i in range(len(hierarchy)))),
+        "messages": float(sum(below_counts(hierarchy))),
         "joint_actions": tried / len(session.deciding),
         "team_bytes": float(sum(array.nbytes for array in team.arrays().values())),
         "weight_bytes": float(team.learner.theta.nbytes),
@@ -99,19 +100,6 @@ def measure(trial: Trial) -> TrialResult:
     if peak is not None:
         usage["process_bytes"] = float(peak)
     return session.result(numbers, usage)
-
-
-def messages(below: Iterable[tuple[int, ...]]) -> int:
-    """Return how many decided actions are passed down in a step, given whom each agent sees.
-
-    Examples
-    --------
-    A chain of four agents, and a leader with three subordinates:
-
-    >>> messages([(1, 2, 3), (2, 3), (3,), ()]), messages([(1, 2, 3), (), (), ()])
-    (6, 3)
-    """
-    return sum(map(len, below))
 
 
 def _of_a_step(session: Session) -> int:

@@ -272,18 +272,16 @@ def draw(analysis: Analysis) -> Figures:
     courses = analysis.cases
     faults = list(dict.fromkeys(course.fault for course in courses))
     cases = list(dict.fromkeys(course.adapts for course in courses))
-    columns = min(COLUMNS, len(faults))
-    rows = -(-len(faults) // columns)
-    size = (max(5.6, 1.0 + 2.6 * columns), 1.2 + 2.1 * rows)
-    figure, panels = f.panels(rows, columns, size, sharex=True, sharey=True)
+    figure, panels = f.grid(
+        len(faults), COLUMNS, (2.6, 2.1), (1.0, 1.2), least=5.6, sharex=True, sharey=True
+    )
+    columns = panels.shape[1]
     for axes, fault in zip(panels.flat, faults, strict=False):
         for course in (c for c in courses if c.fault == fault):
             _draw_course(axes, course, cases.index(course.adapts))
         axes.set_title("\n".join(wrap(fault, round(60 / columns))), loc="left")
         f.as_rates(axes)
         axes.grid(axis="y", alpha=0.25)
-    for axes in list(panels.flat)[len(faults) :]:
-        axes.set_visible(False)
     for axes in panels[:, 0]:
         axes.set_ylabel("success")
     for axes in list(panels.flat)[max(0, len(faults) - columns) : len(faults)]:

@@ -4,8 +4,9 @@ import pytest
 from made_up_results import NOTHING, Arrays, scaling
 from matplotlib.figure import Figure
 
+from nested_agents.core.agents.cost import below_counts
 from nested_agents.studies.catalogue import scaling as module
-from nested_agents.studies.catalogue.scaling import analyse, draw, exponents_of, measure, messages
+from nested_agents.studies.catalogue.scaling import analyse, draw, exponents_of, measure
 from nested_agents.studies.catalogue.study import drawn
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
@@ -107,7 +108,7 @@ def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
 def test_messages_are_the_edges_of_the_transitive_closure(topology: str, count: int) -> None:
     (condition,) = Spec.of({"topology": topology}).conditions()
     hierarchy = build(condition.settings, 0)[1].hierarchy
-    assert messages(hierarchy.below(i) for i in range(len(hierarchy))) == count
+    assert sum(below_counts(hierarchy)) == count
 
 
 def test_a_trial_is_measured_without_being_changed() -> None:
