@@ -161,7 +161,7 @@ def write(figure: Figure, path: Path) -> None:
     """
     check_suffix(path)
     metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(path.suffix)
-    with mpl.rc_context(SETTINGS), replacing(path) as file:  # type: ignore[arg-type]
+    with styled(), replacing(path) as file:
         figure.savefig(file, format=path.suffix[1:], dpi=150, metadata=metadata)
 
 

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from textwrap import wrap
 
 import numpy as np
@@ -205,10 +206,11 @@ def verdicts_of(results: Results, cases: Sequence[HierarchyCase]) -> tuple[Verdi
     hierarchies = list(dict.fromkeys(case.hierarchy for case in cases))
     reference = REFERENCE if REFERENCE in hierarchies else next(iter(hierarchies), "")
     bases = {case.setting: case.condition for case in cases if case.hierarchy == reference}
+    outcomes = partial(Results.success, phase="evaluation")
     compared: list[tuple[str, Difference]] = []
     for case in cases:
         base = bases.get(case.setting, case.condition)
-        own, other = aligned(results, (case.condition, base), _outcomes)
+        own, other = aligned(results, (case.condition, base), outcomes)
         if base != case.condition and len(own) >= 2:
             runs, estimate = (own.mean(axis=1), other.mean(axis=1)), difference(own, other)
             compared.append(
@@ -220,10 +222,6 @@ def verdicts_of(results: Results, cases: Sequence[HierarchyCase]) -> tuple[Verdi
         Verdict(setting, reference, tuple(d for s, d in every if s == setting), len(every))
         for setting in dict.fromkeys(settings)
     )
-
-
-def _outcomes(results: Results, condition: str) -> Array:
-    return results.success(condition, "evaluation").astype(float)
 
 
 def _verdict_lines(verdicts: Sequence[Verdict]) -> Iterator[str]:

@@ -254,9 +254,8 @@ def _messages_by_size(points: Sequence[Point], bodies: str) -> list[str]:
     return lines
 
 
-def _exponent_text(estimate: Estimate) -> str:
+def _exponent_text(e: Estimate) -> str:
     """Return an exponent with its interval, if there is one."""
-    e = estimate
     return f"{e.value:.2f}" + (f" [{e.low:.2f}, {e.high:.2f}]" if np.isfinite(e.low) else "")
 
 

@@ -153,11 +153,6 @@ class Course:
         return self.success[:, self.onset - BLOCK : self.onset]
 
     @property
-    def after(self) -> Array:
-        """Outcomes of the first episodes with the failure."""
-        return self.success[:, self.onset : self.onset + BLOCK]
-
-    @property
     def end(self) -> Array:
         """Outcomes of the last episodes."""
         return self.success[:, -BLOCK:]
@@ -233,7 +228,7 @@ def _summary(course: Course) -> Summary:
     recovered, episodes, steps = course.recovery()
     estimates = {
         "before": rate(course.before),
-        "just after": rate(course.after),
+        "just after": rate(course.success[:, course.onset : course.onset + BLOCK]),
         "end": rate(course.end),
     }
     if course.before.any():  # else there is nothing to lose or to come back to

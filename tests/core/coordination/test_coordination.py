@@ -5,8 +5,12 @@ import numpy as np
 import pytest
 
 from nested_agents.core.agents.cost import Problem
-from nested_agents.core.coordination.elimination import Elimination, interaction, order_of, total
+from nested_agents.core.coordination.elimination import Elimination, interaction, order_of
 from nested_agents.core.coordination.max_plus import MaxPlus
+
+
+def total(scopes, tables, joint):
+    return float(sum(t[tuple(joint[list(scope)])] for scope, t in zip(scopes, tables, strict=True)))
 
 
 def pairwise(graph):
