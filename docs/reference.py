@@ -62,6 +62,7 @@ MODULES = {
         "learners.fmq", "learners.sparse_cooperative", "learners.vdn", "learners.q_learning",
         "learners.frozen", "evaluators.evaluator", "evaluators.auto", "evaluators.exact",
         "evaluators.sampling", "evaluators.best_response", "evaluators.coordination",
+        "evaluators.cross_entropy",
         "coordination.elimination", "coordination.max_plus", "adaptation.self_model",
         "adaptation.calibration", "agents.cost", "plugins.registry", "plugins.plugged",
         "plugins.settings", "interface.acting", "numerics.ties", "policies.settings",

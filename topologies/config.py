@@ -7,12 +7,13 @@ follow ``kind:`` is in `ARGUMENTS`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Annotated, Any
 
 from pydantic import Field
 
-from ..core.interface.hierarchy import Hierarchy
+from ..core.agents.messages import AnyMessageFailure
+from ..core.interface.hierarchy import Considers, Hierarchy, Told
 from ..core.plugins import sources
 from ..core.plugins.deferred import nx
 from ..core.plugins.messages import closest
@@ -26,9 +27,27 @@ BUILDERS = "nested_agents.topologies.builders"
 
 
 class TopologySettings(Settings):
-    """What the settings of all topologies share."""
+    """What the settings of all topologies share.
+
+    What is left at its default is not written, so that identities of trials stay as they were.
+    """
 
     kind: str = ""
+    told: Annotated[Told, Field(exclude_if=lambda told: told == "ancestors")] = "ancestors"
+    """By whom an agent is told what was decided: all above it, its direct superiors, or nobody."""
+    considers: Annotated[
+        Considers, Field(exclude_if=lambda considers: considers == "descendants")
+    ] = "descendants"
+    """Whose actions an agent tries beside its own: those of all below it, of its direct
+    subordinates, or of nobody."""
+    failures: Annotated[
+        tuple[AnyMessageFailure, ...], Field(exclude_if=lambda failures: not failures)
+    ] = ()
+    """What fails of the messages down the hierarchy, from when to when."""
+
+    def __repr_args__(self) -> Iterable[tuple[str | None, Any]]:
+        written = self.model_dump()
+        return [(name, value) for name, value in super().__repr_args__() if name in written]
 
     @property
     def title(self) -> str:
@@ -173,8 +192,8 @@ def build(
         else:
             graph = files.call(settings.build, title.rpartition(":")[2], agents, named)
             graph = from_networkx(graph, agents, neighbours=True)
-        directed = graph.is_directed()
-        return Hierarchy(agents, graph.edges if directed else (), () if directed else graph.edges)
+        edges, neighbours = (graph.edges, ()) if graph.is_directed() else ((), graph.edges)
+        return Hierarchy(agents, edges, neighbours, settings.told, settings.considers)
     except ValueError as error:
         problem = str(error)
         for start in ("hierarchy: ", f"{title}: ", f"topology {title!r}: "):

@@ -112,7 +112,10 @@ def control_loop(
     first_world = first_episode if first_world is None else first_world
     for k in range(episodes):
         episode = first_episode + k
-        states = scenario.reset(world_seed(seed, first_world + k), episode)
+        world = world_seed(seed, first_world + k)
+        states = scenario.reset(world, episode)
+        if hasattr(team, "begin_world"):
+            team.begin_world(world, episode)
         if learn:
             team.begin_episode()
         prediction = team.predict(scenario, states)

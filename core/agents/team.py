@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -22,6 +22,7 @@ from ..learners.learner import Learner, LearnerSettings
 from ..numerics.arrays import FloatArray, IntArray
 from ..numerics.ties import greatest
 from ..rules.rule_base import RuleBase
+from .messages import MessageFailure, Messages
 from .rows import rows_of
 
 
@@ -38,6 +39,8 @@ class Team:
         Who decides before whom, and sees whom.
     seed
         Source of everything random in the team.
+    failures
+        What fails of the messages down the hierarchy.
 
     Attributes
     ----------
@@ -73,6 +76,7 @@ class Team:
         scenario: Scenario,
         hierarchy: Hierarchy,
         seed: np.random.SeedSequence,
+        failures: Sequence[MessageFailure] = (),
     ) -> None:
         if not isinstance(settings, LearnerSettings):
             raise ValueError(f"settings = {settings!r}: must be a learner's, as BatchTDSettings()")
@@ -103,6 +107,9 @@ class Team:
                 decision.teammates,
                 settings.discount,
                 decision.value_of,
+                decision.unseen,
+                decision.plan,
+                handed_down=hierarchy.told == "ancestors" and not failures,
             )
             self.evaluator = decision.evaluator.build(problem)
         self.explorer: Explorer = settings.exploration.build(n)
@@ -110,12 +117,15 @@ class Team:
         self.seen: FloatArray = np.ones((n, n_actions))
         conditional = self.evaluator is not None and decision.teammates == "conditional"
         self.given: FloatArray = np.ones((n, n_actions) * 2 if conditional else (0, 0, 0, 0))
-        # Agents in the order of decision, each with those before it that it does not see.
-        order = hierarchy.order
-        self._order = [
-            (i, np.array(sorted({*order[:k]} - {*hierarchy.above(i)}), dtype=np.int64))
-            for k, i in enumerate(order)
-        ]
+        self.messages = Messages(hierarchy, failures, n_actions)
+        self._unseen = decision.unseen
+        # Those who are told all that was decided before, and consider all others.
+        self._hears_all = {
+            i
+            for k, i in enumerate(hierarchy.order)
+            if len(hierarchy.above(i)) == k and not hierarchy.unseen(i) and not failures
+        }
+        self._last: IntArray = np.full(n, scenario.action_set.neutral)
 
     def check(self, prediction: Prediction) -> None:
         """Refuse a prediction without what the team decides by.
@@ -140,8 +150,13 @@ class Team:
                 "predicts from predicted states"
             )
 
+    def begin_world(self, seed: int | np.random.SeedSequence, episode: int) -> None:
+        """Note that a world begins, in which what fails of the messages follows from `seed`."""
+        self.messages.begin(seed, episode)
+        self._last = np.full(len(self.hierarchy), self.action_set.neutral)
+
     def begin_episode(self) -> None:
-        """Note that an episode begins."""
+        """Note that an episode of learning begins."""
         self.explorer.begin_episode()
         self.learner.begin_episode()
 
@@ -171,19 +186,20 @@ class Team:
         theta = self.learner.theta
         weights = [theta[row] for row in self.rows]
         joint = np.full(n, self.action_set.neutral)
-        for i, unseen in self._order:
-            known = joint
-            if len(unseen):  # decided, but not above: taken to maintain
-                known = joint.copy()
-                known[unseen] = self.action_set.neutral
+        for i in self.hierarchy.order:
+            senders, known = self._known(i, joint)
             deliberation = Deliberation(
-                i, known, prediction, weights, frequencies, self.rng, self._given_by(i)
+                i, known, prediction, weights, frequencies, self.rng, self._given_by(i), senders
             )
             values = self.evaluator.values(deliberation)
             if explore:
                 joint[i] = self.explorer.choose(i, values, self.rng)
             else:
                 joint[i] = greatest(values, self.rng)
+            if self.messages.is_absent(i):
+                joint[i] = self.action_set.neutral
+        self.messages.advance(joint)
+        self._last = joint
         if explore:
             self.explorer.advance()
             every = np.arange(n)
@@ -191,6 +207,19 @@ class Team:
             if self.given.size:
                 self.given[every[:, None], joint[:, None], every, joint] += 1.0
         return joint
+
+    def _known(self, agent: int, joint_action: IntArray) -> tuple[IntArray, IntArray]:
+        """Return of whom an agent hears, ``(k,)``, and the actions ``(n,)`` that it reckons with.
+
+        The unseen maintain, or do again what they did last; whoever plans sees to it otherwise.
+        """
+        senders, actions = self.messages.heard(agent, joint_action)
+        if agent in self._hears_all:
+            return senders, joint_action
+        neutral = self.action_set.neutral
+        known = self._last.copy() if self._unseen == "last" else np.full_like(joint_action, neutral)
+        known[senders] = actions
+        return senders, known
 
     def _given_by(self, agent: int) -> FloatArray:
         """Return how often all took each action ``(A, n, A)`` given each action of an agent."""

@@ -19,6 +19,7 @@ EVALUATORS = SettingsRegistry(
         "variable-elimination": f"{__name__}.coordination:VariableEliminationSettings",
         "max-plus": f"{__name__}.coordination:MaxPlusSettings",
         "best-response": f"{__name__}.best_response:BestResponse",
+        "cross-entropy": f"{__name__}.cross_entropy:CrossEntropySettings",
     },
     EvaluatorSettings,
 )

@@ -1,7 +1,7 @@
 """The evaluator that suits a team: exact for few agents, sampled for some, planned for many.
 
 Of many agents best responses around a plan reach greater values than a sample, in half of its time.
-They are also taken for some, if the values of others decide too.
+They are also taken for some, if the values of others decide too, and wherever there must be a plan.
 """
 
 from __future__ import annotations
@@ -35,6 +35,8 @@ class AutoSettings(EvaluatorSettings):
     def chosen(self, problem: DecisionProblem) -> EvaluatorSettings:
         """Return the settings of the evaluator that a team gets."""
         hierarchy = problem.hierarchy
+        if problem.unseen == "plan" or problem.plan == "common":
+            return EVALUATORS.parsed("best-response")
         free = max(1 + len(hierarchy.below(i)) for i in range(len(hierarchy)))
         if free <= self.exact_up_to and problem.n_actions**free <= MOST_JOINT_ACTIONS:
             return EVALUATORS.parsed("exact")

@@ -8,9 +8,15 @@ each takes what is best while the others keep to the plan (iterated best respons
 Shoham and Leyton-Brown 2009, Section 7.7).
 
 Then the agents decide in the order of the hierarchy, as ever. Each values its own actions and those
-of its body's agents below it; the actions above are decided, and all others are taken to keep to
-the plan, which is passed down and kept up with what is decided. Agents that see others than the one
-above them, as in a tree, make a plan of their own: nobody plans with what it cannot see.
+of its body's agents below it; what it is told is decided, and all others are taken to keep to the
+plan. An agent's plan is its own, made with its weights for those that it considers, unless one
+above it that considers all others whom it does hands its plan down with what it tells, kept up with
+what is decided: so in a chain. If all work out the same plan (``plan = "common"``), it is made with
+the weights and tie-breaks of the first agent before anything is decided; that is no message, but
+common knowledge of states and weights, and costs computing in every agent. Of what is decided
+nobody learns more by it than it is told.
+
+If the unseen are expected to keep to the plan, an agent plans for all of whom it was told nothing.
 
 The number of joint actions tried grows linearly with the number of bodies.
 """
@@ -21,6 +27,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..interface.hierarchy import Hierarchy
 from ..interface.prediction import Prediction
 from ..numerics.arrays import FloatArray, IntArray
 from ..numerics.ties import greatest
@@ -41,13 +48,15 @@ class _Known(NamedTuple):
 
 
 class BestResponse(Aggregation):
-    """Plans for the agents below by one sweep of best responses.
+    """Plans for other agents by one sweep of best responses.
 
     Raises
     ------
     ValueError
         If the teammate model is another than best response.
     """
+
+    plans = True
 
     def __init__(self, problem: DecisionProblem) -> None:
         super().__init__(problem)
@@ -59,25 +68,23 @@ class BestResponse(Aggregation):
         hierarchy, groups = problem.hierarchy, problem.groups
         n = len(hierarchy)
         self._group_of = {i: g for g, group in enumerate(groups) for i in group}
-        # Agents that do not see the same others plan apart.
-        unseen = [hierarchy.unseen(i) for i in range(n)]
-        self._context = [unseen.index(others) for others in unseen]
+        self._planner = _planners(problem)
+        self._kept_up = _kept_up(problem, self._planner)
         self._place = np.zeros(n, dtype=np.int64)
         for group in groups:
             self._place[list(group)] = np.arange(len(group))
         sizes = {2, *(k for group in groups for k in range(1, len(group) + 1))}
         self._actions = {k: combinations(tuple(range(k)), self.n_actions) for k in sizes}
         self._widest = max(map(len, groups))
-        rank = {i: k for k, i in enumerate(hierarchy.order)}
-        seen = [{i, *hierarchy.below(i)} for i in range(n)]
-        # Per agent, who is free to it, in the order of decision; those of its body; the others.
-        self._free = [tuple(sorted(free, key=rank.__getitem__)) for free in seen]
+        # Per agent, whom it considers, itself included, in the order of decision; those of its
+        # body; the others.
+        self._free = [_in_order(hierarchy, {i, *hierarchy.below(i)}) for i in range(n)]
         self._own = [
             tuple(j for j in free if self._group_of[j] == self._group_of[i])
             for i, free in enumerate(self._free)
         ]
-        self._decided = [np.array([j for j in range(n) if j not in free]) for free in seen]
-        self._starts: dict[int, IntArray] = {}
+        self._others = [np.setdiff1d(np.arange(n), free) for free in self._free]
+        self._starts: dict[tuple[int, ...], IntArray] = {}
         self._prediction: Prediction | None = None
         self._plans: dict[int, IntArray] = {}
         self._known: _Known | None = None
@@ -90,19 +97,26 @@ class BestResponse(Aggregation):
         first = agent == self.hierarchy.order[0]
         if first or deliberation.prediction is not self._prediction:
             self._prediction, self._plans, self._known = deliberation.prediction, {}, None
-        context = self._context[agent]
-        if context not in self._plans:
-            self._plans[context] = self._planned(deliberation)
-        plan = self._plans[context]
-        decided, free = self._decided[agent], self._own[agent]
-        if len(decided):
-            plan[decided] = deliberation.joint_action[decided]
+        plan, free = self._plan(deliberation), self._own[agent]
         tried, worths = self._valued(deliberation, plan, free)
         best = np.full(self.n_actions, -np.inf)
         np.maximum.at(best, tried[:, free.index(agent)], worths)
-        # What its body does is kept in the plan; what it takes in the end, the next one is told.
+        # What its body does is kept in the plan; what it takes in the end may be told.
         plan[list(free)] = tried[greatest(worths, deliberation.rng)]
         return best
+
+    def _plan(self, deliberation: Deliberation) -> IntArray:
+        """Return the plan ``(n,)`` as the deciding agent knows it."""
+        agent = deliberation.agent
+        planner = self._planner[agent]
+        if planner not in self._plans:
+            self._plans[planner] = self._planned(deliberation)
+        plan = self._plans[planner]
+        if not self._kept_up[agent]:
+            plan = plan.copy()
+        known = deliberation.told if self.problem.unseen == "plan" else self._others[agent]
+        plan[known] = deliberation.joint_action[known]
+        return plan
 
     def _valued(
         self, deliberation: Deliberation, plan: IntArray, free: tuple[int, ...]
@@ -126,15 +140,18 @@ class BestResponse(Aggregation):
         return tried, worths
 
     def _planned(self, deliberation: Deliberation) -> IntArray:
-        """Return a plan ``(n,)`` for the agent and those below it."""
+        """Return a plan ``(n,)`` for the agent and those that it plans for."""
         agent, rng = deliberation.agent, deliberation.rng
         free = self._free[agent]
+        if self.problem.unseen == "plan":
+            every = set(range(len(self.hierarchy)))
+            free = _in_order(self.hierarchy, every - set(deliberation.told.tolist()))
         bodies: dict[int, list[int]] = {}
         for i in free:
             bodies.setdefault(self._group_of[i], []).append(i)
-        if agent not in self._starts:
-            self._starts[agent] = self._starting(free, list(bodies))
-        tried = _with(deliberation.joint_action, free, self._starts[agent])
+        if free not in self._starts:
+            self._starts[free] = self._starting(free, list(bodies))
+        tried = _with(deliberation.joint_action, free, self._starts[free])
         plan = tried[greatest(self.worth(deliberation, tried), rng)].copy()
         for members in map(tuple, bodies.values()):
             tried = _with(plan, members, self._distinct(deliberation.prediction, members))
@@ -158,6 +175,40 @@ class BestResponse(Aggregation):
             return actions
         indices = np.arange(len(actions))
         return actions[alike[self._group_of[members[0]], : len(actions)] == indices]
+
+
+def _planners(problem: DecisionProblem) -> list[int]:
+    """Return, for every agent, whose plan it decides by: its own, or one that it has or is told."""
+    hierarchy = problem.hierarchy
+    views = [() if problem.unseen == "plan" else hierarchy.unseen(i) for i in hierarchy.order]
+    planners = list(hierarchy.order)
+    if problem.plan == "common":
+        planners = [hierarchy.order[views.index(view)] for view in views]
+    elif problem.handed_down:
+        for k, agent in enumerate(hierarchy.order):
+            above = hierarchy.above(agent)
+            same = (hierarchy.order[j] for j in range(k) if views[j] == views[k])
+            planners[k] = next((giver for giver in same if giver in above), agent)
+    return [planners[hierarchy.order.index(i)] for i in range(len(hierarchy))]
+
+
+def _kept_up(problem: DecisionProblem, planners: list[int]) -> list[bool]:
+    """Return for every agent whether its plan is kept up by those above it: it is told all of it.
+
+    The others have a copy of the plan as it was made, in which they write what they are told.
+    """
+    hierarchy = problem.hierarchy
+    kept = []
+    for planner in planners:
+        users = [i for i in hierarchy.order if planners[i] == planner]
+        told_all = all({*users[:k]} <= {*hierarchy.above(i)} for k, i in enumerate(users))
+        kept.append(problem.handed_down and told_all)
+    return kept
+
+
+def _in_order(hierarchy: Hierarchy, agents: set[int]) -> tuple[int, ...]:
+    """Return agents in the order of decision."""
+    return tuple(i for i in hierarchy.order if i in agents)
 
 
 def _with(joint_action: IntArray, agents: tuple[int, ...], actions: IntArray) -> IntArray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, Protocol
+from typing import Any, ClassVar, Literal, NamedTuple, Protocol
 
 import numpy as np
 
@@ -22,10 +22,16 @@ Teammates = Literal["best-response", "uniform", "empirical", "conditional"]
 
 ValueOf = Literal["own", "below", "team"]
 """Whose value decides: the agent's own, the mean of its own and those below it, or all agents'."""
+Unseen = Literal["maintain", "last", "plan"]
+"""What agents are expected to do of whom nothing is heard and who are not considered."""
+Plan = Literal["private", "common"]
+"""Whether each agent makes its own plan, or all work out the same one."""
 
 
 NOTHING_GIVEN: FloatArray = np.zeros((0, 0, 0))
 """Conditional frequencies that nobody counts."""
+NOBODY: IntArray = np.zeros(0, dtype=np.int64)
+"""No agents."""
 
 
 class Deliberation(NamedTuple):
@@ -36,7 +42,8 @@ class Deliberation(NamedTuple):
     agent
         The deciding agent.
     joint_action
-        ``(n,)`` the actions decided above; neutral elsewhere.
+        ``(n,)`` the actions of which it was told; of the unseen what they are taken to do; neutral
+        for those below.
     prediction
         Predicts what joint actions would lead to.
     weights
@@ -48,6 +55,8 @@ class Deliberation(NamedTuple):
     given
         ``(A, n, A)`` the same frequencies, given each action of the deciding agent; counted where
         the teammate model asks for it, else empty.
+    told
+        ``(k,)`` the agents of whose actions it was told.
     """
 
     agent: int
@@ -57,6 +66,7 @@ class Deliberation(NamedTuple):
     frequencies: FloatArray
     rng: np.random.Generator
     given: FloatArray = NOTHING_GIVEN
+    told: IntArray = NOBODY
 
     @property
     def own_weights(self) -> FloatArray:
@@ -95,7 +105,7 @@ class DecisionProblem:
     rules
         The agents' rule base.
     hierarchy
-        Who is below whom.
+        Who considers whom, and who is told by whom.
     n_actions
         Actions A of every agent.
     groups
@@ -106,6 +116,10 @@ class DecisionProblem:
         Weight of the value, where it is added to the reward.
     value_of
         Whose value decides.
+    unseen, plan
+        What the unseen are expected to do, and who makes a plan.
+    handed_down
+        Whether all that is told arrives, so that a plan may be told, too.
     """
 
     rules: RuleBase
@@ -116,6 +130,9 @@ class DecisionProblem:
     teammates: Teammates
     discount: float
     value_of: ValueOf = "own"
+    unseen: Unseen = "maintain"
+    plan: Plan = "private"
+    handed_down: bool = True
 
 
 class EvaluatorSettings(PartSettings):
@@ -153,9 +170,27 @@ def concerned(hierarchy: Hierarchy, value_of: ValueOf) -> list[IntArray]:
 
 
 class Aggregation:
-    """What evaluators share: the decision rule, and the aggregation over teammates."""
+    """What evaluators share: the decision rule, and the aggregation over teammates.
+
+    Raises
+    ------
+    ValueError
+        If there is to be a plan, and the evaluator makes none.
+    """
+
+    plans: ClassVar[bool] = False
+    """Whether it makes plans for the other agents."""
 
     def __init__(self, problem: DecisionProblem) -> None:
+        for key, value, of_plans in (
+            ("unseen", problem.unseen, "plan"),
+            ("plan", problem.plan, "common"),
+        ):
+            if value == of_plans and not self.plans:
+                raise ValueError(
+                    f"learner.decision.{key} = {value!r}: needs an evaluator that makes plans, use "
+                    "best-response"
+                )
         self.problem = problem
         self.rules, self.hierarchy = problem.rules, problem.hierarchy
         self.n_actions = problem.n_actions

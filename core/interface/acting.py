@@ -15,7 +15,8 @@ class Actors(Protocol):
 
     Their calls come in this order: `begin_episode`, `predict`, `check`, and at every step `act`,
     `adapt`, `predict`, `learn`; then `end_episode`. Where nothing is learned, only `predict`,
-    `check` and `act` come, without `explore`.
+    `check` and `act` come, without `explore`. Those who have ``begin_world(seed, episode)`` hear of
+    every world that begins, learned in or not: they have failures that follow from its seed.
     """
 
     rng: np.random.Generator

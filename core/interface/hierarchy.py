@@ -1,14 +1,17 @@
-"""The hierarchy of agents: who sees and instructs whom (Section II-D, Fig. 1).
+"""The hierarchy of agents: who considers whom, and who is told by whom (Section II-D, Fig. 1).
 
 A hierarchy is a directed acyclic graph, superior -> subordinate, over named agents. The agents
-decide in topological order, ties in agent order. When an agent decides, every other agent falls in
-one of three classes:
+decide in topological order, ties in agent order. An edge is two relations in one, which a
+hierarchy can part:
 
-- *above*: an ancestor; its action has been decided and passed down;
-- *below*: a descendant; all its actions are considered (averaged over or maximised over);
-- *unseen*: neither; it is taken to perform the neutral action, maintain, even if it has decided.
+- *considering*: an agent tries the actions of those below it (averages or maximises over them):
+  of all its descendants, as in the paper, of its children alone, or of nobody;
+- *telling*: an agent is told what those above it have decided: all its ancestors, as in the paper,
+  its parents alone, or nobody.
 
-In the paper's chain nobody is unseen.
+Whom an agent neither considers nor is told of is *unseen*: it is taken to perform the neutral
+action, maintain, even if it has decided, unless the team reads the unseen otherwise (see
+`nested_agents.core.decision.settings`). In the paper's chain nobody is unseen.
 
 *Neighbours* are joined by an undirected edge: they decide at the same time. Each considers all
 actions of the other, as if it were below, and neither is told what the other does. Neighbours make
@@ -18,8 +21,14 @@ joint-action learners (everybody is everybody's neighbour) and coordination grap
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from typing import Literal
 
 from ..plugins.deferred import nx
+
+Told = Literal["ancestors", "parents", "none"]
+"""By whom an agent is told what was decided."""
+Considers = Literal["descendants", "children", "none"]
+"""Whose actions an agent tries."""
 
 
 class Hierarchy:
@@ -33,6 +42,10 @@ class Hierarchy:
         Pairs (superior, subordinate) of names.
     neighbours
         Pairs of names of those who decide at the same time, each pair once.
+    told
+        By whom an agent is told what was decided.
+    considers
+        Whose actions an agent tries beside its own; neighbours count as its children.
 
     Raises
     ------
@@ -48,6 +61,9 @@ class Hierarchy:
     >>> both = Hierarchy(["a", "b"], [], neighbours=[("a", "b")])
     >>> both.below(0), both.below(1), both.above(1)
     ((1,), (0,), ())
+    >>> silent = Hierarchy("abc", [("a", "b"), ("b", "c")], told="none", considers="children")
+    >>> silent.below(0), silent.above(2), silent.unseen(1)
+    ((1,), (), (0,))
     """
 
     def __init__(
@@ -55,6 +71,8 @@ class Hierarchy:
         agents: Sequence[str],
         edges: Iterable[tuple[str, str]],
         neighbours: Iterable[tuple[str, str]] = (),
+        told: Told = "ancestors",
+        considers: Considers = "descendants",
     ) -> None:
         agents, edges = tuple(agents), [(str(a), str(b)) for a, b in edges]
         if not agents:
@@ -63,6 +81,11 @@ class Hierarchy:
             if agents.count(name) > 1:
                 raise ValueError(f"hierarchy: agent {name!r} is named more than once")
         sides = [(str(a), str(b)) for a, b in neighbours]
+        if sides and considers == "none":
+            raise ValueError(
+                "hierarchy: considers = 'none': neighbours consider each other; without neighbours "
+                "use independent"
+            )
         _check_edges(edges, agents, _arrow, "superior")
         _check_edges([tuple(sorted(pair)) for pair in sides], agents, _line, "neighbour")
         index = {name: i for i, name in enumerate(agents)}
@@ -86,8 +109,13 @@ class Hierarchy:
                 raise ValueError(f"hierarchy: neighbours {pair} are superior and subordinate, too")
             beside[a].add(b)
             beside[b].add(a)
-        self._below = tuple(tuple(sorted(nx.descendants(graph, i) | beside[i])) for i in graph)
-        self._above = tuple(tuple(sorted(nx.ancestors(graph, i))) for i in graph)
+        tellers = {"ancestors": nx.ancestors, "parents": nx.DiGraph.predecessors, "none": _nobody}
+        tried = {"descendants": nx.descendants, "children": nx.DiGraph.successors, "none": _nobody}
+        self._below = tuple(
+            tuple(sorted({*tried[considers](graph, i), *beside[i]})) for i in range(len(agents))
+        )
+        self._above = tuple(tuple(sorted(tellers[told](graph, i))) for i in range(len(agents)))
+        self.told, self.considers = told, considers
         self.depth: int = nx.dag_longest_path_length(graph) + 1
         """Number of agents on the longest path."""
 
@@ -101,21 +129,34 @@ class Hierarchy:
         return f"Hierarchy({len(self)} agents: {named or 'no edges'})"
 
     def below(self, agent: int) -> tuple[int, ...]:
-        """Return all agents that `agent` can see: descendants and neighbours, in agent order."""
+        """Return all agents whose actions `agent` considers, in agent order."""
         return self._below[agent]
 
     def above(self, agent: int) -> tuple[int, ...]:
-        """Return all agents whose actions are passed down to `agent`: its ancestors."""
+        """Return all agents whose actions `agent` is told, in agent order."""
         return self._above[agent]
 
     def unseen(self, agent: int) -> tuple[int, ...]:
-        """Return the agents that are neither above nor below `agent`."""
+        """Return the agents that `agent` neither considers nor is told of."""
         seen = {agent, *self._below[agent], *self._above[agent]}
         return tuple(i for i in range(len(self)) if i not in seen)
+
+    @property
+    def messages(self) -> int:
+        """How many messages there are in one decision of all agents.
+
+        An agent is told by each agent above it what was decided; neighbours tell each other what
+        they have done, or what would be best.
+        """
+        return sum(map(len, self._above)) + 2 * len(self.neighbours) * (self.told != "none")
 
     def joint_actions(self, n_actions: int) -> int:
         """Return how many joint actions one decision of all agents enumerates (exact integer)."""
         return sum(n_actions ** (1 + len(below)) for below in self._below)
+
+
+def _nobody(graph: nx.DiGraph, agent: int) -> tuple[int, ...]:
+    return ()
 
 
 def _check_edges(

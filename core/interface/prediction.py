@@ -76,6 +76,9 @@ class Prediction(Protocol):
         groups. `states_by_group` asks for it, where the values of many agents are pooled.
     ``rewards(joint_actions)``
         Rewards ``(m,)`` of joint actions ``(m, n)``: what deciding by rewards needs.
+    ``after(joint_action)``
+        The prediction from where a joint action ``(n,)`` leads in one decision, which knows the
+        reward and goes on likewise: what plans of several decisions need.
     ``alike``
         ``(G, L)`` for every robot-action index of every group the first one that comes to the same:
         the evaluator ``best-response`` tries only that.

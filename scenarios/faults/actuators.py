@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from ...core.plugins.scheduled import Names
 from . import settings
-from .settings import FailureSettings, Names, befalling
+from .settings import FailureSettings, befalling
 
 
 class ActuatorFault(FailureSettings):

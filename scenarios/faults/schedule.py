@@ -8,7 +8,6 @@ here.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from fnmatch import fnmatchcase
 from typing import Any
 
 import numpy as np
@@ -62,7 +61,7 @@ class Failures:
             range(len(settings)), key=lambda i: not isinstance(settings[i], Delayed)
         )
         self._limits = limits
-        self._masks = [_named(f"{key}[{i}]", failure, agents) for i, failure in enumerate(settings)]
+        self._masks = [failure.mask(agents, f"{key}[{i}]") for i, failure in enumerate(settings)]
         delays = [f.periods for f in settings if isinstance(f, Delayed)]
         self._memory = max(delays, default=0)
         self.begin(0, 0)
@@ -84,8 +83,9 @@ class Failures:
 
     def strike(self, step: int) -> bool:
         """Let begin and end what is due at a step; return whether anything changed."""
-        now = (self._episode, step)
-        active = tuple(i for i in self._delays_first if _lasts(self._settings[i], now))
+        active = tuple(
+            i for i in self._delays_first if self._settings[i].lasts(self._episode, step)
+        )
         changed = active != self._active
         self._active = active
         return changed
@@ -125,26 +125,3 @@ class Failures:
         for _, mask in self.active():
             failed |= mask
         return failed
-
-
-def _lasts(failure: FailureSettings, now: tuple[int, int]) -> bool:
-    """Return whether a failure is on at an episode and step."""
-    over = failure.end_episode is not None and now >= (failure.end_episode, failure.end_step)
-    return now >= (failure.episode, failure.step) and not over
-
-
-def _named(key: str, failure: FailureSettings, agents: Sequence[str]) -> BoolArray:
-    """Return the mask ``(n,)`` of what a failure names."""
-    mask = np.zeros(len(agents), dtype=bool)
-    for name in failure.names:
-        hit = np.array([fnmatchcase(agent, name) for agent in agents])
-        if not hit.any():
-            shown = ", ".join(agents[:8]) + (", ..." if len(agents) > 8 else "")
-            head, dot, _ = agents[0].rpartition(".")
-            raise ValueError(
-                f"{key}.{failure.part} = {name!r}: no such "
-                f"{failure.part.removesuffix('s')}, allowed {shown} or a pattern such as "
-                f"{head}{dot}*"
-            )
-        mask |= hit
-    return mask

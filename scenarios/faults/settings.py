@@ -17,50 +17,18 @@ A failure lies between the command that an actuator gets and the speed that its 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal, Self, cast
+from typing import Annotated, Any, Literal, cast
 
 import numpy as np
 from numpy.random import Generator
-from pydantic import BeforeValidator, Field, create_model, model_validator
+from pydantic import Field, create_model
 
 from ...core.numerics.arrays import FloatArray
-from ...core.plugins.settings import Settings
-
-Index = Annotated[int, Field(ge=0)]
+from ...core.plugins.scheduled import Scheduled
 
 
-def _names(value: object) -> object:
-    several = value if isinstance(value, list | tuple) else (value,)
-    return tuple(str(one) if isinstance(one, int | np.integer) else one for one in several)
-
-
-Names = Annotated[tuple[str, ...], Field(min_length=1), BeforeValidator(_names)]
-"""What fails by name, pattern or number, one or a list."""
-
-
-class FailureSettings(Settings):
-    """From when to when something fails; see `nested_agents.scenarios.faults.schedule`.
-
-    A failure begins at its step of its episode and lasts, from episode to episode, until its end;
-    evaluation comes after all training.
-    """
-
-    part: ClassVar[str] = ""
-    """The field that names what fails."""
-
-    episode: Index = 0
-    """Episode in which it begins, counted from 0."""
-    step: Index = 0
-    """Step of that episode at which it begins."""
-    end_episode: Index | None = None
-    """Episode in which it ends; none: it lasts."""
-    end_step: Index = 0
-    """Step of that episode at which it ends."""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """What fails, by name or pattern."""
-        return cast("tuple[str, ...]", getattr(self, self.part))
+class FailureSettings(Scheduled):
+    """How an actuator fails, and when; see `nested_agents.scenarios.faults.schedule`."""
 
     def held(self, commands: FloatArray, limits: FloatArray, rng: Generator) -> FloatArray:
         """Return the speeds ``(periods, k)`` that the servos of what fails hold.
@@ -75,15 +43,6 @@ class FailureSettings(Settings):
             For noise, drawn anew every control period.
         """
         return commands
-
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
-        if self.end_episode is None and self.end_step:
-            raise ValueError("end_step needs an end_episode")
-        end = self.end_episode, self.end_step
-        if end[0] is not None and end <= (self.episode, self.step):
-            raise ValueError(f"its end {end} must come after its begin {self.episode, self.step}")
-        return self
 
 
 class Seized(FailureSettings):
@@ -170,6 +129,7 @@ def befalling(
 
     Examples
     --------
+    >>> from nested_agents.core.plugins.scheduled import Names
     >>> class CartFailure(FailureSettings):
     ...     part = "carts"
     ...     carts: Names

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Union
 
 from pydantic import Field, field_validator
 
+from ...core.plugins.scheduled import Names
 from ...core.plugins.settings import NonNegative, Positive, ScenarioSettings, Settings
 from ..faults.settings import (
     DISCRIMINATOR,
     FailureSettings,
-    Names,
     Reversed,
     Seized,
     Stuck,

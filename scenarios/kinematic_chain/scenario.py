@@ -280,6 +280,12 @@ class ChainPrediction:
         view = self.seen(joint_actions)
         return self.arm._reward(view.distance, view.approach)
 
+    def after(self, joint_action: IntArray) -> ChainPrediction:
+        """Return the prediction from where a joint action ``(n,)`` leads in one decision."""
+        reached, speeds = self.seen(joint_action[None]), self.commands(joint_action)
+        before = float(reached.distance[0])
+        return ChainPrediction(self.arm, self.effects, reached.angles[0], speeds, before)
+
     @cached_property
     def alike(self) -> IntArray:
         """The first action of each joint that comes to the same ``(n, A)``."""

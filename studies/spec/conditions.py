@@ -68,6 +68,10 @@ class ConditionSettings(Settings):
         scenario = join_agents(world, self.agents)
         return scenario, build(self.topology, scenario.agents, groups_of(scenario))
 
+    def acts_as(self, other: ConditionSettings) -> bool:
+        """Return whether topology and learner are those of `other`."""
+        return (self.topology, self.learner) == (other.topology, other.learner)
+
     def canonical(self) -> str:
         """Return the JSON text that equal settings share, whatever wrote them."""
         return json.dumps(
@@ -110,7 +114,8 @@ class Condition:
     settings
         The resolved settings.
     evaluations
-        Names and scenarios in which its trained teams are evaluated beside its own.
+        Names and settings under which its trained teams are evaluated beside its own: other
+        scenarios, topologies, decisions.
     curriculum
         What its teams are trained on before.
     """
@@ -118,13 +123,13 @@ class Condition:
     label: str
     columns: Mapping[str, Any]
     settings: ConditionSettings
-    evaluations: tuple[tuple[str, ScenarioSettings], ...] = ()
+    evaluations: tuple[tuple[str, ConditionSettings], ...] = ()
     curriculum: tuple[Stage, ...] = ()
 
     @property
     def tables(self) -> list[Any]:
         """Its settings and those of its evaluations and stages, as tables."""
-        others = [scenario.model_dump(mode="json") for _, scenario in self.evaluations]
+        others = [other.model_dump(mode="json") for _, other in self.evaluations]
         stages = [stage.table() for stage in self.curriculum]
         return [self.settings.model_dump(mode="json"), *others, *stages]
 
@@ -167,7 +172,8 @@ def grid(
     overrides
         Crossed with `sweep`; none: the tables as they are.
     evaluations
-        By name, what is laid over each condition's scenario.
+        By name, what is laid over each condition's scenario, and under ``topology`` and
+        ``learner.decision`` over those.
     curriculum
         Stages before the training of conditions whose override names none.
 
@@ -187,7 +193,7 @@ def grid(
         settings = resolve(preset, tables, point, where, override)
         own = override.curriculum if override else None
         stages = tuple(
-            Stage(s.name, s.episodes, _beside(settings, s.scenario, f" (stage {s.name!r}){where}"))
+            Stage(s.name, s.episodes, _stage(settings, s.scenario, f" (stage {s.name!r}){where}"))
             for s in (curriculum if own is None else own)
         )
         content = json.dumps([settings.canonical(), *(stage.table() for stage in stages)])
@@ -198,7 +204,7 @@ def grid(
         columns: dict[str, Any] = {"name": override.name} if override else {}
         columns |= {key: scalar(point[key]) if key in point else "" for key in keys}
         others = tuple(
-            (other, _beside(settings, changes, f" (evaluation {other!r}){where}"))
+            (other, _reevaluation(settings, changes, f" (evaluation {other!r}){where}"))
             for other, changes in (evaluations or {}).items()
         )
         columns = columns or {"preset": preset}
@@ -256,12 +262,24 @@ def _laid(layers: Sequence[Mapping[str, Any]]) -> TomlTable:
     return table
 
 
-def _beside(
-    settings: ConditionSettings, changes: Mapping[str, Any], where: str
-) -> ScenarioSettings:
+def _stage(settings: ConditionSettings, changes: Mapping[str, Any], where: str) -> ScenarioSettings:
     """Return a condition's scenario with changes laid over it."""
     table = overlay(settings.model_dump(), {"scenario": dict(changes)}, ConditionSettings)
     return _validated(table, where).scenario
+
+
+def _reevaluation(
+    settings: ConditionSettings, changes: Mapping[str, Any], where: str
+) -> ConditionSettings:
+    """Return a condition's settings with changes laid over scenario, topology and decision."""
+    parts: TomlTable = {"scenario": dict(changes)}
+    for name in ("topology", "learner"):
+        if name in parts["scenario"]:
+            parts[name] = section(name, parts["scenario"].pop(name))
+    other = next((key for key in parts.get("learner", {}) if key != "decision"), None)
+    if other is not None:
+        raise SpecError(f"learner.{other}: a trained team may change its decision alone{where}")
+    return _validated(overlay(settings.model_dump(), parts, ConditionSettings), where)
 
 
 def _validated(table: TomlTable, where: str) -> ConditionSettings:

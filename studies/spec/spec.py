@@ -5,7 +5,7 @@
 ``[scenario]``, ``[topology]``, ``[learner]``, laid over the preset. What is compared:
 ``[[overrides]]``, further tables by name, and ``[sweep]``, lists of values by dotted key; the
 conditions are their combinations. ``[[curriculum]]`` are stages of training before that of the
-conditions, ``[evaluations]`` further scenarios for the trained teams.
+conditions, ``[evaluations]`` further scenarios and hierarchies for the trained teams.
 """
 
 from __future__ import annotations
@@ -88,7 +88,8 @@ class Spec(Settings):
     curriculum: Curriculum = ()
     """Stages in which teams are trained before `episodes`, in scenarios laid over their own."""
     evaluations: Mapping[Name, Mapping[str, Any]] = Field(default_factory=dict)
-    """By name, changes of the scenario in which the trained teams are evaluated too."""
+    """By name, changes of the scenario in which the trained teams are evaluated too; under
+    ``topology`` and ``learner.decision``, of how they decide."""
 
     _conditions: tuple[Condition, ...] = PrivateAttr(default=())
     _sources: Sources = PrivateAttr(default_factory=Sources)
@@ -260,7 +261,10 @@ class Spec(Settings):
             labels = listed((condition.label for condition in controls), 3)
             lines[f"{keys}: left out for {labels}, which learn nothing"] = None
         for condition in self.conditions():
-            scenarios = [condition.settings.scenario, *(s for _, s in condition.evaluations)]
+            scenarios = [
+                condition.settings.scenario,
+                *(s.scenario for _, s in condition.evaluations),
+            ]
             for scenario in (*scenarios, *(stage.scenario for stage in condition.curriculum)):
                 lines |= dict.fromkeys(scenario.warnings())
         return tuple(lines)

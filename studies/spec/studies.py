@@ -14,6 +14,7 @@ STUDIES = Registry(
         "wheel-failure": f"{CATALOGUE}.wheel_failure",
         "scaling": f"{CATALOGUE}.scaling",
         "hierarchies": f"{CATALOGUE}.hierarchies",
+        "edges": f"{CATALOGUE}.edges",
         "games": f"{CATALOGUE}.games",
         "related": f"{CATALOGUE}.related",
         "peers": f"{CATALOGUE}.peers",

@@ -18,7 +18,6 @@ from ...core.interface.measures import Measure, measures_of
 from ...core.interface.scenario import Scenario
 from ...core.learners import LearnerSettings, TeamSettings
 from ...core.numerics.arrays import IntArray
-from ...core.plugins.settings import ScenarioSettings
 from ..errors import SpecError
 from ..spec.conditions import Condition, ConditionSettings
 from ..spec.curriculum import Stage
@@ -27,8 +26,8 @@ from .measures import joined
 if TYPE_CHECKING:
     from ..spec.spec import Spec
 
-Evaluations = Sequence[tuple[str, ScenarioSettings]]
-"""Names and scenarios in which a trained team is evaluated beside its own."""
+Evaluations = Sequence[tuple[str, ConditionSettings]]
+"""Names and settings under which a trained team is evaluated beside its own."""
 
 
 class Arrangement(NamedTuple):
@@ -49,26 +48,11 @@ class Arrangement(NamedTuple):
         ValueError
             If it cannot, see `carried_rows` and `Team.continue_from`; one line.
         """
-        rows = self._rows(former, settings)
+        rows = self.rows_from(former, settings)
         of_fuzzy_agents(self.team).continue_from(of_fuzzy_agents(former.team), rows)
 
-    def with_trained(self, former: Arrangement, settings: TeamSettings) -> Arrangement:
-        """Return it with the team that was trained in another world: to be evaluated, not to learn.
-
-        That is the former team itself if the agents are the same, else one that takes over.
-
-        Raises
-        ------
-        ValueError
-            As `continue_from`.
-        """
-        rows = self._rows(former, settings)
-        if self.scenario.agents == former.scenario.agents:
-            return self._replace(team=former.team)
-        of_fuzzy_agents(self.team).continue_from(of_fuzzy_agents(former.team), rows)
-        return self
-
-    def _rows(self, former: Arrangement, settings: TeamSettings) -> IntArray:
+    def rows_from(self, former: Arrangement, settings: TeamSettings) -> IntArray:
+        """Return the row of weights that each of its rows goes on from, see `carried_rows`."""
         shared = isinstance(settings, LearnerSettings) and settings.weights == "role"
         return carried_rows(former.scenario, self.scenario, shared=shared)
 
@@ -85,7 +69,7 @@ def arrange(settings: ConditionSettings, seed: int) -> Arrangement:
     scenario, hierarchy = settings.arrange(world)
     learner, source = settings.learner, policy_seed(seed)
     if isinstance(learner, LearnerSettings):
-        team: Actors = Team(learner, scenario, hierarchy, source)
+        team: Actors = Team(learner, scenario, hierarchy, source, settings.topology.failures)
     else:
         team = learner.build(scenario, source)
     return Arrangement(world, scenario, team)
@@ -123,19 +107,26 @@ def teach(
 
 
 def transfer(
-    own: Arrangement, settings: ConditionSettings, scenarios: Evaluations, seed: int
+    own: Arrangement, settings: ConditionSettings, evaluations: Evaluations, seed: int
 ) -> Iterator[tuple[str, Arrangement]]:
-    """Yield the name and the arrangement of each further evaluation, with the team of `own`.
+    """Yield the name and the arrangement of each further evaluation: to be evaluated, not to learn.
+
+    Its team is that of `own` itself if the same agents decide in the same way, else one that
+    continues from it.
 
     Raises
     ------
     ValueError
-        If a scenario cannot be built, or what the team has learned means nothing in it.
+        If a scenario or a team cannot be built, or what was learned means nothing there.
     """
-    for name, scenario in scenarios:
+    for name, other in evaluations:
         with _naming(f"evaluations.{name}"):
-            there = arrange(settings.model_copy(update={"scenario": scenario}), seed)
-            there = there.with_trained(own, settings.learner)
+            there = arrange(other, seed)
+            if other.acts_as(settings) and there.scenario.agents == own.scenario.agents:
+                there.rows_from(own, settings.learner)
+                there = there._replace(team=own.team)
+            else:
+                there.continue_from(own, settings.learner)
         yield name, there
 
 

@@ -110,17 +110,18 @@ class Session:
         self._go_through_curriculum()
         self._evaluate(self._own, phase, observe)
 
-    def run_other_evaluations(self) -> None:
+    def run_other_evaluations(self, observers: Mapping[str, Observer] | None = None) -> None:
         """Evaluate in each of the trial's `evaluations`, whatever the others are.
 
-        The same agents are the same team; others take over what it has learned.
+        The same agents are the same team; others take over what it has learned. The steps of each
+        are shown to the observer of its name, if there is one.
         """
         self._go_through_curriculum()
         trial, rng = self.trial, self.team.rng.bit_generator
         state = rng.state
         for name, there in transfer(self._own, trial.settings, trial.evaluations, trial.seed):
             self._note_measures(there)
-            self._evaluate(there, f"{EVALUATION}{name}", None)
+            self._evaluate(there, f"{EVALUATION}{name}", (observers or {}).get(name))
             rng.state = state
 
     def _note_measures(self, there: Arrangement) -> None:

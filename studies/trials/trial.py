@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 from ...core.interface.measures import Measure
 from ...core.interface.scenario import Scenario
-from ...core.plugins.settings import ScenarioSettings
 from ...core.plugins.sources import Sources, named
 from ..spec.conditions import ConditionSettings
 from ..spec.curriculum import Stage
@@ -42,7 +41,7 @@ class Trial:
     seed, episodes, steps, evaluation, evaluation_steps
         As in `Spec`.
     evaluations
-        Names and scenarios in which the trained team is evaluated beside its own.
+        Names and settings under which the trained team is evaluated beside its own.
     curriculum
         Stages that the team is trained in before its own scenario.
     sources
@@ -56,7 +55,7 @@ class Trial:
     episodes: int
     steps: int
     evaluation: int
-    evaluations: tuple[tuple[str, ScenarioSettings], ...] = ()
+    evaluations: tuple[tuple[str, ConditionSettings], ...] = ()
     curriculum: tuple[Stage, ...] = ()
     evaluation_steps: int | None = None
     sources: Sources = field(default_factory=Sources, compare=False)
@@ -66,7 +65,7 @@ class Trial:
         content = {
             **{name: getattr(self, name) for name in PLAIN},
             "settings": self.settings.model_dump(),
-            "evaluations": [(name, scenario.model_dump()) for name, scenario in self.evaluations],
+            "evaluations": [(name, other.model_dump()) for name, other in self.evaluations],
             "curriculum": [(s.name, s.episodes, s.scenario.model_dump()) for s in self.curriculum],
         }
         return _revived, (self.sources, content)
@@ -94,8 +93,10 @@ class Trial:
         if self.evaluation_steps is not None:
             content["evaluation_steps"] = self.evaluation_steps
         if self.evaluations:
+            own = self.settings
             content["evaluations"] = [
-                [name, scenario.model_dump(mode="json")] for name, scenario in self.evaluations
+                [name, (other.scenario if other.acts_as(own) else other).model_dump(mode="json")]
+                for name, other in self.evaluations
             ]
         if self.curriculum:
             content["curriculum"] = [stage.table() for stage in self.curriculum]
@@ -192,15 +193,16 @@ def trials_of(spec: Spec) -> tuple[Trial, ...]:
 def _revived(sources: Sources, content: dict[str, Any]) -> Trial:
     """Return a trial that was pickled, its settings made again by its files."""
 
-    def scenario(table: dict[str, Any]) -> ScenarioSettings:
-        return ConditionSettings.model_validate({"scenario": table}, strict=True).scenario
+    def settings(table: dict[str, Any]) -> ConditionSettings:
+        return ConditionSettings.model_validate(table, strict=True)
 
     with sources.active():
         made = {
-            "settings": ConditionSettings.model_validate(content["settings"], strict=True),
-            "evaluations": tuple((name, scenario(s)) for name, s in content["evaluations"]),
+            "settings": settings(content["settings"]),
+            "evaluations": tuple((name, settings(s)) for name, s in content["evaluations"]),
             "curriculum": tuple(
-                Stage(name, episodes, scenario(s)) for name, episodes, s in content["curriculum"]
+                Stage(name, episodes, settings({"scenario": s}).scenario)
+                for name, episodes, s in content["curriculum"]
             ),
         }
     return Trial(**{**content, **made}, sources=sources)

@@ -6,12 +6,11 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
-BENCHMARKS, DOCS = ROOT / "benchmarks", ROOT / "docs"
+DOCS = Path(__file__).resolve().parents[2] / "docs"
 
 
 def test_the_documented_prediction_errors_are_those_of_the_benchmark() -> None:
-    benchmark = runpy.run_path(str(BENCHMARKS / "prediction_errors.py"), run_name="benchmark")
+    benchmark = runpy.run_module("benchmarks.prediction_errors")
     count, means = benchmark["errors"](box="square")
     row = "| ".join(f"{mean:.1f} " for mean in means)
     documented = (DOCS / "predictors.md").read_text(encoding="utf-8")
@@ -19,7 +18,7 @@ def test_the_documented_prediction_errors_are_those_of_the_benchmark() -> None:
 
 
 def test_calibrated_constants_predict_as_well_as_the_right_ones() -> None:
-    benchmark = runpy.run_path(str(BENCHMARKS / "calibration.py"), run_name="benchmark")
+    benchmark = runpy.run_module("benchmarks.calibration")
     found, errors = benchmark["calibrated"]("e-puck", "too soft", 3)
     believed, calibrated, right = errors[20:].mean(axis=0)
     assert calibrated < 1.2 * right < 0.3 * believed
@@ -29,7 +28,7 @@ def test_calibrated_constants_predict_as_well_as_the_right_ones() -> None:
 def test_free_motion_agrees_with_the_theory_as_well_as_is_documented(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    runpy.run_path(str(BENCHMARKS / "free_motion.py"), run_name="__main__")
+    runpy.run_module("benchmarks.free_motion", run_name="__main__")
     said = capsys.readouterr().out
     (ahead, yaw) = re.findall(
         r"within (\S+) mm/s and (\S+) rad/s", (DOCS / "worlds.md").read_text(encoding="utf-8")

@@ -27,6 +27,7 @@ LONG = ("success, 4", "success, 40", "success, 120", *COLUMNS[2:])
         ("peers-arm-long", LONG),
         ("peers-tuning", ("success, 12", "evaluation success")),
         ("peers-predictors", PREDICTORS),
+        ("peers-plans", PREDICTORS),
     ],
 )
 def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:

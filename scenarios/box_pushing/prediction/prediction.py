@@ -7,6 +7,7 @@ own block is the wheel speed that is exact.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 from math import pi
 from typing import ClassVar
@@ -163,6 +164,15 @@ class BoxPrediction:
     def poses(self, joint_actions: IntArray) -> View:
         """Return the situations that joint actions ``(m, n)`` lead to in a decision period."""
         return self._after(self._choices(joint_actions), self.premises.hold)
+
+    def after(self, joint_action: IntArray) -> BoxPrediction:
+        """Return the prediction from where a joint action ``(n,)`` leads in a decision period."""
+        view = self.poses(joint_action[None])
+        reached = replace(
+            self.situation,
+            robots=view.robots[0], box=view.box[0], speeds=self.commands(joint_action),
+        )  # fmt: skip
+        return BoxPrediction(reached, self.model, self.premises)
 
     def commands(self, joint_action: IntArray) -> FloatArray:
         """Return the wheel speeds ``(n,)`` that a joint action ``(n,)`` would command [m/s]."""

@@ -15,7 +15,7 @@ exact
 from __future__ import annotations
 
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -82,12 +82,22 @@ class Future:
 
     def after(self, commands: FloatArray, periods: int) -> tuple[FloatArray, FloatArray]:
         """Return poses ``(M + 1, 3)``, the box first, and gaps ``(M,)`` under held commands."""
+        self._play(commands, periods)
+        return np.vstack([self.world.box_pose, self.world.robot_poses]), self.world.gaps.copy()
+
+    def onward(self, commands: FloatArray) -> Future:
+        """Return where the world goes from the end of a step under held commands."""
+        failures = self._play(commands, self.hold)
+        return replace(self, state=self.world.state(), failures=failures, step=self.step + 1)
+
+    def _play(self, commands: FloatArray, periods: int) -> WheelFailures:
+        """Play control periods from the saved state; return the failures at their end."""
         self.world.restore(self.state)
         failures = deepcopy(self.failures)
         self.world.set_grip(failures.grip)
         for number, past in enumerate(range(0, periods, self.hold), self.step):
             failures.advance(self.world, commands, number, min(self.hold, periods - past))
-        return np.vstack([self.world.box_pose, self.world.robot_poses]), self.world.gaps.copy()
+        return failures
 
 
 class ExactPrediction(BoxPrediction):
@@ -120,3 +130,11 @@ class ExactPrediction(BoxPrediction):
             gaps.append(gap)
         pose, gap = np.array(poses)[which], np.array(gaps)[which]
         return self.premises.seen(self.situation, pose[:, 1:], pose[:, 0], gap, seconds)
+
+    def after(self, joint_action: IntArray) -> ExactPrediction:
+        """Return the prediction from where a joint action ``(n,)`` leads in a decision period."""
+        speeds = self.commands(joint_action)
+        future = self.future.onward(speeds)
+        box, robots = future.state.poses[0], future.state.poses[1:]
+        reached = replace(self.situation, robots=robots, box=box, speeds=speeds)
+        return ExactPrediction(reached, self.model, self.premises, future)

@@ -8,8 +8,9 @@ import numpy as np
 from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
 from ....core.numerics.arrays import FloatArray
+from ....core.plugins.scheduled import Names
 from ....core.plugins.settings import NonNegative, Positive, Settings
-from ...faults.settings import DISCRIMINATOR, KINDS, FailureSettings, Names, befalling
+from ...faults.settings import DISCRIMINATOR, KINDS, FailureSettings, befalling
 
 GRAVITY = 9.81
 """Standard acceleration of free fall [m/s2], rounded."""

@@ -21,7 +21,6 @@ from typing import Any
 
 import numpy as np
 
-from ....core.agents.cost import below_counts
 from ....core.agents.team import of_fuzzy_agents
 from ...results.analysis import Analysis, Figures
 from ...results.results import Results
@@ -76,7 +75,7 @@ def measure(trial: Trial) -> TrialResult:
     numbers = {
         "agents": float(len(hierarchy)),
         "memory": 1e-3 * team.learner.theta.nbytes,
-        "messages": float(sum(below_counts(hierarchy))),
+        "messages": float(hierarchy.messages),
         "formula": float(tried * n_rules),
         "counted": counted / len(session.deciding),
     }

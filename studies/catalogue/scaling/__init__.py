@@ -20,7 +20,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ....core.agents.cost import below_counts
 from ....core.agents.team import of_fuzzy_agents
 from ....core.interface.scenario import groups_of
 from ...presentation.words import count
@@ -77,7 +76,7 @@ def measure(trial: Trial) -> TrialResult:
     numbers = {
         "robots": float(len(groups_of(session.world))),
         "agents": float(len(hierarchy)),
-        "messages": float(sum(below_counts(hierarchy))),
+        "messages": float(hierarchy.messages),
         "joint_actions": tried / len(session.deciding),
         "team_bytes": float(sum(array.nbytes for array in team.arrays().values())),
         "weight_bytes": float(team.learner.theta.nbytes),

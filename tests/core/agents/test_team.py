@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from nested_agents.core.agents.joint_agents import join_agents
+from nested_agents.core.agents.messages import AbsentAgents, LostMessages
 from nested_agents.core.agents.rows import carried_rows
 from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.exploration import BurstExploration
@@ -383,3 +384,41 @@ def test_parts_that_cannot_take_over_are_named(part: str, world) -> None:
     setattr(successor, part, object())
     with pytest.raises(ValueError, match=r"learner\..*kind: object has no continue_from"):
         successor.continue_from(former, np.arange(4))
+
+
+def acting(world, unseen: str, told: str, failures=()) -> tuple[Team, list[np.ndarray]]:
+    """A trained team, and five joint actions of an episode."""
+    settings = settings_of({"kind": "frozen", "decision": {"rule": "reward", "unseen": unseen}})
+    hierarchy = Hierarchy(world.agents, list(pairwise(world.agents)), (), told)
+    team = Team(settings, world, hierarchy, np.random.SeedSequence(1), failures)
+    joints = []
+    world.reset(4)
+    team.begin_world(4, 0)
+    for _ in range(5):
+        joints.append(team.act(team.predict(world), explore=False))
+        world.step(joints[-1])
+    return team, joints
+
+
+def test_the_unseen_are_read_as_the_settings_say(world) -> None:
+    team, joints = acting(world, "last", "none")
+    assert team._known(3, joints[0])[1].tolist() == joints[-1].tolist()
+    team.begin_world(4, 1)
+    neutral = [world.action_set.neutral] * 4
+    assert team._known(3, joints[0])[1].tolist() == neutral
+    team, joints = acting(world, "maintain", "none")
+    assert team._known(3, joints[-1])[1].tolist() == neutral
+    team, joints = acting(world, "maintain", "parents")
+    assert team._known(3, joints[-1])[1].tolist() == [*neutral[:2], joints[-1][2], neutral[3]]
+
+
+def test_who_is_absent_maintains(world) -> None:
+    _, joints = acting(world, "maintain", "ancestors", [AbsentAgents(agents=world.agents[1])])
+    assert {joint[1] for joint in joints} == {world.action_set.neutral}
+
+
+def test_failures_of_messages_leave_worlds_and_ties_as_they_are(world) -> None:
+    """What is lost has a stream of its own: agents who hear all decide with the same numbers."""
+    team, _ = acting(world, "maintain", "ancestors")
+    broken, _ = acting(world, "maintain", "ancestors", [LostMessages(agents="*", probability=0.0)])
+    assert team.rng.bit_generator.state == broken.rng.bit_generator.state

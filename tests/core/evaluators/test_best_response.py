@@ -1,6 +1,6 @@
 """Decisions by the values of several agents, and best responses around a plan."""
 
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
@@ -185,3 +185,83 @@ def test_other_teammate_models_are_refused(world, rules) -> None:
         ValueError, match=r"learner\.decision\.teammates = 'uniform': best-response"
     ):
         BestResponse(DecisionProblem(**fields))
+
+
+class InStep:
+    """Rewards every pair of neighbouring agents that do the same; predicts nothing."""
+
+    def rewards(self, joint: np.ndarray) -> np.ndarray:
+        return (joint[:, 1:] == joint[:, :-1]).mean(axis=1)
+
+
+def decided(hierarchy, first, plan="private", unseen="maintain", seed=0) -> list[np.ndarray]:
+    """What all value their actions at, after the first agent does `first` whatever it values."""
+    n = len(hierarchy)
+    rules = RuleBase.build(
+        StateSpace("none", (Variable("x", "1", -1.0, 1.0),), 1), RuleBaseSettings()
+    )
+    problem = DecisionProblem(
+        rules, hierarchy, A, tuple((i,) for i in range(n)), "reward", "best-response", 0.9, "own",
+        unseen, plan, hierarchy.told == "ancestors",
+    )  # fmt: skip
+    search, prediction, rng = BestResponse(problem), InStep(), np.random.default_rng(seed)
+    joint, values = np.full(n, NEUTRAL), []
+    for agent in hierarchy.order:
+        told = np.array(hierarchy.above(agent), dtype=np.int64)
+        known = np.full(n, NEUTRAL)
+        known[told] = joint[told]
+        deliberation = Deliberation(
+            agent, known, prediction, [], np.zeros((n, A)), rng, told=told
+        )  # fmt: skip
+        values.append(search.values(deliberation))
+        joint[agent] = first if agent == hierarchy.order[0] else values[-1].argmax()
+    return values
+
+
+NAMES = tuple("abcdef")
+PAIRS = list(pairwise(NAMES))
+ALL = [(a, b) for k, a in enumerate(NAMES) for b in NAMES[k + 1 :]]
+
+
+@pytest.mark.parametrize("plan", ["private", "common"])
+@pytest.mark.parametrize(
+    ("hierarchy", "unseen"),
+    [
+        (Hierarchy(NAMES, [], ALL), "maintain"),
+        (Hierarchy(NAMES, PAIRS, told="none"), "maintain"),
+        (Hierarchy(NAMES, PAIRS, told="none"), "plan"),
+        (Hierarchy(NAMES, PAIRS, told="none", considers="children"), "plan"),
+    ],
+)
+def test_who_is_told_nothing_learns_nothing_of_what_others_decide(hierarchy, unseen, plan) -> None:
+    runs = [decided(hierarchy, first, plan, unseen) for first in range(A)]
+    for agent in range(1, 6):
+        assert len({tuple(run[agent]) for run in runs}) == 1
+
+
+@pytest.mark.parametrize("plan", ["private", "common"])
+def test_who_is_told_answers(plan) -> None:
+    for hierarchy in (Hierarchy(NAMES, PAIRS), Hierarchy(NAMES, PAIRS, told="parents")):
+        answers = [decided(hierarchy, first, plan)[1].argmax() for first in range(A)]
+        assert answers == list(range(A))
+
+
+def test_agents_with_a_common_plan_agree_without_a_word() -> None:
+    """All are equally good who do the same: private plans break ties apart, a common one not."""
+    silent = Hierarchy(NAMES, PAIRS, told="none")
+
+    def chosen(plan: str, seed: int) -> int:
+        values = decided(silent, 0, plan, "plan", seed)
+        return len({int(v.argmax()) for v in values[1:]})
+
+    assert {chosen("common", seed) for seed in range(5)} == {1}
+    assert max(chosen("private", seed) for seed in range(5)) > 1
+
+
+def test_a_plan_needs_an_evaluator_that_makes_one(world, rules) -> None:
+    fields = vars(problem_of(world, rules, "chain", "own"))
+    for key, value in (("unseen", "plan"), ("plan", "common")):
+        with pytest.raises(ValueError, match=f"learner.decision.{key} = '{value}': needs an eval"):
+            ExactEnumeration(DecisionProblem(**fields | {key: value}))
+        chosen = AutoSettings().chosen(DecisionProblem(**fields | {key: value}))
+        assert chosen.kind == "best-response"

@@ -115,3 +115,23 @@ def test_a_hierarchy_refuses(agents: str, edges: list, complaint: str) -> None:
     with pytest.raises(ValueError, match=complaint) as caught:
         Hierarchy(agents, edges)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("told", "above"), [("ancestors", (0, 1, 2)), ("parents", (2,)), ("none", ())]
+)
+@pytest.mark.parametrize(
+    ("considers", "below"), [("descendants", (1, 2, 3)), ("children", (1,)), ("none", ())]
+)
+def test_considering_and_telling_can_be_parted(told, above, considers, below) -> None:
+    parted = Hierarchy("abcd", [("a", "b"), ("b", "c"), ("c", "d")], (), told, considers)
+    assert (parted.above(3), parted.below(0), parted.order) == (above, below, CHAIN.order)
+    assert parted.unseen(3) == tuple(i for i in range(3) if i not in above)
+    assert parted.messages == {"ancestors": 6, "parents": 3, "none": 0}[told]
+
+
+def test_neighbours_who_do_not_consider_each_other_are_none() -> None:
+    with pytest.raises(ValueError, match="considers = 'none': neighbours consider each other"):
+        Hierarchy("ab", [], [("a", "b")], considers="none")
+    assert Hierarchy("ab", [], [("a", "b")]).messages == 2
+    assert Hierarchy("ab", [], [("a", "b")], told="none").messages == 0

@@ -4,7 +4,6 @@ import pytest
 from made_up_results import NOTHING, Arrays, scaling
 from matplotlib.figure import Figure
 
-from nested_agents.core.agents.cost import below_counts
 from nested_agents.studies.catalogue import scaling as module
 from nested_agents.studies.catalogue.scaling import analyse, draw, exponents_of, measure
 from nested_agents.studies.catalogue.study import drawn
@@ -108,7 +107,7 @@ def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
 def test_messages_are_the_edges_of_the_transitive_closure(topology: str, count: int) -> None:
     (condition,) = Spec.of({"topology": topology}).conditions()
     hierarchy = build(condition.settings, 0)[1].hierarchy
-    assert sum(below_counts(hierarchy)) == count
+    assert hierarchy.messages == count
 
 
 def test_a_trial_is_measured_without_being_changed() -> None:

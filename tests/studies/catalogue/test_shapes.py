@@ -52,6 +52,6 @@ def test_the_spec_holds_the_shapes_of_the_claim() -> None:
     spec = Spec.load(Path(module.__file__).parent / "shapes.toml")
     (condition,) = spec.conditions()
     assert condition.settings.scenario.box == "square"
-    assert {scenario.box for _, scenario in condition.evaluations} == {
+    assert {settings.scenario.box for _, settings in condition.evaluations} == {
         "rectangle", "circle", "triangle", "hexagon", "L",
     }  # fmt: skip

@@ -248,6 +248,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "peers-100",
         "peers-arm-long",
         "peers-predictors",
+        "peers-plans",
         "locked-joint",
         "large-failures",
         "climbing",

@@ -75,7 +75,7 @@ def test_a_broken_scenario_is_told_in_one_line(
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (["--steps", "1"], "'--steps': 1 is not in the range x>=2"),
+        (["--steps", "1"], "steps = 1: must be at least 2"),
         (["--set", "scenario.failures=[{kind='seized', wheels='robot3.*'}]"], "no such wheel"),
         (["--set", "scenario.failures=[{kind='siezed', wheels='*'}]"], "did you mean 'seized'?"),
         (["--set", "scenario.failures=[{kind='seized'}]"], "failures[0].wheels: missing"),

@@ -258,15 +258,54 @@ def test_the_trials_of_all_overrides_are_counted_before_they_are_made():
         Spec.of(table)
 
 
+def test_evaluations_may_change_the_hierarchy_and_the_decision():
+    spec = Spec.parse(
+        """
+        topology.told = "parents"
+        [evaluations]
+        circle.box = "circle"
+        silent = { topology.told = "none", learner.decision.unseen = "last" }
+        tree.topology = "tree:2"
+        """
+    )
+    (condition,) = spec.conditions()
+    circle, silent, tree = (settings for _, settings in condition.evaluations)
+    assert circle.acts_as(condition.settings)
+    assert not silent.acts_as(condition.settings)
+    assert (silent.topology.kind, silent.topology.told) == ("chain", "none")
+    assert (silent.learner.decision.unseen, tree.learner.decision.unseen) == ("last", "maintain")
+    assert (tree.topology.kind, tree.topology.told) == ("tree", "parents")
+    assert silent.scenario == condition.settings.scenario
+
+
+@pytest.mark.parametrize(
+    ("table", "complaint"),
+    [
+        ({"learner": {"kind": "frozen"}}, "learner.kind: a trained team may change its decision"),
+        ({"topology": {"told": "all"}}, "topology.told = 'all': must be 'ancestors', 'parents'"),
+        ({"topology": {"considers": 1}}, "topology.considers = 1: must be"),
+        ({"topology": {"failures": [{"kind": "lots"}]}}, "topology.failures"),
+        (
+            {"topology": {"failures": [{"kind": "lost", "agents": "*", "probability": 2}]}},
+            "probability = 2: must be",
+        ),
+    ],
+)
+def test_what_an_evaluation_cannot_change_is_told(table, complaint):
+    with pytest.raises(SpecError, match=complaint) as error:
+        Spec.of({"evaluations": {"other": table}})
+    assert "\n" not in str(error.value)
+
+
 def test_evaluations_are_laid_over_the_scenario_of_every_condition():
     spec = Spec.parse(
         "evaluations.circle.box = 'circle'\nevaluations.hard.start = 'hard'\n"
         "sweep.scenario.action_repeat = [8, 4]"
     )
     found = [
-        (name, scenario.box, scenario.start, scenario.action_repeat)
+        (name, settings.scenario.box, settings.scenario.start, settings.scenario.action_repeat)
         for condition in spec.conditions()
-        for name, scenario in condition.evaluations
+        for name, settings in condition.evaluations
     ]
     assert found == [
         ("circle", "circle", "medium", 8), ("hard", "square", "hard", 8),

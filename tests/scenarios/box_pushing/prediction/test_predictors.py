@@ -56,6 +56,19 @@ def test_the_exact_one_foresees_to_the_bit(failures: tuple[object, ...], periods
 
 
 @pytest.mark.parametrize("failures", [(), FAILURES], ids=["healthy", "failures"])
+def test_the_exact_one_goes_on_from_where_an_action_leads(failures: tuple[object, ...]) -> None:
+    world = scenario("exact", start="easy", prediction_horizon=8, failures=failures)
+    world.reset(world_seed(3, 0), 0)
+    for _ in range(4):
+        onward = world.predict().after(AHEAD)
+        states, then = onward.states(0, AHEAD[None] + 2), onward.poses(AHEAD[None] + 2)
+        world.step(AHEAD)
+        expected = world.predict()
+        np.testing.assert_array_equal(states, expected.states(0, AHEAD[None] + 2))
+        np.testing.assert_array_equal(then.robots, expected.poses(AHEAD[None] + 2).robots)
+
+
+@pytest.mark.parametrize("failures", [(), FAILURES], ids=["healthy", "failures"])
 def test_looking_ahead_changes_nothing(failures: tuple[object, ...]) -> None:
     settings = BoxPushingSettings.model_validate(
         {"predictor": "exact", "prediction_horizon": 4, "action_repeat": 4, "failures": failures}

@@ -1,0 +1,219 @@
+"""Messages down the hierarchy, and how they fail.
+
+An agent is told the actions that those above it have decided. A failure of messages concerns what
+named agents say: it is lost, late, wrong, or not said at all because the agent is absent; or an
+agent is told by others than it was. All that is random here has a stream of its own, so that worlds
+and policies stay paired. How an agent reads what it was not told is the team's own business, see
+`nested_agents.core.decision.settings`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from numpy.random import Generator
+from pydantic import Field
+
+from ..interface.hierarchy import Hierarchy
+from ..numerics.arrays import BoolArray, IntArray
+from ..plugins.scheduled import Names, Scheduled
+from ..plugins.settings import Fraction
+
+STREAM = 2
+"""Child of a world's seed from which failures of messages draw; see `loop.world_seed`."""
+
+
+class MessageFailure(Scheduled):
+    """From when to when what agents say fails."""
+
+    part: ClassVar[str] = "agents"
+
+    agents: Names
+    """Agents by name or pattern, one or a list."""
+
+    def arrives(self, count: int, rng: Generator) -> BoolArray:
+        """Return which of as many messages of the agents arrive."""
+        return np.ones(count, dtype=bool)
+
+    def altered(self, actions: IntArray, n_actions: int, rng: Generator) -> IntArray:
+        """Return what messages say that are to tell `actions` ``(k,)``."""
+        return actions
+
+
+class LostMessages(MessageFailure):
+    """What the agents say is lost, each message with a probability."""
+
+    kind: Literal["lost"] = "lost"
+    probability: Fraction = 1.0
+    """Of each message; 1: the agents are silent."""
+
+    def arrives(self, count: int, rng: Generator) -> BoolArray:
+        """Return which of as many messages are not lost."""
+        return rng.random(count) >= self.probability
+
+
+class DelayedMessages(MessageFailure):
+    """What the agents say is what they did some decisions before."""
+
+    kind: Literal["delayed"] = "delayed"
+    decisions: Annotated[int, Field(ge=1, le=1000)] = 1
+    """How many; before as many have been made, nothing is said."""
+
+
+class NoisyMessages(MessageFailure):
+    """What the agents say is any action, each message with a probability."""
+
+    kind: Literal["noisy"] = "noisy"
+    probability: Fraction = 0.3
+    """Of each message."""
+
+    def altered(self, actions: IntArray, n_actions: int, rng: Generator) -> IntArray:
+        """Return the actions, some of them replaced by random ones."""
+        noise = rng.integers(n_actions, size=len(actions), dtype=np.int64)
+        is_noisy = rng.random(len(actions)) < self.probability
+        return np.where(is_noisy, noise, actions)
+
+
+class AbsentAgents(MessageFailure):
+    """The agents maintain and say nothing; nobody knows."""
+
+    kind: Literal["absent"] = "absent"
+
+    def arrives(self, count: int, rng: Generator) -> BoolArray:
+        """Return that nothing does."""
+        return np.zeros(count, dtype=bool)
+
+
+class ReparentedAgents(MessageFailure):
+    """The agents are told by another superior; those who consider them do not know."""
+
+    kind: Literal["reparented"] = "reparented"
+    superior: str
+    """Name of an agent that decides before them."""
+
+
+AnyMessageFailure = Annotated[
+    LostMessages | DelayedMessages | NoisyMessages | AbsentAgents | ReparentedAgents,
+    Field(discriminator="kind"),
+]
+"""Any failure of messages: a table distinguished by `kind`."""
+
+
+class Messages:
+    """Who hears what in the decisions of a team.
+
+    Parameters
+    ----------
+    hierarchy
+        Who is told by whom.
+    failures
+        What fails, and when.
+    n_actions
+        Actions of every agent.
+
+    Raises
+    ------
+    ValueError
+        If a failure names an agent that there is not, or a superior that decides too late.
+
+    Examples
+    --------
+    >>> chain = Hierarchy("abc", [("a", "b"), ("b", "c")])
+    >>> messages = Messages(chain, [LostMessages(agents="a")], n_actions=4)
+    >>> messages.begin(0, episode=0)
+    >>> senders, actions = messages.heard(2, np.array([3, 1, 0]))
+    >>> senders.tolist(), actions.tolist()
+    ([1], [1])
+    """
+
+    def __init__(
+        self, hierarchy: Hierarchy, failures: Sequence[MessageFailure], n_actions: int
+    ) -> None:
+        n = len(hierarchy)
+        self._failures, self._n_actions = tuple(failures), n_actions
+        places = [f"topology.failures[{k}]" for k in range(len(failures))]
+        named = [f.mask(hierarchy.agents, p) for f, p in zip(failures, places, strict=True)]
+        self._masks = named
+        self._told: list[IntArray] = [
+            np.array(hierarchy.above(i), dtype=np.int64) for i in range(n)
+        ]
+        self._told_instead = {
+            k: _reparented(hierarchy, failure, np.flatnonzero(named[k]), places[k])
+            for k, failure in enumerate(failures)
+            if isinstance(failure, ReparentedAgents)
+        }
+        self._memory = max(
+            [f.decisions for f in failures if isinstance(f, DelayedMessages)], default=0
+        )
+        self.begin(0, 0)
+
+    @property
+    def fail(self) -> bool:
+        """Whether anything is ever to fail."""
+        return bool(self._failures)
+
+    def begin(self, seed: int | np.random.SeedSequence, episode: int) -> None:
+        """Start an episode; what is random in it follows from `seed`."""
+        root = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
+        key = (*root.spawn_key, STREAM)
+        self._rng = np.random.default_rng(np.random.SeedSequence(root.entropy, spawn_key=key))
+        self._episode, self._step = episode, 0
+        self._past: list[IntArray] = []
+        self._strike()
+
+    def advance(self, joint_action: IntArray) -> None:
+        """Note what all did in a decision, after which the next one comes."""
+        if self._memory:
+            self._past = [*self._past, joint_action.copy()][-self._memory :]
+        self._step += 1
+        self._strike()
+
+    def _strike(self) -> None:
+        now = self._episode, self._step
+        self._active = [k for k, f in enumerate(self._failures) if f.lasts(*now)]
+
+    def is_absent(self, agent: int) -> bool:
+        """Return whether an agent takes no part in the present decision."""
+        return any(
+            isinstance(self._failures[k], AbsentAgents) and self._masks[k][agent]
+            for k in self._active
+        )
+
+    def heard(self, agent: int, joint_action: IntArray) -> tuple[IntArray, IntArray]:
+        """Return whom an agent hears of, ``(k,)``, and what, given what has been decided."""
+        senders = self._told[agent]
+        for k in self._active:
+            senders = self._told_instead[k][agent] if k in self._told_instead else senders
+        actions = joint_action[senders]
+        for k in self._active:
+            failure, concerned = self._failures[k], np.flatnonzero(self._masks[k][senders])
+            arrive = np.ones(len(senders), dtype=bool)
+            arrive[concerned] = failure.arrives(len(concerned), self._rng)
+            if isinstance(failure, DelayedMessages):
+                if len(self._past) < failure.decisions:
+                    arrive[concerned] = False
+                else:
+                    actions[concerned] = self._past[-failure.decisions][senders[concerned]]
+            actions[concerned] = failure.altered(actions[concerned], self._n_actions, self._rng)
+            senders, actions = senders[arrive], actions[arrive]
+        return senders, actions
+
+
+def _reparented(
+    hierarchy: Hierarchy, failure: ReparentedAgents, agents: IntArray, where: str
+) -> dict[int, IntArray]:
+    """Return who is told by whom when some agents have another superior."""
+    names, order = hierarchy.agents, hierarchy.order
+    known = f"{where}.superior = {failure.superior!r}"
+    if failure.superior not in names:
+        raise ValueError(f"{known}: no such agent, allowed {', '.join(names[:8])}")
+    superior = names.index(failure.superior)
+    for agent in agents:
+        if order.index(superior) >= order.index(agent):
+            raise ValueError(f"{known}: must decide before {names[agent]!r}")
+    kept = [(a, b) for a, b in hierarchy.edges if b not in agents]
+    edges = [*kept, *((superior, int(agent)) for agent in agents)]
+    changed = Hierarchy(names, [(names[a], names[b]) for a, b in edges], told=hierarchy.told)
+    return {i: np.array(changed.above(i), dtype=np.int64) for i in range(len(hierarchy))}

@@ -1,0 +1,104 @@
+"""Messages down the hierarchy: who hears what, and how it fails."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from nested_agents.core.agents.messages import (
+    AbsentAgents,
+    DelayedMessages,
+    LostMessages,
+    MessageFailure,
+    Messages,
+    NoisyMessages,
+    ReparentedAgents,
+)
+from nested_agents.core.interface.hierarchy import Hierarchy
+
+CHAIN = Hierarchy("abcd", list(pairwise("abcd")))
+DECIDED = np.array([3, 1, 0, 2])
+
+
+def messages(*failures: MessageFailure, hierarchy: Hierarchy = CHAIN) -> Messages:
+    made = Messages(hierarchy, failures, n_actions=4)
+    made.begin(5, episode=0)
+    return made
+
+
+def heard(made: Messages, agent: int, decided: np.ndarray = DECIDED) -> dict[int, int]:
+    senders, actions = made.heard(agent, decided)
+    return dict(zip(senders.tolist(), actions.tolist(), strict=True))
+
+
+def test_all_that_is_told_arrives_unless_something_fails() -> None:
+    assert heard(messages(), 3) == {0: 3, 1: 1, 2: 0}
+    assert heard(messages(), 0) == {}
+    assert not messages().fail
+
+
+def test_those_who_are_silent_are_not_heard_and_act_on() -> None:
+    made = messages(LostMessages(agents=["a", "c"]))
+    assert heard(made, 3) == {1: 1}
+    assert not made.is_absent(0)
+    assert made.fail
+
+
+def test_messages_are_lost_as_often_as_they_should_be() -> None:
+    made = messages(LostMessages(agents="*", probability=0.3))
+    count = sum(len(heard(made, 3)) for _ in range(2000))
+    assert count / 6000 == pytest.approx(0.7, abs=0.03)
+
+
+def test_late_messages_say_what_was_done_before() -> None:
+    made = messages(DelayedMessages(agents="b", decisions=2))
+    assert heard(made, 3) == {0: 3, 2: 0}
+    for past in ([0, 2, 0, 0], [0, 3, 0, 0]):
+        made.advance(np.array(past))
+    assert heard(made, 3) == {0: 3, 1: 2, 2: 0}
+    made.begin(5, episode=1)
+    assert heard(made, 3) == {0: 3, 2: 0}
+
+
+def test_noise_alters_what_is_said_by_whom_it_befalls_alone() -> None:
+    made = messages(NoisyMessages(agents="b", probability=1.0))
+    said = [heard(made, 3) for _ in range(400)]
+    assert {(s[0], s[2]) for s in said} == {(3, 0)}
+    assert np.bincount([s[1] for s in said], minlength=4) == pytest.approx([100] * 4, abs=35)
+
+
+def test_who_is_absent_says_nothing() -> None:
+    made = messages(AbsentAgents(agents="a", episode=1, end_episode=2))
+    assert (made.is_absent(0), len(heard(made, 3))) == (False, 3)
+    made.begin(5, episode=1)
+    assert (made.is_absent(0), made.is_absent(1), heard(made, 1)) == (True, False, {})
+    made.begin(5, episode=2)
+    assert not made.is_absent(0)
+
+
+def test_who_has_another_superior_is_told_by_that_one_and_those_above_it() -> None:
+    made = messages(ReparentedAgents(agents="d", superior="b", step=1))
+    assert heard(made, 3).keys() == {0, 1, 2}
+    made.advance(DECIDED)
+    assert heard(made, 3).keys() == {0, 1}
+    assert heard(made, 2).keys() == {0, 1}
+
+
+def test_the_same_seed_loses_the_same_messages() -> None:
+    one, same, other = (messages(LostMessages(agents="*", probability=0.5)) for _ in range(3))
+    other.begin(6, episode=0)
+    lost = [[tuple(heard(made, 3)) for _ in range(50)] for made in (one, same, other)]
+    assert lost[0] == lost[1] != lost[2]
+
+
+@pytest.mark.parametrize(
+    ("failure", "complaint"),
+    [
+        (LostMessages(agents="e"), r"topology.failures\[0\].agents = 'e': no such agent, allowed"),
+        (ReparentedAgents(agents="b", superior="z"), "superior = 'z': no such agent, allowed a, b"),
+        (ReparentedAgents(agents="b", superior="c"), "superior = 'c': must decide before 'b'"),
+    ],
+)
+def test_failures_of_agents_that_do_not_exist_are_refused(failure, complaint) -> None:
+    with pytest.raises(ValueError, match=complaint):
+        messages(failure)
