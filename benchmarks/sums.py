@@ -22,7 +22,7 @@ from itertools import product
 import numpy as np
 
 from nested_agents.core.agents.loop import world_seed
-from nested_agents.core.coordination.elimination import Elimination, Scope, total
+from nested_agents.core.coordination.elimination import Elimination, Scope
 from nested_agents.core.coordination.max_plus import MaxPlus
 from nested_agents.core.interface.prediction import Prediction
 from nested_agents.core.numerics.arrays import FloatArray, IntArray
@@ -32,6 +32,11 @@ from nested_agents.studies.trials.trial import trials_of
 
 EVERY = 5
 """Decisions from one situation to the next."""
+
+
+def total(scopes: Sequence[Scope], tables: Sequence[FloatArray], joint: IntArray) -> float:
+    """Return the sum of all tables at a joint action ``(n,)``."""
+    return float(sum(t[tuple(joint[list(scope)])] for scope, t in zip(scopes, tables, strict=True)))
 
 
 def tables_of(

@@ -19,13 +19,11 @@ __all__ = ["DEFAULT", "SCENARIOS"]
 SCENARIOS = SettingsRegistry(
     "scenario",
     {
-        "box-pushing": "nested_agents.scenarios.box_pushing.config:BoxPushingSettings",
-        "pushing-points": (
-            "nested_agents.scenarios.box_pushing.options.config:PushingPointsSettings"
-        ),
-        "matrix-game": "nested_agents.scenarios.matrix_games.scenario:MatrixGameSettings",
-        "kinematic-chain": "nested_agents.scenarios.kinematic_chain.config:KinematicChainSettings",
-        "line-up": "nested_agents.scenarios.line_up:LineUpSettings",
+        "box-pushing": f"{__name__}.box_pushing.config:BoxPushingSettings",
+        "pushing-points": f"{__name__}.box_pushing.options.config:PushingPointsSettings",
+        "matrix-game": f"{__name__}.matrix_games.scenario:MatrixGameSettings",
+        "kinematic-chain": f"{__name__}.kinematic_chain.config:KinematicChainSettings",
+        "line-up": f"{__name__}.line_up:LineUpSettings",
     },
     ScenarioSettings,
 )

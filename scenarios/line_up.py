@@ -185,9 +185,7 @@ class LineUpPrediction:
     def reward_table(self) -> FloatArray:
         """Return the rewards ``(A ** n,)`` of all joint actions by index."""
         n, n_actions = self._places.shape
-        indices = np.arange(n_actions**n)
-        digits = indices[:, None] // n_actions ** np.arange(n - 1, -1, -1) % n_actions
-        return self.rewards(digits)
+        return self.rewards(np.indices((n_actions,) * n).reshape(n, -1).T)
 
     def _after(self, joint_actions: IntArray) -> FloatArray:
         """Return the places ``(m, n)`` [m] after joint actions ``(m, n)``."""

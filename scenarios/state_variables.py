@@ -4,19 +4,19 @@ A state variable is a function of a view and of the number of a body (a robot, a
 over the situations that the view holds; the same function serves sensing, where there is one
 situation, and prediction, where there are many. It must depend on nothing else: ``nested-agents
 check`` finds out where it means two things. What a view is, and which variables are built in, is
-the scenario's business: each has a registry and a view of its own, which tells `n_situations`, how
-many it holds, and gives by ``guarded()`` the same situations, not to be written to.
+the scenario's business: each has a registry and a view of its own, a dataclass which tells
+`n_situations`, how many it holds.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from typing import Any, Literal
 
 import numpy as np
 
-from ..core.interface.spaces import Variable
+from ..core.interface.spaces import StateSpace, Variable
 from ..core.numerics.arrays import FloatArray
 from ..core.plugins.registry import Registry
 
@@ -66,6 +66,37 @@ class StateVariable:
         return values
 
 
+def space_of(name: str, own: Variable, things: Sequence[StateVariable]) -> StateSpace:
+    """Return the state space of an own variable and what is perceived beside it.
+
+    Raises
+    ------
+    ValueError
+        If that is nothing, or a variable occurs twice.
+    """
+    variables = (own, *(thing.variable for thing in things))
+    names = [variable.name for variable in variables]
+    if len(names) < 2 or len(set(names)) < len(names):
+        raise ValueError(
+            f"scenario.state_space = {names[1:]}: variables must be distinct and at least one"
+        )
+    common = tuple(thing.variable.name for thing in things if thing.common)
+    return StateSpace(name, variables, 1, common)
+
+
+def fixed(array: FloatArray) -> FloatArray:
+    """Make an array read-only, and return it."""
+    array.flags.writeable = False
+    return array
+
+
+def guarded(view: Any) -> Any:
+    """Return a view of the same situations whose arrays cannot be written to."""
+    held = {field.name: getattr(view, field.name) for field in fields(view)}
+    arrays = {k: fixed(v.view()) for k, v in held.items() if isinstance(v, np.ndarray)}
+    return replace(view, **arrays)
+
+
 def sensed(
     things: Sequence[StateVariable],
     trusted: Sequence[bool],
@@ -78,7 +109,7 @@ def sensed(
     return is checked.
     """
     values = np.empty((len(bodies), view.n_situations, len(things)))
-    guarded = view if all(trusted) else view.guarded()
+    safe = view if all(trusted) else guarded(view)
     for column, (thing, is_trusted) in enumerate(zip(things, trusted, strict=True)):
         for k, body in enumerate(bodies):
             if k and thing.common:
@@ -86,7 +117,7 @@ def sensed(
             elif is_trusted:
                 values[k, :, column] = thing(view, body)
             else:
-                values[k, :, column] = thing.checked(guarded, body)
+                values[k, :, column] = thing.checked(safe, body)
     return values
 
 

@@ -74,11 +74,6 @@ class Calibration:
         self._units = np.stack([np.ones_like(levers), np.ones_like(levers), levers], axis=1)
 
     @property
-    def deviations(self) -> FloatArray:
-        """Standard deviations ``(n,)`` that the filter gives its constants."""
-        return np.sqrt(np.diagonal(self._covariance))
-
-    @property
     def points(self) -> FloatArray:
         """Constants ``(2 n, n)`` whose outcomes are to be predicted: m + L u, then m - L u."""
         spread = np.sqrt(len(self.constants)) * self._root.T

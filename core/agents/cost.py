@@ -108,26 +108,6 @@ class Problem:
         _check(n)
         return self.iterations * self.rules**n * self.actions ** (2 * n)
 
-    def elimination(self, beside: Iterable[int]) -> int:
-        """Return what variable elimination adds and compares in one decision.
-
-        ``sum_i |A| ** (1 + beside_i)``, exponential in the width of the graph, linear in the agents
-        (Guestrin, Koller and Parr 2002).
-
-        Parameters
-        ----------
-        beside
-            The number of agents in the table that is left when each agent is eliminated.
-
-        Examples
-        --------
-        A line of pairs, and the same agents as one table:
-
-        >>> Problem().elimination([1] * 127 + [0]), Problem().elimination([3, 2, 1, 0])
-        (2036, 340)
-        """
-        return sum(self.actions ** (1 + count) for count in beside)
-
     def decision(self, below: Iterable[int]) -> int:
         """Return how many joint actions one step of the running system tries.
 

@@ -140,8 +140,3 @@ class Elimination:
         for step, choice in zip(reversed(self._steps), reversed(choices), strict=True):
             joint[step.agent] = choice[tuple(joint[list(step.beside)])]
         return joint
-
-
-def total(scopes: Sequence[Scope], tables: Sequence[FloatArray], joint: IntArray) -> float:
-    """Return the sum of all tables at a joint action ``(n,)``."""
-    return float(sum(t[tuple(joint[list(scope)])] for scope, t in zip(scopes, tables, strict=True)))

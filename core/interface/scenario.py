@@ -112,6 +112,35 @@ class RecordedScenario(Scenario, Protocol):
         """Return what is kept once an episode: numbers, texts, arrays."""
 
 
+class EpisodeRecorder:
+    """Collects the recording of one episode.
+
+    Parameters
+    ----------
+    scenario
+        As it is before the first step, which no transition tells; it may be a like of the one that
+        steps.
+    """
+
+    def __init__(self, scenario: RecordedScenario) -> None:
+        opening = scenario.measure()
+        self._frames = {name: [np.array(opening[name])] for name in scenario.recorded}
+        constants = scenario.constants_of_episode()
+        self._constants = {name: np.array(value) for name, value in constants.items()}
+        self._rewards: list[FloatArray] = []
+
+    def add(self, transition: Transition) -> None:
+        """Take in one step."""
+        for name, frames in self._frames.items():
+            frames.append(np.array(transition.info[name]))
+        self._rewards.append(np.array(transition.reward, dtype=float))
+
+    def recording(self) -> dict[str, Any]:
+        """Return what was recorded, arrays by name."""
+        arrays = {name: np.stack(frames) for name, frames in self._frames.items()}
+        return arrays | {"reward": np.array(self._rewards)} | self._constants
+
+
 @runtime_checkable
 class EmbodiedScenario(Scenario, Protocol):
     """A scenario whose groups are bodies on wheels, open to self-models.

@@ -74,6 +74,12 @@ class Variable:
             )
 
 
+def choice(name: str, actions: tuple[str, ...]) -> Variable:
+    """Return a variable that is the index of an action, with a membership centre at each."""
+    centres = tuple(map(float, range(len(actions))))
+    return Variable(name, "1", 0.0, centres[-1], centres=centres, labels=actions)
+
+
 @dataclass(frozen=True)
 class StateSpace:
     """The state variables of an agent, own block first.

@@ -9,7 +9,6 @@ Agents that share weights share the regression: the experience of all of them is
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal, NamedTuple
 
@@ -54,23 +53,6 @@ class BatchTDSettings(ReplaySettings):
     """Trace decay lambda: 0 bootstraps from the next state, 1 sums the rewards of an episode."""
 
 
-class Experience(NamedTuple):
-    """All after-states in memory of the agents of one row; rewards are scaled.
-
-    Of k agents and N steps, after-state ``s * k + j`` is that of agent j after step s.
-    """
-
-    rewards: FloatArray
-    follower: IntArray
-    """Index of the next after-state, `TERMINAL` or `CUT_OFF`."""
-    known: FloatArray
-    """1 where what follows is known, else 0."""
-    low: float
-    """Least discounted sum of rewards that could be."""
-    high: float
-    """Greatest one."""
-
-
 class Earlier(NamedTuple):
     """After-states of a row that agents of another team met."""
 
@@ -82,8 +64,8 @@ class Earlier(NamedTuple):
     """``(m,)`` index of the next after-state among them, `TERMINAL` or `CUT_OFF`."""
 
 
-class ReplayLearner(ABC):
-    """What the batch learners share: a memory of after-states, and the regression.
+class BatchTD:
+    """Batch TD(lambda): a memory of after-states, and regressions on all of them.
 
     Raises
     ------
@@ -91,7 +73,7 @@ class ReplayLearner(ABC):
         If the rule base is too large for its normal equations to be solved densely.
     """
 
-    def __init__(self, settings: ReplaySettings, rules: RuleBase, rows: IntArray) -> None:
+    def __init__(self, settings: BatchTDSettings, rules: RuleBase, rows: IntArray) -> None:
         if rules.n_rules > MOST_RULES:
             raise ValueError(
                 f"learner.kind: batch learners solve for all rules at once: {rules.n_rules} rules, "
@@ -108,6 +90,9 @@ class ReplayLearner(ABC):
         self._rewards: list[FloatArray] = []
         self._follower: list[int] = []
         self._begun = 0  # the first after-state of the running episode
+        # By row, active rules and strengths of the after-states so far regressed on.
+        self._active: list[tuple[IntArray, FloatArray]] = []
+        self._regressed = 0
 
     def begin_episode(self) -> None:
         """Note that the first after-state follows none, even if the last episode was given up."""
@@ -131,21 +116,51 @@ class ReplayLearner(ABC):
         if self._follower and self._follower[-1] == len(self._states):
             self._follower[-1] = CUT_OFF
 
-    @abstractmethod
     def _regress(self) -> int:
-        """Find the weights of all rows anew; return how many there are."""
+        from scipy.linalg import cho_factor
+        from scipy.linalg.lapack import dpotrs  # `cho_solve` without what that does around it
 
-    def experience(self, row: int) -> Experience:
-        """Return what the agents of a row have met, and before them those of another team."""
-        rewards, follower = self._outcomes(row)
-        rewards = REWARD_SCALE * rewards
-        known = (follower != CUT_OFF).astype(float)
-        gamma = self.settings.discount
-        low, high = rewards.min() / (1.0 - gamma), rewards.max() / (1.0 - gamma)
-        return Experience(rewards, follower, known, low, high)
+        self._extend()
+        s = self.settings
+        for row, (active, strengths) in enumerate(self._active):
+            rewards, follower = self._outcomes(row)
+            rewards = REWARD_SCALE * rewards
+            known = (follower != CUT_OFF).astype(float)
+            low, high = np.array([rewards.min(), rewards.max()]) / (1.0 - s.discount)
+            gram = s.ridge * np.eye(self.rules.n_rules)
+            regression.add_gram(gram, active, strengths, known)
+            factor, lower = cho_factor(gram, check_finite=False)
+            theta = self.theta[row].astype(float) * REWARD_SCALE
+            for _ in range(s.regression_iterations):
+                values = regression.row_values(theta, active, strengths)
+                returns = regression.lambda_returns(
+                    values, rewards, follower, s.discount, s.trace_decay
+                )
+                targets = known * np.clip(returns, low, high)
+                moment = regression.moment(active, strengths, targets, self.rules.n_rules)
+                theta, _ = dpotrs(factor, moment, lower)
+            change = theta / REWARD_SCALE - self.theta[row]
+            self.theta[row] += s.target_averaging_rate * change
+        return self.theta.size
+
+    def _extend(self) -> None:
+        """Find the active rules of the after-states that are new since the last regression."""
+        if self._regressed == len(self._states):
+            return
+        rows = range(len(self.theta))
+        active = [self.rules.active(self.states_of(row, self._regressed)) for row in rows]
+        if self._active:
+            active = [
+                (np.concatenate([old[0], new[0]]), np.concatenate([old[1], new[1]]))
+                for old, new in zip(self._active, active, strict=True)
+            ]
+        self._active, self._regressed = active, len(self._states)
 
     def _outcomes(self, row: int) -> tuple[FloatArray, IntArray]:
-        """Return rewards and followers of all after-states of a row, the earlier ones first."""
+        """Return rewards and followers of all after-states of a row, the earlier ones first.
+
+        Of k agents and N steps, after-state ``s * k + j`` is that of agent j after step s.
+        """
         earlier, members = self._earlier[row], self.members[row]
         k, before = len(members), len(earlier.states)
         steps = np.array(self._follower, dtype=np.int64)
@@ -200,61 +215,9 @@ class ReplayLearner(ABC):
             Earlier(*(arrays[f"earlier_{name}"][rows == row] for name in Earlier._fields))
             for row in range(len(self.theta))
         ]
+        self._active, self._regressed = [], 0
 
-    def continue_from(self, former: ReplayLearner, rows: IntArray) -> None:
+    def continue_from(self, former: BatchTD, rows: IntArray) -> None:
         """Begin with weights and experience of another team, of which no episode is under way."""
         self.theta = former.theta[rows]
         self._earlier = [Earlier(former.states_of(row), *former._outcomes(row)) for row in rows]
-
-
-class BatchTD(ReplayLearner):
-    """Batch TD(lambda)."""
-
-    def __init__(self, settings: BatchTDSettings, rules: RuleBase, rows: IntArray) -> None:
-        super().__init__(settings, rules, rows)
-        self._decay = settings.trace_decay
-        # By row, active rules and strengths of the after-states so far regressed on.
-        self._active: list[tuple[IntArray, FloatArray]] = []
-        self._regressed = 0
-
-    def _regress(self) -> int:
-        from scipy.linalg import cho_factor
-        from scipy.linalg.lapack import dpotrs  # `cho_solve` without what that does around it
-
-        self._extend()
-        s = self.settings
-        for row, (active, strengths) in enumerate(self._active):
-            rewards, follower, known, low, high = self.experience(row)
-            gram = s.ridge * np.eye(self.rules.n_rules)
-            regression.add_gram(gram, active, strengths, known)
-            factor, lower = cho_factor(gram, check_finite=False)
-            theta = self.theta[row].astype(float) * REWARD_SCALE
-            for _ in range(s.regression_iterations):
-                values = regression.row_values(theta, active, strengths)
-                returns = regression.lambda_returns(
-                    values, rewards, follower, s.discount, self._decay
-                )
-                targets = known * np.clip(returns, low, high)
-                moment = regression.moment(active, strengths, targets, self.rules.n_rules)
-                theta, _ = dpotrs(factor, moment, lower)
-            change = theta / REWARD_SCALE - self.theta[row]
-            self.theta[row] += s.target_averaging_rate * change
-        return self.theta.size
-
-    def _extend(self) -> None:
-        """Find the active rules of the after-states that are new since the last regression."""
-        if self._regressed == len(self._states):
-            return
-        rows = range(len(self.theta))
-        active = [self.rules.active(self.states_of(row, self._regressed)) for row in rows]
-        if self._active:
-            active = [
-                (np.concatenate([old[0], new[0]]), np.concatenate([old[1], new[1]]))
-                for old, new in zip(self._active, active, strict=True)
-            ]
-        self._active, self._regressed = active, len(self._states)
-
-    def restore(self, arrays: Mapping[str, FloatArray]) -> None:
-        """Continue from `arrays`."""
-        super().restore(arrays)
-        self._active, self._regressed = [], 0

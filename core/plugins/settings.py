@@ -118,8 +118,8 @@ class ScenarioSettings(PartSettings):
 
     @property
     def onset(self) -> int | None:
-        """Episode in which something is scheduled to change, such as a failure; none: never."""
-        return None
+        """Episode in which the first of the ``failures``, if it has any, begins; none: never."""
+        return min((failure.episode for failure in getattr(self, "failures", ())), default=None)
 
 
 def tuples(value: Any) -> Any:

@@ -127,7 +127,8 @@ class Sources:
         for part in name.split("."):
             thing = getattr(thing, part, None)
         if thing is None:
-            own = [n for n, f in vars(module).items() if _belongs(f, module)]
+            its = vars(module).items()
+            own = [n for n, f in its if getattr(f, "__module__", "") == module.__name__]
             raise ValueError(f"{path} has no {name!r}, it has: {', '.join(own) or 'nothing'}")
         return thing
 
@@ -327,7 +328,3 @@ def message(error: BaseException) -> str:
 
 def _sha256(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
-
-
-def _belongs(thing: object, module: ModuleType) -> bool:
-    return getattr(thing, "__module__", "") == module.__name__

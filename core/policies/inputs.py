@@ -10,7 +10,6 @@ from __future__ import annotations
 import numpy as np
 
 from ..interface.scenario import Scenario, groups_of
-from ..interface.spaces import StateSpace
 from ..numerics.arrays import FloatArray
 
 FARTHEST = 3.0
@@ -43,7 +42,8 @@ class Inputs:
         self._low = np.array([v.low for v in space.variables])
         self._span = np.array([v.high - v.low for v in space.variables])
         self._periodic = np.array([v.periodic for v in space.variables])
-        self._columns = _columns(space)
+        # Which variable each input is of: all of them, then the cosines of the periodic.
+        self._columns = np.append(np.arange(space.n_variables), np.flatnonzero(self._periodic))
         self._groups, self._n_own = groups_of(scenario), space.n_own
         n = len(scenario.agents)
         self._names = np.eye(n)
@@ -69,12 +69,6 @@ class Inputs:
         angles = 2.0 * np.pi * place[:, self._periodic]
         columns = np.where(self._periodic, np.sin(2.0 * np.pi * place), linear)
         return np.hstack([columns, np.cos(angles)])
-
-
-def _columns(space: StateSpace) -> FloatArray:
-    """Return which variable each input is of: all of them, then the cosines of the periodic."""
-    every = np.arange(space.n_variables)
-    return np.concatenate([every, every[[v.periodic for v in space.variables]]])
 
 
 class RewardScale:

@@ -23,7 +23,7 @@ import numpy as np
 from ..interface.prediction import Blocks
 from ..interface.spaces import StateSpace
 from ..numerics.arrays import FloatArray, IntArray
-from .kernels.compact import active_compact, each_compact, td_compact, total_compact, values_compact
+from .kernels.compact import active_compact, each_compact, td_compact, total_compact
 from .kernels.dense import values_dense
 from .kernels.enumeration import (
     Tried,
@@ -191,7 +191,8 @@ class RuleBase:
         self._check_states(states)
         self._check_theta(theta)
         if self.compact:
-            return values_compact(theta, states, self.layout)
+            values: FloatArray = each_compact(theta[None], states[None], self.layout)[0]
+            return values
         return values_dense(theta, states, self.layout)
 
     def each(self, theta: FloatArray, states: FloatArray) -> FloatArray:

@@ -65,11 +65,6 @@ class BoxTaskSettings(ScenarioSettings):
         return tuple(units.warnings(self))
 
     @property
-    def onset(self) -> int | None:
-        """Episode in which the first wheel fails; none: none does."""
-        return min((failure.episode for failure in self.failures), default=None)
-
-    @property
     def period(self) -> float:
         """Seconds for which a decision is held."""
         return self.action_repeat * CONTROL_PERIOD

@@ -113,10 +113,9 @@ class Game:
             raise ValueError(f"steps = {steps}, must be at least 1")
         if render_mode not in (None, *RENDER_MODES):
             raise ValueError(f"render_mode = {render_mode!r}, allowed None, {RENDER_MODES}")
-        settings = as_settings(settings)
-        self.scenario = BoxPushing(settings)
+        self.scenario = BoxPushing(as_settings(settings))
         self.steps = steps
-        self.screen = Screen(settings.drawn, render_mode, sensors=sensors) if render_mode else None
+        self.screen = Screen(self.scenario, render_mode, sensors=sensors) if render_mode else None
         self._seeds = np.random.default_rng()
         self._episode, self._step = -1, 0
 
@@ -131,7 +130,7 @@ class Game:
         self._step = 0
         states = self.scenario.reset(int(self._seeds.integers(2**63)), self._episode)
         if self.screen is not None:
-            self.screen.begin(self.scenario.measure())
+            self.screen.begin()
         return states
 
     def step(self, joint_action: IntArray) -> tuple[Transition, bool]:

@@ -16,8 +16,8 @@ import numpy as np
 from ...core.agents.team import Team
 from ...core.interface.measures import SUCCESS, Measure
 from ...core.interface.scenario import Transition
-from ...core.interface.spaces import ActionSet, StateSpace
-from ...core.numerics.arrays import BoolArray, FloatArray, IntArray
+from ...core.interface.spaces import ActionSet
+from ...core.numerics.arrays import FloatArray, IntArray
 from .config import BoxPushingSettings
 from .prediction.belief import APART, CONSTANTS, PushBelief, believing, least_gap
 from .prediction.prediction import BoxPrediction, mean_twists
@@ -95,8 +95,9 @@ class BoxPushing:
         self.box = box_for(settings.box, settings.robots)
         similar = settings.scaling == "similar"
         self._unit = growth(settings.box, settings.robots) if similar else 1.0
+        robots = [self.robot] * settings.robots
         # Whether they fit is better known now than in the middle of a study.
-        place(settings.start, np.random.default_rng(0), [self.robot] * settings.robots, self.box)
+        place(settings.start, np.random.default_rng(0), robots, self.box)
         wheels = len(self.robot.wheels)
         self.groups = tuple(
             tuple(range(r * wheels, (r + 1) * wheels)) for r in range(settings.robots)
@@ -108,18 +109,20 @@ class BoxPushing:
         )
         self.roles = self.robot.wheel_names * settings.robots
         self.action_set = ActionSet()
-        self.world = World([self.robot] * settings.robots, self.box, infrared=settings.infrared)
+        self.world = World(robots, self.box, infrared=settings.infrared)
         self._space = state_space_for(settings.state_space, self.robot.max_speed)
         self._limits: FloatArray = np.full(len(self.agents), self.robot.max_speed)
-        self._effects = (nominal_effect(self.robot),) * settings.robots
-        robots = [self.robot] * settings.robots
+        self.state_space = self._space.space
+        self.nominal_effects = (nominal_effect(self.robot),) * settings.robots
+        """Per robot the ``(3, w + 1)`` effect of its wheel speeds on its twist."""
+        self.constants = CONSTANTS if settings.predictor == "push" else ()
+        """Names of what the push predictor can calibrate; the other predictors have none."""
+        radii = [self.robot.radius] * settings.robots
+        self.levers: FloatArray = np.array([self.box.friction_radius, *radii])
+        """Speed per turning rate of the box and of every robot ``(M + 1,)`` [m]."""
         self._model = push_model(settings.predictor, robots, self.box, settings.belief)
         self._playground = World(robots, self.box) if settings.predictor == "exact" else None
-        self._failures = (
-            WheelFailures(settings.failures, self.agents, self._limits)
-            if settings.failures
-            else None
-        )
+        self._failures = WheelFailures(settings.failures, self.agents, self._limits)
         paid = settings.reward.model_copy(update={"r1": settings.reward.r1 / self._unit})
         self._task = Task(paid, self._unit * settings.tolerance, settings.orientation_tolerance)
         self._belief = PushBelief.of(self._model, robots, settings.belief.stiffness)
@@ -133,11 +136,6 @@ class BoxPushing:
         self._speeds: FloatArray = np.zeros(len(self.agents))
         self._step = 0
         self._saved: WorldState | None = None
-
-    @property
-    def state_space(self) -> StateSpace:
-        """The state variables of every agent."""
-        return self._space.space
 
     @property
     def bounds(self) -> FloatArray:
@@ -190,9 +188,8 @@ class BoxPushing:
         self.world.place(robots, box)
         self._speeds = np.zeros(len(self.agents))
         self._step = 0
-        if self._failures is not None:
-            self._failures.begin(seed, episode)
-            self.world.set_grip(self._failures.grip)
+        self._failures.begin(seed, episode)
+        self.world.set_grip(self._failures.grip)
         self._save()
         return self._observe(self.world.box_pose)
 
@@ -227,7 +224,9 @@ class BoxPushing:
             paid = np.repeat(gained, [len(group) for group in self.groups])
         sensed = perf_counter()
         if terminated:
-            measured["stopped_at_goal"] = self._stays()
+            # Does the box come to rest within the tolerance when all wheels stop?
+            self._advance(np.zeros(len(self.agents)))
+            measured["stopped_at_goal"] = self._reached()
         self._step += 1
         self._save()
         measured["seconds"] = {"physics": moved - begin, "sensors": sensed - moved}
@@ -235,25 +234,9 @@ class BoxPushing:
         truncated = not terminated and measured["distance_m"] > farthest
         return Transition(states, paid, terminated, truncated, measured, twists)
 
-    @property
-    def nominal_effects(self) -> tuple[FloatArray, ...]:
-        """Per robot the ``(3, w + 1)`` effect of its wheel speeds on its twist."""
-        return self._effects
-
     def predict(self) -> BoxPrediction:
         """Predict from the present state, every robot taken as nominal."""
-        return self.predict_with(self._effects)
-
-    @property
-    def constants(self) -> tuple[str, ...]:
-        """Names of what the push predictor can calibrate; the other predictors have none."""
-        return CONSTANTS if self.settings.predictor == "push" else ()
-
-    @property
-    def levers(self) -> FloatArray:
-        """Speed per turning rate of the box and of every robot ``(M + 1,)`` [m]."""
-        radii = [self.robot.radius] * self.settings.robots
-        return np.array([self.box.friction_radius, *radii])
+        return self.predict_with(self.nominal_effects)
 
     def predict_with(
         self, effects: Sequence[FloatArray], constants: FloatArray | None = None
@@ -324,26 +307,16 @@ class BoxPushing:
             "contact": self.world.contact.copy(),
             "contact_time": self.world.contact_time.copy(),
             "contact_fraction": float(np.mean(self.world.contact_time)),
-            "failed": self.failed,
+            "failed": self._failures.failed,
             "distance_m": self._distance(),
             "orientation_rad": orientation,
             "orientation_error_rad": abs(orientation),
             "stopped_at_goal": False,
         }
 
-    @property
-    def failed(self) -> BoolArray:
-        """Whether each wheel is under a failure now, ``(n,)``."""
-        if self._failures is None:
-            return np.zeros(len(self.agents), dtype=bool)
-        return self._failures.failed
-
     def _advance(self, commands: FloatArray) -> None:
         """Let the world go on for one decision period, the wheels being commanded `commands`."""
-        if self._failures is None:
-            self.world.advance(commands, self.settings.action_repeat)
-        else:
-            self._failures.advance(self.world, commands, self._step, self.settings.action_repeat)
+        self._failures.advance(self.world, commands, self._step, self.settings.action_repeat)
 
     def _distance(self) -> float:
         ahead = self._goal[:2] - self.world.box_pose[:2]
@@ -355,11 +328,6 @@ class BoxPushing:
     def _reached(self) -> bool:
         distance, orientation = np.array([self._distance()]), np.array([self._orientation()])
         return bool(self._task.reached(distance, orientation)[0])
-
-    def _stays(self) -> bool:
-        """Stop all wheels and tell whether the box comes to rest within the tolerance."""
-        self._advance(np.zeros(len(self.agents)))
-        return self._reached()
 
     def _observe(self, origin: FloatArray) -> FloatArray:
         """Return the states ``(n, d)`` of all agents: the error observation layer.

@@ -115,11 +115,6 @@ class KinematicChainSettings(ScenarioSettings):
         return {"learner": {"ridge": RIDGE * sharing[preset], "discount": DISCOUNT}}
 
     @property
-    def onset(self) -> int | None:
-        """Episode in which the first joint fails; none: none does."""
-        return min((failure.episode for failure in self.failures), default=None)
-
-    @property
     def period(self) -> float:
         """Seconds for which a decision is held."""
         return PERIOD

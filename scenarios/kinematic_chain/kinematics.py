@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...core.numerics.arrays import FloatArray
 from ...core.numerics.compiling import njit
 
 
@@ -34,15 +35,10 @@ def postures_of(angles, length):  # type: ignore[no-untyped-def]
     return places
 
 
-@njit(cache=True)
-def jacobian_of(places):  # type: ignore[no-untyped-def]
+def jacobian_of(places: FloatArray) -> FloatArray:
     """Return how the tip moves ``(n, 2)`` as each joint turns, given `ends_of` a posture [m/rad].
 
     A joint turns all that is behind it: the tip moves at right angles to the line from the joint.
     """
-    n = len(places) - 1
-    moves = np.empty((n, 2))
-    for i in range(n):
-        moves[i, 0] = places[i, 1] - places[n, 1]
-        moves[i, 1] = places[n, 0] - places[i, 0]
-    return moves
+    x, y = (places[-1] - places[:-1]).T
+    return np.stack([-y, x], axis=1)

@@ -19,8 +19,8 @@ import numpy as np
 from ...core.interface.measures import SUCCESS, Measure
 from ...core.interface.prediction import first_alike
 from ...core.interface.scenario import Transition
-from ...core.interface.spaces import ActionSet, StateSpace
-from ...core.numerics.arrays import BoolArray, FloatArray, IntArray
+from ...core.interface.spaces import ActionSet
+from ...core.numerics.arrays import FloatArray, IntArray
 from ..faults.schedule import Failures
 from .config import PERIOD, REACH, KinematicChainSettings
 from .kinematics import postures_of
@@ -76,6 +76,9 @@ class KinematicChain:
         self._most = np.full(n, settings.joint_limit or np.inf)
         self._most[0] = np.inf
         self._states = ChainStates(settings.state_space)
+        self.state_space = self._states.space
+        self.nominal_effects = (np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]]),) * n
+        """Per joint the ``(3, 2)`` effect of its speed: as a body it can but turn."""
         self._failures = Failures(settings.failures, self.agents, self._limits)
         # What an informed prediction knows of the next step, while the others tell of the last.
         self._known = Failures(settings.failures, self.agents, self._limits)
@@ -83,11 +86,6 @@ class KinematicChain:
         self._angles: FloatArray = np.zeros(n)
         self._speeds: FloatArray = np.zeros(n)
         self._step = 0
-
-    @property
-    def state_space(self) -> StateSpace:
-        """The state variables of every agent."""
-        return self._states.space
 
     def partners(self) -> tuple[int, ...]:
         """Return for every joint the one in whose place it stands in the mirror: itself."""
@@ -135,11 +133,6 @@ class KinematicChain:
         measured["seconds"] = {"physics": moved - begin, "sensors": perf_counter() - moved}
         return Transition(states, paid, terminated, truncated, measured, twists)
 
-    @property
-    def nominal_effects(self) -> tuple[FloatArray, ...]:
-        """Per joint the ``(3, 2)`` effect of its speed: as a body it can but turn."""
-        return (np.array([[0.0, 0.0], [0.0, 0.0], [1.0, 0.0]]),) * len(self.agents)
-
     def predict(self) -> ChainPrediction:
         """Predict from the present state, by joints as built or, failures known, as they are."""
         if self.settings.predictor == "nominal":
@@ -172,16 +165,11 @@ class KinematicChain:
         return {
             "angles": self._angles.copy(),
             "speeds": self._speeds.copy(),
-            "failed": self.failed,
+            "failed": self._failures.failed,
             "tip": self._places()[-1].copy(),
             "goal": self._goal,
             "distance_m": self._distance(),
         }
-
-    @property
-    def failed(self) -> BoolArray:
-        """Whether each joint is under a failure now, ``(n,)``."""
-        return self._failures.failed
 
     def constants_of_episode(self) -> Mapping[str, Any]:
         """Return the goal of the episode, and what is drawn."""

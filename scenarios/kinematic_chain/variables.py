@@ -17,10 +17,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...core.interface.spaces import StateSpace, Variable
+from ...core.interface.spaces import Variable
 from ...core.numerics.arrays import FloatArray
 from ...core.plugins.registry import Registry
-from ..state_variables import find_variable
+from ..state_variables import find_variable, guarded, space_of
 from .kernels import COMPILED, columns
 from .view import ChainView
 
@@ -51,14 +51,7 @@ class ChainStates:
 
     def __init__(self, names: Sequence[str]) -> None:
         things = [find_variable(CHAIN_VARIABLES, name) for name in names]
-        variables = tuple(thing.variable for thing in things)
-        distinct = {"speed", *(variable.name for variable in variables)}
-        if not names or len(distinct) <= len(names):
-            raise ValueError(
-                f"scenario.state_space = {list(names)}: variables must be distinct and at least one"
-            )
-        common = tuple(thing.variable.name for thing in things if thing.common)
-        self.space = StateSpace("+".join(names), (SPEED, *variables), 1, common)
+        self.space = space_of("+".join(names), SPEED, things)
         self._own = [
             (column, thing)
             for column, (name, thing) in enumerate(zip(names, things, strict=True), 1)
@@ -74,8 +67,8 @@ class ChainStates:
             view.places, view.angles, view.speeds, view.goal, view.before, first, count, self._rows
         )
         if self._own:
-            guarded = view.guarded()
+            safe = guarded(view)
             for column, thing in self._own:
                 for i in range(count):
-                    states[i, :, column] = thing.checked(guarded, first + i)
+                    states[i, :, column] = thing.checked(safe, first + i)
         return states

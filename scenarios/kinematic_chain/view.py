@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from ...core.numerics.arrays import FloatArray
+from ..state_variables import fixed
 
 
 @dataclass(frozen=True)
@@ -47,22 +48,9 @@ class ChainView:
     @cached_property
     def distance(self) -> FloatArray:
         """Distance ``(m,)`` of the tip from the goal [m]."""
-        return _fixed(np.hypot(*(self.goal - self.tip).T))
+        return fixed(np.hypot(*(self.goal - self.tip).T))
 
     @property
     def approach(self) -> FloatArray:
         """How much nearer ``(m,)`` the tip has come to the goal in the decision [m]."""
         return self.before - self.distance
-
-    def guarded(self) -> ChainView:
-        """Return the same situations, not to be written to."""
-        places, angles, speeds, goal = (
-            _fixed(array.view()) for array in (self.places, self.angles, self.speeds, self.goal)
-        )
-        return ChainView(places, angles, speeds, goal, self.before)
-
-
-def _fixed(array: FloatArray) -> FloatArray:
-    """Make an array read-only, and return it."""
-    array.flags.writeable = False
-    return array

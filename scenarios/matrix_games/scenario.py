@@ -19,7 +19,7 @@ from ...core.agents.loop import EpisodeSummary
 from ...core.agents.team import Team
 from ...core.interface.measures import SUCCESS, Measure
 from ...core.interface.scenario import Transition
-from ...core.interface.spaces import ActionSet, StateSpace, Variable
+from ...core.interface.spaces import ActionSet, StateSpace, choice
 from ...core.numerics.arrays import FloatArray, IntArray
 from ...core.plugins.settings import ScenarioSettings
 from .games import of_two, optimal, payoffs_of
@@ -176,12 +176,10 @@ class MatrixGamePrediction:
 def _state_space(
     agents: tuple[str, ...], actions: tuple[str, ...], observed: Literal["joint", "own", "above"]
 ) -> StateSpace:
-    def variable(name: str) -> Variable:
-        centres = tuple(float(a) for a in range(len(actions)))
-        return Variable(name, "1", 0.0, centres[-1], centres=centres, labels=actions)
-
     if observed == "joint":
         names = tuple(f"action_of_{agent}" for agent in agents)
-        return StateSpace(observed, tuple(map(variable, names)), common=names)
+        return StateSpace(observed, tuple(choice(name, actions) for name in names), common=names)
     above = tuple(f"told_by_{agent}" for agent in agents[:-1]) if observed == "above" else ()
-    return StateSpace(observed, tuple(map(variable, ("own_action", *above))), n_own=1)
+    return StateSpace(
+        observed, tuple(choice(name, actions) for name in ("own_action", *above)), n_own=1
+    )

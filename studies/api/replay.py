@@ -60,18 +60,10 @@ def draw(
     SpecError
         If there is no such trial or recording, or its scenario does not draw.
     """
-    from ..trials.keeping import spec_of
-    from ..trials.trial import trials_of
+    from ..trials.keeping import trial_of
 
     with Store.open(directory) as store:
-        spec = spec_of(store)
-        trials = [t for t in trials_of(spec) if condition in (None, t.condition)]
-        if not trials:
-            known = closest(condition, [c.label for c in spec.conditions()])
-            raise SpecError(f"condition = {condition!r}: {known}")
-        chosen = next((t for t in trials if seed in (None, t.seed)), None)
-        if chosen is None:
-            raise SpecError(f"seed = {seed}: known: {', '.join(map(str, spec.seeds))}")
+        chosen = trial_of(store, condition, seed)
         recorded = list(chosen.recorded.values())
         if episode == "first" and episode not in recorded:
             episode = "last"  # of one episode

@@ -342,13 +342,15 @@ def load(*places: Place) -> StudyResults:
     if not places:
         raise SpecError("load: needs a directory at least")
     paths = [Path(place) for place in places]
-    twice = next((p for i, p in enumerate(paths) if p.resolve() in _resolved(paths[:i])), None)
+    resolved = [path.resolve() for path in paths]
+    twice = next((p for i, p in enumerate(paths) if resolved[i] in resolved[:i]), None)
     if twice is not None:
         raise SpecError(f"{twice}: is named more than once")
     loaded = [_loaded(path) for path in paths]
     if len(loaded) == 1:
         return loaded[0]
-    names = [path.name if _distinct(paths) else str(path) for path in paths]
+    names = [path.name for path in paths]
+    names = names if len(set(names)) == len(names) else list(map(str, paths))
     results, labels = together(
         [(n, s.results) for n, s in zip(names, loaded, strict=True)],
         [study._settings for study in loaded],
@@ -365,14 +367,6 @@ def load(*places: Place) -> StudyResults:
         loaded[0]._sources, settings, tuple(d for s in loaded for d in s._directories),
         _is_whole=False,
     )  # fmt: skip
-
-
-def _resolved(paths: Sequence[Path]) -> list[Path]:
-    return [path.resolve() for path in paths]
-
-
-def _distinct(paths: Sequence[Path]) -> bool:
-    return len({path.name for path in paths}) == len(paths)
 
 
 def _loaded(path: Path) -> StudyResults:

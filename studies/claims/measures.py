@@ -15,7 +15,7 @@ from ...core.agents.cost import Problem
 from ..catalogue.chain_order import compare_orders
 from ..catalogue.shapes import ratios_of
 from ..catalogue.wheel_failure import courses_of
-from ..results.comparison import difference, paired, ratio
+from ..results.comparison import aligned, difference, ratio
 from ..results.results import Results
 from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
 
@@ -93,25 +93,17 @@ def sooner_than_planned(results: Results) -> Measured | None:
     return _compare(results, learner_of(results), PLANNER, _evaluation_steps, share)
 
 
-def success(episodes: slice) -> Compute:
-    """Return what measures the learner's success in some episodes of training."""
+def success(episodes: slice, name: str = "", note: str = "") -> Compute:
+    """Return what measures success in some episodes of training, see `learned` for the `name`."""
 
     def compute(results: Results) -> Measured | None:
-        learner = learner_of(results)
-        if not results.has(learner, "training"):
+        condition = name or learner_of(results)
+        if not results.has(condition, "training"):
             return None
-        outcomes = results.success(learner)[:, episodes]
-        return Measured(rate(outcomes), len(outcomes)) if outcomes.size else None
+        outcomes = results.success(condition)[:, episodes]
+        return Measured(rate(outcomes), len(outcomes), note=note) if outcomes.size else None
 
     return compute
-
-
-def oriented(results: Results) -> Measured | None:
-    """Measure how often preset pose, which asks for it, brings the box to the goal pose."""
-    if not results.has("pose", "training"):
-        return None
-    outcomes = results.success("pose")[:, LAST]
-    return Measured(rate(outcomes), len(outcomes), note="preset pose")
 
 
 def contact_gained(results: Results) -> Measured | None:
@@ -242,7 +234,7 @@ def _compare(
     """
     if not all(results.has(c, phase, measure) for c in (condition, reference)):
         return None
-    base, own = paired(results, reference, condition, values)
+    base, own = aligned(results, (reference, condition), values)
     return Measured(estimate(own, base), len(own), note=note) if len(own) else None
 
 
@@ -288,10 +280,6 @@ def worst_shape(condition: str = "") -> Compute:
     return compute
 
 
-def without(condition: str) -> Compute:
-    """Return what measures the evaluation success of a condition relative to the default's."""
-
-    def compute(results: Results) -> Measured | None:
-        return _compare(results, condition, "default", _evaluation_success, ratio)
-
-    return compute
+def without_model(results: Results) -> Measured | None:
+    """Measure evaluation success where the box is predicted not to move, over the default's."""
+    return _compare(results, "static predictor", "default", _evaluation_success, ratio)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import ceil
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -36,10 +35,7 @@ def _figures(explained: Explanation) -> Iterator[tuple[str, Figure]]:
 
 def _functions(explained: Explanation, block: slice) -> Figure:
     d = len(explained.variables)
-    columns = 4 if d > 3 else d
-    rows = ceil(d / columns)
-    size = 2.45 * columns, 2.2 * rows + 0.7
-    figure, panels = figures.panels(rows, columns, size, sharey=True)
+    figure, panels = figures.grid(d, 4, (2.45, 2.2), (0.0, 0.7), sharey=True)
     panels = panels.ravel()
     power = exponent(explained.parts)
     names, parts = explained.agents[block], explained.parts[block]
@@ -67,8 +63,6 @@ def _functions(explained: Explanation, block: slice) -> Figure:
         unit = {"rad": " [°]", "1": ""}.get(variable.unit, f" [{variable.unit}]")
         axes.set_title(f"{variable.name}{unit}, {percent(share)}", loc="left")
         axes.axhline(0.0, color="#cccccc", lw=0.8, zorder=0)
-    for axes in panels[d:]:
-        axes.set_visible(False)
     scale = rf" [$\times 10^{{{-power}}}$]" if power else ""
     figure.supylabel(f"adds to f{scale}", fontsize=9)
     title = "markers: rules, less their mean; in the titles the share of the variance of f"

@@ -21,15 +21,13 @@ from ...core.agents.team import Team, of_fuzzy_agents
 from ...core.interface.scenario import Scenario
 from ...core.interface.spaces import Variable
 from ...core.learners import LearnerSettings
-from ...core.plugins.messages import closest
 from ...core.rules.rule_base import RuleBase
 from ..errors import SpecError
-from ..spec.labels import aliases
 from ..store.schema import STAGE, columns
 from ..store.store import Store
-from ..trials.keeping import spec_of
+from ..trials.keeping import trial_of
 from ..trials.session import Session
-from ..trials.trial import Trial, trials_of
+from ..trials.trial import Trial
 from . import rules as explain_rules
 from .body import Bodies
 from .rules import Parts
@@ -74,21 +72,9 @@ def choose(store: Store, condition: str | None, seed: int | None) -> Trial:
     SpecError
         If there is no such trial, or it has not finished.
     """
-    spec = spec_of(store)
-    known = {c.label: aliases(c.label, c.columns) for c in spec.conditions()}
-    conditions = list(known)
-    if condition is None:
-        condition = conditions[0]
-    elif condition not in known and sum(condition in own for own in known.values()) == 1:
-        condition = next(label for label, own in known.items() if condition in own)
-    if condition not in known:
-        raise SpecError(f"--condition {condition!r}: {closest(condition, conditions)}")
-    seed = spec.seeds[0] if seed is None else seed
-    if seed not in spec.seeds:
-        raise SpecError(f"--seed {seed}: allowed {', '.join(map(str, spec.seeds))}")
-    trial = next(t for t in trials_of(spec) if (t.condition, t.seed) == (condition, seed))
+    trial = trial_of(store, condition, seed)
     if not _kept(store, trial):
-        raise SpecError(f"{store.directory}: {condition}, seed {seed} has not finished")
+        raise SpecError(f"{store.directory}: {trial.condition}, seed {trial.seed} has not finished")
     return trial
 
 

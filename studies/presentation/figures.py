@@ -56,6 +56,28 @@ def panels(
     return figure, figure.subplots(rows, columns, squeeze=False, **sharing)
 
 
+def grid(
+    count: int,
+    most: int,
+    each: tuple[float, float],
+    margin: tuple[float, float],
+    least: float = 0.0,
+    **sharing: Any,
+) -> tuple[Figure, Any]:
+    """Return a figure of a number of panels, see `panels`, at most so many side by side.
+
+    Width and height [inch] are those of `each` panel and the `margin` of all of them; the width is
+    the `least` at least.
+    """
+    columns = min(most, count)
+    rows = -(-count // columns)
+    size = max(least, margin[0] + each[0] * columns), margin[1] + each[1] * rows
+    figure, axes = panels(rows, columns, size, **sharing)
+    for spare in axes.flat[count:]:
+        spare.set_visible(False)
+    return figure, axes
+
+
 def look(index: int) -> dict[str, Any]:
     """Return colour and dashes of a line, by which lines differ."""
     return {"color": COLOURS[index % len(COLOURS)], "ls": STYLES[index % len(STYLES)]}
@@ -139,7 +161,7 @@ def write(figure: Figure, path: Path) -> None:
     """
     check_suffix(path)
     metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(path.suffix)
-    with mpl.rc_context(SETTINGS), replacing(path) as file:  # type: ignore[arg-type]
+    with styled(), replacing(path) as file:
         figure.savefig(file, format=path.suffix[1:], dpi=150, metadata=metadata)
 
 

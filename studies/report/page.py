@@ -13,7 +13,7 @@ from ..claims.claims import judge
 from ..presentation.tables import tabulate
 from ..presentation.words import count
 from ..results.contrasts import contrasts
-from ..results.results import Results, read
+from ..results.results import read
 from ..spec.outline import StudyOutline, sources_of
 from ..spec.toml import dumps
 from ..store.schema import RESULTS_VERSION
@@ -46,13 +46,16 @@ def page(directory: Path) -> str:
     with sources.active():
         analysis = analysed(outline.study, results)
         figures = drawn(load_study(outline.study), analysis)
+    notes = getattr(analysis, "notes", ())
+    if not notes and len(results.conditions) > 1:  # what `compare` says of it
+        notes = contrasts(results).notes
     return _template().render(
         study=outline.study,
         extent=words.extent(outline),
         compared=", ".join(next(iter(outline.columns.values()))),
         standing=words.standing(len(trials), counts["done"], counts["failed"]),
         complete=counts["done"] == len(trials),
-        notes=getattr(analysis, "notes", ()) or _compared(results),
+        notes=notes,
         table=tabulate(analysis.table),
         claims=[
             (finding.claim, finding.result, finding.verdict)
@@ -70,11 +73,6 @@ def page(directory: Path) -> str:
         js=_own("page.js"),
         replay_js=Markup(packed.script),
     )
-
-
-def _compared(results: Results) -> tuple[str, ...]:
-    """Return what `compare` says of a study that has no notes of its own."""
-    return contrasts(results).notes if len(results.conditions) > 1 else ()
 
 
 @cache

@@ -8,11 +8,10 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import matplotlib as mpl
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
-from ..presentation.figures import SETTINGS
+from ..presentation.figures import styled
 
 
 @dataclass(frozen=True)
@@ -42,7 +41,7 @@ class Picture:
 def pictures(figures: Mapping[str, Figure]) -> list[Picture]:
     """Return a study's figures, by name, as they stand in a page and are taken away from it."""
     drawn = []
-    with mpl.rc_context(SETTINGS):  # type: ignore[arg-type]
+    with styled():
         for number, (name, figure) in enumerate(figures.items(), 1):
             svg = io.StringIO()
             figure.savefig(svg, format="svg", metadata={"Date": None})

@@ -6,6 +6,8 @@ import platform
 import re
 from collections.abc import Iterable
 
+import numpy as np
+
 from ..presentation.words import count
 from ..spec.outline import StudyOutline
 from ..workers.worker import installed
@@ -31,12 +33,8 @@ def runs(values: Iterable[int]) -> str:
     >>> runs([0, 1, 2, 3, 7, 9, 8, 20]), runs([1, 0])
     ('0 to 3, 7 to 9, 20', '0, 1')
     """
-    blocks: list[list[int]] = []
-    for value in sorted(values):
-        if blocks and value == blocks[-1][-1] + 1:
-            blocks[-1].append(value)
-        else:
-            blocks.append([value])
+    ordered = np.array(sorted(values), dtype=np.int64)
+    blocks = np.split(ordered, np.flatnonzero(np.diff(ordered) != 1) + 1)
     parts = [
         f"{block[0]} to {block[-1]}" if len(block) > 2 else ", ".join(map(str, block))
         for block in blocks

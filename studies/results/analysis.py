@@ -4,10 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from .comparison import Difference
 from .summary import Summary
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Figures: TypeAlias = "dict[str, Figure]"
+"""The figures of an analysis by name."""
 
 
 @dataclass(frozen=True)

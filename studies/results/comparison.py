@@ -136,17 +136,6 @@ def paired_difference(own: Array, base: Array, *, of_rates: bool) -> Estimate:
     return bootstrap(own - base, bounds=(-1.0, 1.0) if of_rates else (-np.inf, np.inf))
 
 
-def paired(
-    results: Results,
-    first: str,
-    second: str,
-    values: Callable[[Results, str], ArrayLike],
-) -> tuple[Array, Array]:
-    """Return the values ``(n_seeds, ...)`` of two conditions for the seeds that both have."""
-    one, other = aligned(results, (first, second), values)
-    return one, other
-
-
 def aligned(
     results: Results, conditions: Sequence[str], values: Callable[[Results, str], ArrayLike]
 ) -> list[Array]:

@@ -14,7 +14,6 @@ from ..errors import SpecError
 from ..spec.labels import aliases, label
 from .comparison import Array, Difference, differences
 from .numbers import shown
-from .paired_tests import LEVEL
 from .results import SECONDS, Results
 from .statistics import bootstrap, rate
 from .summary import Summary
@@ -71,11 +70,6 @@ class Contrasts:
     def differences(self) -> tuple[Difference, ...]:
         """All differences."""
         return tuple(d for group in self.groups for d in group.differences)
-
-    @property
-    def significant(self) -> tuple[Difference, ...]:
-        """Those whose adjusted p is below .05."""
-        return tuple(d for d in self.differences if d.p < LEVEL)
 
     @property
     def title(self) -> str:

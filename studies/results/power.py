@@ -9,6 +9,7 @@ below `LEVEL`. The differences of single seeds are taken for independent and nor
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Sequence
 from functools import lru_cache
 from itertools import combinations
@@ -120,13 +121,9 @@ def seeds_for(
         low, high = high + 1, 2 * high
         if high > 2 * MOST_SEEDS:
             return None
-    while low < high:
-        middle = (low + high) // 2
-        if power(effect, deviation, middle, comparisons) < wanted:
-            low = middle + 1
-        else:
-            high = middle
-    return low if low <= MOST_SEEDS else None
+    seeds = range(low, high)
+    enough = bisect_left(seeds, wanted, key=lambda n: power(effect, deviation, n, comparisons))
+    return low + enough if low + enough <= MOST_SEEDS else None
 
 
 def deviation_of(samples: Sequence[ArrayLike], *, of_rates: bool) -> float | None:
@@ -196,7 +193,8 @@ def _power(effect: float, seeds: int, comparisons: int) -> float:
         return 0.0
     level = LEVEL / comparisons
     if 2**seeds <= EXACT:
-        extreme = _extreme(seeds, comparisons)
+        # So many of the 2 ** (seeds - 1) patterns, up to sign, are significant at most.
+        extreme = math.ceil(level * 2.0 ** (seeds - 1)) - 1
         if extreme <= FEW_PATTERNS:
             return _simulated(effect, seeds, extreme)
         level = extreme * 2.0 ** (1 - seeds)
@@ -218,11 +216,6 @@ def _detectable(seeds: int, comparisons: int, wanted: float) -> float:
         else:
             high = middle
     return high
-
-
-def _extreme(seeds: int, comparisons: int) -> int:
-    """Return how many of the ``2 ** (seeds - 1)`` patterns, up to sign, are significant at most."""
-    return math.ceil(LEVEL / comparisons * 2.0 ** (seeds - 1)) - 1
 
 
 def _simulated(effect: float, seeds: int, extreme: int) -> float:

@@ -98,7 +98,7 @@ class Results:
         rows = self._rows.get((phase, condition))
         if rows is None or not measure:
             return rows is not None if phase else condition in self._finished
-        return measure in self.episodes and not np.isnan(self._column(measure)[rows]).any()
+        return measure in self._measured and not np.isnan(self._measured[measure][rows]).any()
 
     def of_phase(self, phase: str) -> tuple[str, ...]:
         """Return the conditions that have episodes of a phase."""
@@ -122,7 +122,7 @@ class Results:
             If there are no such episodes.
         """
         rows = self._rows[phase, condition]
-        values = self._column(measure)[rows]
+        values = self._measured[measure][rows]
         if measure in self._whole:
             values = values.astype(int)
         return values.reshape(len(np.unique(self.episodes["seed"].to_numpy()[rows])), -1)
@@ -159,14 +159,10 @@ class Results:
         return frozenset(("steps", *(m.name for m in self.measures if m.is_rate)))
 
     @cached_property
-    def _columns(self) -> dict[str, Array]:
-        return {}
-
-    def _column(self, measure: str) -> Array:
-        if measure not in self._columns:
-            values = self.episodes[measure].to_numpy(dtype=float, na_value=np.nan)
-            self._columns[measure] = values
-        return self._columns[measure]
+    def _measured(self) -> dict[str, Array]:
+        names = {"steps", "return", *(measure.name for measure in self.measures)}
+        columns = self.episodes[[name for name in self.episodes if name in names]]
+        return {n: own.to_numpy(dtype=float, na_value=np.nan) for n, own in columns.items()}
 
 
 def read(store: Store) -> Results:

@@ -69,21 +69,6 @@ def two_figures(value: float) -> str:
     return text.replace("0.", ".", 1) if text.lstrip("-").startswith("0.") else text
 
 
-def interval(estimate: Estimate) -> str:
-    """Return the interval of an estimate as text; a dash if it is not known.
-
-    Examples
-    --------
-    >>> interval(Estimate(np.float64(0.4), np.float64(0.25), np.float64(1.0)))
-    '.25–1.0'
-    >>> interval(Estimate(np.float64(-0.6), np.float64(-0.72), np.float64(-0.53)))
-    '-.72 to -.53'
-    """
-    if np.isnan(estimate.low):
-        return "–"
-    return between(two_figures(float(estimate.low)), two_figures(float(estimate.high)))
-
-
 def between(low: str, high: str) -> str:
     """Return the two bounds of an interval as one text, in which no dash meets a minus sign."""
     return f"{low} to {high}" if "-" in (low[0], high[0]) else f"{low}–{high}"

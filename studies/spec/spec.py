@@ -169,7 +169,8 @@ class Spec(Settings):
             spec = cls.model_validate(tuples(table), strict=True)
         except ValidationError as error:
             raise SpecError(explain(error, cls, table, below(table))) from None
-        points = spec.n_conditions
+        own = [override.sweep for override in spec.overrides] or [{}]
+        points = sum(math.prod(map(len, {**swept, **spec.sweep}.values())) for swept in own)
         if points * len(spec.seeds) > MOST_TRIALS:
             grid_size = f"{points} conditions x {len(spec.seeds)} seeds"
             raise SpecError(f"sweep: {grid_size}, at most {MOST_TRIALS} trials")
@@ -238,13 +239,6 @@ class Spec(Settings):
             except ValueError as error:
                 raise SpecError(f"--set {change}: {error}") from None
         return cls.of(table, Sources(folder, study=study))
-
-    @property
-    def n_conditions(self) -> int:
-        """How many conditions there are."""
-        own = [override.sweep for override in self.overrides] or [{}]
-        sizes = [math.prod(map(len, {**swept, **self.sweep}.values())) for swept in own]
-        return sum(sizes)
 
     def conditions(self) -> tuple[Condition, ...]:
         """Return the conditions in the order of the overrides and sweeps."""

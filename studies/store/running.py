@@ -18,7 +18,7 @@ LOCK = ".lock"
 MARK = "running.json"
 
 
-class Running:
+class Running(contextlib.AbstractContextManager["Running"]):
     """Keeps the mark while its context lasts.
 
     Parameters
@@ -33,9 +33,6 @@ class Running:
         self._path = directory / MARK
         self._processes = processes
         self._begun: dict[str, float] = {}
-
-    def __enter__(self) -> Running:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self._begun.clear()
@@ -70,8 +67,7 @@ def look(directory: Path) -> tuple[int, dict[str, float]] | None:
     if not _locked(directory / LOCK):
         return None
     try:
-        mark = json.loads((directory / MARK).read_text())
-        now = time.time()
+        mark, now = json.loads((directory / MARK).read_text()), time.time()
         seconds = {identity: max(now - begun, 0.0) for identity, begun in mark["begun"].items()}
         return mark["processes"], seconds
     except (OSError, ValueError, KeyError, TypeError, AttributeError):

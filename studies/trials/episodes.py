@@ -7,11 +7,9 @@ from math import inf, isfinite
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.interface.measures import Measure
-from ...core.interface.scenario import RecordedScenario, Transition
-from ..store.durable import Recording
+from ...core.interface.scenario import Transition
 
 if TYPE_CHECKING:
     from ...core.agents.loop import StepRecord
@@ -133,32 +131,3 @@ class Stopwatch:
         self.seconds["physics"] += spent.get("physics", 0.0)
         self.seconds["sensors"] += spent.get("sensors", 0.0)
         self.seconds["learning"] += record.learning
-
-
-class EpisodeRecorder:
-    """Collects the recording of one episode.
-
-    Parameters
-    ----------
-    scenario
-        As it is before the first step, which no transition tells; it may be a like of the one that
-        steps.
-    """
-
-    def __init__(self, scenario: RecordedScenario) -> None:
-        opening = scenario.measure()
-        self._frames = {name: [np.array(opening[name])] for name in scenario.recorded}
-        constants = scenario.constants_of_episode()
-        self._constants = {name: np.array(value) for name, value in constants.items()}
-        self._rewards: list[NDArray[np.float64]] = []
-
-    def add(self, transition: Transition) -> None:
-        """Take in one step."""
-        for name, frames in self._frames.items():
-            frames.append(np.array(transition.info[name]))
-        self._rewards.append(np.array(transition.reward, dtype=float))
-
-    def recording(self) -> Recording:
-        """Return what was recorded."""
-        arrays = {name: np.stack(frames) for name, frames in self._frames.items()}
-        return arrays | {"reward": np.array(self._rewards)} | self._constants

@@ -11,8 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from ...core.interface.measures import Measure
+from ...core.plugins.messages import closest
 from ...core.plugins.sources import FOLDER, Sources, kept_name
 from ..errors import SpecError, show
+from ..spec.labels import aliases
 from ..spec.outline import sources_of
 from ..spec.overlay import flat
 from ..spec.spec import Spec
@@ -24,7 +26,7 @@ from ..store.schema import Noted
 from ..store.store import Store, locked
 from . import code
 from .measures import column_of
-from .trial import Trial
+from .trial import Trial, trials_of
 
 SAME = ("study", "episodes", "steps", "evaluation", "evaluation_steps", "evaluations")
 """What of a spec must be the same for a study to go on."""
@@ -95,6 +97,27 @@ def pending(store: Store, trials: Iterable[Trial]) -> list[Trial]:
     """
     states = store.states()
     return [trial for trial in trials if trial.identity not in states]
+
+
+def trial_of(store: Reading, condition: str | None, seed: int | None) -> Trial:
+    """Return the trial of a condition and seed of a study, each the first one unless named.
+
+    Raises
+    ------
+    SpecError
+        If there is no such condition or seed.
+    """
+    spec = spec_of(store)
+    known = {c.label: aliases(c.label, c.columns) for c in spec.conditions()}
+    labels = [label for label, own in known.items() if condition in own]
+    if condition is None or condition in known:
+        labels = [next(iter(known)) if condition is None else condition]
+    if len(labels) != 1:
+        raise SpecError(f"condition = {condition!r}: {closest(condition, known)}")
+    seed = spec.seeds[0] if seed is None else seed
+    if seed not in spec.seeds:
+        raise SpecError(f"seed = {seed}: known: {', '.join(map(str, spec.seeds))}")
+    return next(t for t in trials_of(spec) if (t.condition, t.seed) == (labels[0], seed))
 
 
 def noted_of(spec: Spec, measures: Sequence[Measure] = (), trials: Sequence[Trial] = ()) -> Noted:

@@ -10,11 +10,11 @@ from ...core.agents.loop import StepRecord, control_loop, world_seed
 from ...core.agents.team import Team
 from ...core.interface.acting import Actors
 from ...core.interface.measures import Measure, measures_of
-from ...core.interface.scenario import RecordedScenario
+from ...core.interface.scenario import EpisodeRecorder, RecordedScenario
 from ..store.durable import Recording
 from ..store.schema import EVALUATION, STAGE
 from .arrangement import Arrangement, arrange, teach, transfer
-from .episodes import EpisodeMeter, EpisodeRecorder, EpisodeRow, Stopwatch
+from .episodes import EpisodeMeter, EpisodeRow, Stopwatch
 from .measures import joined
 from .trial import Trial, TrialResult
 

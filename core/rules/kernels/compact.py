@@ -135,12 +135,6 @@ def _numbered(n: int) -> IntArray:
 
 
 @njit(cache=True)
-def values_compact(theta: FloatArray, states: FloatArray, packed: Packed) -> FloatArray:
-    """Return f ``(m,)`` of states ``(m, d)``, triangular partitions."""
-    return each_compact(theta[None], states[None], packed)[0]
-
-
-@njit(cache=True)
 def each_compact(theta: FloatArray, states: FloatArray, packed: Packed) -> FloatArray:
     """Return f ``(n, s)`` of states ``(n, s, d)``, each by its row of theta ``(n, n_rules)``."""
     out, lay = np.zeros(states.shape[:2]), unpack(packed)

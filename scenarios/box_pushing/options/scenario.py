@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from ....core.interface.scenario import Transition
-from ....core.interface.spaces import ActionSet, StateSpace, Variable
+from ....core.interface.spaces import ActionSet, StateSpace, Variable, choice
 from ....core.numerics.arrays import FloatArray, IntArray
 from ..config import BoxPushingSettings, BoxTaskSettings
 from ..scenario import MEASURES, BoxPushing
@@ -172,14 +172,9 @@ def _state_space(
     turns = np.arange(settings.bearings) * 2.0 * pi / settings.bearings - pi
     bearing = Variable("goal_bearing", "rad", -pi, pi, periodic=True, centres=tuple(turns.tolist()))
 
-    def choice(name: str) -> Variable:
-        centres = tuple(float(k) for k in range(len(points)))
-        return Variable(name, "1", 0.0, centres[-1], centres=centres, labels=points)
-
     if settings.observed == "own":
-        return StateSpace(
-            "own pushing point", (choice("own_point"), bearing), 1, (bearing.name,), ("own_point",)
-        )
+        own = choice("own_point", points)
+        return StateSpace("own pushing point", (own, bearing), 1, (bearing.name,), (own.name,))
     names = tuple(f"point_of_{agent}" for agent in agents)
-    variables = (bearing, *map(choice, names))
+    variables = (bearing, *(choice(name, points) for name in names))
     return StateSpace("pushing points", variables, 0, (bearing.name, *names), names)

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from ....core.interface.scenario import Transition
-
-SHOWN = ("robot_poses", "box_pose", "wheel_speeds", "contact", "failed")
+from ....core.interface.scenario import EpisodeRecorder, RecordedScenario, Transition
 
 
 class Screen:
@@ -17,31 +14,28 @@ class Screen:
 
     Parameters
     ----------
-    drawn
-        What does not change, `BoxPushingSettings.drawn`.
+    scenario
+        Where it is played.
     mode
         ``"rgb_array"``: `render` returns a picture. ``"human"``: a window is kept up to date.
     sensors
         Whether rays of infrared sensors are drawn.
     """
 
-    def __init__(self, drawn: Mapping[str, Any], mode: str, *, sensors: bool = False) -> None:
-        self.mode, self.sensors = mode, sensors
-        self._constants = {name: np.array(value) for name, value in drawn.items()}
-        self._frames: dict[str, list[Any]] = {}
+    def __init__(self, scenario: RecordedScenario, mode: str, *, sensors: bool = False) -> None:
+        self.scenario, self.mode, self.sensors = scenario, mode, sensors
+        self._recorder: Any = None
         self._window: Any = None
 
-    def begin(self, measured: Mapping[str, Any]) -> None:
+    def begin(self) -> None:
         """Forget the past and take in the start of an episode."""
-        self._constants["goal_pose"] = np.array(measured["goal_pose"])
-        self._frames = {name: [np.array(measured[name])] for name in SHOWN}
+        self._recorder = EpisodeRecorder(self.scenario)
         if self.mode == "human":
             self._show()
 
     def add(self, transition: Transition) -> None:
         """Take in a step."""
-        for name, frames in self._frames.items():
-            frames.append(np.array(transition.info[name]))
+        self._recorder.add(transition)
         if self.mode == "human":
             self._show()
 
@@ -53,7 +47,7 @@ class Screen:
         RuntimeError
             If no episode has begun.
         """
-        if not self._frames:
+        if self._recorder is None:
             raise RuntimeError("render: no episode has begun, call reset first")
         return None if self.mode == "human" else self._picture()
 
@@ -68,8 +62,7 @@ class Screen:
     def _picture(self) -> np.ndarray:
         from .rendering import picture
 
-        recording = {name: np.stack(frames) for name, frames in self._frames.items()}
-        recording |= self._constants
+        recording = self._recorder.recording()
         return picture(recording, len(recording["box_pose"]) - 1, sensors=self.sensors)
 
     def _show(self) -> None:

@@ -21,7 +21,7 @@ from ..world.reward import reward
 from .belief import outcomes
 from .push import PushModel, push
 from .situation import Premises, Situation
-from .wheel_commands import WheelCommands, choices_of, speeds_of, twist_table, wheel_commands_of
+from .wheel_commands import WheelCommands, choices_of, twist_table, wheel_commands_of
 
 
 class BoxPrediction:
@@ -42,6 +42,7 @@ class BoxPrediction:
 
     def __init__(self, situation: Situation, model: PushModel, premises: Premises) -> None:
         self.situation, self.model, self.premises = situation, model, premises
+        self.groups = situation.groups
         self._last: tuple[bytes, View] | None = None  # what was asked for last
 
     @cached_property
@@ -53,10 +54,6 @@ class BoxPrediction:
             speeds[:, None], np.arange(len(actions)), self.premises.increment * limits, limits
         ).reshape(len(self.situation.groups), -1, len(actions))
         return wheel_commands_of(commands, np.array(self.situation.effects), self.merges)
-
-    def _view(self, choices: IntArray) -> View:
-        """Return where the robots' wheel commands ``(m, M)`` lead."""
-        return self._after(choices, self.premises.seconds)
 
     def _after(self, choices: IntArray, seconds: float) -> View:
         robots, box, gaps = push(
@@ -73,7 +70,7 @@ class BoxPrediction:
         """Return the view of `choices`: the last one, if they are the same."""
         key = choices.tobytes()
         if self._last is None or self._last[0] != key:
-            self._last = key, self._view(choices)
+            self._last = key, self._after(choices, self.premises.seconds)
         return self._last[1]
 
     def _choices(self, joint_actions: IntArray) -> IntArray:
@@ -89,7 +86,7 @@ class BoxPrediction:
     def _table(self) -> tuple[View, IntArray]:
         """Where all combinations of twists lead, and the row of every joint-action index."""
         choices, row = twist_table(self.wheel_commands)
-        return self._view(choices), row
+        return self._after(choices, self.premises.seconds), row
 
     @cached_property
     def _alone(self) -> list[FloatArray]:
@@ -152,8 +149,10 @@ class BoxPrediction:
         if space.own_needs_pose:
             own = np.array([self._own_after(agent, choices, view) for agent in range(n)])
             return own, shared
-        speeds = speeds_of(choices, self.wheel_commands.speeds)
-        own = space.own(np.zeros((0, 3)), speeds.reshape(-1), self.situation.goal)
+        # (M, m, wheels)
+        speeds = self.wheel_commands.speeds[np.arange(len(shared))[:, None], choices.T]
+        speeds = speeds.transpose(0, 2, 1).reshape(-1)
+        own = space.own(np.zeros((0, 3)), speeds, self.situation.goal)
         return own.reshape(n, m, -1), shared
 
     def _own_after(self, agent: int, choices: IntArray, view: View) -> FloatArray:
@@ -174,11 +173,6 @@ class BoxPrediction:
             robots=view.robots[0], box=view.box[0], speeds=self.commands(joint_action),
         )  # fmt: skip
         return BoxPrediction(reached, self.model, self.premises)
-
-    @property
-    def groups(self) -> tuple[tuple[int, ...], ...]:
-        """Agents by robot."""
-        return self.situation.groups
 
     def commands(self, joint_action: IntArray) -> FloatArray:
         """Return the wheel speeds ``(n,)`` that a joint action ``(n,)`` would command [m/s]."""

@@ -76,7 +76,7 @@ class Future:
 
     world: World
     state: WorldState
-    failures: WheelFailures | None
+    failures: WheelFailures
     step: int
     hold: int
 
@@ -90,16 +90,13 @@ class Future:
         failures = self._play(commands, self.hold)
         return replace(self, state=self.world.state(), failures=failures, step=self.step + 1)
 
-    def _play(self, commands: FloatArray, periods: int) -> WheelFailures | None:
+    def _play(self, commands: FloatArray, periods: int) -> WheelFailures:
         """Play control periods from the saved state; return the failures at their end."""
         self.world.restore(self.state)
         failures = deepcopy(self.failures)
-        if failures is None:
-            self.world.advance(commands, periods)
-        else:
-            self.world.set_grip(failures.grip)
-            for number, past in enumerate(range(0, periods, self.hold), self.step):
-                failures.advance(self.world, commands, number, min(self.hold, periods - past))
+        self.world.set_grip(failures.grip)
+        for number, past in enumerate(range(0, periods, self.hold), self.step):
+            failures.advance(self.world, commands, number, min(self.hold, periods - past))
         return failures
 
 

@@ -161,19 +161,6 @@ def choices_of(joint_actions: IntArray, which: IntArray, n_actions: int) -> IntA
 
 
 @njit(cache=True)
-def speeds_of(choices: IntArray, speeds: FloatArray) -> FloatArray:
-    """Return the wheel speeds ``(n, m)`` of all agents under wheel commands ``(m, M)`` [m/s]."""
-    m, n = choices.shape
-    wheels = speeds.shape[2]
-    wheel_speeds = np.empty((n * wheels, m))
-    for r in range(n):
-        for j in range(wheels):
-            for c in range(m):
-                wheel_speeds[r * wheels + j, c] = speeds[r, choices[c, r], j]
-    return wheel_speeds
-
-
-@njit(cache=True)
 def twist_table(commands: WheelCommands) -> tuple[IntArray, IntArray]:
     """Return all combinations of distinct twists, and the one of every joint-action index.
 

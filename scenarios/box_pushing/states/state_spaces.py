@@ -18,7 +18,7 @@ import numpy as np
 
 from ....core.interface.spaces import StateSpace, Variable
 from ....core.numerics.arrays import FloatArray
-from ...state_variables import StateVariable, find_variable, sensed
+from ...state_variables import StateVariable, find_variable, guarded, sensed, space_of
 from ..world.geometry import wrap
 from .kernels import COMPILED, Columns
 from .variables import STATE_VARIABLES
@@ -72,11 +72,11 @@ class BoxStateSpace:
             return compiled
         blocks = np.empty((len(robots), len(view.box), len(self.functions)))
         blocks[:, :, np.array(self.compiled)] = compiled
-        guarded = view.guarded()
+        safe = guarded(view)
         # Every robot is asked, so that `check` finds what is wrongly called common.
         for column in np.flatnonzero(~np.array(self.compiled)):
             for block, robot in zip(blocks, robots, strict=True):
-                block[:, column] = self.functions[column].checked(guarded, robot)
+                block[:, column] = self.functions[column].checked(safe, robot)
         return blocks
 
     def is_own(self, variable: str) -> bool:
@@ -118,14 +118,8 @@ def listed(name: str, *shared: str) -> BoxStateSpace:
         If there is none, one is unknown or named twice.
     """
     functions = tuple(find_variable(STATE_VARIABLES, one) for one in shared)
-    variables = (_SPEED, *(function.variable for function in functions))
-    if not shared or len({variable.name for variable in variables}) != len(variables):
-        raise ValueError(
-            f"scenario.state_space = {list(shared)}: variables must be distinct and at least one"
-        )
-    common = tuple(function.variable.name for function in functions if function.common)
     return BoxStateSpace(
-        StateSpace(name, variables, 1, common),
+        space_of(name, _SPEED, functions),
         lambda poses, speeds, goal: speeds[:, None],
         own_needs_pose=False,
         functions=functions,
@@ -149,37 +143,9 @@ _PAPER = (
     ),
 )
 
-_PUSHING = (
-    "gap",
-    "box_bearing",
-    "side",
-    "others_gap",
-    "cross_track_error",
-    "box_distance",
-    "approach",
-)
-
-_PUSHING_TOGETHER = (
-    "gap",
-    "face_bearing",
-    "side",
-    "others_away",
-    "contact_push_bearing",
-    "contact_cross_track_error",
-    "box_distance",
-    "approach",
-)
-
-_STEERING = (
-    "gap",
-    "face_bearing",
-    "side",
-    "others_away",
-    "path_bearing",
-    "path_cross_track_error",
-    "box_distance",
-    "approach",
-)
+_ON_THE_WAY = ("box_distance", "approach")
+_PUSHING = ("gap", "box_bearing", "side", "others_gap", "cross_track_error", *_ON_THE_WAY)
+_BESIDE_OTHERS = ("gap", "face_bearing", "side", "others_away")
 
 STATE_SPACES: dict[str, BoxStateSpace] = {
     # Eq. 1, in the order of its own and its shared part.
@@ -206,9 +172,11 @@ STATE_SPACES: dict[str, BoxStateSpace] = {
     "relational": listed("relational", *_PUSHING),
     "pose": listed("pose", *_PUSHING, "bend", "box_turn"),
     # The same for boxes that are wide for a robot, and for any number of robots.
-    "crowd": listed("crowd", *_PUSHING_TOGETHER),
+    "crowd": listed(
+        "crowd", *_BESIDE_OTHERS, "contact_push_bearing", "contact_cross_track_error", *_ON_THE_WAY
+    ),
     # For boxes so wide that they hardly turn on the way: where the box goes, not how it is pushed.
-    "wide": listed("wide", *_STEERING),
+    "wide": listed("wide", *_BESIDE_OTHERS, "path_bearing", "path_cross_track_error", *_ON_THE_WAY),
 }
 """State spaces by the name that specs use."""
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from ....core.numerics.arrays import FloatArray
 from ....core.numerics.compiling import njit
+from ...state_variables import fixed
 from ..world.geometry import Outline, surface, wrap
 
 CLOSE = 0.02
@@ -57,24 +57,18 @@ class View:
     outline: Outline
     friction_radius: float
 
-    # What all robots share is computed once, and must stay as it is.
-
-    def guarded(self) -> View:
-        """Return the same situations, not to be written to."""
-        names = ("robots", "box", "gaps", "goal", "origin")
-        arrays: dict[str, Any] = {name: _fixed(getattr(self, name).view()) for name in names}
-        return replace(self, **arrays)
-
     @property
     def n_situations(self) -> int:
         """How many situations there are."""
         return len(self.box)
 
+    # What all robots share is computed once, and must stay as it is.
+
     @cached_property
     def distance(self) -> FloatArray:
         """Distance ``(m,)`` of the box from the goal [m]."""
         ahead = self.goal[:2] - self.box[:, :2]
-        return _fixed(np.hypot(ahead[:, 0], ahead[:, 1]))
+        return fixed(np.hypot(ahead[:, 0], ahead[:, 1]))
 
     @cached_property
     def before(self) -> float:
@@ -130,12 +124,12 @@ class View:
         drift = np.arctan2(across, np.abs(along) + STILL * self.periods)
         reach = 2.0 * self.friction_radius**2 / np.maximum(self.distance, ARRIVED)
         turn = np.arctan2(lever, np.maximum(depth, reach))
-        return _fixed(inward + KEPT * drift + turn)
+        return fixed(inward + KEPT * drift + turn)
 
     @cached_property
     def turn(self) -> FloatArray:
         """Turn ``(m,)`` of the box from the goal pose [rad]."""
-        return _fixed(wrap(self.box[:, 2] - self.goal[2]))
+        return fixed(wrap(self.box[:, 2] - self.goal[2]))
 
     def azimuth(self, robot: int) -> FloatArray:
         """Direction ``(m,)`` from a robot to the box [rad]."""
@@ -149,13 +143,7 @@ class View:
 
 def _direction(ways: FloatArray) -> FloatArray:
     """Return the directions ``(m,)`` of ways ``(m, 2)`` [rad], read-only."""
-    return _fixed(np.arctan2(ways[:, 1], ways[:, 0]))
-
-
-def _fixed(array: FloatArray) -> FloatArray:
-    """Make an array read-only, and return it."""
-    array.flags.writeable = False
-    return array
+    return fixed(np.arctan2(ways[:, 1], ways[:, 0]))
 
 
 @njit(cache=True)

@@ -30,6 +30,9 @@ class WheelFailures(Failures):
         """Let a world go on through (a part of) a step, its wheels being commanded `commands`."""
         if self.strike(step):
             world.set_grip(self.grip)
+        if not self._settings:
+            world.advance(commands, periods)
+            return
         touched = np.zeros(len(world.robots))
         for speeds in self.driven(commands, periods):
             world.advance(speeds, 1)

@@ -143,11 +143,6 @@ class World:
     def place(self, robot_poses: FloatArray, box_pose: FloatArray) -> None:
         """Start afresh, everything at rest: robots ``(M, 3)`` and the box ``(3,)``."""
         n = len(self.robots)
-        if np.shape(robot_poses) != (n, 3) or np.shape(box_pose) != (3,):
-            raise ValueError(
-                f"poses of shapes {np.shape(robot_poses)} and {np.shape(box_pose)}, "
-                f"must be ({n}, 3) and (3,)"
-            )
         poses = np.vstack([box_pose, robot_poses])
         rest = np.zeros((n, 3))
         self.restore(WorldState(poses, np.zeros((n + 1, 3)), rest, rest, np.zeros(n)))

@@ -9,20 +9,15 @@ conditions and both measures.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from ...results.analysis import Analysis
+from ...results.analysis import Analysis, Figures
 from ...results.comparison import differences, mean_success, with_first
 from ...results.results import Results
 from ...results.statistics import Estimate, rate
 from ...results.summary import EVALUATED, Summary
 from ...results.verdicts import power_lines, verdict_lines
 from ..study import run_training as measure
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
@@ -54,7 +49,7 @@ def analyse(results: Results) -> Analysis:
     )
 
 
-def draw(analysis: Analysis) -> dict[str, Figure]:
+def draw(analysis: Analysis) -> Figures:
     """Return the figures of an analysis by name."""
     from ...presentation import forest
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ...results.analysis import Analysis
+from ...results.analysis import Analysis, Figures
 from ...results.comparison import aligned, mean_success
 from ...results.paired_tests import LEVEL, Friedman, friedman, holm, paired_permutation
 from ...results.results import Results
@@ -26,7 +26,6 @@ from ..study import run_training as measure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
@@ -61,12 +60,6 @@ class OrderComparison:
     test: Friedman
     p: float
     against_first: NDArray[np.float64]
-
-    @property
-    def resolution(self) -> float:
-        """Half the median width of the 95 % intervals of the differences, unadjusted."""
-        shifts = bootstrap(self.values[:, 1:] - self.values[:, :1])
-        return float(np.median(shifts.high - shifts.low)) / 2.0
 
 
 def analyse(results: Results) -> Analysis:
@@ -135,6 +128,9 @@ def _verdict(comparisons: Sequence[OrderComparison]) -> Iterator[str]:
         means = c.values.mean(axis=0)
         best, worst = int(means.argmax()), int(means.argmin())
         differ = "differ" if c.p < LEVEL else "do not differ significantly"
+        # Half the median width of their 95 % intervals, unadjusted.
+        shifts = bootstrap(c.values[:, 1:] - c.values[:, :1])
+        reach = float(np.median(shifts.high - shifts.low)) / 2.0
         named = int((c.against_first < LEVEL).sum())
         yield (
             f"{c.title}: {k} orders {differ} (Friedman {c.test.statistic:.1f}, p = {c.test.p:.2g}, "
@@ -142,7 +138,7 @@ def _verdict(comparisons: Sequence[OrderComparison]) -> Iterator[str]:
         )
         yield (
             f"  {named} of {k - 1} differ from the first (least p {c.against_first.min():.2g}, "
-            f"adjusted); intervals of the differences reach {c.resolution:.2f} to either side"
+            f"adjusted); intervals of the differences reach {reach:.2f} to either side"
         )
         yield (
             f"  best {c.orders[best]}: {means[best]:.3f}; worst {c.orders[worst]}: "
@@ -150,7 +146,7 @@ def _verdict(comparisons: Sequence[OrderComparison]) -> Iterator[str]:
         )
 
 
-def draw(analysis: Analysis) -> dict[str, Figure]:
+def draw(analysis: Analysis) -> Figures:
     """Return the figure: every order with its interval, sorted, and every seed.
 
     Points are means over seeds, bars their 95 % intervals, grey the seeds; the first condition,

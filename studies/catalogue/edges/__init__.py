@@ -12,14 +12,12 @@ the study `hierarchies`.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ....core.agents.loop import StepRecord
 from ....core.interface.scenario import groups_of
 from ...errors import SpecError
-from ...results.analysis import Analysis
+from ...results.analysis import Analysis, Figures
 from ...results.results import Results
 from ...results.summary import EVALUATED
 from ...spec.spec import Spec
@@ -28,9 +26,6 @@ from ...trials.trial import Trial, TrialResult
 from ..hierarchies import VALUE_OF, HierarchyCase, analysis_of, estimates
 from ..hierarchies import draw as draw_by_robots
 from ..study import check_evaluated, check_rule_bases
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
@@ -86,7 +81,7 @@ def analyse(results: Results) -> Analysis:
     return analysis_of(results, cases, TRAINED)
 
 
-def draw(analysis: Analysis) -> dict[str, Figure]:
+def draw(analysis: Analysis) -> Figures:
     """Return the figure of `hierarchies`; of one setting alone, differences from training."""
     from ...presentation import forest
 

@@ -11,12 +11,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import ceil
 from string import ascii_uppercase
 from textwrap import wrap
-from typing import TYPE_CHECKING
 
-from ...results.analysis import Analysis
+from ...results.analysis import Analysis, Figures
 from ...results.results import Results
 from ...results.statistics import Estimate, rate
 from ...results.summary import Summary, two_figures
@@ -25,9 +23,6 @@ from ...store.schema import EVALUATION
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..study import check_evaluated as check
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
@@ -120,7 +115,7 @@ def _side_by_side(cases: Sequence[GameCase]) -> Iterator[str]:
             yield f"{', '.join(setting):{widest}}{shown}"
 
 
-def draw(analysis: Analysis) -> dict[str, Figure]:
+def draw(analysis: Analysis) -> Figures:
     """Return the figure: probabilities of the optimum with their 95 % intervals.
 
     A panel for each game (the first thing that settings differ in), the systems one below the
@@ -135,9 +130,8 @@ def draw(analysis: Analysis) -> dict[str, Figure]:
     rests = list(dict.fromkeys(case.setting[1:] for case in cases))
     plays = sorted({count for case in cases for count in case.optimal})
     looks = [(rest, count) for rest in rests for count in plays]
-    rows, columns = ceil(len(games) / COLUMNS), min(COLUMNS, len(games))
-    size = (1.8 + 2.3 * columns, 0.9 + rows * (0.5 + 0.24 * len(systems)))
-    figure, panels = f.panels(rows, columns, size, sharex=True, sharey=True)
+    each = 2.3, 0.5 + 0.24 * len(systems)
+    figure, panels = f.grid(len(games), COLUMNS, each, (1.8, 0.9), sharex=True, sharey=True)
 
     def colours(rest: tuple[str, ...], count: int) -> dict[str, str]:
         colour = f.look(rests.index(rest))["color"]
@@ -160,8 +154,6 @@ def draw(analysis: Analysis) -> dict[str, Figure]:
         for line in range(len(systems) - 1):
             axes.axhline(line + 0.5, color="#e4e4e4", linewidth=0.6, zorder=0)
     f.name_rows(panels[0, 0], systems)
-    for axes in panels.flat[len(games) :]:
-        axes.set_axis_off()
     for axes in panels[-1]:
         axes.set_xlabel("P(optimal joint action)")
     handles = [

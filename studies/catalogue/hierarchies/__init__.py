@@ -16,13 +16,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from textwrap import wrap
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...errors import SpecError
-from ...results.analysis import Analysis
+from ...results.analysis import Analysis, Figures
 from ...results.comparison import Array, Difference, adjusted, difference, of_shared_seeds
 from ...results.paired_tests import LEVEL
 from ...results.power import seeds_needed
@@ -34,9 +34,6 @@ from ...spec.labels import label_but
 from ...spec.spec import Spec
 from ..scaling import NUMBERS, measure
 from ..study import check_evaluated
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
@@ -269,7 +266,7 @@ def _listed(what: str, comparisons: Sequence[Difference]) -> Iterator[str]:
         yield from (line.replace(UNBROKEN, " ") for line in lines)
 
 
-def draw(analysis: Analysis) -> dict[str, Figure]:
+def draw(analysis: Analysis) -> Figures:
     """Return the figure: success and time of a decision by number of robots.
 
     There is a column of panels for each choice of whose value decides. Points are means over seeds,

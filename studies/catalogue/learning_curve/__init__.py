@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Literal
 
 from ....core.interface.measures import SUCCESS, Measure
 from ...errors import SpecError
-from ...results.analysis import Analysis
+from ...results.analysis import Analysis, Figures
 from ...results.results import Array, Results
 from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, rates
 from ...results.summary import EVALUATED, Summary, evaluated
@@ -20,7 +20,6 @@ from ..study import run_training as measure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
     from ...spec.spec import Spec
 
@@ -142,7 +141,7 @@ def analyse(results: Results) -> Analysis:
     return Analysis(tuple(table), cases=followed)
 
 
-def draw(analysis: Analysis) -> dict[str, Figure]:
+def draw(analysis: Analysis) -> Figures:
     """Return the figure, a panel for every measure that is followed.
 
     Lines are means over seeds, bands their 95 % intervals. A condition has a colour and a style of
@@ -151,14 +150,11 @@ def draw(analysis: Analysis) -> dict[str, Figure]:
     from ...presentation import figures as f  # matplotlib takes its time
 
     followed = analysis.cases
-    columns = min(COLUMNS, len(followed))
-    rows = -(-len(followed) // columns)
-    figure, panels = f.panels(rows, columns, (3.6 * COLUMNS, 1.2 + 2.1 * rows), sharex=True)
+    width = 3.6 * COLUMNS
+    figure, panels = f.grid(len(followed), COLUMNS, (3.6, 2.1), (0.0, 1.2), width, sharex=True)
     for axes, own in zip(panels.flat, followed, strict=False):
         _panel(axes, own, [line.condition for line in analysis.table])
-    for axes in panels.flat[len(followed) :]:
-        axes.set_visible(False)
-    for axes in panels.flat[len(followed) - columns : len(followed)]:
+    for axes in panels.flat[len(followed) - panels.shape[1] : len(followed)]:
         f.as_episodes(axes)
     seeds = {line.condition: line.seeds for line in analysis.table}
     same = len(set(seeds.values())) == 1

@@ -10,11 +10,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from time import process_time
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...results.analysis import Analysis
+from ...results.analysis import Analysis, Figures
 from ...results.comparison import Array, differences, mean_success, with_first
 from ...results.results import Results
 from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, stacked
@@ -23,9 +22,6 @@ from ...results.verdicts import power_lines
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..study import check_evaluated as check
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 CHECKPOINTS = (0.01, 0.03, 0.1, 0.3)
 """Shares of the episodes after which training stops for an evaluation, before the last one."""
@@ -123,7 +119,7 @@ def analyse(results: Results) -> Analysis:
     return Analysis(tuple(table), tuple(notes), courses, compared)
 
 
-def draw(analysis: Analysis) -> dict[str, Figure]:
+def draw(analysis: Analysis) -> Figures:
     """Return the figure: evaluation success against experience and against time.
 
     A line per condition, bands its 95 % intervals.

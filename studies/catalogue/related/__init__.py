@@ -17,12 +17,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ....core.agents.team import of_fuzzy_agents
-from ...results.analysis import Analysis
+from ...results.analysis import Analysis, Figures
 from ...results.results import Results
 from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap
 from ...results.summary import EVALUATED, Summary, evaluated
@@ -30,9 +30,6 @@ from ...spec.spec import Spec
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..study import check_evaluated, check_rule_bases
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 TITLES = {
     "memory": "memory [kB]",
@@ -138,7 +135,7 @@ def _world(columns: Mapping[str, Any]) -> str:
     return ", ".join(f"{v} {k}" if isinstance(v, int) else str(v) for k, v in swept.items())
 
 
-def draw(analysis: Analysis) -> dict[str, Figure]:
+def draw(analysis: Analysis) -> Figures:
     """Return the figure: the systems one below the other, a colour for each world.
 
     Bars are 95 % intervals. Hollow marks are operations by formula, where they differ from those

@@ -23,7 +23,7 @@ import numpy as np
 from ....core.agents.team import of_fuzzy_agents
 from ....core.interface.scenario import groups_of
 from ...presentation.words import count
-from ...results.analysis import Analysis
+from ...results.analysis import Analysis, Figures
 from ...results.comparison import Array, of_shared_seeds
 from ...results.results import Results
 from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
@@ -36,7 +36,6 @@ from ..study import check_rule_bases
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 NUMBERS = ("robots", "agents", "messages", "team_bytes", "decision_median", "step_bytes")
 """What of whole trials the analysis rests on."""
@@ -254,9 +253,8 @@ def _messages_by_size(points: Sequence[Point], bodies: str) -> list[str]:
     return lines
 
 
-def _exponent_text(estimate: Estimate) -> str:
+def _exponent_text(e: Estimate) -> str:
     """Return an exponent with its interval, if there is one."""
-    e = estimate
     return f"{e.value:.2f}" + (f" [{e.low:.2f}, {e.high:.2f}]" if np.isfinite(e.low) else "")
 
 
@@ -278,7 +276,7 @@ def exponents_of(points: Sequence[Point]) -> dict[str, dict[str, Estimate]]:
     return exponents
 
 
-def draw(analysis: Analysis) -> dict[str, Figure]:
+def draw(analysis: Analysis) -> Figures:
     """Return the figure.
 
     Points are means over seeds, bars their 95 % intervals; evaluators differ by colour and marker,

@@ -8,12 +8,10 @@ the shape; the predictor by which they look ahead is given it (see docs/predicto
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from ...errors import SpecError
-from ...results.analysis import Analysis
+from ...results.analysis import Analysis, Figures
 from ...results.comparison import Difference, adjusted, ratio
 from ...results.results import Results
 from ...results.statistics import Estimate, bootstrap, rate
@@ -21,9 +19,6 @@ from ...results.summary import Summary
 from ...results.verdicts import power_lines
 from ...spec.spec import Spec
 from ..study import run_training as measure
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 TRAINED = "trained on"
 """How the box of training is called among the others."""
@@ -93,7 +88,7 @@ def _line(d: Difference) -> str:
     return f"  {d.condition}: {e.value:.2f} [{e.low:.2f}, {e.high:.2f}], p = {d.p:.2g} (adjusted)"
 
 
-def draw(analysis: Analysis) -> dict[str, Figure]:
+def draw(analysis: Analysis) -> Figures:
     """Return the figures of an analysis by name."""
     from ...presentation import forest
 

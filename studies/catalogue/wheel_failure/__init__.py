@@ -25,7 +25,7 @@ from ....core.agents.team import Team
 from ....core.learners.frozen import FrozenSettings
 from ....core.learners.learner import LearnerSettings
 from ...errors import SpecError
-from ...results.analysis import Analysis
+from ...results.analysis import Analysis, Figures
 from ...results.comparison import Array, Difference, adjusted, of_shared_seeds
 from ...results.results import Results
 from ...results.statistics import NOT_NEGATIVE, bootstrap, rate
@@ -40,7 +40,6 @@ from ..study import check_rule_bases
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 NUMBERS = ("onset",)
 """What of whole trials the analysis rests on."""
@@ -154,11 +153,6 @@ class Course:
         return self.success[:, self.onset - BLOCK : self.onset]
 
     @property
-    def after(self) -> Array:
-        """Outcomes of the first episodes with the failure."""
-        return self.success[:, self.onset : self.onset + BLOCK]
-
-    @property
     def end(self) -> Array:
         """Outcomes of the last episodes."""
         return self.success[:, -BLOCK:]
@@ -234,7 +228,7 @@ def _summary(course: Course) -> Summary:
     recovered, episodes, steps = course.recovery()
     estimates = {
         "before": rate(course.before),
-        "just after": rate(course.after),
+        "just after": rate(course.success[:, course.onset : course.onset + BLOCK]),
         "end": rate(course.end),
     }
     if course.before.any():  # else there is nothing to lose or to come back to
@@ -262,7 +256,7 @@ def _gains(courses: Sequence[Course]) -> tuple[Difference, ...]:
     return adjusted(gains)
 
 
-def draw(analysis: Analysis) -> dict[str, Figure]:
+def draw(analysis: Analysis) -> Figures:
     """Return the figure: success from episode to episode, fault by fault.
 
     A panel for every fault, a line for what adapts; running means over seeds and episodes, bands
@@ -273,18 +267,16 @@ def draw(analysis: Analysis) -> dict[str, Figure]:
     courses = analysis.cases
     faults = list(dict.fromkeys(course.fault for course in courses))
     cases = list(dict.fromkeys(course.adapts for course in courses))
-    columns = min(COLUMNS, len(faults))
-    rows = -(-len(faults) // columns)
-    size = (max(5.6, 1.0 + 2.6 * columns), 1.2 + 2.1 * rows)
-    figure, panels = f.panels(rows, columns, size, sharex=True, sharey=True)
+    figure, panels = f.grid(
+        len(faults), COLUMNS, (2.6, 2.1), (1.0, 1.2), least=5.6, sharex=True, sharey=True
+    )
+    columns = panels.shape[1]
     for axes, fault in zip(panels.flat, faults, strict=False):
         for course in (c for c in courses if c.fault == fault):
             _draw_course(axes, course, cases.index(course.adapts))
         axes.set_title("\n".join(wrap(fault, round(60 / columns))), loc="left")
         f.as_rates(axes)
         axes.grid(axis="y", alpha=0.25)
-    for axes in list(panels.flat)[len(faults) :]:
-        axes.set_visible(False)
     for axes in panels[:, 0]:
         axes.set_ylabel("success")
     for axes in list(panels.flat)[max(0, len(faults) - columns) : len(faults)]:

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
+from ...presentation.row_formats import Format, write_rows
 from .. import options
-
-if TYPE_CHECKING:
-    from ...presentation.row_formats import Format
 
 
 @click.command()
@@ -37,7 +34,6 @@ def command(directory: Path, form: Format, phase: str) -> int:
 
     from ....core.plugins.messages import closest
     from ...errors import SpecError
-    from ...presentation.row_formats import write_rows
     from ...results.results import read
     from ..loading import opened
 

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
+from ...workers.workers import Backend
 from .. import options
-
-if TYPE_CHECKING:
-    from ...workers.workers import Backend
 
 
 @click.command()

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
+from ....core.agents.joint_agents import Agents
+from ....topologies.view import Form, HierarchyView, kinds, printed, view
 from .. import options
 
-if TYPE_CHECKING:
-    from ....core.agents.joint_agents import Agents
-    from ....topologies.view import Form
+TOPOLOGY = {"kind", "members", "edges", "nodes"}
+"""Keys of a file that holds a topology and no more."""
 
 
 @click.group(no_args_is_help=False)
@@ -22,8 +23,6 @@ def command() -> None:
 @command.command("list")
 def list_all() -> int:
     """List the topologies, built-in and installed."""
-    from ....topologies.view import kinds
-
     print(kinds())
     return 0
 
@@ -69,12 +68,10 @@ def show(
     teams.json, ...; or the spec of a study, whose hierarchies are shown over its own agents.
     """
     from ....topologies.drawing import draw
-    from ....topologies.view import printed, view
     from ...errors import SpecError
-    from ..hierarchies import of_spec
 
     try:
-        views = of_spec(topology)
+        views = _of_spec(topology)
         if views is None:
             views = [view(topology, agents, robots, actions, per)]
         elif agents or robots or per != "actuator":
@@ -88,3 +85,19 @@ def show(
     except ValueError as error:
         raise SpecError(str(error)) from None
     return 0
+
+
+def _of_spec(path: str) -> list[HierarchyView] | None:
+    """Return the hierarchies of a study's spec; None if the path is not that of one."""
+    if not path.endswith(".toml") or not Path(path).is_file():
+        return None
+    try:
+        table = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
+    except ValueError:
+        return None  # whoever reads it as a topology says why
+    if TOPOLOGY & table.keys() or (list(table) == ["topology"] and "kind" not in table["topology"]):
+        return None
+    from ...spec.spec import Spec
+    from ...trials.hierarchies import views
+
+    return views(Spec.load(Path(path)))

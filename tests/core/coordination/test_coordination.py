@@ -5,8 +5,12 @@ import numpy as np
 import pytest
 
 from nested_agents.core.agents.cost import Problem
-from nested_agents.core.coordination.elimination import Elimination, interaction, order_of, total
+from nested_agents.core.coordination.elimination import Elimination, interaction, order_of
 from nested_agents.core.coordination.max_plus import MaxPlus
+
+
+def total(scopes, tables, joint):
+    return float(sum(t[tuple(joint[list(scope)])] for scope, t in zip(scopes, tables, strict=True)))
 
 
 def pairwise(graph):
@@ -50,7 +54,7 @@ def test_the_order_has_the_width_that_is_told():
         assert widest <= width
         elimination = Elimination(pairwise(graph), 12, 2)
         assert max(elimination.beside) == widest
-        assert Problem(actions=2).elimination(elimination.beside) <= 12 * 2 ** (1 + width)
+        assert Problem(actions=2).decision(elimination.beside) <= 12 * 2 ** (1 + width)
 
 
 def test_max_plus_is_exact_on_trees():

@@ -8,10 +8,11 @@ from made_up_results import Arrays
 from nested_agents.core.interface.measures import SUCCESS, Measure
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
 from nested_agents.studies.catalogue.learning_curve import analyse, draw, metrics_of
+from nested_agents.studies.presentation.cells import Cell
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.presentation.row_formats import write_rows
 from nested_agents.studies.results.statistics import Estimate
-from nested_agents.studies.results.summary import interval, two_figures
+from nested_agents.studies.results.summary import two_figures
 
 
 def arrays(seeds, episodes, success):
@@ -83,10 +84,10 @@ def test_every_condition_is_in_the_legend(tmp_path):
     assert all(f">{name}<" in text for name in many)
 
 
-def test_an_unknown_interval_is_a_dash():
-    assert interval(Estimate(*map(np.asarray, (0.5, np.nan, np.nan)))) == "–"
-    assert interval(Estimate(*map(np.asarray, (0.5, 0.25, 1.0)))) == ".25–1.0"
-    assert interval(Estimate(*map(np.asarray, (-0.6, -0.72, -0.53)))) == "-.72 to -.53"
+def test_the_interval_of_a_cell():
+    assert Cell.of(Estimate(*map(np.asarray, (0.5, np.nan, np.nan)))).interval == ""
+    assert Cell.of(Estimate(*map(np.asarray, (0.5, 0.25, 1.0)))).interval == ".25–1.0"
+    assert Cell.of(Estimate(*map(np.asarray, (-0.6, -0.72, -0.53)))).interval == "-.72 to -.53"
     assert two_figures(float("nan")) == "?"
 
 

@@ -90,7 +90,7 @@ def test_pairs_of_variables_and_nothing_learned(study, capsys):
     ("arguments", "complaint"),
     [
         (["--condition", "oder 1"], "did you mean 'order 1'"),
-        (["--seed", "4"], "--seed 4: allowed 3"),
+        (["--seed", "4"], "seed = 4: known: 3"),
         (["--condition", "unfinished"], "unfinished, seed 3 has not finished"),
     ],
 )

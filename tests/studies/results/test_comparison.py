@@ -3,10 +3,10 @@ import pytest
 from made_up_results import ablation
 
 from nested_agents.studies.results.comparison import (
+    aligned,
     difference,
     differences,
     mean_success,
-    paired,
     ratio,
     with_first,
 )
@@ -30,7 +30,7 @@ def test_only_seeds_that_both_have_are_compared() -> None:
     arrays.seeds["a"] = tuple(range(20))
     arrays.seeds["b"] = tuple(range(15, 35))
     results = arrays.frames()
-    one, other = paired(results, "a", "b", MEASURES["greedy"])
+    one, other = aligned(results, ("a", "b"), MEASURES["greedy"])
     assert (one == MEASURES["greedy"](results, "a")[15:]).all()
     assert (other == MEASURES["greedy"](results, "b")[:5]).all()
     arrays.seeds["b"] = tuple(range(100, 120))

@@ -3,6 +3,7 @@ from made_up_results import hierarchies, scaling
 
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.results.contrasts import contrasts
+from nested_agents.studies.results.paired_tests import LEVEL
 
 CHANCES = {
     ("chain", "team", 2): 0.9,
@@ -17,7 +18,7 @@ def test_levels_are_compared_where_all_else_is_equal() -> None:
     assert [(g.setting, g.reference) for g in found.groups] == [
         ("team, robots=2", "chain"), ("team, robots=8", "chain"),
     ]  # fmt: skip
-    assert [d.condition for d in found.significant] == ["star"]
+    assert [d.condition for d in found.differences if d.p < LEVEL] == ["star"]
     assert found.groups[1].differences[0].estimate.value == pytest.approx(-0.7, abs=0.15)
     text = "\n".join(found.notes)
     assert "team, robots=8: success, evaluation, less that of chain:\n  worse: star" in text
@@ -32,8 +33,9 @@ def test_the_reference_is_the_first_condition_or_a_named_one() -> None:
     assert len(contrasts(results).differences) == 3
     last = list(results.columns)[-1]
     found = contrasts(results, reference=last)
-    assert found.significant[0].condition == first
-    assert {d.condition for d in found.significant} == set(list(results.columns)[:3])
+    significant = [d.condition for d in found.differences if d.p < LEVEL]
+    assert significant[0] == first
+    assert set(significant) == set(list(results.columns)[:3])
 
 
 def test_what_is_better_depends_on_the_measure() -> None:
@@ -49,7 +51,7 @@ def test_numbers_of_whole_trials_are_compared_too() -> None:
         results.columns[condition] = {"name": condition.partition(",")[0]}
     found = contrasts(results.frames(), "decision_median")
     assert found.phase == ""
-    assert [d.condition for d in found.significant] == ["sampling, robots=2"]
+    assert [d.condition for d in found.differences if d.p < LEVEL] == ["sampling, robots=2"]
     assert "worse: sampling" in "\n".join(found.notes)
 
 

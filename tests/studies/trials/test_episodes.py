@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from nested_agents.core.interface.measures import SUCCESS, Measure
-from nested_agents.core.interface.scenario import Transition
+from nested_agents.core.interface.scenario import EpisodeRecorder, Transition
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
-from nested_agents.studies.trials.episodes import EpisodeMeter, EpisodeRecorder, EpisodeRow
+from nested_agents.studies.trials.episodes import EpisodeMeter, EpisodeRow
 
 
 def transition(reward=0.5, terminated=False, **info):
