@@ -25,6 +25,7 @@ LEARNERS = SettingsRegistry(
         "ppo": f"{PEERS}:PPOSettings",
         "ippo": f"{PEERS}:IPPOSettings",
         "mappo": f"{PEERS}:MAPPOSettings",
+        "dqn": f"{PEERS}:DQNSettings",
     },
     LearnerSettings,
     TeamSettings,

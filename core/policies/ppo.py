@@ -21,7 +21,7 @@ from ..interface.scenario import Scenario, Transition
 from ..numerics.arrays import FloatArray, IntArray
 from .central_critic import CentralCriticPolicy
 from .inputs import Inputs, RewardScale
-from .networks import Layers, drawing_from, prepare
+from .networks import Layers, drawing_from, prepare, weights_of
 from .peer import Peer, Seen
 from .settings import PolicyGradientSettings
 
@@ -58,8 +58,8 @@ class IndependentPPO(Peer):
         self._model, self._discount = model, settings.discount
         model.policy.set_training_mode(False)
         hidden = model.policy.mlp_extractor
-        self._actor = Layers([hidden.policy_net, model.policy.action_net])
-        self._critic = Layers([hidden.value_net, model.policy.value_net])
+        self._actor = Layers([hidden.policy_net, model.policy.action_net], np.tanh)
+        self._critic = Layers([hidden.value_net, model.policy.value_net], np.tanh)
         self._n_actions = len(scenario.action_set)
         self._rewards = RewardScale(settings.discount, n_envs)
         self._starts: FloatArray = np.ones(n_envs)
@@ -122,8 +122,7 @@ class IndependentPPO(Peer):
 
     def arrays(self) -> dict[str, FloatArray]:
         """Return the weights of policy and critic."""
-        weights = self._model.policy.state_dict()
-        return {name: value.numpy().copy() for name, value in weights.items()}
+        return weights_of(self._model.policy)
 
 
 class CentralPPO(IndependentPPO):

@@ -40,15 +40,24 @@ class PeerSettings(TeamSettings):
             ) from None
 
 
-class PolicyGradientSettings(PeerSettings):
+class NetworkSettings(PeerSettings):
+    """What the settings of peers of stable-baselines3 share."""
+
+    learning_rate: Positive = 3e-4
+    """Step size of Adam."""
+    batch_size: Count = 64
+    """Transitions in a minibatch."""
+    hidden: Annotated[tuple[Width, ...], Field(min_length=1)] = (64, 64)
+    """Units of the hidden layers of every network."""
+
+
+class PolicyGradientSettings(NetworkSettings):
     """What the settings of PPO (Schulman et al. 2017) in all its forms share."""
 
     learning_rate: Positive = 1e-3
     """Step size of Adam."""
     batch_size: Count = 256
     """Transitions in a minibatch."""
-    hidden: Annotated[tuple[Width, ...], Field(min_length=1)] = (64, 64)
-    """Units of the hidden layers of every network."""
     rollout: Annotated[int, Field(ge=2)] = 256
     """Decisions between two updates."""
     epochs: Count = 10
@@ -80,3 +89,24 @@ class MAPPOSettings(PolicyGradientSettings):
 
     kind: Literal["mappo"] = "mappo"
     factory: ClassVar[str] = f"{__package__}.ppo:CentralCriticPPO"
+
+
+class DQNSettings(NetworkSettings):
+    """DQN (Mnih et al. 2015) for one agent, such as that of ``agents = "team"``."""
+
+    kind: Literal["dqn"] = "dqn"
+    factory: ClassVar[str] = f"{__package__}.dqn:DeepQ"
+    memory: Count = 50_000
+    """Transitions in the replay memory."""
+    begin: Count = 500
+    """Decisions before the first update."""
+    interval: Count = 4
+    """Decisions between two updates."""
+    target_interval: Count = 250
+    """Decisions between two copies to the target network."""
+    exploration_begin: Fraction = 1.0
+    """Exploration rate at the first decision."""
+    exploration_end: Fraction = 0.05
+    """Exploration rate from `exploration_decisions` on."""
+    exploration_decisions: Count = 2000
+    """Decisions over which the exploration rate falls linearly."""

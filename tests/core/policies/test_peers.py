@@ -25,11 +25,13 @@ SHORT = {
     "ppo": {"kind": "ppo", "rollout": 16, "batch_size": 8, "epochs": 2},
     "ippo": {"kind": "ippo", "rollout": 16, "batch_size": 8, "epochs": 2},
     "mappo": {"kind": "mappo", "rollout": 16, "batch_size": 8, "epochs": 2},
+    "dqn": {"kind": "dqn", "begin": 10, "target_interval": 20, "memory": 100},
 }
 
 
 def spec_of(kind: str, **changes: Any) -> Spec:
-    return Spec.of({**TABLE, "learner": SHORT[kind], **changes})
+    single = {"agents": "team"} if kind == "dqn" else {}
+    return Spec.of({**TABLE, **single, "learner": SHORT[kind], **changes})
 
 
 class Beacons:
@@ -110,7 +112,7 @@ def test_equal_seeds_give_equal_bits(kind: str) -> None:
     assert run_trial(other).rows != first.rows
 
 
-@pytest.mark.parametrize("kind", SHORT)
+@pytest.mark.parametrize("kind", ["ppo", "ippo", "mappo"])
 def test_they_learn(kind: str) -> None:
     pytest.importorskip("stable_baselines3", reason="extra [peers]")
     table = {"kind": kind, "rollout": 32, "learning_rate": 0.003, "entropy": 0.02}
@@ -144,11 +146,20 @@ def test_arrays_act_as_the_networks_do(kind: str) -> None:
     n_inputs = policy.observation_space.shape[0]
     seen = np.random.default_rng(0).standard_normal((5, n_inputs)).astype(np.float32)
     with torch.no_grad():
-        features = policy.mlp_extractor(torch.as_tensor(seen))
-        pairs = [(peer._actor(seen), policy.action_net(features[0]))]
-        pairs += [(peer._critic(seen), policy.value_net(features[1]))]
+        if kind == "dqn":
+            pairs = [(peer._q(seen), policy.q_net(torch.as_tensor(seen)))]
+        else:
+            features = policy.mlp_extractor(torch.as_tensor(seen))
+            pairs = [(peer._actor(seen), policy.action_net(features[0]))]
+            pairs += [(peer._critic(seen), policy.value_net(features[1]))]
     for ours, theirs in pairs:
         assert ours == pytest.approx(theirs.numpy(), abs=1e-5)
+
+
+def test_dqn_needs_one_agent() -> None:
+    pytest.importorskip("stable_baselines3", reason="extra [peers]")
+    with pytest.raises(SpecError, match=r"dqn': acts for one agent, there are 2; use topology"):
+        check(spec_of("dqn", topology="chain"))
 
 
 def test_what_needs_rule_bases_says_so() -> None:
