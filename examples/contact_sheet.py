@@ -39,9 +39,10 @@ figure, grid = plt.subplots(len(BOXES), len(ROBOTS), figsize=(9, 1.8 * len(BOXES
 for row, name in zip(grid, BOXES, strict=True):
     for axes, robots in zip(row, ROBOTS, strict=True):
         settings = BoxPushingSettings(box=name, robots=robots, start="hard")
-        scenario, screen = BoxPushing(settings), Screen(settings.drawn, "rgb_array")
+        scenario = BoxPushing(settings)
+        screen = Screen(scenario, "rgb_array")
         scenario.reset(1)
-        screen.begin(scenario.measure())
+        screen.begin()
         axes.imshow(screen.render()[rows, columns])
         axes.set_title(f"{name}, {robots} robots", fontsize=9, loc="left", pad=3)
         axes.set_axis_off()

@@ -129,11 +129,10 @@ def befalling(
 
     Examples
     --------
-    >>> from nested_agents.core.plugins.scheduled import Names
     >>> class CartFailure(FailureSettings):
     ...     part = "carts"
-    ...     carts: Names
-    >>> befalling(CartFailure, loose=Free)["loose"](carts="left")
+    ...     carts: tuple[str, ...]
+    >>> befalling(CartFailure, loose=Free)["loose"](carts=("left",))
     Loose(episode=0, step=0, end_episode=None, end_step=0, carts=('left',), kind='loose')
     >>> CartFailure.Loose.__doc__
     'The cart has no drive and gives way.'
