@@ -123,8 +123,12 @@ def _twist(before, after, seconds, out) -> None:  # type: ignore[no-untyped-def]
     out /= seconds
 
 
+@njit(cache=True)
 def least_gap(robots: FloatArray, radius: float) -> float:
     """Return the least gap [m] between robots ``(M, 3)`` of one radius; infinite for one robot."""
-    one, other = np.triu_indices(len(robots), 1)
-    apart = np.hypot(*(robots[one, :2] - robots[other, :2]).T)
-    return float(apart.min(initial=np.inf)) - 2.0 * radius
+    least = np.inf
+    for r in range(len(robots)):
+        for other in range(r):
+            dx, dy = robots[r, 0] - robots[other, 0], robots[r, 1] - robots[other, 1]
+            least = min(least, np.hypot(dx, dy) - 2.0 * radius)
+    return least

@@ -21,7 +21,7 @@ from ..world.reward import reward
 from .belief import outcomes
 from .push import PushModel, push
 from .situation import Premises, Situation
-from .wheel_commands import WheelCommands, choices_of, twist_table, wheel_commands_of
+from .wheel_commands import WheelCommands, choices_of, speeds_of, twist_table, wheel_commands_of
 
 
 class BoxPrediction:
@@ -149,10 +149,8 @@ class BoxPrediction:
         if space.own_needs_pose:
             own = np.array([self._own_after(agent, choices, view) for agent in range(n)])
             return own, shared
-        # (M, m, wheels)
-        speeds = self.wheel_commands.speeds[np.arange(len(shared))[:, None], choices.T]
-        speeds = speeds.transpose(0, 2, 1).reshape(-1)
-        own = space.own(np.zeros((0, 3)), speeds, self.situation.goal)
+        speeds = speeds_of(choices, self.wheel_commands.speeds)
+        own = space.own(np.zeros((0, 3)), speeds.reshape(-1), self.situation.goal)
         return own.reshape(n, m, -1), shared
 
     def _own_after(self, agent: int, choices: IntArray, view: View) -> FloatArray:

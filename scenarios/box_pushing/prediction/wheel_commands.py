@@ -186,3 +186,16 @@ def twist_table(commands: WheelCommands) -> tuple[IntArray, IntArray]:
                 longer[c * n_indices + index] = start + commands.distinct[r, command]
         row = longer
     return choices, row
+
+
+@njit(cache=True)
+def speeds_of(choices: IntArray, speeds: FloatArray) -> FloatArray:
+    """Return the wheel speeds ``(n, m)`` of all agents under wheel commands ``(m, M)`` [m/s]."""
+    m, n = choices.shape
+    wheels = speeds.shape[2]
+    wheel_speeds = np.empty((n * wheels, m))
+    for r in range(n):
+        for j in range(wheels):
+            for c in range(m):
+                wheel_speeds[r * wheels + j, c] = speeds[r, choices[c, r], j]
+    return wheel_speeds
