@@ -18,6 +18,7 @@ from pydantic import Field
 
 from ..interface.hierarchy import Hierarchy
 from ..numerics.arrays import BoolArray, IntArray
+from ..numerics.streams import stream_of
 from ..plugins.scheduled import Names, Scheduled
 from ..plugins.settings import Fraction
 
@@ -156,9 +157,7 @@ class Messages:
 
     def begin(self, seed: int | np.random.SeedSequence, episode: int) -> None:
         """Start an episode; what is random in it follows from `seed`."""
-        root = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
-        key = (*root.spawn_key, STREAM)
-        self._rng = np.random.default_rng(np.random.SeedSequence(root.entropy, spawn_key=key))
+        self._rng = stream_of(seed, STREAM)
         self._episode, self._step = episode, 0
         self._past: list[IntArray] = []
         self._strike()

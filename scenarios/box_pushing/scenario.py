@@ -18,6 +18,7 @@ from ...core.interface.measures import SUCCESS, Measure
 from ...core.interface.scenario import Transition
 from ...core.interface.spaces import ActionSet
 from ...core.numerics.arrays import FloatArray, IntArray
+from ...core.numerics.streams import stream_of
 from .config import BoxPushingSettings
 from .prediction.belief import APART, CONSTANTS, PushBelief, believing, least_gap
 from .prediction.prediction import BoxPrediction, mean_twists
@@ -177,10 +178,7 @@ class BoxPushing:
 
         Failures are scheduled by the number of the `episode`.
         """
-        root = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
-        self._sensing = np.random.default_rng(
-            np.random.SeedSequence(root.entropy, spawn_key=(*root.spawn_key, SENSING))
-        )
+        self._sensing = stream_of(seed, SENSING)
         rng = np.random.default_rng(seed)
         robots, box, self._goal = place(
             self.settings.start, rng, [self.robot] * self.settings.robots, self.box, self._unit

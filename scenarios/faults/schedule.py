@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...core.numerics.arrays import BoolArray, FloatArray
+from ...core.numerics.streams import stream_of
 from .settings import Delayed, FailureSettings
 
 
@@ -68,13 +69,7 @@ class Failures:
 
     def begin(self, seed: int | np.random.SeedSequence, episode: int) -> None:
         """Start an episode; its noise follows from `seed`, a stream to every failure."""
-        root = seed if isinstance(seed, np.random.SeedSequence) else np.random.SeedSequence(seed)
-        self._streams = [
-            np.random.default_rng(
-                np.random.SeedSequence(root.entropy, spawn_key=(*root.spawn_key, i))
-            )
-            for i in range(len(self._settings))
-        ]
+        self._streams = [stream_of(seed, i) for i in range(len(self._settings))]
         self._episode = episode
         # Commands of the last control periods, the oldest first.
         self._commands = np.zeros((self._memory, len(self._limits)))
