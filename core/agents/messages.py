@@ -22,8 +22,9 @@ from ..numerics.streams import stream_of
 from ..plugins.scheduled import Names, Scheduled
 from ..plugins.settings import Fraction
 
-STREAM = 2
-"""Child of a world's seed from which failures of messages draw; see `loop.world_seed`."""
+STREAM = 2**32 - 2
+"""Key of the stream from which failures of messages draw, under the seed of an episode's world;
+failures of a scenario have 0, 1, ..., and sensor noise the key after this."""
 
 
 class MessageFailure(Scheduled):
