@@ -35,13 +35,23 @@ class MessageFailure(Scheduled):
     agents: Names
     """Agents by name or pattern, one or a list."""
 
-    def arrives(self, count: int, rng: Generator) -> BoolArray:
-        """Return which of as many messages of the agents arrive."""
-        return np.ones(count, dtype=bool)
+    def passed(
+        self, actions: IntArray, past: Sequence[IntArray], n_actions: int, rng: Generator
+    ) -> tuple[BoolArray, IntArray]:
+        """Return which of the agents' messages arrive ``(k,)``, and what they say.
 
-    def altered(self, actions: IntArray, n_actions: int, rng: Generator) -> IntArray:
-        """Return what messages say that are to tell `actions` ``(k,)``."""
-        return actions
+        Parameters
+        ----------
+        actions
+            ``(k,)`` what the agents have decided.
+        past
+            The same of the decisions before, the last one last.
+        n_actions
+            Actions of every agent.
+        rng
+            For what is random.
+        """
+        return np.ones(len(actions), dtype=bool), actions
 
 
 class LostMessages(MessageFailure):
@@ -51,9 +61,11 @@ class LostMessages(MessageFailure):
     probability: Fraction = 1.0
     """Of each message; 1: the agents are silent."""
 
-    def arrives(self, count: int, rng: Generator) -> BoolArray:
-        """Return which of as many messages are not lost."""
-        return rng.random(count) >= self.probability
+    def passed(
+        self, actions: IntArray, past: Sequence[IntArray], n_actions: int, rng: Generator
+    ) -> tuple[BoolArray, IntArray]:
+        """Return which messages are not lost."""
+        return rng.random(len(actions)) >= self.probability, actions
 
 
 class DelayedMessages(MessageFailure):
@@ -63,6 +75,13 @@ class DelayedMessages(MessageFailure):
     decisions: Annotated[int, Field(ge=1, le=1000)] = 1
     """How many; before as many have been made, nothing is said."""
 
+    def passed(
+        self, actions: IntArray, past: Sequence[IntArray], n_actions: int, rng: Generator
+    ) -> tuple[BoolArray, IntArray]:
+        """Return what the agents did as many decisions before."""
+        arrive = np.full(len(actions), len(past) >= self.decisions)
+        return arrive, past[-self.decisions] if arrive.any() else actions
+
 
 class NoisyMessages(MessageFailure):
     """What the agents say is any action, each message with a probability."""
@@ -71,11 +90,13 @@ class NoisyMessages(MessageFailure):
     probability: Fraction = 0.3
     """Of each message."""
 
-    def altered(self, actions: IntArray, n_actions: int, rng: Generator) -> IntArray:
+    def passed(
+        self, actions: IntArray, past: Sequence[IntArray], n_actions: int, rng: Generator
+    ) -> tuple[BoolArray, IntArray]:
         """Return the actions, some of them replaced by random ones."""
         noise = rng.integers(n_actions, size=len(actions), dtype=np.int64)
         is_noisy = rng.random(len(actions)) < self.probability
-        return np.where(is_noisy, noise, actions)
+        return np.ones(len(actions), dtype=bool), np.where(is_noisy, noise, actions)
 
 
 class AbsentAgents(MessageFailure):
@@ -83,9 +104,11 @@ class AbsentAgents(MessageFailure):
 
     kind: Literal["absent"] = "absent"
 
-    def arrives(self, count: int, rng: Generator) -> BoolArray:
-        """Return that nothing does."""
-        return np.zeros(count, dtype=bool)
+    def passed(
+        self, actions: IntArray, past: Sequence[IntArray], n_actions: int, rng: Generator
+    ) -> tuple[BoolArray, IntArray]:
+        """Return that nothing arrives."""
+        return np.zeros(len(actions), dtype=bool), actions
 
 
 class ReparentedAgents(MessageFailure):
@@ -138,9 +161,8 @@ class Messages:
         places = [f"topology.failures[{k}]" for k in range(len(failures))]
         named = [f.mask(hierarchy.agents, p) for f, p in zip(failures, places, strict=True)]
         self._masks = named
-        self._told: list[IntArray] = [
-            np.array(hierarchy.above(i), dtype=np.int64) for i in range(n)
-        ]
+        self.told: list[IntArray] = [np.array(hierarchy.above(i), dtype=np.int64) for i in range(n)]
+        """Per agent those who tell it, if nothing fails."""
         self._told_instead = {
             k: _reparented(hierarchy, failure, np.flatnonzero(named[k]), places[k])
             for k, failure in enumerate(failures)
@@ -183,20 +205,17 @@ class Messages:
 
     def heard(self, agent: int, joint_action: IntArray) -> tuple[IntArray, IntArray]:
         """Return whom an agent hears of, ``(k,)``, and what, given what has been decided."""
-        senders = self._told[agent]
+        senders = self.told[agent]
         for k in self._active:
             senders = self._told_instead[k][agent] if k in self._told_instead else senders
         actions = joint_action[senders]
         for k in self._active:
             failure, concerned = self._failures[k], np.flatnonzero(self._masks[k][senders])
             arrive = np.ones(len(senders), dtype=bool)
-            arrive[concerned] = failure.arrives(len(concerned), self._rng)
-            if isinstance(failure, DelayedMessages):
-                if len(self._past) < failure.decisions:
-                    arrive[concerned] = False
-                else:
-                    actions[concerned] = self._past[-failure.decisions][senders[concerned]]
-            actions[concerned] = failure.altered(actions[concerned], self._n_actions, self._rng)
+            past = [joint[senders[concerned]] for joint in self._past]
+            arrive[concerned], actions[concerned] = failure.passed(
+                actions[concerned], past, self._n_actions, self._rng
+            )
             senders, actions = senders[arrive], actions[arrive]
         return senders, actions
 

@@ -213,9 +213,9 @@ class Team:
 
         The unseen maintain, or do again what they did last; whoever plans sees to it otherwise.
         """
-        senders, actions = self.messages.heard(agent, joint_action)
         if agent in self._hears_all:
-            return senders, joint_action
+            return self.messages.told[agent], joint_action
+        senders, actions = self.messages.heard(agent, joint_action)
         neutral = self.action_set.neutral
         known = self._last.copy() if self._unseen == "last" else np.full_like(joint_action, neutral)
         known[senders] = actions

@@ -197,13 +197,12 @@ def _kept_up(problem: DecisionProblem, planners: list[int]) -> list[bool]:
 
     The others have a copy of the plan as it was made, in which they write what they are told.
     """
-    hierarchy = problem.hierarchy
-    kept = []
-    for planner in planners:
+    hierarchy, kept = problem.hierarchy, {}
+    for planner in set(planners):
         users = [i for i in hierarchy.order if planners[i] == planner]
         told_all = all({*users[:k]} <= {*hierarchy.above(i)} for k, i in enumerate(users))
-        kept.append(problem.handed_down and told_all)
-    return kept
+        kept[planner] = problem.handed_down and told_all
+    return [kept[planner] for planner in planners]
 
 
 def _in_order(hierarchy: Hierarchy, agents: set[int]) -> tuple[int, ...]:

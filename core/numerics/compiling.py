@@ -116,12 +116,12 @@ class Kernel:
             file = _cache_file(compiled)
             with _alone(file), _hoarding():
                 if file is not None:
-                    self._cache(compiled, args)
+                    self._compile_apart(compiled, args)
                 result = compiled(*args)
             self._ready = compiled
         return result
 
-    def _cache(self, compiled: Any, args: tuple[Any, ...]) -> None:
+    def _compile_apart(self, compiled: Any, args: tuple[Any, ...]) -> None:
         """See to it that the cache has the function for arguments of these types, if it can be."""
         types = tuple(map(compiled.typeof_pyval, args))
         key = compiled._cache._index_key(types, compiled.targetctx.codegen())
@@ -165,7 +165,7 @@ def serve() -> None:
             sys.path[:], module, name, types = pickle.load(sys.stdin.buffer)
         except EOFError:
             return
-        with contextlib.suppress(Exception):
+        with contextlib.suppress(Exception), _hoarding():
             kernel = getattr(importlib.import_module(module), name)
             kernel.compiled.compile(pickle.loads(types))
         sys.stdout.buffer.write(b".")
