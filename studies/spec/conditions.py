@@ -102,29 +102,20 @@ class Override(Settings):
 
 @dataclass(frozen=True)
 class Condition:
-    """What one part of a study's trials have in common.
-
-    Attributes
-    ----------
-    label
-        Short name, unique within its study.
-    columns
-        What tells it from the others, as the columns of a result: `name` if there are overrides,
-        the swept keys (empty where an override does not sweep), `preset` if there is neither.
-    settings
-        The resolved settings.
-    evaluations
-        Names and settings under which its trained teams are evaluated beside its own: other
-        scenarios, topologies, decisions.
-    curriculum
-        What its teams are trained on before.
-    """
+    """What one part of a study's trials have in common."""
 
     label: str
+    """Short name, unique within its study."""
     columns: Mapping[str, Any]
+    """What tells it from the others, as the columns of a result: `name` if there are overrides, the
+    swept keys (empty where an override does not sweep), `preset` if there is neither."""
     settings: ConditionSettings
+    """The resolved settings."""
     evaluations: tuple[tuple[str, ConditionSettings], ...] = ()
+    """Names and settings under which its trained teams are evaluated beside its own: other
+    scenarios, topologies, decisions."""
     curriculum: tuple[Stage, ...] = ()
+    """What its teams are trained on before."""
 
     @property
     def tables(self) -> list[Any]:
