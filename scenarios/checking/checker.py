@@ -52,24 +52,16 @@ class ScenarioError(ValueError):
 
 @dataclass(frozen=True)
 class Examination:
-    """What is played.
-
-    Attributes
-    ----------
-    factory
-        Makes a new instance of the scenario.
-    steps
-        Most steps of an episode.
-    seeds
-        At least two seeds of worlds.
-    episodes
-        Numbers under which episodes are played: failures may be scheduled by them.
-    """
+    """What is played."""
 
     factory: Callable[[], Scenario]
+    """Makes a new instance of the scenario."""
     steps: int
+    """Most steps of an episode."""
     seeds: tuple[int, ...]
+    """At least two seeds of worlds."""
     episodes: tuple[int, ...]
+    """Numbers under which episodes are played: failures may be scheduled by them."""
 
     def actions(self, scenario: Scenario, seed: int) -> IntArray:
         """Return the actions that are tried in the world of a seed."""
