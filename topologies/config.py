@@ -18,7 +18,7 @@ from ..core.plugins import sources
 from ..core.plugins.deferred import nx
 from ..core.plugins.messages import closest
 from ..core.plugins.plugged import Plugged, SettingsRegistry
-from ..core.plugins.settings import Settings, SettingsError, tuples
+from ..core.plugins.settings import Settings, SettingsError, tuples, unwritten
 from . import files
 from .builders import Bodies, Members, Names, from_networkx, names_of  # noqa: F401 - of a field
 from .checks import check_names, shown
@@ -27,22 +27,17 @@ BUILDERS = "nested_agents.topologies.builders"
 
 
 class TopologySettings(Settings):
-    """What the settings of all topologies share.
-
-    What is left at its default is not written, so that identities of trials stay as they were.
-    """
+    """What the settings of all topologies share."""
 
     kind: str = ""
-    told: Annotated[Told, Field(exclude_if=lambda told: told == "ancestors")] = "ancestors"
-    """By whom an agent is told what was decided: all above it, its direct superiors, or nobody."""
-    considers: Annotated[
-        Considers, Field(exclude_if=lambda considers: considers == "descendants")
-    ] = "descendants"
+    told: Annotated[Told, unwritten("ancestors")] = "ancestors"
+    """By whom an agent is told what was decided: all above it, its direct superiors, or nobody; or
+    a list of the bodies in which those above it tell it: its own ``body``, those ``next`` to it in
+    the order of bodies, those ``farther`` away."""
+    considers: Annotated[Considers, unwritten("descendants")] = "descendants"
     """Whose actions an agent tries beside its own: those of all below it, of its direct
-    subordinates, or of nobody."""
-    failures: Annotated[
-        tuple[AnyMessageFailure, ...], Field(exclude_if=lambda failures: not failures)
-    ] = ()
+    subordinates, or of nobody; or a list of bodies, as above, in which those below it are."""
+    failures: Annotated[tuple[AnyMessageFailure, ...], unwritten(())] = ()
     """What fails of the messages down the hierarchy, from when to when."""
 
     def __repr_args__(self) -> Iterable[tuple[str | None, Any]]:
@@ -193,7 +188,7 @@ def build(
             graph = files.call(settings.build, title.rpartition(":")[2], agents, named)
             graph = from_networkx(graph, agents, neighbours=True)
         edges, neighbours = (graph.edges, ()) if graph.is_directed() else ((), graph.edges)
-        return Hierarchy(agents, edges, neighbours, settings.told, settings.considers)
+        return Hierarchy(agents, edges, neighbours, settings.told, settings.considers, named)
     except ValueError as error:
         problem = str(error)
         for start in ("hierarchy: ", f"{title}: ", f"topology {title!r}: "):
