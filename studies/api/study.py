@@ -232,9 +232,15 @@ class StudyResults:
         SpecError
             If there is no such trial, it has not finished, or the study keeps no teams.
         """
-        from . import teams
+        from ..trials.keeping import check_teams, finished_trial
+        from ..trials.session import Session
 
-        return teams.load(self.directory, condition, seed)
+        with Store.open(self.directory) as store:
+            check_teams(store)
+            trial = finished_trial(store, condition, seed)
+            with trial.sources.active():
+                session = Session.restored(trial, store.recording(trial.identity, durable.TEAM))
+        return session.scenario, session.team
 
     def report(self, path: Place | None = None) -> Path:
         """Write the whole study as one self-contained HTML file and return its path.

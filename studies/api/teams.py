@@ -1,16 +1,14 @@
-"""Trained teams that a study keeps: ready to act, and evaluated under other hierarchies."""
+"""Trained teams that a study keeps, evaluated under other hierarchies."""
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
-from ...core.interface.acting import Actors
-from ...core.interface.scenario import Scenario
 from ...core.plugins.sources import Sources
 from ..errors import SpecError, show
 from ..results.results import DONE, read
@@ -21,26 +19,15 @@ from ..store.durable import TEAM
 from ..store.schema import EVALUATION
 from ..store.store import Store
 from ..trials.arrangement import check
-from ..trials.keeping import finished_trial, open_to_run
+from ..trials.keeping import check_teams, open_to_run
 from ..trials.session import Session
 from ..trials.trial import Trial, TrialResult, trials_of
 from ..workers.runner import run_trials
 from ..workers.workers import start_workers
-from .study import Place, StudyResults
-from .study import load as load_study
+from .study import Place, StudyResults, load
 
 if TYPE_CHECKING:
     from pandas import DataFrame
-
-
-def load(directory: Path, condition: str | None, seed: int | None) -> tuple[Scenario, Actors]:
-    """Return the world of a trial, and its trained team; see `StudyResults.team`."""
-    with Store.open(directory) as store:
-        _check_kept(store, ())
-        trial = finished_trial(store, condition, seed)
-        with trial.sources.active():
-            session = Session.restored(trial, store.recording(trial.identity, TEAM))
-    return session.scenario, session.team
 
 
 def reevaluate(
@@ -80,12 +67,12 @@ def reevaluate(
     SpecError
         If there are no such teams, or they cannot act so; one line.
     """
-    study = study if isinstance(study, StudyResults) else load_study(study)
+    study = study if isinstance(study, StudyResults) else load(study)
     done = study.trials[study.trials["state"] == DONE]
     identities = {(row.condition, row.seed): str(row.identity) for row in done.itertuples()}
     directory = study.directory.resolve()
     with Store.open(directory) as store:
-        _check_kept(store, {*identities.values()})
+        check_teams(store, {*identities.values()})
         table = {**store.spec(), "evaluations": _entries(topology, decision), "keep_teams": False}
         sources = Sources(Path(), store.sources(), brought_by=str(directory))
     spec = Spec.of(table, sources)
@@ -110,29 +97,17 @@ def reevaluate(
     return frame
 
 
-def _check_kept(store: Store, identities: Container[str]) -> None:
-    """Refuse a study that keeps no teams, or not those of some trials as they were written."""
-    if not store.spec().get("keep_teams"):
-        raise SpecError(f"{store.directory}: keeps no teams: its spec has no keep_teams = true")
-    for identity, line in store.damage().items():
-        if identity in identities:
-            raise SpecError(f"{line}; nested-agents run runs it again")
-
-
 def _entries(topology: Sequence[Any], decision: Sequence[Any]) -> dict[str, dict[str, Any]]:
     """Return the table of ``[evaluations]``, by what tells its entries apart."""
-    lists = {"topology": topology, "decision": decision}
-    for key, values in lists.items():
-        if not isinstance(values, list | tuple):
-            raise SpecError(f"{key} = {show(values)}: must be a list")
-    lists = {key: plain(values, key) for key, values in lists.items() if values}
-    entries: dict[str, dict[str, Any]] = {}
+    given = {"topology": topology, "decision": decision}
+    lists = {key: plain(values, key) for key, values in given.items() if values}
+    if not lists or not all(isinstance(values, list | tuple) for values in lists.values()):
+        asked = ", ".join(f"{key} = {show(values)}" for key, values in given.items())
+        raise SpecError(f"{asked}: must be lists, one of them not empty")
+    entries = {}
     for values in product(*lists.values()):
-        point = dict(zip(lists, values, strict=True))
+        point: dict[str, Any] = dict(zip(lists, values, strict=True))
         name = label(point)
-        if not point or name in entries:
-            given = f"topology = {show(topology)}, decision = {show(decision)}"
-            raise SpecError(f"{given}: must be lists of distinct values, one of them not empty")
         if "decision" in point:
             point["learner"] = {"decision": point.pop("decision")}
         entries[name] = point

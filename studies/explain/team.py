@@ -143,17 +143,13 @@ def _train(store: Store, session: Session, bodies: Bodies | None) -> None:
 
 
 def _kept(store: Store, trial: Trial) -> list[tuple[object, ...]]:
-    """Return the training episodes of a trial as they are kept, none if it has not finished.
-
-    Those of a curriculum come first.
-    """
+    """Return the training episodes of a trial as they are kept, those of a curriculum first."""
     names, every = store.episodes()
-    phase = names.index("phase")
-    rows = [row for row in every if row[phase] == "training" or row[phase].startswith(STAGE)]
     at = [names.index(name) for name in columns(store.measures())]
-    where = names.index("condition"), names.index("seed")
-    own = (row for row in rows if tuple(row[i] for i in where) == (trial.condition, trial.seed))
-    return [tuple(row[i] for i in at) for row in own]
+    condition, seed, phase = (names.index(name) for name in ("condition", "seed", "phase"))
+    own = (row for row in every if (row[condition], row[seed]) == (trial.condition, trial.seed))
+    trained = (row for row in own if row[phase] == "training" or row[phase].startswith(STAGE))
+    return [tuple(row[i] for i in at) for row in trained]
 
 
 def folder_of(directory: Path, trial: Trial, conditions: Sequence[str]) -> Path:

@@ -77,12 +77,6 @@ def arrange(settings: ConditionSettings, seed: int) -> Arrangement:
     return Arrangement(world, scenario, team)
 
 
-def build(settings: ConditionSettings, seed: int) -> tuple[Scenario, Team]:
-    """Return the scenario and the untrained team of fuzzy agents of a condition; see `arrange`."""
-    arrangement = arrange(settings, seed)
-    return arrangement.scenario, of_fuzzy_agents(arrangement.team)
-
-
 def teach(
     own: Arrangement, settings: ConditionSettings, curriculum: Sequence[Stage], seed: int
 ) -> Iterator[tuple[Stage, Arrangement]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -123,6 +123,15 @@ def finished_trial(store: Store, condition: str | None, seed: int | None) -> Tri
         unfinished = f"{trial.condition}, seed {seed}: has not finished"
         raise SpecError(store.damage().get(trial.identity, unfinished))
     return trial
+
+
+def check_teams(store: Store, identities: Container[str] = ()) -> None:
+    """Refuse a study that keeps no teams, or not those of some trials as they were written."""
+    if not store.spec().get("keep_teams"):
+        raise SpecError(f"{store.directory}: keeps no teams: its spec has no keep_teams = true")
+    for identity, line in store.damage().items():
+        if identity in identities:
+            raise SpecError(f"{line}; nested-agents run runs it again")
 
 
 def noted_of(spec: Spec, measures: Sequence[Measure] = (), trials: Sequence[Trial] = ()) -> Noted:

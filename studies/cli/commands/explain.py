@@ -29,7 +29,6 @@ def command(directory: Path, condition: str | None, seed: int | None, trust: boo
     from ...explain.figures import draw
     from ...explain.text import MOST_AGENTS, text
     from ...presentation.figures import save
-    from ...presentation.progress import say
     from ...store import durable
     from ...trials.keeping import finished_trial
     from ..loading import opened, trust_files
@@ -39,8 +38,6 @@ def command(directory: Path, condition: str | None, seed: int | None, trust: boo
     with opened(directory) as store:
         trial = finished_trial(store, condition, seed)
         conditions = list(store.columns())
-        if not trial.keep_teams:
-            say(f"training {trial.condition}, seed {trial.seed} again: {trial.lengths}")
         explanation = team.explain(store, trial)
     folder = team.folder_of(directory, trial, conditions)
     folder.mkdir(parents=True, exist_ok=True)
