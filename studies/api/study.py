@@ -46,6 +46,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from pandas import DataFrame
 
+    from ...core.interface.acting import Actors
+    from ...core.interface.scenario import Scenario
     from ..spec.spec import Spec
     from ..workers.runner import Observer
 
@@ -57,7 +59,7 @@ Place = str | PathLike[str]
 class StudyResults:
     """What the finished trials of a study measured, or those of several studies together.
 
-    Made by `run` and `load`. A notebook shows it as its table.
+    Made by `run` and `load`. Printed, or shown by a notebook, it is its table.
     """
 
     outline: StudyOutline
@@ -215,6 +217,31 @@ class StudyResults:
         where = None if path is None else Path(path)
         return replay.draw(self.directory, condition, seed, episode, where)
 
+    def team(
+        self, condition: str | None = None, seed: int | None = None
+    ) -> tuple[Scenario, Actors]:
+        """Return the world of a trial, and the team that was trained in it, ready to act.
+
+        Parameters
+        ----------
+        condition, seed
+            Which trial; by default the first.
+
+        Raises
+        ------
+        SpecError
+            If there is no such trial, it has not finished, or the study keeps no teams.
+        """
+        from ..trials.keeping import check_teams, finished_trial
+        from ..trials.session import Session
+
+        with Store.open(self.directory) as store:
+            check_teams(store)
+            trial = finished_trial(store, condition, seed)
+            with trial.sources.active():
+                session = Session.restored(trial, store.recording(trial.identity, durable.TEAM))
+        return session.scenario, session.team
+
     def report(self, path: Place | None = None) -> Path:
         """Write the whole study as one self-contained HTML file and return its path.
 
@@ -255,6 +282,11 @@ class StudyResults:
         if len(self._directories) != 1:
             raise SpecError("these are not the results of one study that is kept in a directory")
         return self._directories[0]
+
+    def __str__(self) -> str:
+        return "\n".join([str(self.table()), "", *self.notes])
+
+    __repr__ = __str__
 
     def _repr_html_(self) -> str:
         return f"<h4>{self.outline.study}</h4>{self.table().html}"
