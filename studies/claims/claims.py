@@ -148,6 +148,21 @@ CLAIMS: tuple[Claim, ...] = (
         measured.order_matters, within(0.15),
     ),
     Claim(
+        "considering", "agents gain by considering what those below them may do", "V",
+        "edges", "evaluation success, own value, less that of the same weights considering nobody",
+        measured.lost_without("told only"), at_least(0.1),
+    ),
+    Claim(
+        "telling", "agents gain by being told what those above them have decided", "V",
+        "edges", "the same, less that of agents that are told nothing, take others to maintain",
+        measured.lost_without("considered only"), at_least(0.1),
+    ),
+    Claim(
+        "planning", "the same, if each expects of the others what it would do in their place", "V",
+        "edges", "the same, less that of agents that are told nothing, plan for the others",
+        measured.lost_without("considered only, private plans"), at_least(0.1),
+    ),
+    Claim(
         "speed", "scales with the number of agents: time", "Abstract, VII",
         "scaling", "time of a decision over the decision period, most robots, not by enumeration",
         measured.decision_share, at_most(1.0),

@@ -13,11 +13,14 @@ import numpy as np
 
 from ...core.agents.cost import Problem
 from ..catalogue.chain_order import compare_orders
+from ..catalogue.hierarchies import VALUE_OF
 from ..catalogue.shapes import ratios_of
 from ..catalogue.wheel_failure import courses_of
-from ..results.comparison import aligned, difference, ratio
+from ..presentation.words import count
+from ..results.comparison import aligned, difference, of_shared_seeds, ratio
 from ..results.results import Results
 from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
+from ..store.schema import EVALUATION
 
 Compute = Callable[[Results], "Measured | None"]
 """Computes what a claim is about from the results of a study."""
@@ -170,6 +173,31 @@ def order_matters(results: Results) -> Measured | None:
     low, high = min(float(e.low) for e in shifts), max(float(e.high) for e in shifts)
     widest = Estimate(most.value, np.asarray(low), np.asarray(high))
     return Measured(widest, len(first), comparisons[0].p, f"{1 + len(others)} orders")
+
+
+def lost_without(evaluation: str) -> Compute:
+    """Return what measures evaluation success less that of the same weights under other edges.
+
+    Of the conditions in which every agent seeks its own value, as in the paper, all sizes alike.
+    """
+
+    def compute(results: Results) -> Measured | None:
+        other = EVALUATION + evaluation
+        cases = [
+            condition
+            for condition in results.conditions
+            if results.columns[condition].get(VALUE_OF) == "own" and results.has(condition, other)
+        ]
+        if not cases:
+            return None
+        seeds = [results.seeds(condition) for condition in cases]
+        whole, part = (
+            np.hstack(of_shared_seeds(seeds, [results.success(c, phase) for c in cases]))
+            for phase in ("evaluation", other)
+        )
+        return Measured(difference(whole, part), len(whole), note=count(len(cases), "size"))
+
+    return compute
 
 
 def _sizes(results: Results) -> dict[int, list[str]]:

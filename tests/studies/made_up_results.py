@@ -97,6 +97,23 @@ def games(systems: dict[str, float], by_game: dict[str, float] | None = None) ->
     return base
 
 
+def edges(chance: float, without: dict[str, float], seeds: int = SEEDS) -> Arrays:
+    """Teams of four and eight robots, own values and the team's, and the same with other edges."""
+    columns = {
+        f"value_of={of}, robots={n}": {"learner.decision.value_of": of, "scenario.robots": n}
+        for of in ("own", "team")
+        for n in (4, 8)
+    }
+    base = ablation(dict.fromkeys(columns, chance), seeds)
+    base.columns.update(columns)
+    rng = np.random.default_rng(7)
+    for name, rest in without.items():
+        base.phases[f"evaluation:{name}"] = {
+            c: arrays(np.full(10, rest if "own" in c else chance), rng, seeds) for c in columns
+        }
+    return base
+
+
 def wheel_failure(
     ends: dict[str, dict[str, float]], onset: int = 20, episodes: int = 40, seeds: int = SEEDS
 ) -> Arrays:

@@ -10,6 +10,7 @@ from made_up_results import (
     Arrays,
     ablation,
     arrays,
+    edges,
     games,
     related,
     scaling,
@@ -80,6 +81,7 @@ GOOD = {"nothing": 0.0, "weights": 1.0, "self-model": 1.0, "both": 1.0}
 BAD = {"nothing": 0.0, "weights": 0.1, "self-model": 0.1, "both": 0.1}
 FAULTS = ("4 wheels, seized", "4 wheels, reversed")
 SYSTEMS = ("nested, observed", "nested, maximum")
+RELATIONS = ("told only", "considered only", "considered only, private plans")
 COMPUTED = ("cost", "complexity")
 
 
@@ -92,6 +94,7 @@ def everything(good: bool) -> dict[str, Results]:
         "shapes": shapes({"circle": 0.98, "L": 0.98 if good else 0.2}),
         "related": related(kept=(1.0, 0.2) if good else (0.2, 1.0)),
         "games": games(dict.fromkeys(SYSTEMS, 1.0 if good else 0.1)),
+        "edges": edges(0.9, dict.fromkeys(RELATIONS, 0.2 if good else 0.9)),
         "ablation": ablation({"default": 1.0, "static predictor": 1.0 if good else 0.1}),
     }
     return {study: arrays.frames() for study, arrays in made.items()}
@@ -134,6 +137,17 @@ def test_without_results_nothing_is_decided() -> None:
     assert found == {"not decided"}
 
 
+def test_what_a_relation_buys_is_a_mean_over_sizes_of_own_value() -> None:
+    made = edges(1.0, {"told only": 0.0})
+    for robots in (4, 8):
+        condition = f"value_of=own, robots={robots}"
+        made.phases["evaluation:told only"][condition]["success"][:] = robots == 8
+    results = {"edges": made.frames()}
+    (finding,) = [f for f in judge(results) if f.claim.name == "considering"]
+    assert float(finding.measured.estimate.value) == 0.5
+    assert finding.measured.note == "2 sizes"
+
+
 def test_few_seeds_decide_nothing() -> None:
     results = {"ablation": ablation({"default": 1.0, "static predictor": 0.0}, seeds=4).frames()}
     (finding,) = [f for f in judge(results) if f.claim.name == "model"]
@@ -161,6 +175,7 @@ def test_claims_name_studies_and_conditions_that_their_specs_have() -> None:
                 "wheel-failure": {f"{f}, enabled={e}" for f in FAULTS for e in ("true", "false")},
             }.get(study, set())
             assert wanted <= labels
+            assert study != "edges" or {*RELATIONS} <= {*spec.evaluations}
             if folder is QUICK:
                 check(spec)
 
@@ -304,6 +319,9 @@ REST = {
     "games": '[scenario]\nkind = "matrix-game"\n[learner]\nkind = "td-lambda"\ndiscount = 0.0\n'
     'rule_base.order = "full"\ndecision.value_of = "own"\n'
     '[[overrides]]\nname = "nested, observed"\nsweep.scenario.game = ["climbing"]',
+    "edges": '[learner]\nweights = "role"\ndecision.evaluator = "best-response"\n'
+    '[sweep]\nlearner.decision.value_of = ["own"]\n'
+    '[evaluations]\n"told only".topology.considers = "none"',
     "related": 'evaluations.star.box = "star"\n[[overrides]]\nname = "nested"\n'
     '[[overrides]]\nname = "pushing points, team"\n'
     'scenario = { kind = "pushing-points", observed = "joint" }',
