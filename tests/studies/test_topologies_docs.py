@@ -1,22 +1,26 @@
-"""docs/topologies.md holds the table that the committed results give."""
+"""docs/topologies.md holds the tables that the committed results give."""
 
 import re
 from pathlib import Path
 
 import pytest
+from published_tables import print_table
 
 import nested_agents as na
-from nested_agents.studies.claims import claims
-from nested_agents.studies.cli.main import main
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "topologies.md"
-COLUMNS = ("evaluation success", "decision [ms]", "messages")
+EDGES = ("evaluation success", "decisions to goal", "decision [ms]", "messages")
 
 
-def test_the_table(capsys: pytest.CaptureFixture[str]) -> None:
-    path = claims.PUBLISHED / "hierarchies.json"
-    assert main(["table", str(path), "--columns", *COLUMNS, "--format", "markdown"]) == 0
-    table = capsys.readouterr().out
+@pytest.mark.parametrize(
+    ("name", "columns"),
+    [
+        ("hierarchies", ("evaluation success", "decision [ms]", "messages")),
+        ("edges", EDGES),
+    ],
+)
+def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
+    table = print_table(name, columns, capsys)
     assert table in PAGE.read_text(encoding="utf-8"), f"docs/topologies.md: put in\n{table}"
 
 
