@@ -279,12 +279,12 @@ class BoxPushingEnv(Game, gymnasium.Env):
         return {"single": range(len(self.scenario.agents))}
 
     @cached_property
-    def observation_space(self) -> Box:
+    def observation_space(self) -> Box:  # type: ignore[override]
         """The space of observations."""
         return self.seats["single"].observation_space
 
     @cached_property
-    def action_space(self) -> Discrete | MultiDiscrete:
+    def action_space(self) -> Discrete | MultiDiscrete:  # type: ignore[override]
         """The space of actions."""
         return self.seats["single"].action_space
 
