@@ -64,9 +64,11 @@ def test_orders_are_compared_on_the_seeds_that_all_have_finished() -> None:
         seeds = tuple(seed for seed in range(20) if seed != k)
         results.seeds[order] = seeds
         results.training[order]["success"] = whole[list(seeds)]
-    (comparison,) = analyse(replace(results, evaluation={}).frames()).cases
-    assert comparison.values.tolist() == [[m] * 6 for m in whole[6:].mean(axis=1)]
-    assert comparison.p == 1.0
+    analysis = analyse(replace(results, evaluation={}).frames())
+    (test,) = analysis.cases
+    assert (test.orders, test.seeds, test.p) == (6, 14, 1.0)
+    assert [d.seeds for d in analysis.differences] == [18] * 5
+    assert all(float(d.estimate.value) == 0.0 for d in analysis.differences)
 
 
 def test_what_no_two_seeds_have_finished_is_not_compared() -> None:
