@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core.agents.cost import Problem
-from ..catalogue.chain_order import compare_orders
+from ..catalogue.chain_order import order_tests
 from ..catalogue.hierarchies import VALUE_OF
 from ..catalogue.shapes import ratios_of
 from ..catalogue.wheel_failure import courses_of
@@ -20,6 +20,7 @@ from ..presentation.words import count
 from ..results.comparison import aligned, difference, of_shared_seeds, ratio
 from ..results.results import Results
 from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
+from ..results.summary import EVALUATED
 from ..store.schema import EVALUATION
 
 Compute = Callable[[Results], "Measured | None"]
@@ -163,8 +164,8 @@ def order_matters(results: Results) -> Measured | None:
 
     Intervals of the differences are simultaneous (Bonferroni); p is that of Friedman's test.
     """
-    comparisons = [c for c in compare_orders(results) if c.title.startswith("evaluation")]
-    if not comparisons:
+    tests = [test for test in order_tests(results) if test.title == EVALUATED]
+    if not tests:
         return None
     first, *others = (results.success(c, "evaluation") for c in results.of_phase("evaluation"))
     level = 1.0 - 0.05 / len(others)
@@ -172,7 +173,7 @@ def order_matters(results: Results) -> Measured | None:
     most = max(shifts, key=lambda e: abs(float(e.value)))
     low, high = min(float(e.low) for e in shifts), max(float(e.high) for e in shifts)
     widest = Estimate(most.value, np.asarray(low), np.asarray(high))
-    return Measured(widest, len(first), comparisons[0].p, f"{1 + len(others)} orders")
+    return Measured(widest, len(first), tests[0].p, f"{1 + len(others)} orders")
 
 
 def lost_without(evaluation: str) -> Compute:

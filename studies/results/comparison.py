@@ -111,9 +111,12 @@ def differences(
     return adjusted(made)
 
 
-def with_first(conditions: Sequence[str]) -> list[tuple[str, str, str]]:
+def with_first(
+    conditions: Sequence[str], names: Sequence[str] | None = None
+) -> list[tuple[str, str, str]]:
     """Return the pairs of all other conditions with the first one, see `differences`."""
-    return [(condition, condition, conditions[0]) for condition in conditions[1:]]
+    named = zip(conditions if names is None else names, conditions, strict=True)
+    return [(name, condition, conditions[0]) for name, condition in named][1:]
 
 
 def paired_difference(own: Array, base: Array, *, of_rates: bool) -> Estimate:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
-from textwrap import wrap
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from .numbers import shown
 from .results import SECONDS, Results
 from .statistics import bootstrap, rate
 from .summary import Summary
-from .verdicts import WIDTH, WORDS, power_lines, verdict_lines
+from .verdicts import WORDS, printed
 
 EPISODES = (
     Measure("steps", "steps", "1", better="lower", least=0.0),
@@ -69,25 +68,16 @@ class Contrasts:
     @property
     def notes(self) -> tuple[str, ...]:
         """The verdicts, and what the comparisons could have detected."""
-        return tuple(self._notes())
-
-    def _notes(self) -> Iterator[str]:
-        differences = self.differences
-        if not differences:
-            yield "Nothing to compare: no two conditions share two seeds."
-            return
-        words = {"higher": WORDS, "lower": WORDS[::-1]}.get(
-            self.measure.better or "", ("lower", "higher")
-        )
-        for group in self.groups:
-            if group.differences:
-                where = f"{group.setting}: " if group.setting else ""
-                text = f"{where}{self.title}, less that of {group.reference}:"
-                yield from wrap(text, WIDTH, break_on_hyphens=False)
-                yield from verdict_lines(group.differences, words)
-        counted = f"{len(differences)} comparison{'s' * (len(differences) > 1)}"
-        yield f"p: permutation of signs over seeds, adjusted over {counted} (Holm)."
-        yield from power_lines(differences, of_rates=self.measure.is_rate)
+        higher_is = {"higher": WORDS, "lower": WORDS[::-1]}
+        words = higher_is.get(self.measure.better or "", ("lower", "higher"))
+        groups = {
+            ": ".join(filter(None, (g.setting, f"{self.title}, less that of {g.reference}"))): (
+                g.differences
+            )
+            for g in self.groups
+        }
+        lines = printed(groups, words, of_rates=self.measure.is_rate)
+        return tuple(lines or ["Nothing to compare: no two conditions share two seeds."])
 
 
 def contrasts(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from textwrap import wrap
 
 from .comparison import Difference
@@ -33,6 +33,42 @@ def verdict_lines(
     for d in ranked:
         if d.p >= LEVEL:
             yield from _line("no significant difference", d)
+
+
+def verdicts(differences: Sequence[Difference], reference: str) -> list[str]:
+    """Return all that is to be said of differences of rates from a reference, see `printed`."""
+    heads = {
+        f"{title}, less that of {reference}": own for title, own in by_measure(differences).items()
+    }
+    return printed(heads)
+
+
+def by_measure(differences: Sequence[Difference]) -> dict[str, list[Difference]]:
+    """Return the differences of every measure by its title."""
+    titles = dict.fromkeys(d.measure for d in differences)
+    return {title: [d for d in differences if d.measure == title] for title in titles}
+
+
+def printed(
+    groups: Mapping[str, Sequence[Difference]],
+    words: tuple[str, str] = WORDS,
+    *,
+    of_rates: bool = True,
+) -> list[str]:
+    """Return the verdicts of groups below their heads, how p is adjusted, and `power_lines`.
+
+    No lines if nothing is compared. p must be adjusted over all groups.
+    """
+    compared = [d for group in groups.values() for d in group]
+    lines = []
+    for head, group in groups.items():
+        if group:
+            lines += wrap(f"{head}:", WIDTH, break_on_hyphens=False)
+            lines += verdict_lines(group, words)
+    if compared:
+        counted = f"{len(compared)} comparison{'s' * (len(compared) > 1)}"
+        lines.append(f"p: permutation of signs over seeds, adjusted over {counted} (Holm).")
+    return lines + power_lines(compared, of_rates=of_rates)
 
 
 def _line(verdict: str, d: Difference) -> list[str]:

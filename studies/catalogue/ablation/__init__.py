@@ -9,6 +9,8 @@ conditions and both measures.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ...results.analysis import Analysis, Figures
@@ -16,7 +18,7 @@ from ...results.comparison import differences, mean_success, with_first
 from ...results.results import Results
 from ...results.statistics import Estimate, rate
 from ...results.summary import EVALUATED, Summary
-from ...results.verdicts import power_lines, verdict_lines
+from ...results.verdicts import by_measure, verdicts
 from ..study import run_training as measure
 
 PUBLISHED = ("success",)
@@ -27,36 +29,43 @@ PHASES = {"training success": "training", EVALUATED: "evaluation"}
 
 def analyse(results: Results) -> Analysis:
     """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
+    return compared_with_first(results, results.of_phase("training"))
+
+
+def compared_with_first(results: Results, names: Sequence[str]) -> Analysis:
+    """Return the analysis with conditions under these names, as many as have been trained."""
     conditions = results.of_phase("training")
-    phases = {title: phase for title, phase in PHASES.items() if phase in results.phases}
+    phases = phases_of(results)
     measures = {title: mean_success(phase) for title, phase in phases.items()}
-    compared = differences(results, with_first(conditions), measures)
+    compared = differences(results, with_first(conditions, names), measures)
     by_place = {(d.condition, d.measure): d.estimate for d in compared}
     unknown = Estimate(*(np.asarray(value) for value in (0.0, np.nan, np.nan)))
     table = []
-    for condition in conditions:
+    for condition, name in zip(conditions, names, strict=True):
         estimates = {}
         for title, phase in phases.items():
             estimates[title] = rate(results.success(condition, phase))
-            estimates[f"{title}, difference"] = by_place.get((condition, title), unknown)
-        table.append(Summary(condition, len(results.seeds(condition)), estimates))
-    notes = []
-    for title in dict.fromkeys(d.measure for d in compared):
-        notes.append(f"\n{title}, p adjusted over {len(compared)} comparisons:")
-        notes += verdict_lines([d for d in compared if d.measure == title])
-    return Analysis(
-        tuple(table), (*notes, *power_lines(compared)), tuple(phases), differences=compared
-    )
+            estimates[f"{title}, difference"] = by_place.get((name, title), unknown)
+        table.append(Summary(name, len(results.seeds(condition)), estimates))
+    notes = verdicts(compared, names[0]) if compared else []
+    return Analysis(tuple(table), tuple(notes), differences=compared)
+
+
+def phases_of(results: Results) -> dict[str, str]:
+    """Return those of `PHASES` that all trained conditions have."""
+    conditions = results.of_phase("training")
+    return {
+        title: phase
+        for title, phase in PHASES.items()
+        if all(results.has(condition, phase) for condition in conditions)
+    }
 
 
 def draw(analysis: Analysis) -> Figures:
     """Return the figures of an analysis by name."""
     from ...presentation import forest
 
-    panels = {
-        title: [d for d in analysis.differences if d.measure == title] for title in analysis.cases
-    }
-    figure = forest.draw(panels, "difference from the first condition")
+    figure = forest.draw(by_measure(analysis.differences), "difference from the first condition")
     return {} if figure is None else {"ablation": figure}
 
 

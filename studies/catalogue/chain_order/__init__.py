@@ -3,70 +3,62 @@
 The paper calls its chain "in fact arbitrary" (Section X-A). Conditions are orders of the agents;
 all meet the same worlds, seed by seed. Two measures were fixed beforehand: how fast a team learns
 (success over all of training) and how well it ends (evaluation success). For each,
-Friedman's test asks whether the orders differ at all, and the first condition is compared with each
-other one; p-values are adjusted by Holm's method over the two tests, and over all comparisons.
+Friedman's test asks whether the orders differ at all, p adjusted by Holm's method over the two
+tests; and every order is compared with the first one as the study `ablation` compares.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...results.analysis import Analysis, Figures
 from ...results.comparison import aligned, mean_success
-from ...results.paired_tests import LEVEL, Friedman, friedman, holm, paired_permutation
+from ...results.paired_tests import LEVEL, Friedman, friedman, holm
 from ...results.results import Results
-from ...results.statistics import bootstrap, rate
-from ...results.summary import EVALUATED, Summary
+from ...results.verdicts import by_measure
+from .. import ablation
 from ..study import run_training as measure
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
-PHASES = {"success, all training": "training", EVALUATED: "evaluation"}
-"""What the orders are compared by: success rates in these phases."""
 
 
 @dataclass(frozen=True)
-class OrderComparison:
-    """All orders by one measure."""
+class OrderTest:
+    """Whether the orders differ at all by one measure."""
 
     title: str
     """The measure."""
-    orders: tuple[str, ...]
-    """Labels of the conditions."""
-    values: NDArray[np.float64]
-    """``(n_seeds, n_orders)``, seeds that all orders have finished."""
+    orders: int
+    """How many there are."""
+    seeds: int
+    """How many seeds all orders have finished."""
     test: Friedman
-    """Whether the orders differ at all."""
+    """The test."""
     p: float
     """Its p, adjusted over the measures."""
-    against_first: NDArray[np.float64]
-    """``(n_orders - 1,)`` p of every other order against the first, adjusted over all of them and
-    all measures."""
+
+    @property
+    def verdict(self) -> str:
+        """What the test found, in words."""
+        differ = "differ" if self.p < LEVEL else "do not differ significantly"
+        return (
+            f"{self.title}: {self.orders} orders {differ} (Friedman {self.test.statistic:.1f}, "
+            f"p = {self.test.p:.2g}, adjusted {self.p:.2g}; W = {self.test.concordance:.3f}; "
+            f"{self.seeds} seeds)"
+        )
 
 
 def analyse(results: Results) -> Analysis:
     """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
     conditions = results.of_phase("training")
-    names = shortened(conditions)
-    table = []
-    for condition, name in zip(conditions, names, strict=True):
-        estimates = {
-            title: rate(results.success(condition, phase))
-            for title, phase in PHASES.items()
-            if results.has(condition, phase)
-        }
-        table.append(Summary(name, len(results.seeds(condition)), estimates))
-    comparisons = compare_orders(results)
-    notes = (*_verdict(comparisons), *_legend(conditions))
-    return Analysis(tuple(table), notes, comparisons)
+    compared = ablation.compared_with_first(results, shortened(conditions))
+    tests = order_tests(results)
+    notes = (*(test.verdict for test in tests), *compared.notes, *_legend(conditions))
+    return replace(compared, notes=notes, cases=tests)
 
 
 def shortened(orders: Sequence[str]) -> list[str]:
@@ -91,87 +83,24 @@ def _legend(orders: Sequence[str]) -> list[str]:
     return [f"agents: {', '.join(numbered)}"] if len(named) > 1 else []
 
 
-def compare_orders(results: Results) -> tuple[OrderComparison, ...]:
-    """Return the comparisons of all orders, one for each of `PHASES` that all orders have."""
+def order_tests(results: Results) -> tuple[OrderTest, ...]:
+    """Return the tests of all orders together, one for each measure that all of them have."""
     conditions = results.of_phase("training")
     made = []
-    for title, phase in PHASES.items() if len(conditions) > 1 else ():
-        if not all(results.has(condition, phase) for condition in conditions):
-            continue
+    for title, phase in ablation.phases_of(results).items() if len(conditions) > 1 else ():
         values = np.stack(aligned(results, conditions, mean_success(phase)), axis=1)
         if len(values) >= 2:
-            against = np.array([paired_permutation(c, values[:, 0]) for c in values.T[1:]])
-            made.append((title, values, friedman(values), against))
-    if not made:
-        return ()
-    omnibus = holm([test.p for _, _, test, _ in made])
-    adjusted = holm(np.concatenate([against for *_, against in made])).reshape(len(made), -1)
-    return tuple(
-        OrderComparison(title, tuple(shortened(conditions)), values, test, float(p), ps)
-        for (title, values, test, _), p, ps in zip(made, omnibus, adjusted, strict=True)
-    )
-
-
-def _verdict(comparisons: Sequence[OrderComparison]) -> Iterator[str]:
-    for c in comparisons:
-        n, k = c.values.shape
-        means = c.values.mean(axis=0)
-        best, worst = int(means.argmax()), int(means.argmin())
-        differ = "differ" if c.p < LEVEL else "do not differ significantly"
-        # Half the median width of their 95 % intervals, unadjusted.
-        shifts = bootstrap(c.values[:, 1:] - c.values[:, :1])
-        reach = float(np.median(shifts.high - shifts.low)) / 2.0
-        named = int((c.against_first < LEVEL).sum())
-        yield (
-            f"{c.title}: {k} orders {differ} (Friedman {c.test.statistic:.1f}, p = {c.test.p:.2g}, "
-            f"adjusted {c.p:.2g}; W = {c.test.concordance:.3f}; {n} seeds)"
-        )
-        yield (
-            f"  {named} of {k - 1} differ from the first (least p {c.against_first.min():.2g}, "
-            f"adjusted); intervals of the differences reach {reach:.2f} to either side"
-        )
-        yield (
-            f"  best {c.orders[best]}: {means[best]:.3f}; worst {c.orders[worst]}: "
-            f"{means[worst]:.3f}; first: {means[0]:.3f}"
-        )
+            made.append((title, len(conditions), len(values), friedman(values)))
+    ps = holm([test.p for *_, test in made])
+    return tuple(OrderTest(*own, float(p)) for own, p in zip(made, ps, strict=True))
 
 
 def draw(analysis: Analysis) -> Figures:
-    """Return the figure: every order with its interval, sorted, and every seed.
+    """Return the figure: what each order differs from the first one by."""
+    from ...presentation import forest
 
-    Points are means over seeds, bars their 95 % intervals, grey the seeds; the first condition,
-    the paper's order, is drawn in another colour and its mean as a line.
-    """
-    from ...presentation.figures import name_rows, panels  # matplotlib takes its time
-
-    comparisons = analysis.cases
-    if not comparisons:
-        return {}
-    labels = comparisons[0].orders
-    width = 2.2 + 0.07 * max(map(len, labels)) + 2.6 * len(comparisons)
-    figure, axes = panels(1, len(comparisons), (width, 1.3 + 0.2 * len(labels)), sharey=True)
-    rank = np.argsort(-comparisons[0].values.mean(axis=0), kind="stable")
-    for panel, comparison in zip(axes[0], comparisons, strict=True):
-        _panel(panel, comparison, rank)
-    name_rows(axes[0, 0], [labels[i] for i in rank])
-    return {"chain-order": figure}
-
-
-def _panel(axes: Axes, comparison: OrderComparison, rank: NDArray[np.intp]) -> None:
-    from ...presentation.figures import COLOURS, draw_row
-
-    rng = np.random.default_rng(0)  # spreads the seeds' dots, nothing else
-    for row, i in enumerate(rank):
-        seeds = comparison.values[:, i]
-        spread = row + rng.uniform(-0.25, 0.25, len(seeds))
-        axes.plot(seeds, spread, ".", color="#cccccc", markersize=3, zorder=1)
-        colour = COLOURS[1] if i == 0 else COLOURS[0]
-        draw_row(axes, row, bootstrap(seeds), colour, markersize=4, zorder=3)
-    first = comparison.values[:, 0].mean()
-    axes.axvline(first, color=COLOURS[1], linewidth=0.8, linestyle=":")
-    axes.set_title(f"{comparison.title}\nFriedman p = {comparison.test.p:.2g}", loc="left")
-    axes.set_xlabel("rate")
-    axes.grid(axis="x", alpha=0.25)
+    figure = forest.draw(by_measure(analysis.differences), "difference from the first order")
+    return {} if figure is None else {"chain-order": figure}
 
 
 __all__ = ["analyse", "draw", "measure"]

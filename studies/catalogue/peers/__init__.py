@@ -18,7 +18,7 @@ from ...results.comparison import Array, differences, mean_success, with_first
 from ...results.results import Results
 from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, stacked
 from ...results.summary import EVALUATED, Summary, evaluated
-from ...results.verdicts import power_lines
+from ...results.verdicts import verdicts
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..study import check_evaluated as check
@@ -105,10 +105,7 @@ def analyse(results: Results) -> Analysis:
         )
     compared = differences(results, with_first(conditions), {EVALUATED: mean_success("evaluation")})
     notes = ["success, N: when evaluated after N episodes of training."] if courses else []
-    if compared:
-        notes.append(f"\nsuccess against that of {conditions[0]} (p adjusted):")
-    notes += [f"  {other.condition}: {other.shown}" for other in compared]
-    notes += power_lines(compared)
+    notes += verdicts(compared, conditions[0]) if compared else []
     return Analysis(tuple(table), tuple(notes), courses, compared)
 
 

@@ -30,7 +30,7 @@ from ...results.comparison import Array, Difference, adjusted, of_shared_seeds
 from ...results.results import Results
 from ...results.statistics import NOT_NEGATIVE, bootstrap, rate
 from ...results.summary import Summary
-from ...results.verdicts import power_lines
+from ...results.verdicts import verdicts
 from ...spec.labels import label_but
 from ...spec.spec import Spec
 from ...trials.arrangement import arrange
@@ -179,8 +179,7 @@ def analyse(results: Results) -> Analysis:
     courses = courses_of(results)
     gains = _gains(courses)
     notes = ["Named after the colon is what adapts to the failure."] if courses else []
-    notes += ["\nsuccess at the end against nothing adapting (p adjusted):"] if gains else []
-    notes += [f"  {gain.condition}: {gain.shown}" for gain in gains] + power_lines(gains)
+    notes += verdicts(gains, "nothing adapting")
     return Analysis(tuple(map(_summary, courses)), tuple(notes), courses, gains)
 
 
@@ -242,7 +241,7 @@ def _gains(courses: Sequence[Course]) -> tuple[Difference, ...]:
         own, other = of_shared_seeds([c.seeds for c in both], [c.end.mean(axis=1) for c in both])
         if len(own) >= 2:
             named = f"{course.fault}, {course.adapts}"
-            gains.append(Difference.between(named, "end", own, other, of_rates=True))
+            gains.append(Difference.between(named, "success at the end", own, other, of_rates=True))
     return adjusted(gains)
 
 

@@ -70,7 +70,7 @@ def test_conditions_are_compared(study) -> None:
 def test_trials_are_asked_again_by_another_study(study) -> None:
     again = study.as_study("ablation")
     assert again.table().titles[0] == "training success"
-    assert any("p adjusted over 2 comparisons" in note for note in again.notes)
+    assert any("adjusted over 2 comparisons" in note for note in again.notes)
     for name, complaint in (("ablaton", "did you mean 'ablation'"), ("scaling", "needs robots")):
         with pytest.raises(na.SpecError, match=complaint):
             study.as_study(name).table()

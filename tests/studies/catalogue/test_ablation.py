@@ -16,7 +16,7 @@ def test_what_matters_is_named_and_what_does_not_is_not() -> None:
     assert "worse: no replay" in text
     assert "better: more of it" in text
     assert text.count("no significant difference: no termination radius") == 2
-    assert "p adjusted over 6 comparisons" in text
+    assert "adjusted over 6 comparisons" in text
     assert [line.condition for line in analysis.table] == list(CHANCES)
     by_name = {line.condition: line.estimates for line in analysis.table}
     assert by_name["default"]["evaluation success, difference"].value == 0.0

@@ -34,7 +34,8 @@ def made_up(chances: list[float], seeds: int = 20) -> Arrays:
 def test_equal_orders_are_not_told_apart() -> None:
     analysis = analyse(made_up([0.7] * 6).frames())
     assert [c.p > 0.05 for c in analysis.cases] == [True, True]
-    assert all((c.against_first > 0.05).all() for c in analysis.cases)
+    assert len(analysis.differences) == 10
+    assert all(d.p > 0.05 for d in analysis.differences)
     assert "6 orders do not differ significantly" in analysis.notes[0]
 
 
@@ -42,9 +43,10 @@ def test_one_bad_order_is_found_and_named() -> None:
     analysis = analyse(made_up([0.7, 0.7, 0.7, 0.3, 0.7, 0.7]).frames())
     for comparison in analysis.cases:
         assert comparison.p < 0.001
-        assert (comparison.against_first < 0.05).tolist() == [False, False, True, False, False]
+    assert [d.condition for d in analysis.differences if d.p < 0.05] == ["2 3 1", "2 3 1"]
     assert "6 orders differ" in analysis.notes[0]
-    assert any("worst 2 3 1:" in note for note in analysis.notes)
+    assert "evaluation success, less that of 1 2 3:" in analysis.notes
+    assert sum(note.startswith("  worse: 2 3 1") for note in analysis.notes) == 2
 
 
 def test_agents_are_numbered_in_the_first_order() -> None:
@@ -62,9 +64,11 @@ def test_orders_are_compared_on_the_seeds_that_all_have_finished() -> None:
         seeds = tuple(seed for seed in range(20) if seed != k)
         results.seeds[order] = seeds
         results.training[order]["success"] = whole[list(seeds)]
-    (comparison,) = analyse(replace(results, evaluation={}).frames()).cases
-    assert comparison.values.tolist() == [[m] * 6 for m in whole[6:].mean(axis=1)]
-    assert comparison.p == 1.0
+    analysis = analyse(replace(results, evaluation={}).frames())
+    (test,) = analysis.cases
+    assert (test.orders, test.seeds, test.p) == (6, 14, 1.0)
+    assert [d.seeds for d in analysis.differences] == [18] * 5
+    assert all(float(d.estimate.value) == 0.0 for d in analysis.differences)
 
 
 def test_what_no_two_seeds_have_finished_is_not_compared() -> None:
