@@ -43,13 +43,6 @@ class SummaryTable:
     """The whole table in Markdown. Printed, it is as on a terminal of 80 columns; a notebook shows
     it as HTML."""
 
-    @property
-    def remark(self) -> str:
-        """What must be said of intervals of few seeds, if there are any; else nothing."""
-        if all(seeds >= FEW for _, seeds, _ in self.rows):
-            return ""
-        return f"Intervals of fewer than {FEW} seeds: Student's (short if skewed), rates Wilson's."
-
     def __str__(self) -> str:
         if not self.rows:
             return NOTHING
@@ -58,10 +51,11 @@ class SummaryTable:
     @property
     def legend(self) -> list[str]:
         """Lines that say what stands in the cells."""
-        return [
-            "Means over seeds, and below them their 95 % intervals.",
-            *filter(None, [self.remark]),
-        ]
+        lines = ["Means over seeds, and below them their 95 % intervals."]
+        if any(seeds < FEW for _, seeds, _ in self.rows):
+            few = "Student's (short if skewed), rates Wilson's"
+            lines.append(f"Intervals of fewer than {FEW} seeds: {few}.")
+        return lines
 
     @property
     def html(self) -> str:
