@@ -29,36 +29,10 @@ def random_actions(scenario: Scenario, steps: int, seed: int) -> IntArray:
     return actions
 
 
-def play(
-    scenario: Scenario, seed: int, episode: int, actions: IntArray, *, predicting: bool = False
-) -> Iterator[Frame]:
-    """Yield the frames of an episode, the opening first.
-
-    Parameters
-    ----------
-    scenario
-        What is played; modified.
-    seed, episode
-        As in the control loop.
-    actions
-        ``(steps, n)`` joint actions; the episode may end earlier.
-    predicting
-        Whether predictions and measurements are asked for before every step.
-    """
-    yield opening(scenario, seed, episode)
-    for action in actions:
-        if predicting:
-            _look_ahead(scenario)
-        frame = _copied(dict(fields(scenario.step(action))))
-        yield frame
-        if frame["terminated"] or frame["truncated"]:
-            return
-
-
 def opening(scenario: Scenario, seed: int, episode: int) -> Frame:
     """Reset a scenario and return the frame of the start."""
     states = scenario.reset(world_seed(seed, episode), episode)
-    return _copied({"states": states, "info": measured(scenario)})
+    return copied({"states": states, "info": measured(scenario)})
 
 
 def measured(scenario: Scenario) -> Mapping[str, Any]:
@@ -115,7 +89,8 @@ def _contrast(one: Any, other: Any) -> str:
     return f"{list(where)} = {one[where]} and {other[where]}"
 
 
-def _look_ahead(scenario: Scenario) -> None:
+def look_ahead(scenario: Scenario) -> None:
+    """Ask for predictions and measurements."""
     prediction = scenario.predict()
     some = np.zeros((2, len(scenario.agents)), dtype=np.int64)
     some[1] = len(scenario.action_set) - 1
@@ -134,7 +109,8 @@ def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any
             yield prefix + name, value
 
 
-def _copied(table: Mapping[str, Any]) -> Frame:
+def copied(table: Mapping[str, Any]) -> Frame:
+    """Return what is in a table, by dotted name, without the measured times."""
     return {
         name: value.copy() if isinstance(value, np.ndarray) else value
         for name, value in _flat(table)

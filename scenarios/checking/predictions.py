@@ -13,14 +13,13 @@ import numpy as np
 
 from ...core.interface.prediction import Blocks, states_by_group
 from ...core.interface.scenario import Scenario, groups_of
-from ...core.numerics.arrays import BoolArray, FloatArray, IntArray
+from ...core.numerics.arrays import FloatArray, IntArray
+from .variables import differs, fault_of_sharing, is_close
 
 MOST_JOINT_ACTIONS = 4**8
 """Joint actions beyond which no tables are asked for: they might not fit into memory."""
 SAMPLED = 1024
 """Joint actions that are compared, at most; if there are more they are drawn."""
-CLOSE = 1e-9
-"""Difference of predicted numbers, relative to 1 or to their size, that rounding may make."""
 
 
 def fault_of_prediction(
@@ -37,14 +36,44 @@ def fault_of_prediction(
     rng
         Draws the joint actions for which tables are compared, where there are many.
     """
+    prediction, given = scenario.predict(), joint_actions.copy()
+    fault = _misformed(scenario, prediction, joint_actions)
+    if not np.array_equal(joint_actions, given):
+        return "the joint actions that are to be predicted are changed"
+    if fault is not None:
+        return fault
+    states = np.array([prediction.states(i, given) for i in range(len(scenario.agents))])
+    for i in range(len(states)):
+        if differs(scenario, prediction.states(i, given[-1:])[0], states[i, -1]).any():
+            return f"states of agent {i} after a joint action depend on those predicted with it"
+    fault = fault_of_sharing(scenario, states) or _wrong_groups(scenario, prediction, given, states)
+    return fault or _wrong_tables(scenario, prediction, rng)
+
+
+def has_tables(prediction: Any) -> bool:
+    """Return whether a prediction has tables of all joint actions, too many to ask for or not."""
+    return hasattr(prediction, "blocks") and hasattr(prediction, "reward_table")
+
+
+def too_many(scenario: Scenario) -> bool:
+    """Return whether a scenario has more joint actions than tables are asked for."""
+    return len(scenario.action_set) ** len(scenario.agents) > MOST_JOINT_ACTIONS
+
+
+def own_may_move(scenario: Scenario) -> bool:
+    """Return whether tables of predictions say, or may say, that own variables are as if alone."""
     prediction: Any = scenario.predict()
+    return has_tables(prediction) and (too_many(scenario) or prediction.blocks(0).alone)
+
+
+def _misformed(scenario: Scenario, prediction: Any, joint_actions: IntArray) -> str | None:
+    """Return what is predicted in a wrong shape, or is not finite."""
     n, m, d = len(scenario.agents), len(joint_actions), scenario.state_space.n_variables
     groups, n_own = groups_of(scenario), scenario.state_space.n_own
-    each = [prediction.states(i, joint_actions) for i in range(n)]
-    own, shared = states_by_group(prediction, joint_actions, groups, n_own)
     wanted: dict[str, tuple[Any, tuple[int, ...]]] = {
-        f"states of agent {i}": (states, (m, d)) for i, states in enumerate(each)
+        f"states of agent {i}": (prediction.states(i, joint_actions), (m, d)) for i in range(n)
     }
+    own, shared = states_by_group(prediction, joint_actions, groups, n_own)
     wanted["own variables of all agents"] = own, (n, m, n_own)
     wanted["shared variables of all groups"] = shared, (len(groups), m, d - n_own)
     if hasattr(prediction, "rewards"):
@@ -54,44 +83,29 @@ def fault_of_prediction(
             return f"predicted {name} of shape {np.shape(value)}, must be {shape}"
         if not np.isfinite(value).all():
             return f"predicted {name} are not finite"
-    body = np.repeat(np.arange(len(groups)), [len(group) for group in groups])
-    by_group = np.concatenate([np.asarray(own), np.asarray(shared)[body]], axis=2)
-    wrong = _differs(scenario, by_group, np.array(each))
-    if wrong.any():
-        grouped = hasattr(prediction, "states_by_group")
-        source = "states_by_group" if grouped else "shared variables of a group"
-        agent, _, j = np.argwhere(wrong)[0]
-        name = scenario.state_space.variables[j].name
-        return f"{source} and states differ in {name} of agent {agent}"
-    if hasattr(prediction, "blocks") and hasattr(prediction, "reward_table"):
-        return _wrong_tables(scenario, prediction, rng)
     return None
 
 
-def apart(scenario: Scenario, states: FloatArray, others: FloatArray) -> FloatArray:
-    """Return the difference of states ``(..., d)``, of periodic variables the shorter way round."""
-    differences = states - others
-    for j, variable in enumerate(scenario.state_space.variables):
-        if variable.periodic:
-            period = variable.high - variable.low
-            differences[..., j] -= period * np.round(differences[..., j] / period)
-    return differences
-
-
-def _differs(scenario: Scenario, states: FloatArray, expected: FloatArray) -> BoolArray:
-    """Return which numbers of states ``(..., d)`` differ beyond rounding."""
-    return ~_is_close(apart(scenario, np.asarray(states), expected), expected)
-
-
-def _is_close(differences: FloatArray, expected: FloatArray) -> Any:
-    return np.abs(differences) <= CLOSE * np.maximum(1.0, np.abs(expected))
+def _wrong_groups(
+    scenario: Scenario, prediction: Any, joint_actions: IntArray, states: FloatArray
+) -> str | None:
+    """Return where the prediction of all agents at once differs from that of each."""
+    groups = groups_of(scenario)
+    own, shared = states_by_group(prediction, joint_actions, groups, scenario.state_space.n_own)
+    body = np.repeat(np.arange(len(groups)), [len(group) for group in groups])
+    wrong = differs(scenario, np.concatenate([own, shared[body]], axis=2), states)
+    if not wrong.any():
+        return None
+    agent, _, j = np.argwhere(wrong)[0]
+    name = scenario.state_space.variables[j].name
+    return f"states_by_group and states differ in {name} of agent {agent}"
 
 
 def _wrong_tables(scenario: Scenario, prediction: Any, rng: np.random.Generator) -> str | None:
     """Return where the tables differ from the prediction, whose states are taken to be right."""
     n, n_actions = len(scenario.agents), len(scenario.action_set)
     count = n_actions**n
-    if count > MOST_JOINT_ACTIONS:
+    if not has_tables(prediction) or too_many(scenario):
         return None
     indices: IntArray = np.arange(count)
     if count > SAMPLED:
@@ -108,7 +122,7 @@ def _wrong_tables(scenario: Scenario, prediction: Any, rng: np.random.Generator)
             if fault is not None:
                 return f"blocks of agent {agent}: {fault}"
             expected, actual = prediction.states(agent, joint_actions), blocks.states(indices)
-            wrong = _differs(scenario, actual, np.asarray(expected))
+            wrong = differs(scenario, actual, np.asarray(expected))
             if blocks.alone:
                 wrong[:, : scenario.state_space.n_own] = False
             if wrong.any():
@@ -153,7 +167,7 @@ def _wrong_rewards(
     if np.shape(table) != (count,):
         return f"reward_table of shape {np.shape(table)}, must be {(count,)}"
     actual = np.asarray(table)[indices]
-    wrong = ~_is_close(actual - expected, expected)
+    wrong = ~is_close(actual - expected, expected)
     if not wrong.any():
         return None
     row = wrong.argmax()

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from math import isnan
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from .. import options
+
+if TYPE_CHECKING:
+    from ....scenarios.checking.sensing import MetVariable
 
 Case = tuple[str, Callable[[], Any], list[int]]
 """What a scenario is called, a function that makes it, and the episodes to play."""
@@ -27,6 +31,9 @@ Case = tuple[str, Callable[[], Any], list[int]]
 def command(source: str, steps: int, changes: tuple[str, ...]) -> int:
     """Check what every scenario must promise, such as equal bits for equal seeds.
 
+    A table shows the values met of every variable beside its range, and the root mean square error
+    of its prediction beside that of persistence, as if all stayed as it is.
+
     SPEC.toml is a spec, whose conditions are checked; FILE.py:NAME a function or class in a Python
     file that makes a scenario of one's own.
     """
@@ -37,15 +44,32 @@ def command(source: str, steps: int, changes: tuple[str, ...]) -> int:
     faults = 0
     for label, factory, episodes in _cases(source, changes):
         try:
-            passed = check_scenario(factory, steps=steps, episodes=episodes)
+            findings = check_scenario(factory, steps=steps, episodes=episodes)
         except ScenarioError as error:
             faults += 1
             print(f"FAULT   {label}: {error}")
         except ValueError as error:
             raise SpecError(str(error)) from None
         else:
-            print_wrapped(f"{label}: {', '.join(passed)}", "passed  ", 8)
+            print_wrapped(f"{label}: {', '.join(findings.passed)}", "passed  ", 8)
+            for name, reason in findings.unchecked.items():
+                print_wrapped(f"{name}: {reason}", "not checked  ", 8)
+            for warning in findings.warnings():
+                print_wrapped(warning, "warning  ", 8)
+            print("", *_table(findings.variables), "", sep="\n")
     return 1 if faults else 0
+
+
+def _table(variables: Sequence[MetVariable]) -> list[str]:
+    """Return the lines of a table of variables."""
+    from ....topologies.view import aligned
+
+    rows = [("variable", "unit", "range", "met", "error", "persistence")]
+    for name, unit, claimed, met, error, persistence in variables:
+        ranges = (f"{r[0]:.3g}..{r[1]:.3g}" if r else "" for r in (claimed, met))
+        errors = ("" if isnan(e) else f"{e:.3g}" for e in (error, persistence))
+        rows.append((name[:18], unit, *ranges, *errors))
+    return aligned(rows, "<<>>>>")
 
 
 def _cases(source: str, changes: tuple[str, ...]) -> Iterator[Case]:
@@ -63,7 +87,7 @@ def _cases(source: str, changes: tuple[str, ...]) -> Iterator[Case]:
             raise SpecError(" ".join(str(error).split())) from None
         try:
             factory()
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             message = f"raised {type(error).__name__}: {' '.join(str(error).split())}"
             raise SpecError(f"{source}, called without arguments, {message}") from None
         yield source.rpartition(":")[2], factory, [0, 1]
