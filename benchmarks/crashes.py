@@ -47,31 +47,22 @@ WORKERS = {"loky": b"popen_loky_posix", "dask": b"multiprocessing.spawn"}
 
 @dataclass
 class Tally:
-    """What happened.
-
-    Attributes
-    ----------
-    kills
-        How many processes were killed, by what they were.
-    runs, studies
-        How often the command was begun, and in how many directories.
-    lost
-        Trials that had been kept and were missing after a kill.
-    kept
-        Trials that had been kept before a kill, summed over kills.
-    failed
-        Trials that were given up because their workers had been killed too often.
-    unequal
-        Studies that did not end with the bytes of the undisturbed one.
-    """
+    """What happened."""
 
     kills: Counter[str] = field(default_factory=Counter)
+    """How many processes were killed, by what they were."""
     runs: int = 0
+    """How often the command was begun."""
     studies: int = 0
+    """In how many directories it was."""
     lost: int = 0
+    """Trials that had been kept and were missing after a kill."""
     kept: int = 0
+    """Trials that had been kept before a kill, summed over kills."""
     failed: int = 0
+    """Trials that were given up because their workers had been killed too often."""
     unequal: int = 0
+    """Studies that did not end with the bytes of the undisturbed one."""
 
 
 def disturb(backend: str, kills: int, seed: int, seeds: int, folder: Path) -> Tally:

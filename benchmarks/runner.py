@@ -38,19 +38,14 @@ TICK = os.sysconf("SC_CLK_TCK")
 
 @dataclass(frozen=True)
 class Round:
-    """What one run took.
-
-    Attributes
-    ----------
-    trials, outside
-        Processor seconds of the trials, and of runner and workers beside them.
-    busy
-        Part of the workers' time in which they ran trials.
-    """
+    """What one run took."""
 
     trials: float
+    """Processor seconds of the trials."""
     outside: float
+    """Processor seconds of runner and workers beside them."""
     busy: float
+    """Part of the workers' time in which they ran trials."""
 
 
 def timed(trial: Trial) -> TrialResult:

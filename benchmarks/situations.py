@@ -31,23 +31,18 @@ ADDITIVE: dict[str, Any] = {"membership": "triangular", "memberships": 5, "order
 
 @dataclass
 class Moment:
-    """A team, the world it acts in, and the moment at which it is timed.
-
-    Attributes
-    ----------
-    scenario, hierarchy, team
-        The world, a chain over its agents, and a team with random consequent weights.
-    prediction
-        Of the moment.
-    states
-        Two successive states ``(2, n, d)`` and the rewards ``(2,)`` on entering them.
-    """
+    """A team, the world it acts in, and the moment at which it is timed."""
 
     scenario: BoxPushing
+    """The world."""
     hierarchy: Hierarchy
+    """A chain over its agents."""
     team: Team
+    """A team with random consequent weights."""
     prediction: Prediction
+    """Of the moment."""
     states: FloatArray
+    """Two successive states ``(2, n, d)`` and the rewards ``(2,)`` on entering them."""
     rewards: FloatArray
 
     @property

@@ -10,15 +10,10 @@ from time import perf_counter
 
 @dataclass(frozen=True)
 class Paired:
-    """Times of several candidates, round by round.
-
-    Attributes
-    ----------
-    seconds
-        Per candidate its time in every round.
-    """
+    """Times of several candidates, round by round."""
 
     seconds: Mapping[str, list[float]]
+    """Per candidate its time in every round."""
 
     def median(self, name: str) -> float:
         """Return the median time [s] of a candidate."""

@@ -26,21 +26,14 @@ StateFunction = Callable[[Any, int], FloatArray]
 
 @dataclass(frozen=True)
 class StateVariable:
-    """A state variable and how to compute it.
-
-    Attributes
-    ----------
-    variable
-        Its name, unit, range and membership centres.
-    function
-        ``function(view, body) -> (m,)``.
-    common
-        Whether it is the same for all bodies.
-    """
+    """A state variable and how to compute it."""
 
     variable: Variable
+    """Its name, unit, range and membership centres."""
     function: StateFunction
+    """``function(view, body) -> (m,)``."""
     common: bool = False
+    """Whether it is the same for all bodies."""
 
     def __call__(self, view: Any, body: int) -> FloatArray:
         """Return the values ``(m,)`` for a body."""

@@ -18,7 +18,7 @@ from ..core.plugins import sources
 from ..core.plugins.deferred import nx
 from ..core.plugins.messages import closest
 from ..core.plugins.plugged import Plugged, SettingsRegistry
-from ..core.plugins.settings import Settings, SettingsError, tuples
+from ..core.plugins.settings import Settings, SettingsError, tuples, unwritten
 from . import files
 from .builders import Bodies, Members, Names, from_networkx, names_of  # noqa: F401 - of a field
 from .checks import check_names, shown
@@ -27,22 +27,15 @@ BUILDERS = "nested_agents.topologies.builders"
 
 
 class TopologySettings(Settings):
-    """What the settings of all topologies share.
-
-    What is left at its default is not written, so that identities of trials stay as they were.
-    """
+    """What the settings of all topologies share."""
 
     kind: str = ""
-    told: Annotated[Told, Field(exclude_if=lambda told: told == "ancestors")] = "ancestors"
+    told: Annotated[Told, unwritten("ancestors")] = "ancestors"
     """By whom an agent is told what was decided: all above it, its direct superiors, or nobody."""
-    considers: Annotated[
-        Considers, Field(exclude_if=lambda considers: considers == "descendants")
-    ] = "descendants"
+    considers: Annotated[Considers, unwritten("descendants")] = "descendants"
     """Whose actions an agent tries beside its own: those of all below it, of its direct
     subordinates, or of nobody."""
-    failures: Annotated[
-        tuple[AnyMessageFailure, ...], Field(exclude_if=lambda failures: not failures)
-    ] = ()
+    failures: Annotated[tuple[AnyMessageFailure, ...], unwritten(())] = ()
     """What fails of the messages down the hierarchy, from when to when."""
 
     def __repr_args__(self) -> Iterable[tuple[str | None, Any]]:

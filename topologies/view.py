@@ -27,22 +27,16 @@ MOST_AGENTS = 1000
 
 @dataclass(frozen=True)
 class HierarchyView:
-    """A topology over agents.
-
-    Attributes
-    ----------
-    text
-        The topology as the user wrote it.
-    hierarchy, bodies
-        What it makes, and its agents by body.
-    tries
-        Joint actions that each agent tries per step, in agent order.
-    """
+    """A topology over agents."""
 
     text: str
+    """The topology as the user wrote it."""
     hierarchy: Hierarchy
+    """What it makes."""
     bodies: tuple[tuple[int, ...], ...]
+    """Its agents by body."""
     tries: tuple[int, ...]
+    """Joint actions that each agent tries per step, in agent order."""
 
     @property
     def title(self) -> str:

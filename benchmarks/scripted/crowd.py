@@ -52,28 +52,20 @@ pushing at all."""
 
 
 class PushPlan(NamedTuple):
-    """Where everyone is to push; ``M`` robots.
-
-    Attributes
-    ----------
-    side, slots
-        ``(M, 4)`` the `Side` of each robot, and ``(M, 3)`` the pose in which it would wait there.
-    course
-        Direction from the box to the goal, world frame [rad].
-    error
-        The course as seen from the main side [rad].
-    oblique
-        Direction in which robots should push, as seen from their side [rad].
-    second
-        ``(M,)`` who pushes from the second side.
-    """
+    """Where everyone is to push; ``M`` robots."""
 
     side: FloatArray
+    """``(M, 4)`` the `Side` of each robot."""
     slots: FloatArray
+    """``(M, 3)`` the pose in which it would wait there."""
     course: float
+    """Direction from the box to the goal, world frame [rad]."""
     error: float
+    """The course as seen from the main side [rad]."""
     oblique: float
+    """Direction in which robots should push, as seen from their side [rad]."""
     second: BoolArray
+    """``(M,)`` who pushes from the second side."""
 
 
 class Crowd:

@@ -31,22 +31,16 @@ GRID = 41
 
 
 class Side(NamedTuple):
-    """A side of the box to push at, in the frame of the box.
-
-    Attributes
-    ----------
-    direction
-        Of pushing [rad].
-    depth
-        Distance of the side from the centre, against `direction` [m].
-    middle, half
-        Middle and half the length of the usable side, to the left of `direction` [m].
-    """
+    """A side of the box to push at, in the frame of the box."""
 
     direction: float
+    """Of pushing [rad]."""
     depth: float
+    """Distance of the side from the centre, against `direction` [m]."""
     middle: float
+    """Middle of the usable side, to the left of `direction` [m]."""
     half: float
+    """Half its length [m]."""
 
 
 def is_concave(box: BoxSpec) -> bool:

@@ -28,15 +28,6 @@ PAPER_ITERATIONS = 450
 class Problem:
     """The quantities that the formulas share.
 
-    Parameters
-    ----------
-    rules
-        |S_n|, states (rules) of one agent.
-    actions
-        |A|, actions of one agent; at least 2.
-    iterations
-        L.
-
     Raises
     ------
     ValueError
@@ -44,8 +35,11 @@ class Problem:
     """
 
     rules: int = PAPER_RULES
+    """|S_n|, states (rules) of one agent."""
     actions: int = PAPER_ACTIONS
+    """|A|, actions of one agent; at least 2."""
     iterations: int = PAPER_ITERATIONS
+    """L."""
 
     def __post_init__(self) -> None:
         for name, least in (("rules", 1), ("actions", 2), ("iterations", 1)):

@@ -23,32 +23,24 @@ from ..numerics.arrays import FloatArray, IntArray
 
 @dataclass(frozen=True)
 class StepRecord:
-    """One step of the control loop.
-
-    Attributes
-    ----------
-    episode, step
-        Counted from 0.
-    states
-        ``(n, d)`` states before the step.
-    joint_action
-        ``(n,)`` action indices, in agent order.
-    transition
-        What the step led to.
-    last
-        Whether the episode ends with this step.
-    deciding, learning
-        Seconds spent in the team; the scenario reports its own in ``transition.info``.
-    """
+    """One step of the control loop."""
 
     episode: int
+    """Counted from 0."""
     step: int
+    """Counted from 0 in every episode."""
     states: FloatArray
+    """``(n, d)`` states before the step."""
     joint_action: IntArray
+    """``(n,)`` action indices, in agent order."""
     transition: Transition
+    """What the step led to."""
     last: bool
+    """Whether the episode ends with this step."""
     deciding: float
+    """Seconds that the team took to decide; the scenario reports its own in ``transition.info``."""
     learning: float
+    """Seconds that the team took to learn."""
 
 
 class EpisodeSummary(NamedTuple):

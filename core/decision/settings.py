@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field
-
 from ..evaluators import EVALUATORS, EvaluatorSettings
 from ..evaluators.auto import AutoSettings
 from ..evaluators.evaluator import Plan, Teammates, Unseen, ValueOf
 from ..plugins.plugged import Plugged
-from ..plugins.settings import Settings
+from ..plugins.settings import Settings, unwritten
 
 
 class Decision(Settings):
@@ -26,10 +24,10 @@ class Decision(Settings):
     value_of: ValueOf = "own"
     """Whose value decides: the agent's own; the mean of its own and those of the agents below it;
     or the mean of all agents'."""
-    unseen: Annotated[Unseen, Field(exclude_if=lambda unseen: unseen == "maintain")] = "maintain"
+    unseen: Annotated[Unseen, unwritten("maintain")] = "maintain"
     """What agents are expected to do that this one neither considers nor hears of: to maintain, to
     do again what they did last, or to keep to the plan that ``best-response`` makes for them."""
-    plan: Annotated[Plan, Field(exclude_if=lambda plan: plan == "private")] = "private"
+    plan: Annotated[Plan, unwritten("private")] = "private"
     """Whose plan ``best-response`` decides by: each agent's own, unless one above it hands it down
     with what it tells; or one that all work out alike, which is common knowledge and no message."""
     evaluator: Annotated[EvaluatorSettings, Plugged(EVALUATORS, EVALUATORS.parsed)] = AutoSettings()

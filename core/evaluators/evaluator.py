@@ -35,38 +35,26 @@ NOBODY: IntArray = np.zeros(0, dtype=np.int64)
 
 
 class Deliberation(NamedTuple):
-    """What an agent knows when it decides.
-
-    Attributes
-    ----------
-    agent
-        The deciding agent.
-    joint_action
-        ``(n,)`` the actions of which it was told; of the unseen what they are taken to do; neutral
-        for those below.
-    prediction
-        Predicts what joint actions would lead to.
-    weights
-        The consequent weights ``(n_rules,)`` of every agent, in agent order.
-    frequencies
-        ``(n, A)`` how often each agent was seen to take each action, rows summing to one.
-    rng
-        Source of randomness.
-    given
-        ``(A, n, A)`` the same frequencies, given each action of the deciding agent; counted where
-        the teammate model asks for it, else empty.
-    told
-        ``(k,)`` the agents of whose actions it was told.
-    """
+    """What an agent knows when it decides."""
 
     agent: int
+    """The deciding agent."""
     joint_action: IntArray
+    """``(n,)`` the actions of which it was told; of the unseen what they are taken to do; neutral
+    for those below."""
     prediction: Prediction
+    """Predicts what joint actions would lead to."""
     weights: Sequence[FloatArray]
+    """The consequent weights ``(n_rules,)`` of every agent, in agent order."""
     frequencies: FloatArray
+    """``(n, A)`` how often each agent was seen to take each action, rows summing to one."""
     rng: np.random.Generator
+    """Source of randomness."""
     given: FloatArray = NOTHING_GIVEN
+    """``(A, n, A)`` the same frequencies, given each action of the deciding agent; counted where
+    the teammate model asks for it, else empty."""
     told: IntArray = NOBODY
+    """``(k,)`` the agents of whose actions it was told."""
 
     @property
     def own_weights(self) -> FloatArray:
@@ -98,41 +86,30 @@ class Evaluator(Protocol):
 
 @dataclass(frozen=True)
 class DecisionProblem:
-    """What all decisions of a team have in common.
-
-    Attributes
-    ----------
-    rules
-        The agents' rule base.
-    hierarchy
-        Who considers whom, and who is told by whom.
-    n_actions
-        Actions A of every agent.
-    groups
-        Agents by body.
-    rule, teammates
-        By what a joint action is valued, and what the agents below are expected to do.
-    discount
-        Weight of the value, where it is added to the reward.
-    value_of
-        Whose value decides.
-    unseen, plan
-        What the unseen are expected to do, and who makes a plan.
-    handed_down
-        Whether all that is told arrives, so that a plan may be told, too.
-    """
+    """What all decisions of a team have in common."""
 
     rules: RuleBase
+    """The agents' rule base."""
     hierarchy: Hierarchy
+    """Who considers whom, and who is told by whom."""
     n_actions: int
+    """Actions A of every agent."""
     groups: tuple[tuple[int, ...], ...]
+    """Agents by body."""
     rule: Rule
+    """By what a joint action is valued."""
     teammates: Teammates
+    """What the agents below are expected to do."""
     discount: float
+    """Weight of the value, where it is added to the reward."""
     value_of: ValueOf = "own"
+    """Whose value decides."""
     unseen: Unseen = "maintain"
+    """What the unseen are expected to do."""
     plan: Plan = "private"
+    """Who makes a plan."""
     handed_down: bool = True
+    """Whether all that is told arrives, so that a plan may be told, too."""
 
 
 class EvaluatorSettings(PartSettings):

@@ -18,22 +18,16 @@ from ..rules.rule_base import RuleBase
 
 
 class Pooled(NamedTuple):
-    """The consequent weights of k agents of b bodies, summed where they see the same.
-
-    Attributes
-    ----------
-    weights
-        Of the agents ``(k, n_rules)``, of their bodies ``(b, n_rules)``, of all ``(1, n_rules)``.
-    agents, bodies
-        Which they are.
-    firsts
-        ``(b + 1,)`` the first agent of every body among them, and k.
-    """
+    """The consequent weights of k agents of b bodies, summed where they see the same."""
 
     weights: tuple[FloatArray, FloatArray, FloatArray]
+    """Of the agents ``(k, n_rules)``, of their bodies ``(b, n_rules)``, of all ``(1, n_rules)``."""
     agents: IntArray
+    """``(k,)`` which agents they are."""
     bodies: IntArray
+    """``(b,)`` which bodies they are."""
     firsts: IntArray
+    """``(b + 1,)`` the first agent of every body among them, and k."""
 
 
 class Pooling:

@@ -11,38 +11,27 @@ from .scenario import Scenario
 
 @dataclass(frozen=True)
 class Measure:
-    """A number that describes an episode: a column of results.
-
-    Attributes
-    ----------
-    name
-        Of the column; ``success`` is the one by which scenarios are compared.
-    title
-        Its heading in tables and figures.
-    unit
-        In words of the SI, ``"1"`` for a pure number.
-    source
-        Where it is taken from at every step: a key of `Transition.info`, or ``terminated``; empty:
-        the key of its own name.
-    gathering
-        How the steps of an episode make one number: their ``last``, ``mean``, ``sum`` or ``max``.
-    better
-        Which way is better, if one is.
-    is_rate
-        Whether an episode has it or has it not: 1 or 0.
-    least, greatest
-        What it cannot be below or above, if there is such; intervals end there.
-    """
+    """A number that describes an episode: a column of results."""
 
     name: str
+    """Of the column; ``success`` is the one by which scenarios are compared."""
     title: str
+    """Its heading in tables and figures."""
     unit: str = "1"
+    """In words of the SI, ``"1"`` for a pure number."""
     source: str = ""
+    """Where it is taken from at every step: a key of `Transition.info`, or ``terminated``; empty:
+    the key of its own name."""
     gathering: Literal["last", "mean", "sum", "max"] = "last"
+    """How the steps of an episode make one number: their ``last``, ``mean``, ``sum`` or ``max``."""
     better: Literal["higher", "lower"] | None = None
+    """Which way is better, if one is."""
     is_rate: bool = False
+    """Whether an episode has it or has it not: 1 or 0."""
     least: float | None = None
+    """What it cannot be below, if there is such; intervals end there."""
     greatest: float | None = None
+    """What it cannot be above, if there is such; intervals end there."""
 
     def __post_init__(self) -> None:
         """Take it from the key of its own name, if no other is given."""

@@ -25,35 +25,28 @@ def _no_rows() -> IntArray:
 class Blocks:
     """Next states of one agent for all joint actions, in their two blocks.
 
-    Attributes
-    ----------
-    own
-        ``(K, n_own)`` own variables, one row per robot-action index of the agent's group of ``w``
-        agents; fewer with `own_rows`, or if there are no own variables: then one row will do.
-    shared
-        ``(R, d - n_own)`` shared variables, one row per joint-action index; fewer with
-        `shared_rows`.
-    divisor
-        ``A`` to the power of the number of agents behind the group: the robot-action index of
-        joint-action index ``c`` is ``c // divisor % A ** w``.
-    own_rows, shared_rows
-        The row of `own` of every robot-action index ``(A ** w,)``, and of `shared` of every
-        joint-action index ``(A ** n,)``, where several lead to one; empty: each has its row.
-    alone
-        Whether own variables are those that the group would reach alone, which is an approximation
-        where others matter to them. If not, the blocks give for every index exactly what
-        `Prediction.states` gives; if so, of the shared variables only.
-
     Compiled kernels read the tables without looking at their sizes.
     `nested_agents.scenarios.checking.checker` does look.
     """
 
     own: FloatArray
+    """``(K, n_own)`` own variables, one row per robot-action index of the agent's group of ``w``
+    agents; fewer with `own_rows`, or if there are no own variables: then one row will do."""
     shared: FloatArray
+    """``(R, d - n_own)`` shared variables, one row per joint-action index; fewer with
+    `shared_rows`."""
     divisor: int
+    """``A`` to the power of the number of agents behind the group: the robot-action index of
+    joint-action index ``c`` is ``c // divisor % A ** w``."""
     own_rows: IntArray = field(default_factory=_no_rows)
+    """``(A ** w,)`` the row of `own` of every robot-action index, where several lead to one; empty:
+    each has its row."""
     shared_rows: IntArray = field(default_factory=_no_rows)
+    """``(A ** n,)`` the row of `shared` of every joint-action index; empty: each has its row."""
     alone: bool = False
+    """Whether own variables are those that the group would reach alone, which is an approximation
+    where others matter to them. If not, the blocks give for every index exactly what
+    `Prediction.states` gives; if so, of the shared variables only."""
 
     def states(self, indices: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of joint-action indices ``(m,)``."""

@@ -18,32 +18,22 @@ from .spaces import ActionSet, StateSpace
 
 @dataclass(frozen=True)
 class Transition:
-    """What one step of a scenario returns.
-
-    Attributes
-    ----------
-    states
-        ``(n, d)`` states of the agents after the step.
-    reward
-        Reward received on entering these states: one number for all agents, or ``(n,)``.
-    terminated
-        Whether the task is solved (or lost) for good.
-    truncated
-        Whether the episode ends for lack of time.
-    info
-        Measurements of the step by name, scalars or small arrays; for records, not for learners.
-    twists
-        ``(M, 3)`` mean twist of every group's body in its own frame [m/s, m/s, rad/s], where bodies
-        measure it; ``(K + M, 3)`` where they also measure what they move, its twists standing
-        first, and nothing else than these bodies moved it.
-    """
+    """What one step of a scenario returns."""
 
     states: FloatArray
+    """``(n, d)`` states of the agents after the step."""
     reward: float | FloatArray
+    """Reward received on entering these states: one number for all agents, or ``(n,)``."""
     terminated: bool
+    """Whether the task is solved (or lost) for good."""
     truncated: bool
+    """Whether the episode ends for lack of time."""
     info: Mapping[str, Any]
+    """Measurements of the step by name, scalars or small arrays; for records, not for learners."""
     twists: FloatArray | None = None
+    """``(M, 3)`` mean twist of every group's body in its own frame [m/s, m/s, rad/s], where bodies
+    measure it; ``(K + M, 3)`` where they also measure what they move, its twists standing first,
+    and nothing else than these bodies moved it."""
 
 
 @runtime_checkable

@@ -21,26 +21,6 @@ from ..numerics.arrays import FloatArray, IntArray
 class Variable:
     """One state variable.
 
-    Parameters
-    ----------
-    name
-        Short identifier, unique within its state space.
-    unit
-        Unit in words of the SI, ``"1"`` for a pure number.
-    low, high
-        Range over which membership functions are laid; values outside are legal and belong to the
-        outermost membership functions. For a periodic variable ``high - low`` is the period.
-    periodic
-        Whether `low` and `high` are the same point (an angle).
-    centres
-        Default centres of the membership functions, increasing, within the range. Empty: spread
-        evenly, see `core.rules.kernels.fuzzy.Partition.of`.
-    labels
-        Words for the membership functions, in the order of `centres`; empty: numbered.
-    mirrored
-        What it is in the mirror image of a world: the ``same``, or of ``opposite`` sign; none: it
-        is not known, see `core.adaptation.mirror`.
-
     Raises
     ------
     ValueError
@@ -48,13 +28,24 @@ class Variable:
     """
 
     name: str
+    """Short identifier, unique within its state space."""
     unit: str
+    """Unit in words of the SI, ``"1"`` for a pure number."""
     low: float
+    """Lower end of the range over which membership functions are laid; values outside are legal and
+    belong to the outermost membership functions."""
     high: float
+    """Upper end of that range. For a periodic variable ``high - low`` is the period."""
     periodic: bool = False
+    """Whether `low` and `high` are the same point (an angle)."""
     centres: tuple[float, ...] = ()
+    """Default centres of the membership functions, increasing, within the range. Empty: spread
+    evenly, see `core.rules.kernels.fuzzy.Partition.of`."""
     labels: tuple[str, ...] = ()
+    """Words for the membership functions, in the order of `centres`; empty: numbered."""
     mirrored: Literal["same", "opposite"] | None = None
+    """What it is in the mirror image of a world: the ``same``, or of ``opposite`` sign; none: it is
+    not known, see `core.adaptation.mirror`."""
 
     def __post_init__(self) -> None:
         if not (isfinite(self.low) and isfinite(self.high) and self.low < self.high):
@@ -84,21 +75,6 @@ def choice(name: str, actions: tuple[str, ...]) -> Variable:
 class StateSpace:
     """The state variables of an agent, own block first.
 
-    Parameters
-    ----------
-    name
-        The name under which specs know it.
-    variables
-        The variables, the own ones leading.
-    n_own
-        How many leading variables depend on the actions of the agent's own group only.
-    common
-        Names of shared variables that are the same for all agents: what they are worth to a team
-        is found once.
-    actions
-        Names of variables that are actions taken, of the agent or of others, with a membership
-        function at each: what `QLearning` maximises over.
-
     Examples
     --------
     >>> space = StateSpace("demo", (Variable("speed", "m/s", -1, 1), Variable("gap", "m", 0, 2)), 1)
@@ -107,10 +83,17 @@ class StateSpace:
     """
 
     name: str
+    """The name under which specs know it."""
     variables: tuple[Variable, ...]
+    """The variables, the own ones leading."""
     n_own: int = 0
+    """How many leading variables depend on the actions of the agent's own group only."""
     common: tuple[str, ...] = ()
+    """Names of shared variables that are the same for all agents: what they are worth to a team is
+    found once."""
     actions: tuple[str, ...] = ()
+    """Names of variables that are actions taken, of the agent or of others, with a membership
+    function at each: what `QLearning` maximises over."""
 
     def __post_init__(self) -> None:
         names = [v.name for v in self.variables]

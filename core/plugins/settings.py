@@ -19,6 +19,14 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
 
 
+def unwritten(default: Any) -> Any:
+    """Return the field of a key that is not written where it has its default.
+
+    So a new key leaves the identities of trials, and what is kept of them, as they were.
+    """
+    return Field(exclude_if=lambda value: value == default)
+
+
 class SettingsError(ValueError):
     """Settings that cannot be made: one line that names the field, the value, what is allowed.
 

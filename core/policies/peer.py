@@ -12,18 +12,12 @@ from ..numerics.arrays import FloatArray, IntArray
 
 @dataclass(frozen=True)
 class Seen:
-    """The present states, and what could follow, for those who ask.
-
-    Attributes
-    ----------
-    present
-        ``(n, d)`` states of all agents.
-    scenario
-        Where they are.
-    """
+    """The present states, and what could follow, for those who ask."""
 
     present: FloatArray
+    """``(n, d)`` states of all agents."""
     scenario: Scenario
+    """Where they are."""
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of `agent` as the scenario predicts them."""

@@ -43,21 +43,14 @@ class Mark:
 
 @dataclass(frozen=True)
 class Marks:
-    """A graded sheet; printed a line for each question.
-
-    Attributes
-    ----------
-    lab
-        Name of the lab.
-    name
-        Whose answers they are.
-    marks
-        In the order of the questions.
-    """
+    """A graded sheet; printed a line for each question."""
 
     lab: str
+    """Name of the lab."""
     name: str
+    """Whose answers they are."""
     marks: tuple[Mark, ...]
+    """In the order of the questions."""
 
     @property
     def right(self) -> int:

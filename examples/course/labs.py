@@ -19,18 +19,12 @@ WHEELS = tuple(f"robot{robot}.{side}" for robot in (1, 2, 3, 4) for side in ("le
 
 @dataclass(frozen=True)
 class Lab:
-    """One lab.
-
-    Attributes
-    ----------
-    title
-        What it is about.
-    questions
-        By the key of the answer.
-    """
+    """One lab."""
 
     title: str
+    """What it is about."""
     questions: Mapping[str, Question]
+    """By the key of the answer."""
 
 
 def _tried(topology: str, agents: int) -> int:

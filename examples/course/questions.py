@@ -97,18 +97,13 @@ class Edges:
     It is right if it is connected, if one of any two wheels of a robot is above the other, and if a
     decision tries at most so many joint actions. Pairs are data, so that grading runs no code of
     anybody.
-
-    Attributes
-    ----------
-    agents
-        Their names, ``robot.wheel``.
-    most
-        Joint actions that a decision of the team may try.
     """
 
     text: str
     agents: tuple[str, ...]
+    """Their names, ``robot.wheel``."""
     most: int
+    """Joint actions that a decision of the team may try."""
     hint: str = ""
     problem: Problem = field(default_factory=lambda: Problem(actions=PAPER_ACTIONS))
 

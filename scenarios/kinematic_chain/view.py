@@ -13,27 +13,18 @@ from ..state_variables import fixed
 
 @dataclass(frozen=True)
 class ChainView:
-    """Situations to be described, ``m`` at once.
-
-    Attributes
-    ----------
-    places
-        ``(m, n + 1, 2)`` the joints from the base on, and the tip [m].
-    angles
-        ``(m, n)`` joint angles [rad].
-    speeds
-        ``(m, n)`` commanded speeds of the joints, as fractions of the greatest.
-    goal
-        ``(2,)`` where the tip is to be [m].
-    before
-        Distance of the tip from the goal before the decision that led here [m].
-    """
+    """Situations to be described, ``m`` at once."""
 
     places: FloatArray
+    """``(m, n + 1, 2)`` the joints from the base on, and the tip [m]."""
     angles: FloatArray
+    """``(m, n)`` joint angles [rad]."""
     speeds: FloatArray
+    """``(m, n)`` commanded speeds of the joints, as fractions of the greatest."""
     goal: FloatArray
+    """``(2,)`` where the tip is to be [m]."""
     before: float
+    """Distance of the tip from the goal before the decision that led here [m]."""
 
     @property
     def n_situations(self) -> int:

@@ -13,15 +13,10 @@ from ..results.contrasts import Contrasts
 
 @dataclass(frozen=True)
 class Comparison:
-    """Conditions compared by one measure; printed or shown by a notebook, table and verdicts.
-
-    Attributes
-    ----------
-    contrasts
-        The analysis.
-    """
+    """Conditions compared by one measure; printed or shown by a notebook, table and verdicts."""
 
     contrasts: Contrasts
+    """The analysis."""
 
     @cached_property
     def table(self) -> SummaryTable:

@@ -13,15 +13,10 @@ from ..cost.table import written
 
 @dataclass(frozen=True)
 class CostTable:
-    """Costs, a row for every topology and number of agents; printed or shown by a notebook.
-
-    Attributes
-    ----------
-    rows
-        The costs as exact integers.
-    """
+    """Costs, a row for every topology and number of agents; printed or shown by a notebook."""
 
     rows: tuple[CostRow, ...]
+    """The costs as exact integers."""
 
     @property
     def csv(self) -> str:

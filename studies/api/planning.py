@@ -47,27 +47,18 @@ WORKER = f"import {Session.__module__}, matplotlib.pyplot"
 
 @dataclass(frozen=True)
 class Pace:
-    """What the trials of a condition take.
-
-    Attributes
-    ----------
-    acting
-        Seconds of a step but for learning.
-    learning
-        Seconds of learning for a step of the episode that has ended.
-    regression
-        The same for every step that is kept by then.
-    bytes
-        What the team holds [bytes], and how much more for every step of training.
-    start
-        Seconds before the first step: what is imported, loaded and compiled.
-    """
+    """What the trials of a condition take."""
 
     acting: float
+    """Seconds of a step but for learning."""
     learning: float
+    """Seconds of learning for a step of the episode that has ended."""
     regression: float
+    """The same for every step that is kept by then."""
     bytes: tuple[float, float]
+    """What the team holds [bytes], and how much more for every step of training."""
     start: float = 0.0
+    """Seconds before the first step: what is imported, loaded and compiled."""
 
     def seconds(self, steps: float, training: Sequence[int], evaluation: float) -> float:
         """Return the time of a trial whose episodes take so many steps.
@@ -91,40 +82,27 @@ class Pace:
 
 @dataclass(frozen=True)
 class Plan:
-    """What a study will take and what it can find.
-
-    Attributes
-    ----------
-    outline
-        What the study consists of.
-    trials
-        How many there are.
-    processes
-        How many run at a time.
-    seconds
-        Time of the whole study [s], from and to: from `QUICK` of the steps of its episodes on a
-        machine that is `FASTER` to all of them on one that is `SLOWER`.
-    memory
-        Of all processes together [bytes], about.
-    comparisons
-        With the first condition.
-    deviation
-        Standard deviation of paired differences that is supposed.
-    smallest
-        The smallest difference of success rates that is of interest.
-    warnings
-        What looks wrong and is not refused, a line each.
-    """
+    """What a study will take and what it can find."""
 
     outline: StudyOutline
+    """What the study consists of."""
     trials: int
+    """How many there are."""
     processes: int
+    """How many run at a time."""
     seconds: tuple[float, float] | None
+    """Time of the whole study [s], from and to: from `QUICK` of the steps of its episodes on a
+    machine that is `FASTER` to all of them on one that is `SLOWER`."""
     memory: float | None
+    """Of all processes together [bytes], about."""
     comparisons: int
+    """With the first condition."""
     deviation: float
+    """Standard deviation of paired differences that is supposed."""
     smallest: float
+    """The smallest difference of success rates that is of interest."""
     warnings: tuple[str, ...] = ()
+    """What looks wrong and is not refused, a line each."""
 
     @property
     def detectable(self) -> float:

@@ -67,22 +67,16 @@ class RandomPolicy:
 
 @dataclass(frozen=True)
 class FaultCourse:
-    """The returns of one policy under one schedule of faults.
-
-    Attributes
-    ----------
-    name
-        Policy and schedule.
-    onset
-        Episode in which the first fault begins.
-    healthy, faulty
-        ``(n_seeds, n_episodes)`` returns without and with the faults.
-    """
+    """The returns of one policy under one schedule of faults."""
 
     name: str
+    """Policy and schedule."""
     onset: int
+    """Episode in which the first fault begins."""
     healthy: FloatArray
+    """``(n_seeds, n_episodes)`` returns without the faults."""
     faulty: FloatArray
+    """``(n_seeds, n_episodes)`` returns with the faults."""
 
     @property
     def shortfall(self) -> FloatArray:
@@ -124,15 +118,10 @@ class FaultCourse:
 
 @dataclass(frozen=True)
 class RecoveryTable:
-    """What faults cost, policy by policy; printed or shown by a notebook.
-
-    Attributes
-    ----------
-    courses
-        The returns behind every line.
-    """
+    """What faults cost, policy by policy; printed or shown by a notebook."""
 
     courses: tuple[FaultCourse, ...]
+    """The returns behind every line."""
 
     @cached_property
     def table(self) -> SummaryTable:

@@ -18,18 +18,12 @@ MOST_BYTES = 20_000_000
 
 @dataclass(frozen=True)
 class Replay:
-    """An animation.
-
-    Attributes
-    ----------
-    path
-        Where it is.
-    title
-        Condition, seed and episode.
-    """
+    """An animation."""
 
     path: Path
+    """Where it is."""
     title: str
+    """Condition, seed and episode."""
 
     def _repr_html_(self) -> str:
         content = self.path.read_bytes()

@@ -58,23 +58,16 @@ class StudyResults:
     """What the finished trials of a study measured, or those of several studies together.
 
     Made by `run` and `load`. A notebook shows it as its table.
-
-    Attributes
-    ----------
-    outline
-        What the study consists of.
-    results
-        Its frames, and arrays of what they hold.
-    failed
-        Condition, seed and traceback of every failed trial.
-    remarks
-        What must be said of the results, in lines.
     """
 
     outline: StudyOutline
+    """What the study consists of."""
     results: Results
+    """Its frames, and arrays of what they hold."""
     failed: tuple[tuple[str, int, str], ...] = ()
+    """Condition, seed and traceback of every failed trial."""
     remarks: tuple[str, ...] = ()
+    """What must be said of the results, in lines."""
     _sources: Sources = field(default_factory=Sources, repr=False)
     _settings: Mapping[str, Any] = field(default_factory=dict, repr=False)
     _directories: tuple[Path, ...] = ()

@@ -30,13 +30,6 @@ LEAST_SEEDS = 5
 class Criterion:
     """An estimate meets it between two bounds, if no test finds a difference.
 
-    Attributes
-    ----------
-    text
-        The criterion in words.
-    low, high
-        The bounds, both included.
-
     Examples
     --------
     >>> at_least(0.8).text, within(0.01).text
@@ -44,8 +37,11 @@ class Criterion:
     """
 
     text: str
+    """The criterion in words."""
     low: float = -inf
+    """The lower bound, included."""
     high: float = inf
+    """The upper bound, included."""
 
     def decide(self, measured: Measured) -> Verdict:
         """Compare the whole interval with the bounds, and p with .05."""
@@ -72,33 +68,22 @@ def within(margin: float) -> Criterion:
 
 @dataclass(frozen=True)
 class Claim:
-    """A claim of the paper.
-
-    Attributes
-    ----------
-    name
-        For programs.
-    text
-        What is claimed.
-    place
-        Where.
-    study
-        The study that measures it.
-    measure
-        What is measured.
-    compute
-        Measures it; none of the study's results: it cannot be decided.
-    criterion
-        What the measure must be.
-    """
+    """A claim of the paper."""
 
     name: str
+    """For programs."""
     text: str
+    """What is claimed."""
     place: str
+    """Where."""
     study: str
+    """The study that measures it."""
     measure: str
+    """What is measured."""
     compute: Callable[[Results], Measured | None]
+    """Measures it; none of the study's results: it cannot be decided."""
     criterion: Criterion
+    """What the measure must be."""
 
 
 CLAIMS: tuple[Claim, ...] = (

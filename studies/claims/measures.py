@@ -38,24 +38,16 @@ PAPER_NESTED, PAPER_SINGLE = 2.45e12, 1.1e27
 
 @dataclass(frozen=True)
 class Measured:
-    """An estimate of what a claim is about.
-
-    Attributes
-    ----------
-    estimate
-        The value and its interval.
-    seeds
-        How many seeds it rests on; 0: it is computed.
-    p
-        Of a test, if there is one.
-    note
-        What the value is of, if that is part of the result.
-    """
+    """An estimate of what a claim is about."""
 
     estimate: Estimate
+    """The value and its interval."""
     seeds: int
+    """How many seeds it rests on; 0: it is computed."""
     p: float | None = None
+    """Of a test, if there is one."""
     note: str = ""
+    """What the value is of, if that is part of the result."""
 
 
 def learned(name: str = "", known: tuple[str, ...] = UNREWARDED) -> Compute:

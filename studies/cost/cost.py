@@ -59,23 +59,18 @@ LEAST_SECONDS, MOST_TIMES = 0.3, 100
 
 @dataclass(frozen=True)
 class StepCost:
-    """What one step of the running system costs.
-
-    Attributes
-    ----------
-    formula, counted
-        What the formulas say and what was counted, for the whole team.
-    deciding, learning
-        Median time [s].
-    memory
-        Greatest memory held by team and step [bytes].
-    """
+    """What one step of the running system costs."""
 
     formula: Counts
+    """What the formulas say, for the whole team."""
     counted: Counts
+    """What was counted, for the whole team."""
     deciding: float
+    """Median time of a decision [s]."""
     learning: float
+    """Median time of learning from a step [s]."""
     memory: int
+    """Greatest memory held by team and step [bytes]."""
 
 
 @dataclass(frozen=True)

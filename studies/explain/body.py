@@ -19,19 +19,13 @@ Effects = tuple[FloatArray, ...]
 
 @dataclass
 class Bodies:
-    """What the bodies were believed to be at some moments.
-
-    Attributes
-    ----------
-    moments
-        Effects of all bodies by moment: ``built``, perhaps ``before`` the first failure, ``after``
-        all training.
-    deviations
-        Standard deviations of the last of them, as the self-model has them.
-    """
+    """What the bodies were believed to be at some moments."""
 
     moments: dict[str, Effects]
+    """Effects of all bodies by moment: ``built``, perhaps ``before`` the first failure, ``after``
+    all training."""
     deviations: Effects
+    """Standard deviations of the last of them, as the self-model has them."""
 
     def note(self, moment: str, model: SelfModel) -> None:
         """Note what is believed now."""

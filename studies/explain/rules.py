@@ -38,24 +38,16 @@ Pair = tuple[int, int]
 
 @dataclass(frozen=True)
 class Parts:
-    """What the f of one agent consists of.
-
-    Attributes
-    ----------
-    constant
-        Mean of all rules.
-    singles
-        ``(m_j,)`` consequents of every variable j, of mean zero: g_j at the centres.
-    pairs
-        ``(m_j, m_k)`` consequents of pairs of variables beyond those of either.
-    variance
-        Of all rules.
-    """
+    """What the f of one agent consists of."""
 
     constant: float
+    """Mean of all rules."""
     singles: tuple[FloatArray, ...]
+    """``(m_j,)`` consequents of every variable j, of mean zero: g_j at the centres."""
     pairs: dict[Pair, FloatArray]
+    """``(m_j, m_k)`` consequents of pairs of variables beyond those of either."""
     variance: float
+    """Of all rules."""
 
     def share(self, consequents: FloatArray) -> float:
         """Return the share of the variance that consequents of mean zero have."""

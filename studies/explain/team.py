@@ -35,33 +35,25 @@ from .rules import Parts
 
 @dataclass(frozen=True)
 class Explanation:
-    """What is known of a trained team.
-
-    Attributes
-    ----------
-    trial
-        The trial that it was trained in.
-    agents, actuators
-        Its agents and what moves the bodies, by name; mostly the same.
-    rules, variables
-        The rule base that all of them have, and its state variables.
-    parts
-        What each agent's f consists of.
-    policy
-        What its scenario shows of what it does: text by ``lines()``, a drawing by ``figure()``; or
-        why there is none.
-    bodies
-        What bodies believed their actuators to do; none: they have no self-model.
-    """
+    """What is known of a trained team."""
 
     trial: Trial
+    """The trial that it was trained in."""
     agents: tuple[str, ...]
+    """Its agents, by name."""
     actuators: tuple[str, ...]
+    """What moves the bodies, by name; mostly the agents themselves."""
     rules: RuleBase
+    """The rule base that all of them have."""
     variables: tuple[Variable, ...]
+    """Its state variables."""
     parts: tuple[Parts, ...]
+    """What each agent's f consists of."""
     policy: Any
+    """What its scenario shows of what it does: text by ``lines()``, a drawing by ``figure()``; or
+    why there is none."""
     bodies: Bodies | None
+    """What bodies believed their actuators to do; none: they have no self-model."""
 
 
 def choose(store: Store, condition: str | None, seed: int | None) -> Trial:

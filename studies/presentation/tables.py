@@ -29,24 +29,19 @@ NOTHING = "no trial has finished"
 
 @dataclass(frozen=True)
 class SummaryTable:
-    """A table in its forms.
-
-    Attributes
-    ----------
-    titles
-        Headings of the estimates.
-    rows
-        Its lines.
-    csv, latex, markdown
-        The whole table as text. Printed, it is as on a terminal of 80 columns; a notebook shows it
-        as HTML.
-    """
+    """A table in its forms."""
 
     titles: tuple[str, ...]
+    """Headings of the estimates."""
     rows: tuple[Row, ...]
+    """Its lines."""
     csv: str
+    """The whole table as CSV."""
     latex: str
+    """The whole table in LaTeX."""
     markdown: str
+    """The whole table in Markdown. Printed, it is as on a terminal of 80 columns; a notebook shows
+    it as HTML."""
 
     @property
     def remark(self) -> str:

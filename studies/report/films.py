@@ -25,19 +25,14 @@ LAST = "last"
 
 @dataclass(frozen=True)
 class Film:
-    """The last training episode of a trial.
-
-    Attributes
-    ----------
-    condition, seed
-        Which trial.
-    data
-        A GIF in base64.
-    """
+    """The last training episode of a trial."""
 
     condition: str
+    """The condition of its trial."""
     seed: int
+    """The seed of its trial."""
     data: str
+    """A GIF in base64."""
 
 
 def films(store: Store, planned: Iterable[Planned], most_bytes: int) -> list[Film]:

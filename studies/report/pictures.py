@@ -16,21 +16,14 @@ from ..presentation.figures import styled
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure.
-
-    Attributes
-    ----------
-    name
-        Its file's, without suffix.
-    svg
-        An element that can stand in a page beside others.
-    pdf
-        The same figure, in base64.
-    """
+    """A figure."""
 
     name: str
+    """Its file's, without suffix."""
     svg: Markup
+    """An element that can stand in a page beside others."""
     pdf: str
+    """The same figure, in base64."""
 
     @property
     def title(self) -> str:

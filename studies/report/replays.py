@@ -29,27 +29,18 @@ MOST_BYTES = 1_500_000
 
 @dataclass(frozen=True)
 class Replays:
-    """What the page plays.
-
-    Attributes
-    ----------
-    scenes
-        The shapes that episodes are drawn in.
-    episodes
-        The packed episodes; `scene` is an index into `scenes`.
-    script
-        What draws them; empty if there are none.
-    films
-        Episodes that other scenarios draw themselves.
-    missing
-        How many finished trials are not shown, by condition, by reason.
-    """
+    """What the page plays."""
 
     scenes: list[dict[str, Any]]
+    """The shapes that episodes are drawn in."""
     episodes: list[dict[str, Any]]
+    """The packed episodes; `scene` is an index into `scenes`."""
     script: str
+    """What draws them; empty if there are none."""
     films: list[Film]
+    """Episodes that other scenarios draw themselves."""
     missing: dict[str, Counter[str]]
+    """How many finished trials are not shown, by condition, by reason."""
 
     @property
     def remarks(self) -> list[str]:

@@ -18,21 +18,13 @@ Figures: TypeAlias = "dict[str, Figure]"
 
 @dataclass(frozen=True)
 class Analysis:
-    """The analysis of a study.
-
-    Attributes
-    ----------
-    table
-        Its lines, one for each condition or case.
-    notes
-        Lines that are printed below the table: legend, verdicts, power.
-    cases
-        What the study's figures are drawn from.
-    differences
-        What was compared, p adjusted over all.
-    """
+    """The analysis of a study."""
 
     table: tuple[Summary, ...]
+    """Its lines, one for each condition or case."""
     notes: tuple[str, ...] = ()
+    """Lines that are printed below the table: legend, verdicts, power."""
     cases: Sequence[Any] = ()
+    """What the study's figures are drawn from."""
     differences: tuple[Difference, ...] = ()
+    """What was compared, p adjusted over all."""

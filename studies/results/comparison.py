@@ -17,31 +17,22 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Difference:
-    """A condition minus the reference.
-
-    Attributes
-    ----------
-    condition, measure
-        What is compared by what.
-    seeds
-        How many seeds both have finished.
-    estimate
-        The mean difference with its 95 % bootstrap interval.
-    raw
-        p of no difference, by permutation of signs.
-    p
-        The same, adjusted over all that were compared together, see `adjusted`.
-    sample
-        The differences of single seeds ``(n_seeds,)``.
-    """
+    """A condition minus the reference."""
 
     condition: str
+    """What is compared with the reference."""
     measure: str
+    """By what it is compared."""
     seeds: int
+    """How many seeds both have finished."""
     estimate: Estimate
+    """The mean difference with its 95 % bootstrap interval."""
     raw: float
+    """p of no difference, by permutation of signs."""
     p: float
+    """The same, adjusted over all that were compared together, see `adjusted`."""
     sample: Array = field(repr=False, compare=False)
+    """The differences of single seeds ``(n_seeds,)``."""
 
     @classmethod
     def of(

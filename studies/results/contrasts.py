@@ -28,43 +28,28 @@ EPISODES = (
 
 @dataclass(frozen=True)
 class Group:
-    """Conditions that are compared with each other.
-
-    Attributes
-    ----------
-    setting
-        What they have in common, as a label; empty if there is nothing in common.
-    reference
-        The label of the one that the others are compared with.
-    differences
-        Of the others from it.
-    table
-        A line for each, the reference first.
-    """
+    """Conditions that are compared with each other."""
 
     setting: str
+    """What they have in common, as a label; empty if there is nothing in common."""
     reference: str
+    """The label of the one that the others are compared with."""
     differences: tuple[Difference, ...]
+    """Of the others from it."""
     table: tuple[Summary, ...]
+    """A line for each, the reference first."""
 
 
 @dataclass(frozen=True)
 class Contrasts:
-    """Conditions against references by one measure; p is adjusted over all of them.
-
-    Attributes
-    ----------
-    measure
-        By what they are compared.
-    phase
-        In which episodes; empty if it is a number of whole trials.
-    groups
-        The comparisons.
-    """
+    """Conditions against references by one measure; p is adjusted over all of them."""
 
     measure: Measure
+    """By what they are compared."""
     phase: str
+    """In which episodes; empty if it is a number of whole trials."""
     groups: tuple[Group, ...]
+    """The comparisons."""
 
     @property
     def differences(self) -> tuple[Difference, ...]:

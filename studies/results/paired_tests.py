@@ -22,21 +22,14 @@ EXACT = 99_999
 
 @dataclass(frozen=True)
 class Friedman:
-    """Whether conditions differ at all (Friedman 1937).
-
-    Attributes
-    ----------
-    statistic
-        Friedman's chi square, corrected for ties.
-    p
-        By permutation within seeds.
-    concordance
-        Kendall's W: 0, seeds rank the conditions independently; 1, all alike.
-    """
+    """Whether conditions differ at all (Friedman 1937)."""
 
     statistic: float
+    """Friedman's chi square, corrected for ties."""
     p: float
+    """By permutation within seeds."""
     concordance: float
+    """Kendall's W: 0, seeds rank the conditions independently; 1, all alike."""
 
 
 def friedman(values: ArrayLike, permutations: int = 9999, seed: int = 0) -> Friedman:

@@ -51,33 +51,23 @@ TRIAL_COLUMNS = {
 
 @dataclass(frozen=True, eq=False)
 class Results:
-    """The frames of a study, or of several together, and arrays of what they hold.
-
-    Attributes
-    ----------
-    episodes
-        A row for each episode of the finished trials, by condition in the order of the spec, seed,
-        phase and number of the episode; a column for each swept key and measure.
-    trials
-        A row for each trial, failed ones included: its state, the seconds of its parts, and the
-        numbers of `TrialResult.numbers` and `TrialResult.usage` by their names.
-    phases
-        The phases of the episodes: training, evaluation, then others.
-    columns
-        By condition, what tells it from the others, see
-        `nested_agents.studies.spec.conditions.Condition`.
-    measures
-        What is measured of an episode, of any condition; success first.
-    usage
-        Names of the numbers that differ from run to run, times first.
-    """
+    """The frames of a study, or of several together, and arrays of what they hold."""
 
     episodes: DataFrame
+    """A row for each episode of the finished trials, by condition in the order of the spec, seed,
+    phase and number of the episode; a column for each swept key and measure."""
     trials: DataFrame
+    """A row for each trial, failed ones included: its state, the seconds of its parts, and the
+    numbers of `TrialResult.numbers` and `TrialResult.usage` by their names."""
     phases: tuple[str, ...] = ()
+    """The phases of the episodes: training, evaluation, then others."""
     columns: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    """By condition, what tells it from the others, see
+    `nested_agents.studies.spec.conditions.Condition`."""
     measures: tuple[Measure, ...] = (SUCCESS,)
+    """What is measured of an episode, of any condition; success first."""
     usage: tuple[str, ...] = ()
+    """Names of the numbers that differ from run to run, times first."""
 
     @cached_property
     def conditions(self) -> tuple[str, ...]:

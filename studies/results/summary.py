@@ -17,21 +17,14 @@ MANY = 1e6
 
 @dataclass(frozen=True)
 class Summary:
-    """A line of the table.
-
-    Attributes
-    ----------
-    condition
-        Label of the condition.
-    seeds
-        Number of seeds that have finished.
-    estimates
-        Estimates of no dimension by title.
-    """
+    """A line of the table."""
 
     condition: str
+    """Label of the condition."""
     seeds: int
+    """Number of seeds that have finished."""
     estimates: dict[str, Estimate]
+    """Estimates of no dimension by title."""
 
 
 def evaluated(results: Results, condition: str) -> dict[str, Estimate]:

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, cast
 
-from pydantic import Field, SerializerFunctionWrapHandler, ValidationError, model_serializer
+from pydantic import Field, ValidationError
 
 from ...core.agents.joint_agents import Agents, join_agents
 from ...core.interface.hierarchy import Hierarchy
@@ -22,7 +22,7 @@ from ...core.learners import LEARNERS, LearnerSettings, TeamSettings
 from ...core.learners.batch import BatchTDSettings
 from ...core.plugins.messages import closest
 from ...core.plugins.plugged import Plugged
-from ...core.plugins.settings import ScenarioSettings, Settings, tuples
+from ...core.plugins.settings import ScenarioSettings, Settings, tuples, unwritten
 from ...scenarios import DEFAULT, SCENARIOS
 from ...topologies import build
 from ...topologies.config import Topology, parse
@@ -42,20 +42,9 @@ class ConditionSettings(Settings):
     scenario: Annotated[ScenarioSettings, Plugged(SCENARIOS)] = Field(
         default_factory=lambda: cast(ScenarioSettings, SCENARIOS.parsed(DEFAULT))
     )
-    agents: Agents = "actuator"
+    agents: Annotated[Agents, unwritten("actuator")] = "actuator"
     topology: Topology = parse("chain")
     learner: Annotated[TeamSettings, Plugged(LEARNERS)] = BatchTDSettings()
-
-    @model_serializer(mode="wrap")
-    def _table(self, handler: SerializerFunctionWrapHandler) -> TomlTable:
-        """Leave out the agents where there is one for every actuator.
-
-        Versions before there was a choice wrote no more, and identities of trials stay as they are.
-        """
-        table: TomlTable = handler(self)
-        if self.agents == "actuator":
-            del table["agents"]
-        return table
 
     def arrange(self, world: Scenario) -> tuple[Scenario, Hierarchy]:
         """Return a world as the agents see it, and their hierarchy.
@@ -102,29 +91,20 @@ class Override(Settings):
 
 @dataclass(frozen=True)
 class Condition:
-    """What one part of a study's trials have in common.
-
-    Attributes
-    ----------
-    label
-        Short name, unique within its study.
-    columns
-        What tells it from the others, as the columns of a result: `name` if there are overrides,
-        the swept keys (empty where an override does not sweep), `preset` if there is neither.
-    settings
-        The resolved settings.
-    evaluations
-        Names and settings under which its trained teams are evaluated beside its own: other
-        scenarios, topologies, decisions.
-    curriculum
-        What its teams are trained on before.
-    """
+    """What one part of a study's trials have in common."""
 
     label: str
+    """Short name, unique within its study."""
     columns: Mapping[str, Any]
+    """What tells it from the others, as the columns of a result: `name` if there are overrides, the
+    swept keys (empty where an override does not sweep), `preset` if there is neither."""
     settings: ConditionSettings
+    """The resolved settings."""
     evaluations: tuple[tuple[str, ConditionSettings], ...] = ()
+    """Names and settings under which its trained teams are evaluated beside its own: other
+    scenarios, topologies, decisions."""
     curriculum: tuple[Stage, ...] = ()
+    """What its teams are trained on before."""
 
     @property
     def tables(self) -> list[Any]:

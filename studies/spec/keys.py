@@ -37,30 +37,23 @@ COMPARISONS = ((Ge, "ge", ">="), (Gt, "gt", ">"), (Le, "le", "<="), (Lt, "lt", "
 
 @dataclass(frozen=True)
 class Key:
-    """A key of a table.
-
-    Attributes
-    ----------
-    name
-        As it is written in a spec.
-    type, default, allowed
-        In words; a default is written as in TOML, or is ``none`` or ``required``.
-    preset
-        What the preset `default`, which a spec begins from, has in place of the default; empty if
-        the same.
-    unit
-        Empty where there is none.
-    meaning
-        The docstring of the field, in one line; empty if it has none.
-    """
+    """A key of a table."""
 
     name: str
+    """As it is written in a spec."""
     type: str
+    """In words."""
     default: str
+    """As written in TOML; or ``none``, or ``required``."""
     allowed: str
+    """In words."""
     unit: str
+    """Empty where there is none."""
     meaning: str
+    """The docstring of the field, in one line; empty if it has none."""
     preset: str = ""
+    """What the preset `default`, which a spec begins from, has in place of the default; empty if
+    the same."""
 
     @property
     def value(self) -> str:
@@ -70,30 +63,20 @@ class Key:
 
 @dataclass(frozen=True)
 class Table:
-    """A table of a spec, or the part of it that things of one kind have.
-
-    Attributes
-    ----------
-    name
-        Dotted, as ``learner.rule_base``; empty for the top of a spec.
-    kind
-        The ``kind`` that it must have for these keys; empty: any.
-    within
-        The ``kind`` of the table above that it belongs to; empty: any.
-    summary
-        The first line of the docstring of its model.
-    model
-        The settings model.
-    keys
-        What may stand in it.
-    """
+    """A table of a spec, or the part of it that things of one kind have."""
 
     name: str
+    """Dotted, as ``learner.rule_base``; empty for the top of a spec."""
     kind: str
+    """The ``kind`` that it must have for these keys; empty: any."""
     within: str
+    """The ``kind`` of the table above that it belongs to; empty: any."""
     summary: str
+    """The first line of the docstring of its model."""
     model: type[Settings]
+    """The settings model."""
     keys: tuple[Key, ...]
+    """What may stand in it."""
 
     @property
     def full_names(self) -> tuple[str, ...]:

@@ -61,15 +61,23 @@ def plain(value: Any, key: str = "") -> Any:
 
 
 def _edges(graph: Hierarchy | nx.Graph) -> dict[str, Any]:
-    """Return the table of the topology of just these agents and edges."""
+    """Return the table of the topology of just these agents and edges, or neighbours."""
+    relations = {}
     if isinstance(graph, Hierarchy):
+        if graph.edges and graph.neighbours:
+            raise SpecError("topology: a hierarchy of edges and neighbours has no table in a spec")
         agents: list[str] = list(graph.agents)
-        edges = [(graph.agents[a], graph.agents[b]) for a, b in graph.edges]
+        pairs = [(agents[a], agents[b]) for a, b in graph.edges or graph.neighbours]
+        of_neighbours = bool(graph.neighbours)
+        relations = {"told": graph.told, "considers": graph.considers}
     else:
-        agents, edges = list(map(str, graph)), [(str(a), str(b)) for a, b in graph.edges]
-    joined = {name for edge in edges for name in edge}
+        agents, pairs = list(map(str, graph)), [(str(a), str(b)) for a, b in graph.edges]
+        of_neighbours = bool(pairs) and not graph.is_directed()
+    if of_neighbours:
+        return {"kind": "coordination-graph", "edges": tuple(pairs), **relations}
+    joined = {name for pair in pairs for name in pair}
     alone = tuple(name for name in agents if name not in joined)
-    return {"kind": "edges", "edges": tuple(edges), "alone": alone}
+    return {"kind": "edges", "edges": tuple(pairs), "alone": alone, **relations}
 
 
 def _of_settings(settings: Settings, registry: Registry | None) -> Any:

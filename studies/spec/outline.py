@@ -20,27 +20,22 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class StudyOutline:
-    """A spec as plain words and numbers.
-
-    Attributes
-    ----------
-    study
-        Name of the study.
-    seeds, episodes, steps, evaluation
-        As in `Spec`.
-    columns
-        By condition, what tells it from the others.
-    table
-        The whole spec as a table.
-    """
+    """A spec as plain words and numbers."""
 
     study: str
+    """Name of the study."""
     seeds: tuple[int, ...]
+    """As in `Spec`."""
     episodes: int
+    """As in `Spec`."""
     steps: int
+    """As in `Spec`."""
     evaluation: int
+    """As in `Spec`."""
     columns: Mapping[str, Mapping[str, Any]]
+    """By condition, what tells it from the others."""
     table: Mapping[str, Any]
+    """The whole spec as a table."""
 
     @property
     def lengths(self) -> str:

@@ -76,33 +76,22 @@ class Planned(NamedTuple):
 
 @dataclass(frozen=True)
 class Noted:
-    """What a study is, in plain tables, texts and rows, as it is noted before anything is run.
-
-    Attributes
-    ----------
-    spec
-        The spec as a table.
-    conditions
-        The settings of each condition, by label.
-    columns
-        What tells each condition from the others, by label; all have the same keys.
-    sources
-        The texts of the files of users that it names, by name.
-    measures
-        What it measures of its episodes.
-    planned
-        All its trials.
-    code
-        By module, two digests of the code that computes what is added.
-    """
+    """What a study is, in plain tables, texts and rows, as it is noted before anything is run."""
 
     spec: Mapping[str, Any]
+    """The spec as a table."""
     conditions: Mapping[str, Any]
+    """The settings of each condition, by label."""
     columns: Mapping[str, Mapping[str, Any]]
+    """What tells each condition from the others, by label; all have the same keys."""
     sources: Mapping[str, str]
+    """The texts of the files of users that it names, by name."""
     measures: Sequence[Measure] = ()
+    """What it measures of its episodes."""
     planned: Sequence[Planned] = ()
+    """All its trials."""
     code: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    """By module, two digests of the code that computes what is added."""
 
     @property
     def code_digest(self) -> str:

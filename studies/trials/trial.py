@@ -28,37 +28,30 @@ PLAIN = ("study", "condition", "seed", "episodes", "steps", "evaluation", "evalu
 
 @dataclass(frozen=True)
 class Trial:
-    """One run of a study.
-
-    Attributes
-    ----------
-    study
-        Name of the study that measures it.
-    condition
-        Label of its condition; a name only, no part of its identity.
-    settings
-        What the condition consists of.
-    seed, episodes, steps, evaluation, evaluation_steps
-        As in `Spec`.
-    evaluations
-        Names and settings under which the trained team is evaluated beside its own.
-    curriculum
-        Stages that the team is trained in before its own scenario.
-    sources
-        The files of users that it names; what they mean is part of its identity.
-    """
+    """One run of a study."""
 
     study: str
+    """Name of the study that measures it."""
     condition: str = field(compare=False)
+    """Label of its condition; a name only, no part of its identity."""
     settings: ConditionSettings
+    """What the condition consists of."""
     seed: int
+    """As in `Spec`."""
     episodes: int
+    """As in `Spec`."""
     steps: int
+    """As in `Spec`."""
     evaluation: int
+    """As in `Spec`."""
     evaluations: tuple[tuple[str, ConditionSettings], ...] = ()
+    """Names and settings under which the trained team is evaluated beside its own."""
     curriculum: tuple[Stage, ...] = ()
+    """Stages that the team is trained in before its own scenario."""
     evaluation_steps: int | None = None
+    """As in `Spec`."""
     sources: Sources = field(default_factory=Sources, compare=False)
+    """The files of users that it names; what they mean is part of its identity."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Settings of a user's thing are of a class that only its file can make again.
@@ -142,31 +135,21 @@ class Trial:
 
 @dataclass(frozen=True)
 class TrialResult:
-    """What a trial measured.
-
-    Attributes
-    ----------
-    rows
-        The episodes in order, training first. A function of the trial, bit by bit.
-    measures
-        What is measured of them; of some episodes a part, if scenarios of evaluations differ.
-    recordings
-        Training episodes by name, those of `Trial.recorded`; none if the scenario is no
-        `RecordedScenario`. A function of the trial, too.
-    seconds
-        Time spent in each part of the control loop; differs from run to run.
-    numbers
-        Further measurements of the trial as a whole by name; a function of the trial.
-    usage
-        What it took beside time, by name; differs from run to run.
-    """
+    """What a trial measured."""
 
     rows: tuple[EpisodeRow, ...]
+    """The episodes in order, training first. A function of the trial, bit by bit."""
     measures: tuple[Measure, ...]
+    """What is measured of them; of some episodes a part, if scenarios of evaluations differ."""
     recordings: dict[str, Recording]
+    """Training episodes by name, those of `Trial.recorded`; none if the scenario is no
+    `RecordedScenario`. A function of the trial, too."""
     seconds: dict[str, float]
+    """Time spent in each part of the control loop; differs from run to run."""
     numbers: Mapping[str, float] = field(default_factory=dict)
+    """Further measurements of the trial as a whole by name; a function of the trial."""
     usage: Mapping[str, float] = field(default_factory=dict)
+    """What it took beside time, by name; differs from run to run."""
 
 
 def trials_of(spec: Spec) -> tuple[Trial, ...]:

@@ -14,34 +14,27 @@ from .worker import cores
 
 @dataclass(frozen=True)
 class Progress:
-    """The trials of a study, each counted once.
-
-    Attributes
-    ----------
-    total, done, failed, left
-        Numbers of trials; `left` are those that neither ended nor run.
-    running
-        Condition, seed, and seconds so far of the trials that are running.
-    processes
-        How many trials run at a time; if none does, as many as in the last run, or as would now:
-        the cores of this machine; or none where nothing is left.
-    seconds
-        Estimate of the time left [s]; None if nothing has finished to go by.
-    damaged
-        What has finished but is not as it was written, one line each; counted as left.
-    refusal
-        Why the installed code would not go on with the study, in one line; None if it would.
-    """
+    """The trials of a study, each counted once."""
 
     total: int
+    """Number of trials."""
     done: int
+    """Of these, how many have ended well."""
     failed: int
+    """How many have failed."""
     left: int
+    """How many neither ended nor run."""
     running: tuple[tuple[str, int, float], ...]
+    """Condition, seed, and seconds so far of the trials that are running."""
     processes: int
+    """How many trials run at a time; if none does, as many as in the last run, or as would now: the
+    cores of this machine; or none where nothing is left."""
     seconds: float | None
+    """Estimate of the time left [s]; None if nothing has finished to go by."""
     damaged: tuple[str, ...]
+    """What has finished but is not as it was written, one line each; counted as left."""
     refusal: str | None
+    """Why the installed code would not go on with the study, in one line; None if it would."""
 
 
 def progress(store: Store) -> Progress:

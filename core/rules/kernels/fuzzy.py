@@ -37,17 +37,6 @@ MOST_COPIES = 32
 class Partition:
     """Membership functions over one variable.
 
-    Parameters
-    ----------
-    centres
-        ``(m,)`` increasing centres; at least two.
-    membership
-        ``"triangular"`` or ``"sigmoid"``.
-    period
-        Period of a circular variable, 0 for a linear one.
-    steepness
-        Sigmoid slope c_k times the distance of the two centres it separates, above 0.
-
     Raises
     ------
     ValueError
@@ -61,9 +50,13 @@ class Partition:
     """
 
     centres: tuple[float, ...]
+    """``(m,)`` increasing centres; at least two."""
     membership: Membership
+    """``"triangular"`` or ``"sigmoid"``."""
     period: float = 0.0
+    """Period of a circular variable, 0 for a linear one."""
     steepness: float = 8.0
+    """Sigmoid slope c_k times the distance of the two centres it separates, above 0."""
 
     def __post_init__(self) -> None:
         if self.membership not in get_args(Membership):

@@ -53,27 +53,18 @@ What a robot does that stands at rest around the box and looks at it, the goal
 
 @dataclass(frozen=True)
 class Field:
-    """What one robot does from each point around the box.
-
-    Attributes
-    ----------
-    robot
-        Its number, from 0.
-    points
-        ``(m, 3)`` its poses in the frame of the box.
-    ways
-        ``(m, 2)`` how far it is predicted to move, in the frame of the box [m].
-    turns
-        ``(m,)`` how far it is predicted to turn [rad].
-    others
-        ``(M - 1, 2)`` places of the others.
-    """
+    """What one robot does from each point around the box."""
 
     robot: int
+    """Its number, from 0."""
     points: FloatArray
+    """``(m, 3)`` its poses in the frame of the box."""
     ways: FloatArray
+    """``(m, 2)`` how far it is predicted to move, in the frame of the box [m]."""
     turns: FloatArray
+    """``(m,)`` how far it is predicted to turn [rad]."""
     others: FloatArray
+    """``(M - 1, 2)`` places of the others."""
 
     @property
     def moves(self) -> list[str]:
@@ -93,19 +84,14 @@ class Field:
 
 @dataclass(frozen=True)
 class Policy:
-    """What each of the first `MOST_ROBOTS` robots of a team does.
-
-    Attributes
-    ----------
-    fields
-        Robot by robot.
-    box, robot
-        What stands there.
-    """
+    """What each of the first `MOST_ROBOTS` robots of a team does."""
 
     fields: tuple[Field, ...]
+    """Robot by robot."""
     box: BoxSpec
+    """The box that they push."""
     robot: RobotSettings
+    """What the robots are."""
 
     def lines(self) -> Iterator[str]:
         """Yield, by robot and side of the box, how often it makes which move."""

@@ -31,19 +31,14 @@ through one another, so that nothing is to be learned from it then."""
 
 
 class PushBelief(NamedTuple):
-    """Push models by constants.
-
-    Attributes
-    ----------
-    model
-        The model where all constants are 0: as believed at first.
-    ahead, sideways
-        ``(M, 3, 3)`` what servos and grip add to the wrench per twist with which robots resist.
-    """
+    """Push models by constants."""
 
     model: PushModel
+    """The model where all constants are 0: as believed at first."""
     ahead: FloatArray
+    """``(M, 3, 3)`` what the servos add to the wrench per twist with which robots resist."""
     sideways: FloatArray
+    """``(M, 3, 3)`` what the grip adds to it."""
 
     @classmethod
     def of(cls, model: PushModel, robots: Sequence[RobotSettings], stiffness: float) -> PushBelief:

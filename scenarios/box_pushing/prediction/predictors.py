@@ -60,25 +60,18 @@ def push_model(
 
 @dataclass(frozen=True)
 class Future:
-    """Where a world goes from a saved state.
-
-    Attributes
-    ----------
-    world
-        A world built alike, to play in; modified.
-    state
-        The present.
-    failures
-        Those of the scenario; left as they are.
-    step, hold
-        Number of the step to come, and control periods in one.
-    """
+    """Where a world goes from a saved state."""
 
     world: World
+    """A world built alike, to play in; modified."""
     state: WorldState
+    """The present."""
     failures: WheelFailures
+    """Those of the scenario; left as they are."""
     step: int
+    """Number of the step to come."""
     hold: int
+    """Control periods in one step."""
 
     def after(self, commands: FloatArray, periods: int) -> tuple[FloatArray, FloatArray]:
         """Return poses ``(M + 1, 3)``, the box first, and gaps ``(M,)`` under held commands."""

@@ -28,34 +28,24 @@ SWEEPS = 4
 
 
 class PushModel(NamedTuple):
-    """What the push predictor believes of robots and box; ``M`` robots.
-
-    Attributes
-    ----------
-    edges, rounding
-        Outline of the box, see `box_pushing.world.geometry.Outline`.
-    reach
-        Distance from the centre of the box within which all of it lies [m].
-    radii
-        ``(M,)`` robot radii [m].
-    compliance
-        ``(M, 3, 3)`` twist per wrench in the robot frame [m/s, rad/s per N, Nm]; zero: rigid.
-    friction_force
-        Greatest ground friction of the box, F [N].
-    friction_radius
-        rho [m].
-    contact_friction
-        Coefficient of friction between robot and box.
-    """
+    """What the push predictor believes of robots and box; ``M`` robots."""
 
     edges: FloatArray
+    """Of the outline of the box, see `box_pushing.world.geometry.Outline`."""
     rounding: float
+    """Of that outline [m]."""
     reach: float
+    """Distance from the centre of the box within which all of it lies [m]."""
     radii: FloatArray
+    """``(M,)`` robot radii [m]."""
     compliance: FloatArray
+    """``(M, 3, 3)`` twist per wrench in the robot frame [m/s, rad/s per N, Nm]; zero: rigid."""
     friction_force: float
+    """Greatest ground friction of the box, F [N]."""
     friction_radius: float
+    """rho [m]."""
     contact_friction: float
+    """Coefficient of friction between robot and box."""
 
 
 def push(

@@ -17,26 +17,20 @@ from .belief import PushBelief
 
 @dataclass(frozen=True)
 class Situation:
-    """The present, as far as prediction needs it.
-
-    Attributes
-    ----------
-    robots, box, goal
-        Poses ``(M, 3)``, ``(3,)``, ``(3,)``.
-    speeds
-        ``(n,)`` commanded wheel speeds [m/s].
-    effects
-        Per robot ``(3, w + 1)``: twist in its frame = effect @ [wheel speeds, 1].
-    groups
-        Agents of each robot.
-    """
+    """The present, as far as prediction needs it."""
 
     robots: FloatArray
+    """Poses ``(M, 3)``."""
     box: FloatArray
+    """Pose ``(3,)``."""
     goal: FloatArray
+    """Pose ``(3,)``."""
     speeds: FloatArray
+    """``(n,)`` commanded wheel speeds [m/s]."""
     effects: tuple[FloatArray, ...]
+    """Per robot ``(3, w + 1)``: twist in its frame = effect @ [wheel speeds, 1]."""
     groups: tuple[tuple[int, ...], ...]
+    """Agents of each robot."""
 
     @cached_property
     def places(self) -> list[tuple[int, int]]:
@@ -46,34 +40,28 @@ class Situation:
 
 @dataclass(frozen=True)
 class Premises:
-    """What all predictions of a scenario rest on.
-
-    Attributes
-    ----------
-    belief
-        Push models by constants, for `outcomes`.
-    space
-        State variables.
-    action_set, increment, limits
-        What actions tell the wheels: an increment is a fraction of the ``(n,)`` limits [m/s].
-    task, infrared
-        What is rewarded, and what the sensors read.
-    outline
-        Of the box.
-    hold, seconds
-        How long a decision stands, and how far predictions look ahead [s].
-    """
+    """What all predictions of a scenario rest on."""
 
     belief: PushBelief
+    """Push models by constants, for `outcomes`."""
     space: BoxStateSpace
+    """State variables."""
     action_set: ActionSet
+    """What actions tell the wheels."""
     increment: float
+    """By how much, as a fraction of `limits`."""
     limits: FloatArray
+    """``(n,)`` greatest wheel speeds [m/s]."""
     task: Task
+    """What is rewarded."""
     infrared: InfraredSettings
+    """What the sensors read."""
     outline: Outline
+    """Of the box."""
     hold: float
+    """How long a decision stands [s]."""
     seconds: float
+    """How far predictions look ahead [s]."""
 
     def seen(
         self,

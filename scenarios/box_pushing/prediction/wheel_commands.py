@@ -21,42 +21,28 @@ SAME_TWIST = 1e-11
 
 
 class WheelCommands(NamedTuple):
-    """Wheel commands and twists of ``M`` robots; of robots with fewer than most, zeros follow.
-
-    Attributes
-    ----------
-    counts
-        ``(M,)`` number of wheel commands of each robot, K at most.
-    speeds
-        ``(M, K, w)`` wheel speeds of every command [m/s].
-    twists
-        ``(M, K, 3)`` twist under every command in the frame of the robot [m/s, m/s, rad/s].
-    which
-        ``(M, A ** w)`` the command of every robot-action index.
-    n_levels
-        ``(M, w)`` number of speeds that each wheel may be commanded.
-    levels
-        ``(M, w, A)`` these speeds [m/s], increasing.
-    level
-        ``(M, w, A ** w)`` which of them every robot-action index tells each wheel.
-    n_distinct
-        ``(M,)`` number of distinct twists of each robot.
-    first
-        ``(M, K)`` the first command of every distinct twist.
-    distinct
-        ``(M, K)`` which of the distinct twists every command gives.
-    """
+    """Wheel commands and twists of ``M`` robots; of robots with fewer than most, zeros follow."""
 
     counts: IntArray
+    """``(M,)`` number of wheel commands of each robot, K at most."""
     speeds: FloatArray
+    """``(M, K, w)`` wheel speeds of every command [m/s]."""
     twists: FloatArray
+    """``(M, K, 3)`` twist under every command in the frame of the robot [m/s, m/s, rad/s]."""
     which: IntArray
+    """``(M, A ** w)`` the command of every robot-action index."""
     n_levels: IntArray
+    """``(M, w)`` number of speeds that each wheel may be commanded."""
     levels: FloatArray
+    """``(M, w, A)`` these speeds [m/s], increasing."""
     level: IntArray
+    """``(M, w, A ** w)`` which of them every robot-action index tells each wheel."""
     n_distinct: IntArray
+    """``(M,)`` number of distinct twists of each robot."""
     first: IntArray
+    """``(M, K)`` the first command of every distinct twist."""
     distinct: IntArray
+    """``(M, K)`` which of the distinct twists every command gives."""
 
 
 @njit(cache=True)

@@ -27,31 +27,21 @@ from .view import View
 
 @dataclass(frozen=True)
 class BoxStateSpace:
-    """A state space and how to compute it.
-
-    Attributes
-    ----------
-    space
-        Names, ranges and membership centres.
-    own
-        ``own(poses (m, 3), speeds (m,), goal (3,)) -> (m, n_own)``.
-    own_needs_pose
-        Whether `own` reads the poses; if not, none need be predicted for it.
-    functions
-        The shared variables, in order.
-    compiled
-        Which of them have a column of `kernels`.
-    of_users
-        Whether the others are functions of users: of them nothing is known, and what they return
-        is checked.
-    """
+    """A state space and how to compute it."""
 
     space: StateSpace
+    """Names, ranges and membership centres."""
     own: Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
+    """``own(poses (m, 3), speeds (m,), goal (3,)) -> (m, n_own)``."""
     own_needs_pose: bool
+    """Whether `own` reads the poses; if not, none need be predicted for it."""
     functions: tuple[StateVariable, ...]
+    """The shared variables, in order."""
     compiled: tuple[bool, ...]
+    """Which of them have a column of `kernels`."""
     of_users: bool = True
+    """Whether the others are functions of users: of them nothing is known, and what they return is
+    checked."""
 
     @cached_property
     def _columns(self) -> Columns:

@@ -26,36 +26,24 @@ ARRIVED = 0.1
 
 @dataclass(frozen=True)
 class View:
-    """Situations to be described, ``m`` at once.
-
-    Attributes
-    ----------
-    robots
-        ``(m, M, 3)`` poses [m, m, rad].
-    box
-        ``(m, 3)`` poses of the box.
-    gaps
-        ``(m, M)`` distances between robot and box surfaces [m]; slightly negative in contact.
-    goal
-        ``(3,)`` goal pose of the box.
-    origin
-        ``(3,)`` pose of the box before the motion that led here.
-    periods
-        How many decision periods that motion took.
-    outline
-        Of the box, in its own frame.
-    friction_radius
-        Lever with which ground friction resists turning of the box [m].
-    """
+    """Situations to be described, ``m`` at once."""
 
     robots: FloatArray
+    """``(m, M, 3)`` poses [m, m, rad]."""
     box: FloatArray
+    """``(m, 3)`` poses of the box."""
     gaps: FloatArray
+    """``(m, M)`` distances between robot and box surfaces [m]; slightly negative in contact."""
     goal: FloatArray
+    """``(3,)`` goal pose of the box."""
     origin: FloatArray
+    """``(3,)`` pose of the box before the motion that led here."""
     periods: float
+    """How many decision periods that motion took."""
     outline: Outline
+    """Of the box, in its own frame."""
     friction_radius: float
+    """Lever with which ground friction resists turning of the box [m]."""
 
     @property
     def n_situations(self) -> int:

@@ -32,23 +32,6 @@ ROBOTS_PER_BOX = 2
 class BoxSpec:
     """A box: a polygon, or a disc if it has a radius instead of vertices.
 
-    Attributes
-    ----------
-    name
-        The name under which specs know it.
-    vertices
-        Outline [m], anywhere in the plane; the frame of the box is centred afterwards.
-    holes
-        Outlines of holes [m].
-    radius
-        Of a disc [m]; 0 for a polygon.
-    mass
-        [kg].
-    friction
-        Coefficient of friction with the ground.
-    contact_friction
-        Coefficient of friction with robots.
-
     Raises
     ------
     ValueError
@@ -62,12 +45,19 @@ class BoxSpec:
     """
 
     name: str
+    """The name under which specs know it."""
     vertices: Vertices = ()
+    """Outline [m], anywhere in the plane; the frame of the box is centred afterwards."""
     holes: tuple[Vertices, ...] = ()
+    """Outlines of holes [m]."""
     radius: float = 0.0
+    """Of a disc [m]; 0 for a polygon."""
     mass: float = 0.4
+    """[kg]."""
     friction: float = 0.2
+    """Coefficient of friction with the ground."""
     contact_friction: float = 0.3
+    """Coefficient of friction with robots."""
 
     def __post_init__(self) -> None:
         if bool(self.vertices) == bool(self.radius):

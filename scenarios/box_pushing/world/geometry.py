@@ -38,13 +38,6 @@ _TURN_LOW = _TURN - _TURN_HIGH
 class Outline:
     """The surface of a body.
 
-    Attributes
-    ----------
-    edges
-        ``(n_edges, 4)`` rows ``[x0, y0, x1, y1]`` [m], the material on the left.
-    rounding
-        Margin by which the shape is grown [m].
-
     Examples
     --------
     >>> disc = Outline(np.zeros((1, 4)), rounding=0.1)
@@ -54,7 +47,9 @@ class Outline:
     """
 
     edges: FloatArray
+    """``(n_edges, 4)`` rows ``[x0, y0, x1, y1]`` [m], the material on the left."""
     rounding: float = 0.0
+    """Margin by which the shape is grown [m]."""
 
     @property
     def radius(self) -> float:

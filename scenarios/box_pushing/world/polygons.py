@@ -34,24 +34,16 @@ STRAIGHT = 1e-9
 
 
 class Moments(NamedTuple):
-    """Area and its moments about the origin.
-
-    Attributes
-    ----------
-    area
-        [m2].
-    first
-        ``(2,)`` integrals of x and y [m3].
-    second
-        ``(2, 2)`` integrals of the products of coordinates [m4].
-    radial
-        Integral of the distance from the origin [m3].
-    """
+    """Area and its moments about the origin."""
 
     area: float
+    """[m2]."""
     first: FloatArray
+    """``(2,)`` integrals of x and y [m3]."""
     second: FloatArray
+    """``(2, 2)`` integrals of the products of coordinates [m4]."""
     radial: float
+    """Integral of the distance from the origin [m3]."""
 
 
 def moments(edges: FloatArray) -> Moments:

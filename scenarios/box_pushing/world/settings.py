@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, Union, get_args
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self, Union, get_args
 
 import numpy as np
-from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
+from pydantic import Field, model_validator
 
 from ....core.numerics.arrays import FloatArray
 from ....core.plugins.scheduled import Names
-from ....core.plugins.settings import NonNegative, Positive, Settings
+from ....core.plugins.settings import NonNegative, Positive, Settings, unwritten
 from ...faults.settings import DISCRIMINATOR, KINDS, FailureSettings, befalling
 
 GRAVITY = 9.81
@@ -75,14 +75,10 @@ Vertices = Annotated[tuple[tuple[float, float], ...], Field(min_length=3)]
 class Described(Settings):
     """Something of one's own, described by a table that may say what it is called."""
 
-    name: Annotated[str, Field(min_length=1, pattern=r"^[^\x00-\x1f\x7f]+$")] | None = None
+    name: Annotated[
+        Annotated[str, Field(min_length=1, pattern=r"^[^\x00-\x1f\x7f]+$")] | None, unwritten(None)
+    ] = None
     """What labels call it; nothing depends on it."""
-
-    @model_serializer(mode="wrap")
-    def _without_no_name(self, write: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        # Without a name it is written as it ever was, and its trials are the same.
-        table: dict[str, Any] = write(self)
-        return {key: value for key, value in table.items() if key != "name" or value is not None}
 
 
 class BoxSettings(Described):

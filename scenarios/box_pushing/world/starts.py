@@ -32,27 +32,20 @@ PRECISION = 1e-9
 
 @dataclass(frozen=True)
 class Start:
-    """A start distribution; all quantities uniform and independent.
-
-    Attributes
-    ----------
-    distance
-        From the box to the goal [m].
-    bearing, angle, heading
-        Greatest absolute bearing of the goal from the box, angle of the box, and heading of a
-        robot relative to the box [rad]; pi: any.
-    gaps
-        Least and greatest distance between a robot's surface and the box's [m].
-    around
-        Whether robots stand anywhere around the box, or side by side behind it.
-    """
+    """A start distribution; all quantities uniform and independent."""
 
     distance: float
+    """From the box to the goal [m]."""
     bearing: float
+    """Greatest absolute bearing of the goal from the box [rad]; pi: any."""
     angle: float
+    """Greatest absolute angle of the box [rad]; pi: any."""
     heading: float
+    """Greatest absolute heading of a robot relative to the box [rad]; pi: any."""
     gaps: tuple[float, float]
+    """Least and greatest distance between a robot's surface and the box's [m]."""
     around: bool = False
+    """Whether robots stand anywhere around the box, or side by side behind it."""
 
 
 STARTS: dict[str, Start] = {

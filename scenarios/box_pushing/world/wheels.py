@@ -30,31 +30,22 @@ from .settings import RobotSettings
 
 
 class WheelModel(NamedTuple):
-    """Robots on their wheels; ``M`` robots, ``n`` wheels in all.
-
-    Attributes
-    ----------
-    first
-        ``(M + 1,)`` index of the first wheel of each robot, and n.
-    mass
-        ``(M, 3)`` mass, mass, moment of inertia.
-    points
-        ``(n, 2)`` where the wheels stand in the body frame.
-    ahead, sideways
-        ``(n,)`` stiffness.
-    limit
-        ``(n,)`` greatest force.
-    implicit
-        ``(M, 3, 3)`` inverse of M + dt K.
-    """
+    """Robots on their wheels; ``M`` robots, ``n`` wheels in all."""
 
     first: IntArray
+    """``(M + 1,)`` index of the first wheel of each robot, and n."""
     mass: FloatArray
+    """``(M, 3)`` mass, mass, moment of inertia."""
     points: FloatArray
+    """``(n, 2)`` where the wheels stand in the body frame."""
     ahead: FloatArray
+    """``(n,)`` stiffness along the heading."""
     sideways: FloatArray
+    """``(n,)`` stiffness across it."""
     limit: FloatArray
+    """``(n,)`` greatest force."""
     implicit: FloatArray
+    """``(M, 3, 3)`` inverse of M + dt K."""
 
 
 def wheel_model(

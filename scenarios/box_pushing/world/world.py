@@ -51,23 +51,18 @@ step = _Box2D.b2World_Step
 
 
 class WorldState(NamedTuple):
-    """All that the future of a `World` depends on, besides the wheel speeds to come.
-
-    Attributes
-    ----------
-    poses, twists
-        ``(M + 1, 3)`` of the box and the robots, world frame.
-    last, wrenches
-        ``(M, 3)`` what the wheel model remembers of the last step, in units of Box2D.
-    contact_time
-        As in `World`.
-    """
+    """All that the future of a `World` depends on, besides the wheel speeds to come."""
 
     poses: FloatArray
+    """``(M + 1, 3)`` of the box and the robots, world frame."""
     twists: FloatArray
+    """``(M + 1, 3)`` of the box and the robots, world frame."""
     last: FloatArray
+    """``(M, 3)`` what the wheel model remembers of the last step: twists, in units of Box2D."""
     wrenches: FloatArray
+    """``(M, 3)`` what it remembers of wrenches, in units of Box2D."""
     contact_time: FloatArray
+    """As in `World`."""
 
 
 class World:

@@ -35,31 +35,21 @@ PHASES = {"success, all training": "training", EVALUATED: "evaluation"}
 
 @dataclass(frozen=True)
 class OrderComparison:
-    """All orders by one measure.
-
-    Attributes
-    ----------
-    title
-        The measure.
-    orders
-        Labels of the conditions.
-    values
-        ``(n_seeds, n_orders)``, seeds that all orders have finished.
-    test
-        Whether the orders differ at all.
-    p
-        Its p, adjusted over the measures.
-    against_first
-        ``(n_orders - 1,)`` p of every other order against the first, adjusted over all of them and
-        all measures.
-    """
+    """All orders by one measure."""
 
     title: str
+    """The measure."""
     orders: tuple[str, ...]
+    """Labels of the conditions."""
     values: NDArray[np.float64]
+    """``(n_seeds, n_orders)``, seeds that all orders have finished."""
     test: Friedman
+    """Whether the orders differ at all."""
     p: float
+    """Its p, adjusted over the measures."""
     against_first: NDArray[np.float64]
+    """``(n_orders - 1,)`` p of every other order against the first, adjusted over all of them and
+    all measures."""
 
 
 def analyse(results: Results) -> Analysis:

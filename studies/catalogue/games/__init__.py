@@ -52,21 +52,14 @@ def measure(trial: Trial) -> TrialResult:
 
 @dataclass(frozen=True)
 class GameCase:
-    """One condition.
-
-    Attributes
-    ----------
-    system
-        Name of its override: what learns and decides.
-    setting
-        What it is compared in: the game, the exploration.
-    optimal
-        By number of plays, the probability of the optimal joint action.
-    """
+    """One condition."""
 
     system: str
+    """Name of its override: what learns and decides."""
     setting: tuple[str, ...]
+    """What it is compared in: the game, the exploration."""
     optimal: Mapping[int, Estimate]
+    """By number of plays, the probability of the optimal joint action."""
 
 
 def analyse(results: Results) -> Analysis:

@@ -58,30 +58,20 @@ def check(spec: Spec) -> None:
 
 @dataclass(frozen=True)
 class HierarchyCase:
-    """One hierarchy under which teams are evaluated.
-
-    Attributes
-    ----------
-    condition
-        Its label.
-    hierarchy
-        Its label without the number of robots and whose value decides.
-    value_of
-        Whose value decides; empty if that is not swept.
-    robots
-        Their number.
-    values
-        Estimates by title.
-    phase
-        Of its episodes.
-    """
+    """One hierarchy under which teams are evaluated."""
 
     condition: str
+    """Its label."""
     hierarchy: str
+    """Its label without the number of robots and whose value decides."""
     value_of: str
+    """Whose value decides; empty if that is not swept."""
     robots: int
+    """Their number."""
     values: dict[str, Estimate]
+    """Estimates by title."""
     phase: str = "evaluation"
+    """Of its episodes."""
 
     @property
     def setting(self) -> str:
@@ -92,24 +82,16 @@ class HierarchyCase:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether the hierarchy matters, given the number of robots and whose value decides.
-
-    Attributes
-    ----------
-    setting
-        Those two.
-    reference
-        The hierarchy that the others are compared with.
-    comparisons
-        Every other hierarchy less the reference, by evaluation success.
-    among
-        How many comparisons of the study p is adjusted over.
-    """
+    """Whether the hierarchy matters, given the number of robots and whose value decides."""
 
     setting: str
+    """Those two."""
     reference: str
+    """The hierarchy that the others are compared with."""
     comparisons: tuple[Difference, ...]
+    """Every other hierarchy less the reference, by evaluation success."""
     among: int
+    """How many comparisons of the study p is adjusted over."""
 
     @property
     def different(self) -> tuple[Difference, ...]:

@@ -43,27 +43,18 @@ def check(spec: Spec) -> None:
 
 @dataclass(frozen=True)
 class Metric:
-    """A column of the table.
-
-    Attributes
-    ----------
-    title
-        Its heading.
-    measure
-        Which measurement: a measure of `Results.measures`, or ``steps``.
-    block
-        Which episodes: the first or the last `BLOCK` of training, or those of the evaluation.
-    is_rate
-        Whether each episode is a success or not.
-    bounds
-        The least and the greatest value that there can be.
-    """
+    """A column of the table."""
 
     title: str
+    """Its heading."""
     measure: str
+    """Which measurement: a measure of `Results.measures`, or ``steps``."""
     block: Literal["first", "last", "evaluation"]
+    """Which episodes: the first or the last `BLOCK` of training, or those of the evaluation."""
     is_rate: bool = False
+    """Whether each episode is a success or not."""
     bounds: tuple[float, float] = NOT_NEGATIVE
+    """The least and the greatest value that there can be."""
 
     def estimate(self, values: Array) -> Estimate:
         """Return the mean over the block of values ``(n_seeds, n_episodes)``."""
@@ -97,18 +88,12 @@ def metrics_of(measures: Sequence[Measure], episodes: int) -> tuple[Metric, ...]
 
 @dataclass(frozen=True)
 class Followed:
-    """A measure that is followed from episode to episode: success, or one that is no rate.
-
-    Attributes
-    ----------
-    measure
-        Which.
-    training
-        By condition, what was measured ``(n_seeds, n_episodes)``.
-    """
+    """A measure that is followed from episode to episode: success, or one that is no rate."""
 
     measure: Measure
+    """Which."""
     training: Mapping[str, Array]
+    """By condition, what was measured ``(n_seeds, n_episodes)``."""
 
     @property
     def curves(self) -> dict[str, Estimate]:

@@ -62,23 +62,16 @@ def measure(trial: Trial) -> TrialResult:
 
 @dataclass(frozen=True)
 class LearningCourse:
-    """How one condition fares with experience.
-
-    Attributes
-    ----------
-    condition
-        Its label.
-    decisions, seconds
-        ``(k,)`` decisions experienced and CPU seconds spent until each evaluation, means over
-        seeds.
-    success
-        The evaluations' success rates.
-    """
+    """How one condition fares with experience."""
 
     condition: str
+    """Its label."""
     decisions: Array
+    """``(k,)`` decisions experienced until each evaluation, means over seeds."""
     seconds: Array
+    """``(k,)`` CPU seconds spent until each evaluation, means over seeds."""
     success: tuple[Estimate, ...]
+    """The evaluations' success rates."""
 
 
 def analyse(results: Results) -> Analysis:

@@ -89,21 +89,14 @@ def measure(trial: Trial) -> TrialResult:
 
 @dataclass(frozen=True)
 class RelatedCase:
-    """One condition.
-
-    Attributes
-    ----------
-    system
-        Name of its override: how agents coordinate.
-    world
-        What else it differs in, such as the number of robots.
-    values
-        Estimates by title, see `analyse`.
-    """
+    """One condition."""
 
     system: str
+    """Name of its override: how agents coordinate."""
     world: str
+    """What else it differs in, such as the number of robots."""
     values: Mapping[str, Estimate]
+    """Estimates by title, see `analyse`."""
 
 
 def analyse(results: Results) -> Analysis:

@@ -127,35 +127,26 @@ def _peak() -> int | None:
 
 @dataclass(frozen=True)
 class Point:
-    """One condition.
-
-    Attributes
-    ----------
-    evaluator
-        Its label without the number of robots: the evaluator, and whatever else differs.
-    bodies
-        What is counted: ``robots``, or what a spec sweeps in place of them.
-    robots, agents, messages
-        Sizes.
-    period
-        What a decision may take to keep up with the robots [s]; none: the scenario has no hurry.
-    seeds
-        Those that have finished.
-    values
-        Estimates by title, see `analyse`.
-    times
-        By title, times of single seeds ``(n_seeds,)``.
-    """
+    """One condition."""
 
     evaluator: str
+    """Its label without the number of robots: the evaluator, and whatever else differs."""
     bodies: str
+    """What is counted: ``robots``, or what a spec sweeps in place of them."""
     robots: int
+    """Number of robots."""
     agents: int
+    """Number of agents."""
     messages: int
+    """Number of messages in one decision of all agents."""
     period: float | None
+    """What a decision may take to keep up with the robots [s]; none: the scenario has no hurry."""
     seeds: tuple[int, ...]
+    """Those that have finished."""
     values: dict[str, Estimate]
+    """Estimates by title, see `analyse`."""
     times: dict[str, Array]
+    """By title, times of single seeds ``(n_seeds,)``."""
 
 
 def analyse(results: Results) -> Analysis:

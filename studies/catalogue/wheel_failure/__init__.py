@@ -121,31 +121,21 @@ def _keeping_weights(session: Session) -> Team:
 
 @dataclass(frozen=True)
 class Course:
-    """One case: what happened to a fault, given what adapts.
-
-    Attributes
-    ----------
-    fault
-        Label of the condition but for `SWEPT`.
-    adapts
-        What does, see `ADAPTS`; `training` or `weights kept` if self-models were not swept.
-    onset
-        Episode in which the first wheel fails.
-    onsets
-        Episodes in which any does.
-    success
-        ``(n_seeds, n_episodes)`` from the start of training.
-    seeds
-        The seeds, in that order.
-    """
+    """One case: what happened to a fault, given what adapts."""
 
     fault: str
+    """Label of the condition but for `SWEPT`."""
     adapts: str
+    """What does, see `ADAPTS`; `training` or `weights kept` if self-models were not swept."""
     onset: int
+    """Episode in which the first wheel fails."""
     onsets: tuple[int, ...]
+    """Episodes in which any does."""
     success: Array
+    """``(n_seeds, n_episodes)`` from the start of training."""
     steps: Array
     seeds: tuple[int, ...]
+    """The seeds, in that order."""
 
     @property
     def before(self) -> Array:

@@ -1,14 +1,18 @@
 import re
 import tomllib
 
+import networkx as nx
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.studies.errors import SpecError
+from nested_agents.studies.spec.objects import plain
 from nested_agents.studies.spec.presets import PRESETS
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.spec.toml import dumps
+from nested_agents.topologies import build
 
 BAD = {
     "": [],
@@ -421,7 +425,6 @@ def test_described_boxes_are_called_by_their_names():
 
 
 def test_keywords_make_a_whole_spec_and_objects_stand_for_names():
-    from nested_agents.core.interface.hierarchy import Hierarchy
     from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 
     pair = Hierarchy(["robot1.left", "robot1.right"], [("robot1.left", "robot1.right")])
@@ -433,6 +436,30 @@ def test_keywords_make_a_whole_spec_and_objects_stand_for_names():
     assert Spec.of(spec.table()) == spec
     with pytest.raises(SpecError, match="seed = 3: unknown key; did you mean 'seeds'"):
         Spec(seed=3)
+
+
+@pytest.mark.parametrize(
+    "topology",
+    [
+        Hierarchy("abc", [("a", "b")], told="none", considers="children"),
+        Hierarchy("abc", [], neighbours=[("a", "b")]),
+        nx.path_graph(["a", "b", "c"]),
+        nx.DiGraph([("a", "b"), ("b", "c")]),
+    ],
+)
+def test_a_topology_given_as_an_object_keeps_its_relations(topology):
+    built = build(plain(topology, "topology"), list("abc"))
+    if isinstance(topology, Hierarchy):
+        assert (built.edges, built.neighbours) == (topology.edges, topology.neighbours)
+        assert (built.told, built.considers) == (topology.told, topology.considers)
+    else:
+        pairs = built.edges if topology.is_directed() else built.neighbours
+        assert pairs == ((0, 1), (1, 2))
+
+
+def test_edges_beside_neighbours_have_no_table():
+    with pytest.raises(SpecError, match="of edges and neighbours has no table in a spec"):
+        plain(Hierarchy("abc", [("a", "b")], neighbours=[("a", "c")]), "topology")
 
 
 def test_a_key_that_is_nearly_another_one_is_suggested():
