@@ -31,10 +31,12 @@ class TopologySettings(Settings):
 
     kind: str = ""
     told: Annotated[Told, unwritten("ancestors")] = "ancestors"
-    """By whom an agent is told what was decided: all above it, its direct superiors, or nobody."""
+    """By whom an agent is told what was decided: all above it, its direct superiors, or nobody; or
+    a list of the bodies in which those above it tell it: its own ``body``, those ``next`` to it in
+    the order of bodies, those ``farther`` away."""
     considers: Annotated[Considers, unwritten("descendants")] = "descendants"
     """Whose actions an agent tries beside its own: those of all below it, of its direct
-    subordinates, or of nobody."""
+    subordinates, or of nobody; or a list of bodies, as above, in which those below it are."""
     failures: Annotated[tuple[AnyMessageFailure, ...], unwritten(())] = ()
     """What fails of the messages down the hierarchy, from when to when."""
 
@@ -186,7 +188,7 @@ def build(
             graph = files.call(settings.build, title.rpartition(":")[2], agents, named)
             graph = from_networkx(graph, agents, neighbours=True)
         edges, neighbours = (graph.edges, ()) if graph.is_directed() else ((), graph.edges)
-        return Hierarchy(agents, edges, neighbours, settings.told, settings.considers)
+        return Hierarchy(agents, edges, neighbours, settings.told, settings.considers, named)
     except ValueError as error:
         problem = str(error)
         for start in ("hierarchy: ", f"{title}: ", f"topology {title!r}: "):

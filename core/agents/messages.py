@@ -233,6 +233,7 @@ def _reparented(
         if order.index(superior) >= order.index(agent):
             raise ValueError(f"{known}: must decide before {names[agent]!r}")
     kept = [(a, b) for a, b in hierarchy.edges if b not in agents]
-    edges = [*kept, *((superior, int(agent)) for agent in agents)]
-    changed = Hierarchy(names, [(names[a], names[b]) for a, b in edges], told=hierarchy.told)
+    pairs = [*kept, *((superior, int(agent)) for agent in agents)]
+    edges = [(names[a], names[b]) for a, b in pairs]
+    changed = Hierarchy(names, edges, told=hierarchy.told, bodies=hierarchy.bodies)
     return {i: np.array(changed.above(i), dtype=np.int64) for i in range(len(hierarchy))}

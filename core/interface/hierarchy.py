@@ -9,6 +9,10 @@ hierarchy can part:
 - *telling*: an agent is told what those above it have decided: all its ancestors, as in the paper,
   its parents alone, or nobody.
 
+Either may hold for ancestors or descendants in some bodies alone: within an agent's own body, in
+the next ones, which come directly before and after it in the order of bodies, or in those farther
+away.
+
 Whom an agent neither considers nor is told of is *unseen*: it is taken to perform the neutral
 action, maintain, even if it has decided, unless the team reads the unseen otherwise (see
 `nested_agents.core.decision.settings`). In the paper's chain nobody is unseen.
@@ -21,14 +25,27 @@ joint-action learners (everybody is everybody's neighbour) and coordination grap
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import Literal
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator
 
 from ..plugins.deferred import nx
 
-Told = Literal["ancestors", "parents", "none"]
-"""By whom an agent is told what was decided."""
-Considers = Literal["descendants", "children", "none"]
-"""Whose actions an agent tries."""
+WHERE = ("body", "next", "farther")
+"""In which body another agent is: in the same one, in the next one, or farther away."""
+
+
+def _some(where: tuple[str, ...]) -> tuple[str, ...]:
+    if not 1 <= len(where) <= 2 or not {*where} <= {*WHERE}:
+        raise ValueError(f"must be a list of one or two of {', '.join(WHERE)}")
+    return where
+
+
+SomeBodies = Annotated[tuple[str, ...], AfterValidator(_some)]
+Told = Literal["ancestors", "parents", "none"] | SomeBodies
+"""By whom an agent is told what was decided; or in which bodies its ancestors tell it."""
+Considers = Literal["descendants", "children", "none"] | SomeBodies
+"""Whose actions an agent tries; or in which bodies those of its descendants."""
 
 
 class Hierarchy:
@@ -46,6 +63,8 @@ class Hierarchy:
         By whom an agent is told what was decided.
     considers
         Whose actions an agent tries beside its own; neighbours count as its children.
+    bodies
+        Names of the agents of each body, in the order of bodies; none: each is a body of its own.
 
     Raises
     ------
@@ -73,6 +92,7 @@ class Hierarchy:
         neighbours: Iterable[tuple[str, str]] = (),
         told: Told = "ancestors",
         considers: Considers = "descendants",
+        bodies: Iterable[Sequence[str]] = (),
     ) -> None:
         agents, edges = tuple(agents), [(str(a), str(b)) for a, b in edges]
         if not agents:
@@ -81,10 +101,10 @@ class Hierarchy:
             if agents.count(name) > 1:
                 raise ValueError(f"hierarchy: agent {name!r} is named more than once")
         sides = [(str(a), str(b)) for a, b in neighbours]
-        if sides and considers == "none":
+        if sides and considers not in ("descendants", "children"):
             raise ValueError(
-                "hierarchy: considers = 'none': neighbours consider each other; without neighbours "
-                "use independent"
+                f"hierarchy: considers = {considers!r}: neighbours consider each other; without "
+                "neighbours use independent"
             )
         _check_edges(edges, agents, _arrow, "superior")
         _check_edges([tuple(sorted(pair)) for pair in sides], agents, _line, "neighbour")
@@ -109,12 +129,22 @@ class Hierarchy:
                 raise ValueError(f"hierarchy: neighbours {pair} are superior and subordinate, too")
             beside[a].add(b)
             beside[b].add(a)
-        tellers = {"ancestors": nx.ancestors, "parents": nx.DiGraph.predecessors, "none": _nobody}
-        tried = {"descendants": nx.descendants, "children": nx.DiGraph.successors, "none": _nobody}
+        self.bodies = tuple(bodies) or tuple((name,) for name in agents)
+        place = {index[name]: k for k, body in enumerate(self.bodies) for name in body}
+
+        def related(agent: int, relation: Any, every: str) -> set[int]:
+            if isinstance(relation, str):
+                return set(RELATIONS[relation](graph, agent))
+            away = {j: abs(place[j] - place[agent]) for j in RELATIONS[every](graph, agent)}
+            return {j for j, bodies in away.items() if WHERE[min(bodies, 2)] in relation}
+
         self._below = tuple(
-            tuple(sorted({*tried[considers](graph, i), *beside[i]})) for i in range(len(agents))
+            tuple(sorted(related(i, considers, "descendants") | beside[i]))
+            for i in range(len(agents))
         )
-        self._above = tuple(tuple(sorted(tellers[told](graph, i))) for i in range(len(agents)))
+        self._above = tuple(
+            tuple(sorted(related(i, told, "ancestors"))) for i in range(len(agents))
+        )
         self.told, self.considers = told, considers
         self.depth: int = nx.dag_longest_path_length(graph) + 1
         """Number of agents on the longest path."""
@@ -155,8 +185,14 @@ class Hierarchy:
         return sum(n_actions ** (1 + len(below)) for below in self._below)
 
 
-def _nobody(graph: nx.DiGraph, agent: int) -> tuple[int, ...]:
-    return ()
+RELATIONS: dict[str, Callable[[nx.DiGraph, int], Iterable[int]]] = {
+    "ancestors": lambda graph, agent: nx.ancestors(graph, agent),
+    "parents": lambda graph, agent: graph.predecessors(agent),
+    "descendants": lambda graph, agent: nx.descendants(graph, agent),
+    "children": lambda graph, agent: graph.successors(agent),
+    "none": lambda graph, agent: (),
+}
+"""Who is related to an agent in a hierarchy's graph."""
 
 
 def _check_edges(

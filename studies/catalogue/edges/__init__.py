@@ -5,9 +5,8 @@ the same worlds, as every entry of ``[evaluations]`` has it: agents that are tol
 consider nobody, that expect something else of the unseen, whose messages are lost. So a difference
 is one of deciding alone, not of what was learned.
 
-One measure was fixed beforehand: evaluation success. For each number of robots and each choice of
-whose value decides, every evaluation is compared with that under the hierarchy of training, as in
-the study `hierarchies`.
+One measure was fixed beforehand: evaluation success. For each condition of training, every
+evaluation is compared with that under the hierarchy of training, as in the study `hierarchies`.
 """
 
 from __future__ import annotations
@@ -20,10 +19,11 @@ from ...errors import SpecError
 from ...results.analysis import Analysis, Figures
 from ...results.results import Results
 from ...results.summary import EVALUATED
+from ...spec.labels import label_but
 from ...spec.spec import Spec
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
-from ..hierarchies import VALUE_OF, HierarchyCase, analysis_of, estimates
+from ..hierarchies import HierarchyCase, analysis_of, estimates, sizes_of
 from ..hierarchies import draw as draw_by_robots
 from ..study import check_evaluated, check_rule_bases
 
@@ -71,9 +71,11 @@ def measure(trial: Trial) -> TrialResult:
 def analyse(results: Results) -> Analysis:
     """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
     cases = []
-    for condition in results.of_phase("evaluation"):
+    conditions = results.of_phase("evaluation")
+    sizes = {c: int(results.numbers(c)["robots"][0]) for c in conditions}
+    for condition, robots in sizes.items():
         numbers, columns = results.numbers(condition), results.columns.get(condition, {})
-        value_of, robots = str(columns.get(VALUE_OF, "")), int(numbers["robots"][0])
+        value_of = label_but(columns, sizes_of(results.columns, sizes))
         for name, phase in ({TRAINED: "evaluation"} | results.other_evaluations(condition)).items():
             cost = numbers[f"decision.{name}"], numbers[f"messages.{name}"]
             values = estimates(results, condition, phase, *cost)

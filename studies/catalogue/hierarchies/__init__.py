@@ -123,7 +123,7 @@ def analyse(results: Results) -> Analysis:
     """
     conditions = results.of_phase("evaluation")
     robots = {c: int(results.numbers(c)["robots"][0]) for c in conditions}
-    apart = (VALUE_OF, *_sizes(results.columns, robots))
+    apart = (VALUE_OF, *sizes_of(results.columns, robots))
     cases = []
     for condition in conditions:
         columns = results.columns.get(condition, {"name": condition})
@@ -146,12 +146,12 @@ def analysis_of(results: Results, cases: Sequence[HierarchyCase], reference: str
     ]
     verdicts = verdicts_of(results, cases, reference)
     compared = tuple(d for verdict in verdicts for d in verdict.comparisons)
-    legend = "Rows: number of robots, whose value decides, hierarchy."
+    legend = "Rows: number of robots, what else is swept, hierarchy."
     notes = [legend] if any(case.value_of for case in cases) else []
     return Analysis(tuple(table), (*notes, *_verdict_lines(verdicts)), cases, compared)
 
 
-def _sizes(columns: Mapping[str, Mapping[str, object]], robots: Mapping[str, int]) -> list[str]:
+def sizes_of(columns: Mapping[str, Mapping[str, object]], robots: Mapping[str, int]) -> list[str]:
     """Return the swept keys that are the number of robots, whatever the scenario calls it."""
     keys = dict.fromkeys(key for swept in columns.values() for key in swept)
     return [

@@ -130,6 +130,22 @@ def test_considering_and_telling_can_be_parted(told, above, considers, below) ->
     assert parted.messages == {"ancestors": 6, "parents": 3, "none": 0}[told]
 
 
+@pytest.mark.parametrize(
+    ("some", "above", "below", "messages"),
+    [
+        (("body",), (4,), (3,), 4),
+        (("next",), (2, 3), (4, 5), 12),
+        (("farther",), (0, 1), (6, 7), 12),
+        (("body", "farther"), (0, 1, 4), (3, 6, 7), 16),
+    ],
+)
+def test_edges_are_left_out_by_where_they_lead(some, above, below, messages) -> None:
+    names, bodies = "abcdefgh", ["ab", "cd", "ef", "gh"]
+    parted = Hierarchy(names, list(pairwise(names)), (), some, some, bodies)
+    assert (parted.above(5), parted.below(2)) == (above, below)
+    assert parted.messages == messages
+
+
 def test_neighbours_who_do_not_consider_each_other_are_none() -> None:
     with pytest.raises(ValueError, match="considers = 'none': neighbours consider each other"):
         Hierarchy("ab", [], [("a", "b")], considers="none")
