@@ -21,20 +21,22 @@ from typing import Any
 
 import numpy as np
 
-from ...core.interface.scenario import Scenario, roles_of
-from .examination import Examination, Findings
-from .form import fault_of_form, fault_of_measures
-from .frames import at, bits, difference, fields, opening
+from ...core.interface.scenario import RecordedScenario, Scenario, groups_of, roles_of
+from ...core.numerics.arrays import FloatArray
+from .frames import Examination, Frame, at, bits, difference, fields, measured, opening
 from .predictions import (
     MOST_JOINT_ACTIONS,
     fault_of_prediction,
+    fault_of_sharing,
     has_tables,
-    own_may_move,
     too_many,
 )
-from .sensing import fault_of_sensing, met_variables, predicted_steps
-from .variables import fault_of_sharing, own_variable_moved
+from .sensing import Findings, fault_of_sensing, met_variables, predicted_steps
 
+MEMBERS = ("agents", "state_space", "action_set", "reset", "step", "predict")
+"""Of the protocol `Scenario`."""
+STEPS = 5
+"""Steps after which measurements are looked at, and predictions."""
 LEAST_STEPS = 2
 """Steps of the shortest episodes by which equal and different seeds can be distinguished."""
 
@@ -74,8 +76,8 @@ def check_scenario(
     >>> findings = check_scenario(LineUpSettings(carts=2).build)
     >>> findings.passed == tuple(CHECKS), list(findings.unchecked)
     (True, ['roles'])
-    >>> [(variable.name, variable.claimed) for variable in findings.variables]
-    [('distance', (-1.0, 1.0)), ('lead', (-0.8, 0.8)), ('reward', None)]
+    >>> [(v.name, v.low, v.high) for v in findings.variables]
+    [('distance', -1.0, 1.0), ('lead', -0.8, 0.8), ('reward', nan, nan)]
     """
     if steps < LEAST_STEPS:
         raise ValueError(f"steps = {steps}: must be at least {LEAST_STEPS}")
@@ -105,50 +107,98 @@ def _raised(error: BaseException) -> str:
     return f"{type(error).__name__} in {place}: {' '.join(str(error).split())}"
 
 
-def _finite(of: Examination) -> str | None:
-    """Check that all numbers are finite."""
-    for seed, episode in product(of.seeds, of.episodes):
-        for step, frame in enumerate(of.play(of.factory(), seed, episode)):
-            for name, value in frame.items():
-                array = np.asarray(value)
-                if array.dtype.kind == "f" and not np.isfinite(array).all():
-                    return f"{name} is not finite {at(step)} of seed {seed}"
+def _form(of: Examination) -> str | None:
+    """Check names, groups, shapes and types."""
+    scenario: Any = of.factory()
+    if not isinstance(scenario, Scenario):
+        missing = [name for name in MEMBERS if not hasattr(scenario, name)]
+        return f"{type(scenario).__name__} lacks {', '.join(missing)}"
+    n, d = len(scenario.agents), scenario.state_space.n_variables
+    if not n or len(set(scenario.agents)) != n:
+        return f"agents {scenario.agents} must be at least one, of different names"
+    groups, roles = groups_of(scenario), roles_of(scenario)
+    if [i for group in groups for i in group] != list(range(n)):
+        return f"groups {groups} must hold the {n} agents once each, in order"
+    if len(roles) != n:
+        return f"roles {roles} must be one for each of the {n} agents"
+    for step, frame in enumerate(of.play(scenario, of.seeds[0], of.episodes[0])):
+        for name, shapes in (("states", [(n, d)]), ("reward", [(), (n,)]))[: step + 1]:
+            value = np.asarray(frame[name])
+            if value.shape not in shapes or value.dtype.kind not in "biuf":
+                allowed = " or ".join(map(str, shapes))
+                return f"{name} of shape {value.shape} {at(step)}, must be numbers of {allowed}"
+        if step and not all(isinstance(frame[e], bool) for e in ("terminated", "truncated")):
+            return f"terminated and truncated must be bool, {at(step)} they are not"
+        twists = frame.get("twists")
+        shape = (len(groups), 3) if twists is None else np.shape(twists)
+        if shape[1:] != (3,) or shape[0] < len(groups):
+            return f"twists of shape {shape} {at(step)}, must be (bodies >= {len(groups)}, 3)"
     return None
 
 
-def _bounds(of: Examination) -> str | None:
-    """Check that variables stay within their period, and within `bounds` if a scenario has them."""
-    for seed, episode in product(of.seeds, of.episodes):
-        scenario = of.factory()
-        limits = [
-            (v.low, v.high) if v.periodic else (-np.inf, np.inf)
-            for v in scenario.state_space.variables
-        ]
-        low, high = np.array(getattr(scenario, "bounds", limits)).T
-        for step, frame in enumerate(of.play(scenario, seed, episode)):
-            states = np.asarray(frame["states"])
-            outside = np.argwhere((states < low) | (states > high))
-            if len(outside):
-                i = outside[0, 1]
+def _measures(of: Examination) -> str | None:
+    """Check that what a scenario declares to be measured and recorded is there."""
+    scenario: Any = of.factory()
+    measures = tuple(getattr(scenario, "measures", ()))
+    names = [measure.name for measure in measures]
+    if len(set(names)) != len(names):
+        return f"names {names} must be distinct"
+    opening(scenario, of.seeds[0], of.episodes[0])
+    kept = scenario.recorded if isinstance(scenario, RecordedScenario) else ()
+    for step, action in enumerate(of.actions(scenario, of.seeds[0])[:STEPS], 1):
+        transition = scenario.step(action)
+        info, told = transition.info, measured(scenario)
+        for measure in measures:
+            source = measure.source
+            if source != "terminated" and source not in info:
+                return f"{measure.name}: info has no {source!r} {at(step)}, has {', '.join(info)}"
+            if source != "terminated" and np.ndim(info[source]):
+                return f"{measure.name}: info[{source!r}] must be one number"
+        for name in kept:
+            if name not in info or name not in told:
                 return (
-                    f"{scenario.state_space.variables[i].name} leaves [{low[i]}, {high[i]}] "
-                    f"{at(step)} of seed {seed}"
+                    f"recorded is {name!r}, which {'measure' if name in info else 'info'} has not"
                 )
+            if bits(info[name]) != bits(told[name]):
+                return f"recorded is {name!r}, of which info and measure differ {at(step)}"
+        if transition.terminated or transition.truncated:
+            break
     return None
 
 
-def _shares(of: Examination) -> str | None:
-    """Check that agents sense alike what they share: the variables of a group, the common ones."""
+def _values(of: Examination) -> str | None:
+    """Check that numbers are finite, variables within bounds, and alike where they are shared."""
     for seed, episode in product(of.seeds, of.episodes):
         scenario = of.factory()
         for step, frame in enumerate(of.play(scenario, seed, episode)):
-            fault = fault_of_sharing(scenario, np.asarray(frame["states"]))
+            fault = _not_finite(frame) or _out_of_bounds(scenario, np.asarray(frame["states"]))
+            fault = fault or fault_of_sharing(scenario, np.asarray(frame["states"]))
             if fault is not None:
-                return f"{fault}, {at(step)} of seed {seed}"
+                return f"{fault} {at(step)} of seed {seed}"
     roles = roles_of(of.factory())
     if len(set(roles)) < len(roles):
         of.unchecked["roles"] = "whether agents of one role are alike is not seen from outside"
     return None
+
+
+def _not_finite(frame: Frame) -> str | None:
+    for name, value in frame.items():
+        array = np.asarray(value)
+        if array.dtype.kind == "f" and not np.isfinite(array).all():
+            return f"{name} is not finite"
+    return None
+
+
+def _out_of_bounds(scenario: Scenario, states: FloatArray) -> str | None:
+    """Return which variable leaves its period, or the ``bounds`` of a scenario that has them."""
+    variables = scenario.state_space.variables
+    limits = [(v.low, v.high) if v.periodic else (-np.inf, np.inf) for v in variables]
+    low, high = np.array(getattr(scenario, "bounds", limits)).T
+    outside = np.argwhere((states < low) | (states > high))
+    if not len(outside):
+        return None
+    i = outside[0, 1]
+    return f"{variables[i].name} leaves [{low[i]}, {high[i]}]"
 
 
 def _repeats(of: Examination) -> str | None:
@@ -204,15 +254,10 @@ def _predicts(of: Examination) -> str | None:
     scenario, rng = of.factory(), np.random.default_rng(of.seeds[0])
     opening(scenario, of.seeds[0], of.episodes[0])
     actions = of.actions(scenario, of.seeds[0])
-    for action in actions[:5]:
+    for action in actions[:STEPS]:
         fault = fault_of_prediction(scenario, actions, rng)
         if fault is not None:
             return fault
-        moved = own_variable_moved(scenario, actions, rng)
-        if moved is not None:
-            if not own_may_move(scenario):
-                return moved
-            of.unchecked["own variables"] = f"{moved}; tables may be as if each were alone"
         scenario.step(action)
     if has_tables(scenario.predict()) and too_many(scenario):
         of.unchecked["tables"] = f"more than {MOST_JOINT_ACTIONS:,} joint actions"
@@ -280,11 +325,9 @@ def _keeps_off_globals(of: Examination) -> str | None:
 
 
 CHECKS: dict[str, Callable[[Examination], str | None]] = {
-    "form": fault_of_form,
-    "measures": fault_of_measures,
-    "finite numbers": _finite,
-    "bounds": _bounds,
-    "shared variables": _shares,
+    "form": _form,
+    "measures": _measures,
+    "values": _values,
     "equal seeds": _repeats,
     "different seeds": _varies,
     "two instances": _keeps_apart,

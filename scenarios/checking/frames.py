@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from itertools import zip_longest
 from typing import Any
 
@@ -16,6 +17,57 @@ Frame = dict[str, Any]
 """What one step gave, by dotted name; without the measured times."""
 
 FIELDS = ("states", "reward", "terminated", "truncated", "twists", "info")
+
+
+@dataclass(frozen=True)
+class Examination:
+    """What is played, and what could not be checked."""
+
+    factory: Callable[[], Scenario]
+    """Makes a new instance of the scenario."""
+    steps: int
+    """Most steps of an episode."""
+    seeds: tuple[int, ...]
+    """At least two seeds of worlds."""
+    episodes: tuple[int, ...]
+    """Numbers under which episodes are played: failures may be scheduled by them."""
+    unchecked: dict[str, str] = field(default_factory=dict)
+    """Why something could not be checked, by its name; checks write it."""
+
+    def actions(self, scenario: Scenario, seed: int) -> IntArray:
+        """Return the actions that are tried in the world of a seed."""
+        return random_actions(scenario, self.steps, seed)
+
+    def play(
+        self,
+        scenario: Scenario,
+        seed: int,
+        episode: int,
+        actions: IntArray | None = None,
+        *,
+        predicting: bool = False,
+    ) -> Iterator[Frame]:
+        """Yield the frames of an episode, the opening first.
+
+        Parameters
+        ----------
+        scenario
+            What is played; modified.
+        seed, episode
+            As in the control loop.
+        actions
+            ``(steps, n)`` joint actions; none: those of the seed. The episode may end earlier.
+        predicting
+            Whether predictions and measurements are asked for before every step.
+        """
+        yield opening(scenario, seed, episode)
+        for action in self.actions(scenario, seed) if actions is None else actions:
+            if predicting:
+                look_ahead(scenario)
+            frame = copied(dict(fields(scenario.step(action))))
+            yield frame
+            if frame["terminated"] or frame["truncated"]:
+                return
 
 
 def random_actions(scenario: Scenario, steps: int, seed: int) -> IntArray:

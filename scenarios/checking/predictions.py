@@ -1,4 +1,7 @@
-"""Whether a prediction has the right shapes, and its tables say what it says itself.
+"""Whether a prediction has the right shapes, claims what is so, and has tables that say the same.
+
+Agents share the variables that they are said to share, and what is said to be an agent's own does
+not change with what others do.
 
 Where few agents are free, decisions are not made by `Prediction.states` and `rewards`, but by its
 tables over all joint actions, `blocks` and `reward_table`. Compiled kernels read them without
@@ -13,13 +16,14 @@ import numpy as np
 
 from ...core.interface.prediction import Blocks, states_by_group
 from ...core.interface.scenario import Scenario, groups_of
-from ...core.numerics.arrays import FloatArray, IntArray
-from .variables import differs, fault_of_sharing, is_close
+from ...core.numerics.arrays import BoolArray, FloatArray, IntArray
 
 MOST_JOINT_ACTIONS = 4**8
 """Joint actions beyond which no tables are asked for: they might not fit into memory."""
 SAMPLED = 1024
 """Joint actions that are compared, at most; if there are more they are drawn."""
+CLOSE = 1e-9
+"""Difference of predicted numbers, relative to 1 or to their size, that rounding may make."""
 
 
 def fault_of_prediction(
@@ -47,7 +51,9 @@ def fault_of_prediction(
         if differs(scenario, prediction.states(i, given[-1:])[0], states[i, -1]).any():
             return f"states of agent {i} after a joint action depend on those predicted with it"
     fault = fault_of_sharing(scenario, states) or _wrong_groups(scenario, prediction, given, states)
-    return fault or _wrong_tables(scenario, prediction, rng)
+    if has_tables(prediction):
+        return fault or _wrong_tables(scenario, prediction, rng)
+    return fault or _own_variable_moved(scenario, prediction, given, rng)
 
 
 def has_tables(prediction: Any) -> bool:
@@ -58,12 +64,6 @@ def has_tables(prediction: Any) -> bool:
 def too_many(scenario: Scenario) -> bool:
     """Return whether a scenario has more joint actions than tables are asked for."""
     return len(scenario.action_set) ** len(scenario.agents) > MOST_JOINT_ACTIONS
-
-
-def own_may_move(scenario: Scenario) -> bool:
-    """Return whether tables of predictions say, or may say, that own variables are as if alone."""
-    prediction: Any = scenario.predict()
-    return has_tables(prediction) and (too_many(scenario) or prediction.blocks(0).alone)
 
 
 def _misformed(scenario: Scenario, prediction: Any, joint_actions: IntArray) -> str | None:
@@ -105,7 +105,7 @@ def _wrong_tables(scenario: Scenario, prediction: Any, rng: np.random.Generator)
     """Return where the tables differ from the prediction, whose states are taken to be right."""
     n, n_actions = len(scenario.agents), len(scenario.action_set)
     count = n_actions**n
-    if not has_tables(prediction) or too_many(scenario):
+    if too_many(scenario):
         return None
     indices: IntArray = np.arange(count)
     if count > SAMPLED:
@@ -175,3 +175,69 @@ def _wrong_rewards(
         f"reward_table: {actual[row]:.6g} after joint action {joint_actions[row].tolist()}, "
         f"rewards has {expected[row]:.6g}"
     )
+
+
+def apart(scenario: Scenario, states: FloatArray, others: FloatArray) -> FloatArray:
+    """Return the difference of states ``(..., d)``, of periodic variables the shorter way round."""
+    differences = states - others
+    for j, variable in enumerate(scenario.state_space.variables):
+        if variable.periodic:
+            period = variable.high - variable.low
+            differences[..., j] -= period * np.round(differences[..., j] / period)
+    return differences
+
+
+def is_close(differences: FloatArray, expected: FloatArray) -> Any:
+    """Return which differences from what is expected rounding may make."""
+    return np.abs(differences) <= CLOSE * np.maximum(1.0, np.abs(expected))
+
+
+def differs(scenario: Scenario, states: FloatArray, expected: FloatArray) -> BoolArray:
+    """Return which numbers of states ``(..., d)`` differ beyond rounding."""
+    wrong: BoolArray = ~is_close(apart(scenario, np.asarray(states), expected), expected)
+    return wrong
+
+
+def fault_of_sharing(scenario: Scenario, states: FloatArray) -> str | None:
+    """Return which variable agents are said to share and do not, in states ``(n, ..., d)``.
+
+    Agents of a group share all that is not their own, and all agents what is ``common``.
+    """
+    space = scenario.state_space
+    names = [variable.name for variable in space.variables]
+    shared = [(group, names[space.n_own :], "shared by a group") for group in groups_of(scenario)]
+    for agents, claimed, claim in [*shared, (range(len(states)), space.common, "common")]:
+        first, columns = agents[0], [names.index(name) for name in claimed]
+        wrong = differs(scenario, states[list(agents)], states[[first]])[..., columns]
+        if wrong.any():
+            where = tuple(np.argwhere(wrong)[0])
+            i, here = agents[where[0]], (*where[1:-1], columns[where[-1]])
+            return (
+                f"{names[here[-1]]}, said to be {claim}, is {states[i][here]:.6g} of agent {i} and "
+                f"{states[first][here]:.6g} of agent {first}"
+            )
+    return None
+
+
+def _own_variable_moved(
+    scenario: Scenario, prediction: Any, joint_actions: IntArray, rng: np.random.Generator
+) -> str | None:
+    """Return which own variable is predicted to change by what other groups do, or None.
+
+    Predicted are joint actions ``(m, n)``, and then the same with other actions of the others.
+    """
+    space = scenario.state_space
+    drawn = rng.integers(len(scenario.action_set), size=joint_actions.shape)
+    for group in groups_of(scenario) if space.n_own else ():
+        changed = drawn.copy()
+        changed[:, list(group)] = joint_actions[:, list(group)]
+        for agent in group:
+            before, after = (prediction.states(agent, a) for a in (joint_actions, changed))
+            moved = differs(scenario, after, before)[:, : space.n_own].any(axis=0)
+            if moved.any():
+                name = space.variables[int(moved.argmax())].name
+                return (
+                    f"{name} of agent {agent} changes with the actions of others, n_own = "
+                    f"{space.n_own} says it does not"
+                )
+    return None

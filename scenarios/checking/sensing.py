@@ -7,6 +7,8 @@ predicted. What differs then is a variable that is computed in two ways.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from math import isnan
 from typing import NamedTuple
 
 import numpy as np
@@ -15,10 +17,14 @@ from ...core.agents.loop import world_seed
 from ...core.interface.scenario import Scenario
 from ...core.numerics.arrays import FloatArray, IntArray
 from .frames import at
-from .variables import apart
+from .predictions import apart
 
 TOLERANCE = 1e-6
 """Difference of sensed and predicted variables that rounding may make, relative to their range."""
+SMALL = 0.02
+"""Error of prediction, in ranges of the variable, of which no word is lost."""
+FAR = 10
+"""Ranges beyond its own at which a variable looks as if it were in another unit."""
 
 
 class MetVariable(NamedTuple):
@@ -28,10 +34,14 @@ class MetVariable(NamedTuple):
     """Of the variable, or ``reward``."""
     unit: str
     """In words of the SI."""
-    claimed: tuple[float, float] | None
-    """Its range; the reward has none."""
-    met: tuple[float, float]
-    """The least and the greatest value that was sensed."""
+    low: float
+    """Where its range begins; the reward has none: NaN."""
+    high: float
+    """Where it ends."""
+    least: float
+    """The least value that was sensed."""
+    greatest: float
+    """The greatest."""
     error: float
     """Root mean square error of what was predicted; NaN: it is not predicted."""
     persistence: float
@@ -112,7 +122,27 @@ def met_variables(scenario: Scenario, steps: FloatArray) -> tuple[MetVariable, .
         np.sqrt((apart(scenario, after, guess) ** 2).mean(axis=(0, 1)))
         for guess in (predicted, before)
     )
-    met = zip(after.min(axis=(0, 1)), after.max(axis=(0, 1)), strict=True)
-    claims = [(v.name, v.unit, (v.low, v.high)) for v in scenario.state_space.variables]
-    rows = zip([*claims, ("reward", "1", None)], met, error, persistence, strict=True)
-    return tuple(MetVariable(*claim, *numbers) for claim, *numbers in rows)
+    numbers = np.stack([after.min(axis=(0, 1)), after.max(axis=(0, 1)), error, persistence], 1)
+    claims = [(v.name, v.unit, v.low, v.high) for v in scenario.state_space.variables]
+    claims.append(("reward", "1", np.nan, np.nan))
+    return tuple(MetVariable(*c, *row) for c, row in zip(claims, numbers.tolist(), strict=True))
+
+
+class Findings(NamedTuple):
+    """What came of a check that found no fault."""
+
+    passed: tuple[str, ...]
+    """Names of the checks that were passed."""
+    unchecked: Mapping[str, str]
+    """Why something was not checked, by its name."""
+    variables: tuple[MetVariable, ...]
+    """What was met of every variable and of the reward."""
+
+    def warnings(self) -> Iterator[str]:
+        """Yield what is allowed and looks wrong, a line each."""
+        for v in self.variables:
+            width = v.greatest - v.least if isnan(v.low) else v.high - v.low
+            if v.error >= max(v.persistence, SMALL * width) > 0:
+                yield f"{v.name} is predicted no better than if it stayed as it is"
+            if max(v.low - v.least, v.greatest - v.high) > FAR * width:
+                yield f"{v.name} goes more than {FAR} times its range beyond it"

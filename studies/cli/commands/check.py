@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from math import isnan
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from .. import options
 
-if TYPE_CHECKING:
-    from ....scenarios.checking.sensing import MetVariable
-
+SHORT = "{:.3g}".format
+"""How numbers are printed."""
 Case = tuple[str, Callable[[], Any], list[int]]
 """What a scenario is called, a function that makes it, and the episodes to play."""
 
@@ -37,6 +35,8 @@ def command(source: str, steps: int, changes: tuple[str, ...]) -> int:
     SPEC.toml is a spec, whose conditions are checked; FILE.py:NAME a function or class in a Python
     file that makes a scenario of one's own.
     """
+    from pandas import DataFrame
+
     from ....scenarios.checking.checker import ScenarioError, check_scenario
     from ...errors import SpecError
     from ..display import print_wrapped
@@ -56,20 +56,9 @@ def command(source: str, steps: int, changes: tuple[str, ...]) -> int:
                 print_wrapped(f"{name}: {reason}", "not checked  ", 8)
             for warning in findings.warnings():
                 print_wrapped(warning, "warning  ", 8)
-            print("", *_table(findings.variables), "", sep="\n")
+            frame = DataFrame(findings.variables)
+            print("", frame.to_string(index=False, na_rep="", float_format=SHORT), "", sep="\n")
     return 1 if faults else 0
-
-
-def _table(variables: Sequence[MetVariable]) -> list[str]:
-    """Return the lines of a table of variables."""
-    from ....topologies.view import aligned
-
-    rows = [("variable", "unit", "range", "met", "error", "persistence")]
-    for name, unit, claimed, met, error, persistence in variables:
-        ranges = (f"{r[0]:.3g}..{r[1]:.3g}" if r else "" for r in (claimed, met))
-        errors = ("" if isnan(e) else f"{e:.3g}" for e in (error, persistence))
-        rows.append((name[:18], unit, *ranges, *errors))
-    return aligned(rows, "<<>>>>")
 
 
 def _cases(source: str, changes: tuple[str, ...]) -> Iterator[Case]:
