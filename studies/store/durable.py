@@ -22,6 +22,9 @@ Recording = dict[str, NDArray[Any]]
 ``(T + 1, ...)``; ``reward`` ``(T,)``, or ``(T, n)`` if agents are rewarded one by one; and what
 its ``constants_of_episode`` returns."""
 
+TEAM = "team"
+"""The name of what is kept of a trained team, beside those of recorded episodes."""
+
 
 class NotRecordedError(SpecError):
     """A file of recordings is sound, and holds none of this name."""
