@@ -10,7 +10,7 @@ import click
 
 from .. import options
 
-SHORT = "{:.3g}".format
+SHORT = "{:.2g}".format
 """How numbers are printed."""
 Case = tuple[str, Callable[[], Any], list[int]]
 """What a scenario is called, a function that makes it, and the episodes to play."""
