@@ -98,7 +98,7 @@ class Team:
         self.learner: Learner = settings.build(rules, rows)
         self._asked = signature(self.learner.observe).parameters.keys() & {"left", "joint_action"}
         self._states: FloatArray = np.zeros((len(hierarchy), scenario.state_space.n_variables))
-        self._left = self._states
+        self._left: FloatArray = self._states
         self.evaluator: Evaluator | None = None
         decision = settings.decision
         if decision.rule != "random":
