@@ -11,6 +11,8 @@ evaluation is compared with that under the hierarchy of training, as in the stud
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from ....core.agents.loop import StepRecord
@@ -43,35 +45,27 @@ def check(spec: Spec) -> None:
         )
 
 
-class _Deciding:
-    """Collects how long decisions took."""
-
-    def __init__(self) -> None:
-        self.seconds: list[float] = []
-
-    def __call__(self, record: StepRecord) -> None:
-        self.seconds.append(record.deciding)
-
-
 def measure(trial: Trial) -> TrialResult:
     """Train a team, let it act under all hierarchies; imported by name in workers."""
     session = Session.compiled(trial)
     session.train(trial.episodes)
-    deciding = {name: _Deciding() for name in (TRAINED, *dict(trial.evaluations))}
-    session.evaluate(deciding[TRAINED])
-    session.run_other_evaluations(deciding)
+    deciding: dict[str, list[float]] = {n: [] for n in (TRAINED, *dict(trial.evaluations))}
+
+    def note(name: str, record: StepRecord) -> None:
+        deciding[name].append(record.deciding)
+
+    session.evaluate(partial(note, TRAINED))
+    session.run_other_evaluations({name: partial(note, name) for name in deciding})
     numbers = {"robots": float(len(groups_of(session.world)))}
     for name, settings in ((TRAINED, trial.settings), *trial.evaluations):
-        _, hierarchy = settings.arrange(session.world)
-        numbers[f"messages.{name}"] = float(hierarchy.messages)
-    usage = {f"decision.{name}": float(np.median(d.seconds)) for name, d in deciding.items()}
+        numbers[f"messages.{name}"] = float(settings.arrange(session.world)[1].messages)
+    usage = {f"decision.{name}": float(np.median(d)) for name, d in deciding.items()}
     return session.result(numbers, usage)
 
 
 def analyse(results: Results) -> Analysis:
     """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
-    cases = []
-    conditions = results.of_phase("evaluation")
+    cases, conditions = [], results.of_phase("evaluation")
     sizes = {c: int(results.numbers(c)["robots"][0]) for c in conditions}
     for condition, robots in sizes.items():
         numbers, columns = results.numbers(condition), results.columns.get(condition, {})
