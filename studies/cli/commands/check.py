@@ -56,7 +56,7 @@ def command(source: str, steps: int, changes: tuple[str, ...]) -> int:
                 print_wrapped(f"{name}: {reason}", "not checked  ", 8)
             for warning in findings.warnings():
                 print_wrapped(warning, "warning  ", 8)
-            frame = DataFrame(findings.variables)
+            frame = DataFrame(findings.variables).rename(columns={"persistence": "as it is"})
             print("", frame.to_string(index=False, na_rep="", float_format=SHORT), "", sep="\n")
     return 1 if faults else 0
 
