@@ -83,7 +83,7 @@ MODULES = {
         "kinematic_chain.view", "kinematic_chain.variables", "matrix_games.games",
         "matrix_games.scenario", "line_up", "faults.settings", "faults.actuators",
         "faults.carried", "faults.wrappers",
-        "state_variables", "checking.checker",
+        "state_variables", "checking.checker", "checking.sensing",
     )),
     "studies": ("What is measured, compared and drawn.", (
         "api.study", "api.teams", "api.planning", "api.costs", "api.comparison", "api.recovery",

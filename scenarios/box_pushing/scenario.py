@@ -132,6 +132,7 @@ class BoxPushing:
             self._task, settings.infrared, self.box.outline, settings.period,
             settings.prediction_horizon * CONTROL_PERIOD,
         )  # fmt: skip
+        self.horizon = max(1, round(settings.prediction_horizon / settings.action_repeat))
         self._goal: FloatArray = np.zeros(3)
         self._sensing = np.random.default_rng(0)  # until reset
         self._speeds: FloatArray = np.zeros(len(self.agents))

@@ -2,18 +2,18 @@
 
 Whole episodes of random actions are played and compared to the last bit: states, reward, end of the
 episode, twists and measurements of every step. Not compared are the measured times, ``seconds``.
-Predictions are held against each other (see `predictions`), and, of scenarios that can be predicted
-exactly, against what is then sensed (see `sensing`); how good others are is not checked. What a
-scenario need not have, such as measures or tables, is checked where it is there. A further check is
-one function and one line in `CHECKS`; it returns what is wrong, in one line, or nothing. What a
-scenario raises is what is wrong with it.
+What is said of variables is held against what is met (see `variables`). Predictions are held
+against each other (see `predictions`), and, of scenarios that can be predicted exactly, against
+what is then sensed (see `sensing`); of others it is shown by how much they are off. What a scenario
+need not have, such as measures or tables, is checked where it is there. A further check is one
+function and one line in `CHECKS`; it returns what is wrong, in one line, or nothing, and notes what
+it could not check. What a scenario raises is what is wrong with it.
 """
 
 from __future__ import annotations
 
 import random
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from itertools import product, zip_longest
 from pathlib import Path
 from traceback import extract_tb
@@ -22,26 +22,21 @@ from typing import Any
 import numpy as np
 
 from ...core.interface.scenario import RecordedScenario, Scenario, groups_of, roles_of
-from ...core.numerics.arrays import IntArray
-from .frames import (
-    FIELDS,
-    Frame,
-    at,
-    bits,
-    difference,
-    fields,
-    measured,
-    opening,
-    play,
-    random_actions,
+from ...core.numerics.arrays import FloatArray
+from .frames import Examination, Frame, at, bits, difference, fields, measured, opening
+from .predictions import (
+    MOST_JOINT_ACTIONS,
+    fault_of_prediction,
+    fault_of_sharing,
+    has_tables,
+    too_many,
 )
-from .predictions import fault_of_prediction
-from .sensing import fault_of_sensing
+from .sensing import Findings, fault_of_sensing, met_variables, predicted_steps
 
 MEMBERS = ("agents", "state_space", "action_set", "reset", "step", "predict")
 """Of the protocol `Scenario`."""
-STEPS_AT_REST = 3
-"""Steps that are waited for a scenario to be at rest."""
+STEPS = 5
+"""Steps after which measurements are looked at, and predictions."""
 LEAST_STEPS = 2
 """Steps of the shortest episodes by which equal and different seeds can be distinguished."""
 
@@ -50,38 +45,14 @@ class ScenarioError(ValueError):
     """What is wrong with a scenario: one line."""
 
 
-@dataclass(frozen=True)
-class Examination:
-    """What is played."""
-
-    factory: Callable[[], Scenario]
-    """Makes a new instance of the scenario."""
-    steps: int
-    """Most steps of an episode."""
-    seeds: tuple[int, ...]
-    """At least two seeds of worlds."""
-    episodes: tuple[int, ...]
-    """Numbers under which episodes are played: failures may be scheduled by them."""
-
-    def actions(self, scenario: Scenario, seed: int) -> IntArray:
-        """Return the actions that are tried in the world of a seed."""
-        return random_actions(scenario, self.steps, seed)
-
-    def play(
-        self, scenario: Scenario, seed: int, episode: int, *, predicting: bool = False
-    ) -> Iterator[Frame]:
-        """Yield the frames of an episode, the opening first."""
-        return play(scenario, seed, episode, self.actions(scenario, seed), predicting=predicting)
-
-
 def check_scenario(
     factory: Callable[[], Scenario],
     *,
     steps: int = 40,
     seeds: Sequence[int] = (0, 1),
     episodes: Sequence[int] = (0, 1),
-) -> tuple[str, ...]:
-    """Check a scenario and return the names of the checks that it passed.
+) -> Findings:
+    """Check a scenario and return what it passed, what could not be checked, and what was met.
 
     Parameters
     ----------
@@ -102,8 +73,11 @@ def check_scenario(
     Examples
     --------
     >>> from nested_agents.scenarios.line_up import LineUpSettings
-    >>> len(check_scenario(LineUpSettings(carts=2).build)) == len(CHECKS)
-    True
+    >>> findings = check_scenario(LineUpSettings(carts=2).build)
+    >>> findings.passed == tuple(CHECKS), list(findings.unchecked)
+    (True, ['roles'])
+    >>> [(v.name, v.low, v.high) for v in findings.variables]
+    [('distance', -1.0, 1.0), ('lead', -0.8, 0.8), ('reward', nan, nan)]
     """
     if steps < LEAST_STEPS:
         raise ValueError(f"steps = {steps}: must be at least {LEAST_STEPS}")
@@ -118,7 +92,12 @@ def check_scenario(
             fault = _raised(error)
         if fault is not None:
             raise ScenarioError(f"{name}: {fault}")
-    return tuple(CHECKS)
+    scenario, unchecked = factory(), examination.unchecked
+    actions = examination.actions(scenario, seeds[0])
+    ahead = getattr(scenario, "horizon", 1)
+    played = [predicted_steps(scenario, s, e, actions, ahead) for s, e in product(seeds, episodes)]
+    passed = tuple(name for name in CHECKS if name not in unchecked)
+    return Findings(passed, unchecked, met_variables(scenario, np.concatenate(played)))
 
 
 def _raised(error: BaseException) -> str:
@@ -142,23 +121,18 @@ def _form(of: Examination) -> str | None:
         return f"groups {groups} must hold the {n} agents once each, in order"
     if len(roles) != n:
         return f"roles {roles} must be one for each of the {n} agents"
-    opening(scenario, of.seeds[0], of.episodes[0])
-    transition = scenario.step(of.actions(scenario, of.seeds[0])[0])
-    missing = [field for field in FIELDS if not hasattr(transition, field)]
-    if missing:
-        return f"step returns {type(transition).__name__}, must be Transition: no {missing[0]}"
     for step, frame in enumerate(of.play(scenario, of.seeds[0], of.episodes[0])):
-        if np.shape(frame["states"]) != (n, d):
-            return f"states of shape {np.shape(frame['states'])} {at(step)}, must be {(n, d)}"
-        if step and np.shape(frame["reward"]) not in ((), (n,)):
-            return f"reward of shape {np.shape(frame['reward'])} {at(step)}, must be () or {(n,)}"
+        for name, shapes in (("states", [(n, d)]), ("reward", [(), (n,)]))[: step + 1]:
+            value = np.asarray(frame[name])
+            if value.shape not in shapes or value.dtype.kind not in "biuf":
+                allowed = " or ".join(map(str, shapes))
+                return f"{name} of shape {value.shape} {at(step)}, must be numbers of {allowed}"
         if step and not all(isinstance(frame[e], bool) for e in ("terminated", "truncated")):
             return f"terminated and truncated must be bool, {at(step)} they are not"
         twists = frame.get("twists")
-        if twists is not None and (np.ndim(twists) != 2 or np.shape(twists)[1] != 3):
-            return f"twists of shape {np.shape(twists)} {at(step)}, must be (bodies, 3)"
-        if twists is not None and len(twists) < len(groups):
-            return f"twists of {len(twists)} bodies {at(step)}, must be at least {len(groups)}"
+        shape = (len(groups), 3) if twists is None else np.shape(twists)
+        if shape[1:] != (3,) or shape[0] < len(groups):
+            return f"twists of shape {shape} {at(step)}, must be (bodies >= {len(groups)}, 3)"
     return None
 
 
@@ -170,51 +144,61 @@ def _measures(of: Examination) -> str | None:
     if len(set(names)) != len(names):
         return f"names {names} must be distinct"
     opening(scenario, of.seeds[0], of.episodes[0])
-    info = scenario.step(of.actions(scenario, of.seeds[0])[0]).info
-    for measure in measures:
-        source = measure.source
-        if source != "terminated" and source not in info:
-            return f"{measure.name}: info has no {source!r}, it has: {', '.join(info)}"
-        if source != "terminated" and np.ndim(info[source]):
-            return f"{measure.name}: info[{source!r}] must be one number"
     kept = scenario.recorded if isinstance(scenario, RecordedScenario) else ()
-    for place, reported in (("info", info), ("measure", measured(scenario))):
-        missing = [name for name in kept if name not in reported]
-        if missing:
-            return f"recorded is {missing[0]!r}, which {place} has not"
+    for step, action in enumerate(of.actions(scenario, of.seeds[0])[:STEPS], 1):
+        transition = scenario.step(action)
+        info, told = transition.info, measured(scenario)
+        for measure in measures:
+            source = measure.source
+            if source != "terminated" and source not in info:
+                return f"{measure.name}: info has no {source!r} {at(step)}, has {', '.join(info)}"
+            if source != "terminated" and np.ndim(info[source]):
+                return f"{measure.name}: info[{source!r}] must be one number"
+        for name in kept:
+            if name not in info or name not in told:
+                return (
+                    f"recorded is {name!r}, which {'measure' if name in info else 'info'} has not"
+                )
+            if bits(info[name]) != bits(told[name]):
+                return f"recorded is {name!r}, of which info and measure differ {at(step)}"
+        if transition.terminated or transition.truncated:
+            break
     return None
 
 
-def _finite(of: Examination) -> str | None:
-    """Check that all numbers are finite."""
-    for seed, episode in product(of.seeds, of.episodes):
-        for step, frame in enumerate(of.play(of.factory(), seed, episode)):
-            for name, value in frame.items():
-                array = np.asarray(value)
-                if array.dtype.kind == "f" and not np.isfinite(array).all():
-                    return f"{name} is not finite {at(step)} of seed {seed}"
-    return None
-
-
-def _bounds(of: Examination) -> str | None:
-    """Check that variables stay within their period, and within `bounds` if a scenario has them."""
+def _values(of: Examination) -> str | None:
+    """Check that numbers are finite, variables within bounds, and alike where they are shared."""
     for seed, episode in product(of.seeds, of.episodes):
         scenario = of.factory()
-        limits = [
-            (v.low, v.high) if v.periodic else (-np.inf, np.inf)
-            for v in scenario.state_space.variables
-        ]
-        low, high = np.array(getattr(scenario, "bounds", limits)).T
         for step, frame in enumerate(of.play(scenario, seed, episode)):
-            states = np.asarray(frame["states"])
-            outside = np.argwhere((states < low) | (states > high))
-            if len(outside):
-                i = outside[0, 1]
-                return (
-                    f"{scenario.state_space.variables[i].name} leaves [{low[i]}, {high[i]}] "
-                    f"{at(step)} of seed {seed}"
-                )
+            fault = _not_finite(frame) or _out_of_bounds(scenario, np.asarray(frame["states"]))
+            fault = fault or fault_of_sharing(scenario, np.asarray(frame["states"]))
+            if fault is not None:
+                return f"{fault} {at(step)} of seed {seed}"
+    roles = roles_of(of.factory())
+    if len(set(roles)) < len(roles):
+        of.unchecked["roles"] = "whether agents of one role are alike is not seen from outside"
     return None
+
+
+def _not_finite(frame: Frame) -> str | None:
+    for name, value in frame.items():
+        array = np.asarray(value)
+        if array.dtype.kind == "f" and not np.isfinite(array).all():
+            return f"{name} is not finite"
+    return None
+
+
+def _out_of_bounds(scenario: Scenario, states: FloatArray) -> str | None:
+    """Return which variable leaves its period, or the ``bounds`` of a scenario that has them."""
+    variables = scenario.state_space.variables
+    limits = [(v.low, v.high) if v.periodic else (-np.inf, np.inf) for v in variables]
+    low, high = np.array(getattr(scenario, "bounds", limits)).T
+    outside = np.argwhere((states < low) | (states > high))
+    if not len(outside):
+        return None
+    i = outside[0, 1]
+    return f"{variables[i].name} leaves [{low[i]}, {high[i]}]"
 
 
 def _repeats(of: Examination) -> str | None:
@@ -235,7 +219,7 @@ def _repeats(of: Examination) -> str | None:
 def _varies(of: Examination) -> str | None:
     """Check that different seeds give different worlds."""
     actions = of.actions(of.factory(), of.seeds[0])
-    runs = [list(play(of.factory(), seed, of.episodes[0], actions)) for seed in of.seeds]
+    runs = [list(of.play(of.factory(), seed, of.episodes[0], actions)) for seed in of.seeds]
     if any(difference(runs[0], run) for run in runs[1:]):
         return None
     return f"seeds {', '.join(map(str, of.seeds))} give one and the same episode"
@@ -270,11 +254,13 @@ def _predicts(of: Examination) -> str | None:
     scenario, rng = of.factory(), np.random.default_rng(of.seeds[0])
     opening(scenario, of.seeds[0], of.episodes[0])
     actions = of.actions(scenario, of.seeds[0])
-    for action in actions[:5]:
+    for action in actions[:STEPS]:
         fault = fault_of_prediction(scenario, actions, rng)
         if fault is not None:
             return fault
         scenario.step(action)
+    if has_tables(scenario.predict()) and too_many(scenario):
+        of.unchecked["tables"] = f"more than {MOST_JOINT_ACTIONS:,} joint actions"
     return None
 
 
@@ -283,13 +269,14 @@ def _senses(of: Examination) -> str | None:
     for seed, episode in product(of.seeds, of.episodes):
         scenario: Any = of.factory()
         if not hasattr(scenario, "with_exact_prediction"):
+            of.unchecked["sensed and predicted"] = (
+                "without with_exact_prediction, predictions may be off; see their errors"
+            )
             return None
-        exact = scenario.with_exact_prediction()
-        neutral = np.full((STEPS_AT_REST, len(scenario.agents)), scenario.action_set.neutral)
-        fault = fault_of_sensing(exact, seed, episode, of.actions(exact, seed))
-        fault = fault or fault_of_sensing(scenario, seed, episode, neutral, at_rest=True)
+        exact, actions = scenario.with_exact_prediction(), of.actions(scenario, seed)
+        fault = fault_of_sensing(exact, predicted_steps(exact, seed, episode, actions))
         if fault is not None:
-            return fault
+            return f"{fault} of seed {seed}"
     return None
 
 
@@ -340,8 +327,7 @@ def _keeps_off_globals(of: Examination) -> str | None:
 CHECKS: dict[str, Callable[[Examination], str | None]] = {
     "form": _form,
     "measures": _measures,
-    "finite numbers": _finite,
-    "bounds": _bounds,
+    "values": _values,
     "equal seeds": _repeats,
     "different seeds": _varies,
     "two instances": _keeps_apart,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from itertools import zip_longest
 from typing import Any
 
@@ -18,6 +19,57 @@ Frame = dict[str, Any]
 FIELDS = ("states", "reward", "terminated", "truncated", "twists", "info")
 
 
+@dataclass(frozen=True)
+class Examination:
+    """What is played, and what could not be checked."""
+
+    factory: Callable[[], Scenario]
+    """Makes a new instance of the scenario."""
+    steps: int
+    """Most steps of an episode."""
+    seeds: tuple[int, ...]
+    """At least two seeds of worlds."""
+    episodes: tuple[int, ...]
+    """Numbers under which episodes are played: failures may be scheduled by them."""
+    unchecked: dict[str, str] = field(default_factory=dict)
+    """Why something could not be checked, by its name; checks write it."""
+
+    def actions(self, scenario: Scenario, seed: int) -> IntArray:
+        """Return the actions that are tried in the world of a seed."""
+        return random_actions(scenario, self.steps, seed)
+
+    def play(
+        self,
+        scenario: Scenario,
+        seed: int,
+        episode: int,
+        actions: IntArray | None = None,
+        *,
+        predicting: bool = False,
+    ) -> Iterator[Frame]:
+        """Yield the frames of an episode, the opening first.
+
+        Parameters
+        ----------
+        scenario
+            What is played; modified.
+        seed, episode
+            As in the control loop.
+        actions
+            ``(steps, n)`` joint actions; none: those of the seed. The episode may end earlier.
+        predicting
+            Whether predictions and measurements are asked for before every step.
+        """
+        yield opening(scenario, seed, episode)
+        for action in self.actions(scenario, seed) if actions is None else actions:
+            if predicting:
+                look_ahead(scenario)
+            frame = copied(dict(fields(scenario.step(action))))
+            yield frame
+            if frame["terminated"] or frame["truncated"]:
+                return
+
+
 def random_actions(scenario: Scenario, steps: int, seed: int) -> IntArray:
     """Return joint actions ``(steps, n)``, most of them held for some steps."""
     rng = np.random.default_rng(seed)
@@ -29,36 +81,10 @@ def random_actions(scenario: Scenario, steps: int, seed: int) -> IntArray:
     return actions
 
 
-def play(
-    scenario: Scenario, seed: int, episode: int, actions: IntArray, *, predicting: bool = False
-) -> Iterator[Frame]:
-    """Yield the frames of an episode, the opening first.
-
-    Parameters
-    ----------
-    scenario
-        What is played; modified.
-    seed, episode
-        As in the control loop.
-    actions
-        ``(steps, n)`` joint actions; the episode may end earlier.
-    predicting
-        Whether predictions and measurements are asked for before every step.
-    """
-    yield opening(scenario, seed, episode)
-    for action in actions:
-        if predicting:
-            _look_ahead(scenario)
-        frame = _copied(dict(fields(scenario.step(action))))
-        yield frame
-        if frame["terminated"] or frame["truncated"]:
-            return
-
-
 def opening(scenario: Scenario, seed: int, episode: int) -> Frame:
     """Reset a scenario and return the frame of the start."""
     states = scenario.reset(world_seed(seed, episode), episode)
-    return _copied({"states": states, "info": measured(scenario)})
+    return copied({"states": states, "info": measured(scenario)})
 
 
 def measured(scenario: Scenario) -> Mapping[str, Any]:
@@ -115,7 +141,8 @@ def _contrast(one: Any, other: Any) -> str:
     return f"{list(where)} = {one[where]} and {other[where]}"
 
 
-def _look_ahead(scenario: Scenario) -> None:
+def look_ahead(scenario: Scenario) -> None:
+    """Ask for predictions and measurements."""
     prediction = scenario.predict()
     some = np.zeros((2, len(scenario.agents)), dtype=np.int64)
     some[1] = len(scenario.action_set) - 1
@@ -134,7 +161,8 @@ def _flat(table: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any
             yield prefix + name, value
 
 
-def _copied(table: Mapping[str, Any]) -> Frame:
+def copied(table: Mapping[str, Any]) -> Frame:
+    """Return what is in a table, by dotted name, without the measured times."""
     return {
         name: value.copy() if isinstance(value, np.ndarray) else value
         for name, value in _flat(table)

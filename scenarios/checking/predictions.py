@@ -1,4 +1,7 @@
-"""Whether a prediction has the right shapes, and its tables say what it says itself.
+"""Whether a prediction has the right shapes, claims what is so, and has tables that say the same.
+
+Agents share the variables that they are said to share, and what is said to be an agent's own does
+not change with what others do.
 
 Where few agents are free, decisions are not made by `Prediction.states` and `rewards`, but by its
 tables over all joint actions, `blocks` and `reward_table`. Compiled kernels read them without
@@ -37,14 +40,40 @@ def fault_of_prediction(
     rng
         Draws the joint actions for which tables are compared, where there are many.
     """
-    prediction: Any = scenario.predict()
+    prediction, given = scenario.predict(), joint_actions.copy()
+    fault = _misformed(scenario, prediction, joint_actions)
+    if not np.array_equal(joint_actions, given):
+        return "the joint actions that are to be predicted are changed"
+    if fault is not None:
+        return fault
+    states = np.array([prediction.states(i, given) for i in range(len(scenario.agents))])
+    for i in range(len(states)):
+        if differs(scenario, prediction.states(i, given[-1:])[0], states[i, -1]).any():
+            return f"states of agent {i} after a joint action depend on those predicted with it"
+    fault = fault_of_sharing(scenario, states) or _wrong_groups(scenario, prediction, given, states)
+    if has_tables(prediction):
+        return fault or _wrong_tables(scenario, prediction, rng)
+    return fault or _own_variable_moved(scenario, prediction, given, rng)
+
+
+def has_tables(prediction: Any) -> bool:
+    """Return whether a prediction has tables of all joint actions, too many to ask for or not."""
+    return hasattr(prediction, "blocks") and hasattr(prediction, "reward_table")
+
+
+def too_many(scenario: Scenario) -> bool:
+    """Return whether a scenario has more joint actions than tables are asked for."""
+    return len(scenario.action_set) ** len(scenario.agents) > MOST_JOINT_ACTIONS
+
+
+def _misformed(scenario: Scenario, prediction: Any, joint_actions: IntArray) -> str | None:
+    """Return what is predicted in a wrong shape, or is not finite."""
     n, m, d = len(scenario.agents), len(joint_actions), scenario.state_space.n_variables
     groups, n_own = groups_of(scenario), scenario.state_space.n_own
-    each = [prediction.states(i, joint_actions) for i in range(n)]
-    own, shared = states_by_group(prediction, joint_actions, groups, n_own)
     wanted: dict[str, tuple[Any, tuple[int, ...]]] = {
-        f"states of agent {i}": (states, (m, d)) for i, states in enumerate(each)
+        f"states of agent {i}": (prediction.states(i, joint_actions), (m, d)) for i in range(n)
     }
+    own, shared = states_by_group(prediction, joint_actions, groups, n_own)
     wanted["own variables of all agents"] = own, (n, m, n_own)
     wanted["shared variables of all groups"] = shared, (len(groups), m, d - n_own)
     if hasattr(prediction, "rewards"):
@@ -54,44 +83,29 @@ def fault_of_prediction(
             return f"predicted {name} of shape {np.shape(value)}, must be {shape}"
         if not np.isfinite(value).all():
             return f"predicted {name} are not finite"
-    body = np.repeat(np.arange(len(groups)), [len(group) for group in groups])
-    by_group = np.concatenate([np.asarray(own), np.asarray(shared)[body]], axis=2)
-    wrong = _differs(scenario, by_group, np.array(each))
-    if wrong.any():
-        grouped = hasattr(prediction, "states_by_group")
-        source = "states_by_group" if grouped else "shared variables of a group"
-        agent, _, j = np.argwhere(wrong)[0]
-        name = scenario.state_space.variables[j].name
-        return f"{source} and states differ in {name} of agent {agent}"
-    if hasattr(prediction, "blocks") and hasattr(prediction, "reward_table"):
-        return _wrong_tables(scenario, prediction, rng)
     return None
 
 
-def apart(scenario: Scenario, states: FloatArray, others: FloatArray) -> FloatArray:
-    """Return the difference of states ``(..., d)``, of periodic variables the shorter way round."""
-    differences = states - others
-    for j, variable in enumerate(scenario.state_space.variables):
-        if variable.periodic:
-            period = variable.high - variable.low
-            differences[..., j] -= period * np.round(differences[..., j] / period)
-    return differences
-
-
-def _differs(scenario: Scenario, states: FloatArray, expected: FloatArray) -> BoolArray:
-    """Return which numbers of states ``(..., d)`` differ beyond rounding."""
-    return ~_is_close(apart(scenario, np.asarray(states), expected), expected)
-
-
-def _is_close(differences: FloatArray, expected: FloatArray) -> Any:
-    return np.abs(differences) <= CLOSE * np.maximum(1.0, np.abs(expected))
+def _wrong_groups(
+    scenario: Scenario, prediction: Any, joint_actions: IntArray, states: FloatArray
+) -> str | None:
+    """Return where the prediction of all agents at once differs from that of each."""
+    groups = groups_of(scenario)
+    own, shared = states_by_group(prediction, joint_actions, groups, scenario.state_space.n_own)
+    body = np.repeat(np.arange(len(groups)), [len(group) for group in groups])
+    wrong = differs(scenario, np.concatenate([own, shared[body]], axis=2), states)
+    if not wrong.any():
+        return None
+    agent, _, j = np.argwhere(wrong)[0]
+    name = scenario.state_space.variables[j].name
+    return f"states_by_group and states differ in {name} of agent {agent}"
 
 
 def _wrong_tables(scenario: Scenario, prediction: Any, rng: np.random.Generator) -> str | None:
     """Return where the tables differ from the prediction, whose states are taken to be right."""
     n, n_actions = len(scenario.agents), len(scenario.action_set)
     count = n_actions**n
-    if count > MOST_JOINT_ACTIONS:
+    if too_many(scenario):
         return None
     indices: IntArray = np.arange(count)
     if count > SAMPLED:
@@ -108,7 +122,7 @@ def _wrong_tables(scenario: Scenario, prediction: Any, rng: np.random.Generator)
             if fault is not None:
                 return f"blocks of agent {agent}: {fault}"
             expected, actual = prediction.states(agent, joint_actions), blocks.states(indices)
-            wrong = _differs(scenario, actual, np.asarray(expected))
+            wrong = differs(scenario, actual, np.asarray(expected))
             if blocks.alone:
                 wrong[:, : scenario.state_space.n_own] = False
             if wrong.any():
@@ -153,7 +167,7 @@ def _wrong_rewards(
     if np.shape(table) != (count,):
         return f"reward_table of shape {np.shape(table)}, must be {(count,)}"
     actual = np.asarray(table)[indices]
-    wrong = ~_is_close(actual - expected, expected)
+    wrong = ~is_close(actual - expected, expected)
     if not wrong.any():
         return None
     row = wrong.argmax()
@@ -161,3 +175,69 @@ def _wrong_rewards(
         f"reward_table: {actual[row]:.6g} after joint action {joint_actions[row].tolist()}, "
         f"rewards has {expected[row]:.6g}"
     )
+
+
+def apart(scenario: Scenario, states: FloatArray, others: FloatArray) -> FloatArray:
+    """Return the difference of states ``(..., d)``, of periodic variables the shorter way round."""
+    differences = states - others
+    for j, variable in enumerate(scenario.state_space.variables):
+        if variable.periodic:
+            period = variable.high - variable.low
+            differences[..., j] -= period * np.round(differences[..., j] / period)
+    return differences
+
+
+def is_close(differences: FloatArray, expected: FloatArray) -> Any:
+    """Return which differences from what is expected rounding may make."""
+    return np.abs(differences) <= CLOSE * np.maximum(1.0, np.abs(expected))
+
+
+def differs(scenario: Scenario, states: FloatArray, expected: FloatArray) -> BoolArray:
+    """Return which numbers of states ``(..., d)`` differ beyond rounding."""
+    wrong: BoolArray = ~is_close(apart(scenario, np.asarray(states), expected), expected)
+    return wrong
+
+
+def fault_of_sharing(scenario: Scenario, states: FloatArray) -> str | None:
+    """Return which variable agents are said to share and do not, in states ``(n, ..., d)``.
+
+    Agents of a group share all that is not their own, and all agents what is ``common``.
+    """
+    space = scenario.state_space
+    names = [variable.name for variable in space.variables]
+    shared = [(group, names[space.n_own :], "shared by a group") for group in groups_of(scenario)]
+    for agents, claimed, claim in [*shared, (range(len(states)), space.common, "common")]:
+        first, columns = agents[0], [names.index(name) for name in claimed]
+        wrong = differs(scenario, states[list(agents)], states[[first]])[..., columns]
+        if wrong.any():
+            where = tuple(np.argwhere(wrong)[0])
+            i, here = agents[where[0]], (*where[1:-1], columns[where[-1]])
+            return (
+                f"{names[here[-1]]}, said to be {claim}, is {states[i][here]:.6g} of agent {i} and "
+                f"{states[first][here]:.6g} of agent {first}"
+            )
+    return None
+
+
+def _own_variable_moved(
+    scenario: Scenario, prediction: Any, joint_actions: IntArray, rng: np.random.Generator
+) -> str | None:
+    """Return which own variable is predicted to change by what other groups do, or None.
+
+    Predicted are joint actions ``(m, n)``, and then the same with other actions of the others.
+    """
+    space = scenario.state_space
+    drawn = rng.integers(len(scenario.action_set), size=joint_actions.shape)
+    for group in groups_of(scenario) if space.n_own else ():
+        changed = drawn.copy()
+        changed[:, list(group)] = joint_actions[:, list(group)]
+        for agent in group:
+            before, after = (prediction.states(agent, a) for a in (joint_actions, changed))
+            moved = differs(scenario, after, before)[:, : space.n_own].any(axis=0)
+            if moved.any():
+                name = space.variables[int(moved.argmax())].name
+                return (
+                    f"{name} of agent {agent} changes with the actions of others, n_own = "
+                    f"{space.n_own} says it does not"
+                )
+    return None

@@ -1,11 +1,15 @@
-"""Whether what is predicted is what is then sensed: state variables mean one thing.
+"""What is predicted beside what is then sensed: state variables mean one thing.
 
-Predictions need not come true, so that of most scenarios nothing can be said. But one that is
-predicted exactly (``with_exact_prediction``) must sense what was predicted, and where nothing
-moves, so must any predictor. What differs then is a variable that is computed in two ways.
+Predictions need not come true, so that of most scenarios no more can be said than by how much they
+are off. But one that is predicted exactly (``with_exact_prediction``) must sense what was
+predicted. What differs then is a variable that is computed in two ways.
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from math import isnan
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,12 +21,40 @@ from .predictions import apart
 
 TOLERANCE = 1e-6
 """Difference of sensed and predicted variables that rounding may make, relative to their range."""
+SMALL = 0.02
+"""Error of prediction, in ranges of the variable, of which no word is lost."""
+FAR = 10
+"""Ranges beyond its own at which a variable looks as if it were in another unit."""
 
 
-def fault_of_sensing(
-    scenario: Scenario, seed: int, episode: int, joint_actions: IntArray, *, at_rest: bool = False
-) -> str | None:
-    """Return which variable is not sensed as it was predicted, or None.
+class MetVariable(NamedTuple):
+    """What was met of a variable, or of the reward, beside what is said of it."""
+
+    name: str
+    """Of the variable, or ``reward``."""
+    unit: str
+    """In words of the SI."""
+    low: float
+    """Where its range begins; the reward has none: NaN."""
+    high: float
+    """Where it ends."""
+    least: float
+    """The least value that was sensed."""
+    greatest: float
+    """The greatest."""
+    error: float
+    """Root mean square error of what was predicted; NaN: it is not predicted."""
+    persistence: float
+    """The same, had it been predicted that all stays as it is."""
+
+
+def predicted_steps(
+    scenario: Scenario, seed: int, episode: int, joint_actions: IntArray, ahead: int = 1
+) -> FloatArray:
+    """Return states before some steps, as predicted, and after: ``(m, 3, n, d + 1)``.
+
+    Behind the variables stands the reward, the mean of all agents: that of the step before, 0 at
+    the start, that predicted, NaN if none is, and that received.
 
     Parameters
     ----------
@@ -32,33 +64,85 @@ def fault_of_sensing(
         As in the control loop.
     joint_actions
         ``(steps, n)``; the episode may end earlier.
-    at_rest
-        Whether only steps count in which nothing changes.
+    ahead
+        Decisions that predictions look ahead; after each joint action all are neutral for the rest.
     """
-    before = scenario.reset(world_seed(seed, episode), episode)
-    for step, action in enumerate(joint_actions, 1):
+    steps, paid = [], 0.0
+    states = np.array(scenario.reset(world_seed(seed, episode), episode))
+    for action in joint_actions:
         prediction = scenario.predict()
-        predicted = np.stack([prediction.states(i, action[None])[0] for i in range(len(action))])
-        transition = scenario.step(action)
-        states = transition.states
-        if not at_rest or _difference(scenario, states, before) is None:
-            fault = _difference(scenario, states, predicted)
-            if fault is not None:
-                return f"{fault} {at(step)} of seed {seed}{', at rest' if at_rest else ''}"
+        rewards = getattr(prediction, "rewards", None)
+        foretold = [prediction.states(i, action[None])[0] for i in range(len(action))]
+        before = _with_reward(states, paid)
+        predicted = _with_reward(foretold, np.nan if rewards is None else rewards(action[None])[0])
+        for joint in [action, *[np.full_like(action, scenario.action_set.neutral)] * (ahead - 1)]:
+            transition = scenario.step(joint)
+            states, paid = np.array(transition.states), float(np.mean(transition.reward))
+            if transition.terminated or transition.truncated:
+                break
+        steps.append([before, predicted, _with_reward(states, paid)])
         if transition.terminated or transition.truncated:
             break
-        before = states
-    return None
+    return np.array(steps)
 
 
-def _difference(scenario: Scenario, sensed: FloatArray, predicted: FloatArray) -> str | None:
-    """Return where sensed and predicted states ``(n, d)`` differ beyond rounding, or None."""
+def _with_reward(states: FloatArray | list[FloatArray], reward: float) -> FloatArray:
+    return np.column_stack([np.asarray(states), np.full(len(states), reward)])
+
+
+def fault_of_sensing(scenario: Scenario, steps: FloatArray) -> str | None:
+    """Return which variable is not sensed as it was predicted, or None.
+
+    Parameters
+    ----------
+    scenario
+        Whose steps they are.
+    steps
+        ``(m, 3, n, d + 1)`` of an episode, see `predicted_steps`.
+    """
     variables = scenario.state_space.variables
-    ranges = np.array([variable.high - variable.low for variable in variables])
-    off = np.abs(apart(scenario, np.asarray(sensed), predicted)) / ranges
-    if not (off > TOLERANCE).any():
+    _, predicted, after = np.moveaxis(steps[..., : len(variables)], 1, 0)
+    allowed = TOLERANCE * np.array([variable.high - variable.low for variable in variables])
+    off = np.abs(apart(scenario, after, predicted)) / allowed
+    late = (off > 1).any(axis=(1, 2))
+    if not late.any():
         return None
-    i, j = np.unravel_index(off.argmax(), off.shape)
+    step = int(late.argmax())
+    i, j = np.unravel_index(off[step].argmax(), off[step].shape)
     return (
-        f"{variables[j].name} of agent {i} is {sensed[i, j]:.6g}, predicted {predicted[i, j]:.6g},"
+        f"{variables[j].name} of agent {i} is {after[step, i, j]:.6g}, predicted "
+        f"{predicted[step, i, j]:.6g}, {at(step + 1)}"
     )
+
+
+def met_variables(scenario: Scenario, steps: FloatArray) -> tuple[MetVariable, ...]:
+    """Return what was met of every variable, and of the reward, in steps ``(m, 3, n, d + 1)``."""
+    before, predicted, after = np.moveaxis(steps, 1, 0)
+    error, persistence = (
+        np.sqrt((apart(scenario, after, guess) ** 2).mean(axis=(0, 1)))
+        for guess in (predicted, before)
+    )
+    numbers = np.stack([after.min(axis=(0, 1)), after.max(axis=(0, 1)), error, persistence], 1)
+    claims = [(v.name, v.unit, v.low, v.high) for v in scenario.state_space.variables]
+    claims.append(("reward", "1", np.nan, np.nan))
+    return tuple(MetVariable(*c, *row) for c, row in zip(claims, numbers.tolist(), strict=True))
+
+
+class Findings(NamedTuple):
+    """What came of a check that found no fault."""
+
+    passed: tuple[str, ...]
+    """Names of the checks that were passed."""
+    unchecked: Mapping[str, str]
+    """Why something was not checked, by its name."""
+    variables: tuple[MetVariable, ...]
+    """What was met of every variable and of the reward."""
+
+    def warnings(self) -> Iterator[str]:
+        """Yield what is allowed and looks wrong, a line each."""
+        for v in self.variables:
+            width = v.greatest - v.least if isnan(v.low) else v.high - v.low
+            if v.error >= max(v.persistence, SMALL * width) > 0:
+                yield f"{v.name} is predicted no better than if it stayed as it is"
+            if max(v.low - v.least, v.greatest - v.high) > FAR * width:
+                yield f"{v.name} goes more than {FAR} times its range beyond it"

@@ -10,6 +10,8 @@ import click
 
 from .. import options
 
+SHORT = "{:.2g}".format
+"""How numbers are printed."""
 Case = tuple[str, Callable[[], Any], list[int]]
 """What a scenario is called, a function that makes it, and the episodes to play."""
 
@@ -27,9 +29,14 @@ Case = tuple[str, Callable[[], Any], list[int]]
 def command(source: str, steps: int, changes: tuple[str, ...]) -> int:
     """Check what every scenario must promise, such as equal bits for equal seeds.
 
+    A table shows the values met of every variable beside its range, and the root mean square error
+    of its prediction beside that of persistence, as if all stayed as it is.
+
     SPEC.toml is a spec, whose conditions are checked; FILE.py:NAME a function or class in a Python
     file that makes a scenario of one's own.
     """
+    from pandas import DataFrame
+
     from ....scenarios.checking.checker import ScenarioError, check_scenario
     from ...errors import SpecError
     from ..display import print_wrapped
@@ -37,14 +44,20 @@ def command(source: str, steps: int, changes: tuple[str, ...]) -> int:
     faults = 0
     for label, factory, episodes in _cases(source, changes):
         try:
-            passed = check_scenario(factory, steps=steps, episodes=episodes)
+            findings = check_scenario(factory, steps=steps, episodes=episodes)
         except ScenarioError as error:
             faults += 1
             print(f"FAULT   {label}: {error}")
         except ValueError as error:
             raise SpecError(str(error)) from None
         else:
-            print_wrapped(f"{label}: {', '.join(passed)}", "passed  ", 8)
+            print_wrapped(f"{label}: {', '.join(findings.passed)}", "passed  ", 8)
+            for name, reason in findings.unchecked.items():
+                print_wrapped(f"{name}: {reason}", "not checked  ", 8)
+            for warning in findings.warnings():
+                print_wrapped(warning, "warning  ", 8)
+            frame = DataFrame(findings.variables).rename(columns={"persistence": "as it is"})
+            print("", frame.to_string(index=False, na_rep="", float_format=SHORT), "", sep="\n")
     return 1 if faults else 0
 
 

