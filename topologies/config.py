@@ -8,11 +8,11 @@ follow ``kind:`` is in `ARGUMENTS`.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from ..core.agents.messages import AnyMessageFailure
+from ..core.agents.messages import AbsentAgents, AnyMessageFailure
 from ..core.interface.hierarchy import Considers, Hierarchy, Told
 from ..core.plugins import sources
 from ..core.plugins.deferred import nx
@@ -39,6 +39,14 @@ class TopologySettings(Settings):
     subordinates, or of nobody; or a list of bodies, as above, in which those below it are."""
     failures: Annotated[tuple[AnyMessageFailure, ...], unwritten(())] = ()
     """What fails of the messages down the hierarchy, from when to when."""
+
+    @model_validator(mode="after")
+    def _told_what_fails(self) -> Self:
+        if self.told == "none" and not all(isinstance(f, AbsentAgents) for f in self.failures):
+            raise ValueError(
+                "told = 'none': there are no messages to fail, failures must be absent"
+            )
+        return self
 
     def __repr_args__(self) -> Iterable[tuple[str | None, Any]]:
         written = self.model_dump()
@@ -221,11 +229,15 @@ def read(path: str) -> nx.DiGraph | TopologySettings:
     if isinstance(content, nx.Graph):
         return content
     try:
-        return parse(content)
+        settings = parse(content)
     except RecursionError:
         raise ValueError(f"{path}: is nested too deeply") from None
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
+    for key in ("told", "considers", "failures"):
+        if key in settings.model_fields_set:
+            raise ValueError(f"{path}: {key} must stand in the [topology] table of the spec")
+    return settings
 
 
 def _named(agents: Names, bodies: Sequence[Any]) -> Bodies:

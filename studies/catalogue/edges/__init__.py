@@ -11,6 +11,8 @@ evaluation is compared with that under the hierarchy of training, as in the stud
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 
 from ....core.agents.loop import StepRecord
@@ -18,19 +20,25 @@ from ....core.interface.scenario import groups_of
 from ...errors import SpecError
 from ...results.analysis import Analysis, Figures
 from ...results.results import Results
-from ...results.summary import EVALUATED
+from ...results.summary import EVALUATED, two_figures
 from ...spec.labels import label_but
 from ...spec.spec import Spec
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..hierarchies import HierarchyCase, analysis_of, estimates, sizes_of
-from ..hierarchies import draw as draw_by_robots
 from ..study import check_evaluated, check_rule_bases
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
 TRAINED = "as trained"
 """How the hierarchy of training is called among the others."""
+PARTED = (("neither", "considered only"), ("told only", TRAINED))
+"""Names of evaluations by telling (rows) and considering (columns): told x considered."""
+WHOSE = {"own": "own value", "below": "value of those below", "team": "team's value"}
+"""What a sweep of whose value decides is called in titles."""
 
 
 def check(spec: Spec) -> None:
@@ -84,14 +92,49 @@ def analyse(results: Results) -> Analysis:
 
 
 def draw(analysis: Analysis) -> Figures:
-    """Return the figure of `hierarchies`; of one setting alone, differences from training."""
+    """Return told x considered, if that is asked; and all differences from training.
+
+    The second figure has a panel for each setting, if there are enough seeds to compare.
+    """
     from ...presentation import forest
 
-    if len({case.setting for case in analysis.cases}) > 1:
-        (by_robots,) = draw_by_robots(analysis).values()
-        return {"edges": by_robots}
-    figure = forest.draw({EVALUATED: analysis.differences}, f"success less that {TRAINED}")
-    return {} if figure is None else {"edges": figure}
+    asked = dict.fromkeys(case.setting for case in analysis.cases)
+    names = {case.hierarchy for case in analysis.cases}
+    figures = {"edges": _draw_parted(analysis)} if {*sum(PARTED, ())} <= names else {}
+    each = len(analysis.differences) // len(asked)
+    panels = {s: analysis.differences[k * each :][:each] for k, s in enumerate(asked)}
+    if (figure := forest.draw(panels, f"success less that {TRAINED}")) is not None:
+        figures["differences"] = figure
+    return figures
+
+
+def _draw_parted(analysis: Analysis) -> Figure:
+    """Draw success by telling and considering: four fields of a colour for each setting."""
+    from ...presentation import figures
+
+    by_name = {(c.value_of, c.robots, c.hierarchy): c.values[EVALUATED] for c in analysis.cases}
+    settings = sorted({key[:2] for key in by_name})
+    sizes = len({robots for _, robots in settings})
+    most = sizes if sizes > 1 else 4
+    figure, panels = figures.grid(
+        len(settings), most, (1.9, 1.75), (0.9, 0.5), sharex=True, sharey=True
+    )
+    for axes, setting in zip(panels.flat, settings, strict=False):
+        fields = [[by_name[(*setting, name)] for name in row] for row in PARTED]
+        axes.imshow([[float(e.value) for e in row] for row in fields], "Blues", vmin=0, vmax=1)
+        for (row, column), e in np.ndenumerate(np.array(fields, dtype=object)):
+            value, low, high = (two_figures(float(part)) for part in (e.value, e.low, e.high))
+            look: dict[str, Any] = {"ha": "center", "color": "white" if e.value > 0.5 else "black"}
+            axes.text(column, row, value, va="bottom", fontsize=15, **look)
+            axes.text(column, row + 0.08, f"{low} to {high}", va="top", fontsize=7, **look)
+        whose = WHOSE.get(setting[0], setting[0])
+        axes.set_title(f"{setting[1]} robots{', ' * bool(whose)}{whose}", loc="left")
+        axes.set_xticks((0, 1), ("nobody\nconsidered", "those below\nconsidered"))
+        axes.set_yticks((0, 1), ("not told", "told"))
+        axes.tick_params(length=0, labelsize=7.5)
+        axes.spines[:].set_visible(False)
+    figure.suptitle("evaluation success of the same weights, 95 % intervals", fontsize=9)
+    return figure
 
 
 __all__ = ["analyse", "check", "draw", "measure"]
