@@ -24,6 +24,11 @@ def test_commands_name_specs_that_can_be_built(path: str) -> None:
     check(Spec.load(ROOT / path))
 
 
+def test_specs_that_are_named_exist() -> None:
+    named = set(re.findall(r"\w+/\w+\.toml", TEXT))
+    assert [path for path in named if not (ROOT / "studies/catalogue" / path).exists()] == []
+
+
 @pytest.mark.parametrize(
     ("name", "columns"),
     [
