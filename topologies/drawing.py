@@ -19,6 +19,7 @@ from ..core.plugins.deferred import nx
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+Indices = Sequence[int]
 COLUMNS = 6
 """Levels side by side before the picture is folded."""
 WIDTH, HEIGHT = 1.25, 0.3
@@ -170,8 +171,8 @@ def _agents(
     axes: Axes,
     hierarchy: Hierarchy,
     places: FloatArray,
-    bodies: Sequence[Sequence[int]],
-    failing: Sequence[int],
+    bodies: Sequence[Indices],
+    failing: Indices,
 ) -> None:
     from matplotlib.patches import FancyBboxPatch
 

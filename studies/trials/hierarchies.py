@@ -23,12 +23,8 @@ def views(spec: Spec) -> list[HierarchyView]:
     distinct: dict[tuple[object, ...], HierarchyView] = {}
     with spec.sources.active():
         for condition in spec.conditions():
-            others = [
-                (f"{condition.label}, {name}", settings)
-                for name, settings in condition.evaluations
-                if settings.topology != condition.settings.topology
-            ]
-            for label, settings in [(condition.label, condition.settings), *others]:
+            others = {f"{condition.label}, {name}": s for name, s in condition.evaluations}
+            for label, settings in ({condition.label: condition.settings} | others).items():
                 try:
                     view = _view(label, settings)
                 except ValueError as error:

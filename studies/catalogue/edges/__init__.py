@@ -11,6 +11,7 @@ evaluation is compared with that under the hierarchy of training, as in the stud
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -37,8 +38,6 @@ TRAINED = "as trained"
 """How the hierarchy of training is called among the others."""
 PARTED = (("neither", "considered only"), ("told only", TRAINED))
 """Names of evaluations by telling (rows) and considering (columns): told x considered."""
-WHOSE = {"own": "own value", "below": "value of those below", "team": "team's value"}
-"""What a sweep of whose value decides is called in titles."""
 
 
 def check(spec: Spec) -> None:
@@ -51,28 +50,22 @@ def check(spec: Spec) -> None:
         )
 
 
-class _Deciding:
-    """Collects how long decisions took."""
-
-    def __init__(self) -> None:
-        self.seconds: list[float] = []
-
-    def __call__(self, record: StepRecord) -> None:
-        self.seconds.append(record.deciding)
-
-
 def measure(trial: Trial) -> TrialResult:
     """Train a team, let it act under all hierarchies; imported by name in workers."""
     session = Session.compiled(trial)
     session.train(trial.episodes)
-    deciding = {name: _Deciding() for name in (TRAINED, *dict(trial.evaluations))}
-    session.evaluate(deciding[TRAINED])
-    session.run_other_evaluations(deciding)
+    deciding: dict[str, list[float]] = {n: [] for n in (TRAINED, *dict(trial.evaluations))}
+
+    def note(name: str, record: StepRecord) -> None:
+        deciding[name].append(record.deciding)
+
+    session.evaluate(partial(note, TRAINED))
+    session.run_other_evaluations({name: partial(note, name) for name in deciding})
     numbers = {"robots": float(len(groups_of(session.world)))}
     for name, settings in ((TRAINED, trial.settings), *trial.evaluations):
         _, hierarchy = settings.arrange(session.world)
         numbers[f"messages.{name}"] = float(hierarchy.messages)
-    usage = {f"decision.{name}": float(np.median(d.seconds)) for name, d in deciding.items()}
+    usage = {f"decision.{name}": float(np.median(d)) for name, d in deciding.items()}
     return session.result(numbers, usage)
 
 
@@ -112,23 +105,20 @@ def _draw_parted(analysis: Analysis) -> Figure:
     """Draw success by telling and considering: four fields of a colour for each setting."""
     from ...presentation import figures
 
-    by_name = {(c.value_of, c.robots, c.hierarchy): c.values[EVALUATED] for c in analysis.cases}
-    settings = sorted({key[:2] for key in by_name})
-    sizes = len({robots for _, robots in settings})
-    most = sizes if sizes > 1 else 4
-    figure, panels = figures.grid(
-        len(settings), most, (1.9, 1.75), (0.9, 0.5), sharex=True, sharey=True
-    )
+    cases = sorted(analysis.cases, key=lambda case: (case.value_of, case.robots))
+    by_name = {(case.setting, case.hierarchy): case.values[EVALUATED] for case in cases}
+    settings, sizes = dict.fromkeys(s for s, _ in by_name), len({case.robots for case in cases})
+    most, size = sizes if sizes > 1 else 4, ((1.9, 1.75), (0.9, 0.5))
+    figure, panels = figures.grid(len(settings), most, *size, sharex=True, sharey=True)
     for axes, setting in zip(panels.flat, settings, strict=False):
-        fields = [[by_name[(*setting, name)] for name in row] for row in PARTED]
+        fields = [[by_name[setting, name] for name in row] for row in PARTED]
         axes.imshow([[float(e.value) for e in row] for row in fields], "Blues", vmin=0, vmax=1)
         for (row, column), e in np.ndenumerate(np.array(fields, dtype=object)):
             value, low, high = (two_figures(float(part)) for part in (e.value, e.low, e.high))
             look: dict[str, Any] = {"ha": "center", "color": "white" if e.value > 0.5 else "black"}
             axes.text(column, row, value, va="bottom", fontsize=15, **look)
             axes.text(column, row + 0.08, f"{low} to {high}", va="top", fontsize=7, **look)
-        whose = WHOSE.get(setting[0], setting[0])
-        axes.set_title(f"{setting[1]} robots{', ' * bool(whose)}{whose}", loc="left")
+        axes.set_title(setting, loc="left")
         axes.set_xticks((0, 1), ("nobody\nconsidered", "those below\nconsidered"))
         axes.set_yticks((0, 1), ("not told", "told"))
         axes.tick_params(length=0, labelsize=7.5)

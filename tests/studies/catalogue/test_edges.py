@@ -44,7 +44,7 @@ def test_every_hierarchy_is_compared_with_that_of_training() -> None:
 
 def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
     paths = save(draw(analyse(made_up().frames())), tmp_path)
-    assert [path.name for path in paths] == ["edges.png", "edges.svg"]
+    assert [path.name for path in paths] == ["differences.png", "differences.svg"]
     assert drawn(module, analyse(NOTHING)) == {}
 
 
@@ -58,11 +58,15 @@ def test_conditions_that_differ_in_more_are_compared_with_their_own_training() -
     assert {case.setting for case in named.cases} == {"2 robots, tree:2"}
 
 
-def test_teams_of_several_sizes_are_drawn_by_their_size() -> None:
-    analysis = analyse(made_up().frames())
+def test_told_by_considered_is_drawn_as_four_fields_for_each_size() -> None:
+    analysis = analyse(made_up(OUTCOMES | {"neither": 0.0}).frames())
     larger = [replace(case, robots=4) for case in analysis.cases]
-    (figure,) = draw(replace(analysis, cases=[*analysis.cases, *larger])).values()
-    assert figure.axes[1].get_xlabel() == "robots"
+    figure = draw(replace(analysis, cases=[*analysis.cases, *larger]))["edges"]
+    assert [axes.get_title(loc="left") for axes in figure.axes] == ["2 robots", "4 robots"]
+    fields = [text.get_text() for text in figure.axes[0].texts[::2]]
+    assert fields[0] == "0"  # neither
+    assert fields[2] == ".30"  # told only
+    assert figure.axes[0].images[0].get_array().shape == (2, 2)
 
 
 def test_a_spec_without_another_hierarchy_is_refused() -> None:

@@ -288,6 +288,10 @@ def test_evaluations_may_change_the_hierarchy_and_the_decision():
         ({"learner": {"kind": "frozen"}}, "learner.kind: a trained team may change its decision"),
         ({"topology": {"told": "all"}}, "topology.told = 'all': must be 'ancestors', 'parents'"),
         ({"topology": {"considers": 1}}, "topology.considers = 1: must be"),
+        (
+            {"topology": {"told": "none", "failures": [{"kind": "lost", "agents": "*"}]}},
+            "told = 'none': there are no messages to fail",
+        ),
         ({"topology": {"told": ["own"]}}, "must be a list of one or two of body, next, farther"),
         ({"topology": {"failures": [{"kind": "lots"}]}}, "topology.failures"),
         (
