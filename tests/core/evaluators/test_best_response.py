@@ -259,7 +259,8 @@ def test_agents_with_a_common_plan_agree_without_a_word() -> None:
 
 
 def test_a_common_plan_needs_somebody_who_plans_for_others(world, rules) -> None:
-    fields = vars(problem_of(world, rules, "independent", "own")) | {"plan": "common"}
+    apart = Hierarchy(world.agents, [])
+    fields = vars(problem_of(world, rules, "chain", "own")) | {"plan": "common", "hierarchy": apart}
     with pytest.raises(ValueError, match="plan = 'common': nobody considers another"):
         BestResponse(DecisionProblem(**fields))
     assert BestResponse(DecisionProblem(**fields | {"unseen": "plan"})).plans
