@@ -86,7 +86,7 @@ MODULES = {
         "state_variables", "checking.checker",
     )),
     "studies": ("What is measured, compared and drawn.", (
-        "api.study", "api.planning", "api.costs", "api.comparison", "api.recovery",
+        "api.study", "api.teams", "api.planning", "api.costs", "api.comparison", "api.recovery",
         "api.run_study",
         "errors", "spec.spec", "spec.keys", "spec.presets", "trials.trial",
         "trials.arrangement", "trials.session",

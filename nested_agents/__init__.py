@@ -73,6 +73,7 @@ _PLACES = {
     "policy_seed": ("core.agents.loop", "policy_seed"),
     "power": ("studies.results.power", "power"),
     "rate": ("studies.results.statistics", "rate"),
+    "reevaluate": ("studies.api.teams", "reevaluate"),
     "run": ("studies.api.study", "run"),
     "run_trial": ("studies.trials.session", "run_trial"),
     "seeds_for": ("studies.results.power", "seeds_for"),

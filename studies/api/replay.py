@@ -54,10 +54,10 @@ def draw(
     SpecError
         If there is no such trial or recording, or its scenario does not draw.
     """
-    from ..trials.keeping import trial_of
+    from ..trials.keeping import finished_trial
 
     with Store.open(directory) as store:
-        chosen = trial_of(store, condition, seed)
+        chosen = finished_trial(store, condition, seed)
         recorded = list(chosen.recorded.values())
         if episode == "first" and episode not in recorded:
             episode = "last"  # of one episode
@@ -66,8 +66,6 @@ def draw(
         scenario: Any = chosen.world()
         if not can_draw(scenario):
             raise SpecError(f"no replay: {type(scenario).__name__} does not draw its episodes")
-        if store.states().get(chosen.identity) != "done":
-            raise SpecError(f"{chosen.condition}, seed {chosen.seed}: has not finished")
         is_drawn = False
         if path is None:
             path = directory / "replay" / f"{chosen.identity[:8]}-{episode}.gif"

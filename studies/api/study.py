@@ -46,6 +46,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from pandas import DataFrame
 
+    from ...core.interface.acting import Actors
+    from ...core.interface.scenario import Scenario
     from ..spec.spec import Spec
     from ..workers.runner import Observer
 
@@ -214,6 +216,31 @@ class StudyResults:
         """
         where = None if path is None else Path(path)
         return replay.draw(self.directory, condition, seed, episode, where)
+
+    def team(
+        self, condition: str | None = None, seed: int | None = None
+    ) -> tuple[Scenario, Actors]:
+        """Return the world of a trial, and the team that was trained in it, ready to act.
+
+        Parameters
+        ----------
+        condition, seed
+            Which trial; by default the first.
+
+        Raises
+        ------
+        SpecError
+            If there is no such trial, it has not finished, or the study keeps no teams.
+        """
+        from ..trials.keeping import check_teams, finished_trial
+        from ..trials.session import Session
+
+        with Store.open(self.directory) as store:
+            check_teams(store)
+            trial = finished_trial(store, condition, seed)
+            with trial.sources.active():
+                session = Session.restored(trial, store.recording(trial.identity, durable.TEAM))
+        return session.scenario, session.team
 
     def report(self, path: Place | None = None) -> Path:
         """Write the whole study as one self-contained HTML file and return its path.

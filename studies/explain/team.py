@@ -1,8 +1,8 @@
 """Explains a trained team: its functions with their rules in words, its policy, its self-model.
 
-Teams are not kept. A trial is a pure function of its content, so its training is run again, in
-seconds, and held against the episodes that are kept: the team explained is the team that was
-measured, or nothing is explained.
+A study keeps its trained teams if its spec says so. Else, a trial being a pure function of its
+content, its training is run again, in seconds, and held against the episodes that are kept. Either
+way the team explained is the team that was measured, or nothing is explained.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from ...core.interface.spaces import Variable
 from ...core.learners import LearnerSettings
 from ...core.rules.rule_base import RuleBase
 from ..errors import SpecError
+from ..store.durable import TEAM
 from ..store.schema import STAGE, columns
 from ..store.store import Store
-from ..trials.keeping import trial_of
 from ..trials.session import Session
 from ..trials.trial import Trial
 from . import rules as explain_rules
@@ -56,33 +56,19 @@ class Explanation:
     """What bodies believed their actuators to do; none: they have no self-model."""
 
 
-def choose(store: Store, condition: str | None, seed: int | None) -> Trial:
-    """Return the finished trial of a condition and seed, each the first one unless named.
-
-    Raises
-    ------
-    SpecError
-        If there is no such trial, or it has not finished.
-    """
-    trial = trial_of(store, condition, seed)
-    if not _kept(store, trial):
-        raise SpecError(f"{store.directory}: {trial.condition}, seed {trial.seed} has not finished")
-    return trial
-
-
 def explain(store: Store, trial: Trial) -> Explanation:
-    """Train the team of a trial again and explain it.
+    """Explain the team of a trial: the one that is kept, else it is trained again.
 
     Raises
     ------
     SpecError
-        If the trial cannot be built, or an episode of the training is not, to the last bit, the one
-        that is kept.
+        If the trial cannot be built, its team cannot be read, or an episode of the training is not,
+        to the last bit, the one that is kept.
     """
     with trial.sources.active():
-        team, scenario, bodies = _train(store, trial)
+        team, scenario, bodies = _trained(store, trial)
         learner = trial.settings.learner
-        assert isinstance(learner, LearnerSettings), "of fuzzy agents, see _train"
+        assert isinstance(learner, LearnerSettings), "of fuzzy agents, see _trained"
         rules = RuleBase.build(scenario.state_space, learner.rule_base)
         taken = [explain_rules.take_apart(rules, theta) for theta in team.learner.theta]
         return Explanation(
@@ -109,17 +95,28 @@ def _policy(team: Team, scenario: Any) -> Any:
         return str(error)
 
 
-def _train(store: Store, trial: Trial) -> tuple[Team, Scenario, Bodies | None]:
+def _trained(store: Store, trial: Trial) -> tuple[Team, Scenario, Bodies | None]:
+    arrays = store.recording(trial.identity, TEAM) if trial.keep_teams else None
     try:
         session = Session(trial)
         team = of_fuzzy_agents(session.team)
     except ValueError as error:  # a file that settings name is not what it was
         raise SpecError(f"{store.directory}: {error}") from None
-    scenario, strikes = session.scenario, trial.settings.scenario.onset
     model, bodies = team.self_model, None
     if model is not None:
         bodies = Bodies({}, ())
         bodies.note("built", model)
+    if arrays is None:
+        _train(store, session, bodies)
+    else:
+        team.restore(arrays)
+    if bodies and model:
+        bodies.note("after", model)
+    return team, session.scenario, bodies
+
+
+def _train(store: Store, session: Session, bodies: Bodies | None) -> None:
+    trial, model = session.trial, of_fuzzy_agents(session.team).self_model
     episodes = track(
         range(trial.episodes),
         f"training {trial.condition}, seed {trial.seed} again",
@@ -128,11 +125,9 @@ def _train(store: Store, trial: Trial) -> tuple[Team, Scenario, Bodies | None]:
         disable=not sys.stderr.isatty(),
     )
     for episode in episodes:
-        if bodies and model and episode == strikes and episode > 0:
+        if bodies and model and episode == trial.settings.scenario.onset and episode > 0:
             bodies.note("before", model)
         session.train(1, episode)
-    if bodies and model:
-        bodies.note("after", model)
     measured = [measure.name for measure in store.measures()]
     kept = _kept(store, trial)
     again = [row.flat(measured) for row in session.result().rows]
@@ -145,21 +140,16 @@ def _train(store: Store, trial: Trial) -> tuple[Team, Scenario, Bodies | None]:
             f"episode {other[1]}{stage} than the one that is kept; this is not the software, or "
             "not the kind of machine, that ran the study"
         )
-    return team, scenario, bodies
 
 
 def _kept(store: Store, trial: Trial) -> list[tuple[object, ...]]:
-    """Return the training episodes of a trial as they are kept, none if it has not finished.
-
-    Those of a curriculum come first.
-    """
+    """Return the training episodes of a trial as they are kept, those of a curriculum first."""
     names, every = store.episodes()
-    phase = names.index("phase")
-    rows = [row for row in every if row[phase] == "training" or row[phase].startswith(STAGE)]
     at = [names.index(name) for name in columns(store.measures())]
-    where = names.index("condition"), names.index("seed")
-    own = (row for row in rows if tuple(row[i] for i in where) == (trial.condition, trial.seed))
-    return [tuple(row[i] for i in at) for row in own]
+    condition, seed, phase = (names.index(name) for name in ("condition", "seed", "phase"))
+    own = (row for row in every if (row[condition], row[seed]) == (trial.condition, trial.seed))
+    trained = (row for row in own if row[phase] == "training" or row[phase].startswith(STAGE))
+    return [tuple(row[i] for i in at) for row in trained]
 
 
 def folder_of(directory: Path, trial: Trial, conditions: Sequence[str]) -> Path:

@@ -1,7 +1,7 @@
 """The spec of a study, as it stands in a TOML file.
 
 ``study``, ``preset``, ``seeds``, ``episodes``, ``steps``, ``evaluation``,
-``evaluation_steps``, ``agents``, then the tables
+``evaluation_steps``, ``keep_teams``, ``agents``, then the tables
 ``[scenario]``, ``[topology]``, ``[learner]``, laid over the preset. What is compared:
 ``[[overrides]]``, further tables by name, and ``[sweep]``, lists of values by dotted key; the
 conditions are their combinations. ``[[curriculum]]`` are stages of training before that of the
@@ -73,6 +73,9 @@ class Spec(Settings):
     """Episodes after training in which nothing is explored and nothing learned."""
     evaluation_steps: Length | None = None
     """Most decisions in an episode of evaluation; as in training by default."""
+    keep_teams: bool = False
+    """Whether trained teams are kept with their trials, to act, be explained and be re-evaluated
+    without training anew."""
     scenario: Mapping[str, Any] = Field(default_factory=dict)
     """Laid over the preset's scenario."""
     agents: Agents | None = None
@@ -280,6 +283,8 @@ class Spec(Settings):
         table["overrides"] = [_filled(override) for override in table.get("overrides", ())]
         if self.seeds == tuple(range(len(self.seeds))):
             table["seeds"] = len(self.seeds)
+        if not self.keep_teams:  # studies of before there was a choice say no more
+            del table["keep_teams"]
         return {key: value for key, value in table.items() if value not in ([], ())}
 
 

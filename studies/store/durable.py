@@ -23,6 +23,9 @@ Recording = dict[str, NDArray[Any]]
 ``constants_of_episode`` returns; and ``messages_fail`` ``(T + 1, n)``, whose messages fail, if any
 are to."""
 
+TEAM = "team"
+"""The name of what is kept of a trained team, beside those of recorded episodes."""
+
 
 class NotRecordedError(SpecError):
     """A file of recordings is sound, and holds none of this name."""

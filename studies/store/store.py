@@ -179,7 +179,7 @@ class Store(Reading):
             return self._db.execute("DELETE FROM trials WHERE state = 'failed'").rowcount
 
     def recording(self, identity: str, name: str) -> Recording:
-        """Return a recorded episode of a trial, by its name in `Planned.recorded`."""
+        """Return a recorded episode of a trial by its name in `Planned.recorded`, or its `TEAM`."""
         query = "SELECT recording_sha256 FROM trials WHERE identity = ?"
         noted = self._db.execute(query, (identity,)).fetchone()
         return durable.read_recording(self._recordings(identity), name, *(noted or ()))

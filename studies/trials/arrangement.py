@@ -6,9 +6,11 @@ that read results import nothing that learns.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
 
 from ...core.agents.loop import policy_seed
 from ...core.agents.rows import carried_rows
@@ -75,12 +77,6 @@ def arrange(settings: ConditionSettings, seed: int) -> Arrangement:
     return Arrangement(world, scenario, team)
 
 
-def build(settings: ConditionSettings, seed: int) -> tuple[Scenario, Team]:
-    """Return the scenario and the untrained team of fuzzy agents of a condition; see `arrange`."""
-    arrangement = arrange(settings, seed)
-    return arrangement.scenario, of_fuzzy_agents(arrangement.team)
-
-
 def teach(
     own: Arrangement, settings: ConditionSettings, curriculum: Sequence[Stage], seed: int
 ) -> Iterator[tuple[Stage, Arrangement]]:
@@ -138,27 +134,51 @@ def _naming(key: str) -> Iterator[None]:
         raise ValueError(f"{key}: {error}") from error
 
 
-def check(spec: Spec) -> tuple[Measure, ...]:
+def check(spec: Spec, chosen: Container[str] | None = None) -> tuple[Measure, ...]:
     """Return what a study measures of its episodes, if all its conditions can be built.
+
+    Parameters
+    ----------
+    spec
+        The study.
+    chosen
+        Labels of the conditions that matter; None: all.
 
     Raises
     ------
     SpecError
         If one cannot be, or their measures do not fit together; before anything is run or written.
     """
-    conditions = spec.conditions()
+    conditions = [c for c in spec.conditions() if chosen is None or c.label in chosen]
     measures: list[Sequence[Measure]] = []
     with spec.sources.active():
         for condition in conditions:
             where = f" (condition {condition.label!r})" if len(conditions) > 1 else ""
             try:
                 measures += [measures_of(there.world) for there in _arrangements(condition)]
+                if spec.keep_teams:
+                    _check_saved(condition.settings)
             except ValueError as error:
                 raise SpecError(f"{error}{where}") from None
             except SystemExit as error:
                 problem = f"the scenario or topology calls sys.exit({error.code})"
                 raise SpecError(f"{problem}{where}") from None
     return joined(measures, conditions[0].columns)
+
+
+def _check_saved(settings: ConditionSettings) -> None:
+    """Refuse a team that arrays cannot bring back."""
+    team: Any = arrange(settings, 0).team
+    try:
+        arrays = {name: np.array(array) for name, array in team.arrays().items()}
+        if objects := [name for name, array in arrays.items() if array.dtype.hasobject]:
+            raise TypeError(f"its array {objects[0]!r} holds objects")
+        team.restore(arrays)
+    except Exception as error:  # a learner may be anybody's
+        raise ValueError(
+            f"keep_teams = true: a team of learner.kind = {settings.learner.kind!r} cannot be "
+            f"saved, {error}; needs `arrays` of numbers, and `restore` that takes them"
+        ) from None
 
 
 def _arrangements(condition: Condition) -> Iterator[Arrangement]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -26,9 +26,9 @@ from ..store.schema import Noted
 from ..store.store import Store, locked
 from . import code
 from .measures import column_of
-from .trial import Trial, trials_of
+from .trial import AS_IN_SPEC, Trial, trials_of
 
-SAME = ("study", "episodes", "steps", "evaluation", "evaluation_steps", "evaluations")
+SAME = (*AS_IN_SPEC, "evaluations")
 """What of a spec must be the same for a study to go on."""
 
 
@@ -99,13 +99,14 @@ def pending(store: Store, trials: Iterable[Trial]) -> list[Trial]:
     return [trial for trial in trials if trial.identity not in states]
 
 
-def trial_of(store: Reading, condition: str | None, seed: int | None) -> Trial:
+def finished_trial(store: Store, condition: str | None, seed: int | None) -> Trial:
     """Return the trial of a condition and seed of a study, each the first one unless named.
 
     Raises
     ------
     SpecError
-        If there is no such condition or seed.
+        If there is no such condition or seed, the trial has not finished, or what is kept of it is
+        not as it was written.
     """
     spec = spec_of(store)
     known = {c.label: aliases(c.label, c.columns) for c in spec.conditions()}
@@ -117,7 +118,20 @@ def trial_of(store: Reading, condition: str | None, seed: int | None) -> Trial:
     seed = spec.seeds[0] if seed is None else seed
     if seed not in spec.seeds:
         raise SpecError(f"seed = {seed}: known: {', '.join(map(str, spec.seeds))}")
-    return next(t for t in trials_of(spec) if (t.condition, t.seed) == (labels[0], seed))
+    trial = next(t for t in trials_of(spec) if (t.condition, t.seed) == (labels[0], seed))
+    if store.states().get(trial.identity) != "done":
+        unfinished = f"{trial.condition}, seed {seed}: has not finished"
+        raise SpecError(store.damage().get(trial.identity, unfinished))
+    return trial
+
+
+def check_teams(store: Store, identities: Container[str] = ()) -> None:
+    """Refuse a study that keeps no teams, or not those of some trials as they were written."""
+    if not store.spec().get("keep_teams"):
+        raise SpecError(f"{store.directory}: keeps no teams: its spec has no keep_teams = true")
+    for identity, line in store.damage().items():
+        if identity in identities:
+            raise SpecError(f"{line}; nested-agents run runs it again")
 
 
 def noted_of(spec: Spec, measures: Sequence[Measure] = (), trials: Sequence[Trial] = ()) -> Noted:

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from time import perf_counter
+from typing import Any
 
 from ...core.agents.loop import StepRecord, control_loop, world_seed
 from ...core.agents.team import Team
 from ...core.interface.acting import Actors
 from ...core.interface.measures import Measure, measures_of
 from ...core.interface.scenario import EpisodeRecorder, RecordedScenario
-from ..store.durable import Recording
+from ..store.durable import TEAM, Recording
 from ..store.schema import EVALUATION, STAGE
 from .arrangement import Arrangement, arrange, teach, transfer
 from .episodes import EpisodeMeter, EpisodeRow, Stopwatch
@@ -64,6 +65,21 @@ class Session:
         cls(replace(trial, episodes=1, steps=3, curriculum=())).train(1)
         return cls(trial)
 
+    @classmethod
+    def restored(cls, trial: Trial, arrays: Recording) -> Session:
+        """Return a session whose team is trained: it is one that a trial of the same kept.
+
+        Raises
+        ------
+        ValueError
+            If the trial cannot be built, or the arrays are of another team.
+        """
+        session = cls(trial)
+        team: Any = session.team
+        team.restore(arrays)
+        session._stages = ()
+        return session
+
     def train(
         self,
         episodes: int,
@@ -110,8 +126,12 @@ class Session:
                 self.deciding.append(record.deciding)
 
     def evaluate(self, observe: Observer | None = None, phase: str = "evaluation") -> None:
-        """Let the team act greedily on worlds of no training, and show every step to `observe`."""
+        """Let the team act greedily on worlds of no training, and show every step to `observe`.
+
+        A team is kept, if the trial is to keep it, as it begins the last of these.
+        """
         self._go_through_curriculum()
+        self._keep_team()
         self._evaluate(self._own, phase, observe)
 
     def run_other_evaluations(self, observers: Mapping[str, Observer] | None = None) -> None:
@@ -127,6 +147,11 @@ class Session:
             self._note_measures(there)
             self._evaluate(there, f"{EVALUATION}{name}", (observers or {}).get(name))
             rng.state = state
+
+    def _keep_team(self) -> None:
+        if self.trial.keep_teams:
+            arrays = self.team.arrays()
+            self._recordings[TEAM] = {name: array.copy() for name, array in arrays.items()}
 
     def _note_measures(self, there: Arrangement) -> None:
         self._measures = joined((self._measures, measures_of(there.world)))
@@ -219,6 +244,8 @@ class Session:
         usage: Mapping[str, float] | None = None,
     ) -> TrialResult:
         """Return what has been measured, and what the measure adds to it."""
+        if TEAM not in self._recordings:  # was never evaluated
+            self._keep_team()
         return TrialResult(
             tuple(self._rows), self._measures, self._recordings, self._watch.seconds,
             numbers or {}, usage or {},

@@ -22,8 +22,8 @@ from .episodes import EpisodeRow
 if TYPE_CHECKING:
     from ..spec.spec import Spec
 
-PLAIN = ("study", "condition", "seed", "episodes", "steps", "evaluation", "evaluation_steps")
-"""What of a trial any process can read as it is."""
+AS_IN_SPEC = ("study", "episodes", "steps", "evaluation", "evaluation_steps", "keep_teams")
+"""What all trials of a spec have in common, and any process can read as it is."""
 
 
 @dataclass(frozen=True)
@@ -50,13 +50,15 @@ class Trial:
     """Stages that the team is trained in before its own scenario."""
     evaluation_steps: int | None = None
     """As in `Spec`."""
+    keep_teams: bool = False
+    """As in `Spec`; changes nothing that is measured, and is no part of its identity."""
     sources: Sources = field(default_factory=Sources, compare=False)
     """The files of users that it names; what they mean is part of its identity."""
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Settings of a user's thing are of a class that only its file can make again.
         content = {
-            **{name: getattr(self, name) for name in PLAIN},
+            **{name: getattr(self, name) for name in ("condition", "seed", *AS_IN_SPEC)},
             "settings": self.settings.model_dump(),
             "evaluations": [(name, other.model_dump()) for name, other in self.evaluations],
             "curriculum": [(s.name, s.episodes, s.scenario.model_dump()) for s in self.curriculum],
@@ -143,7 +145,8 @@ class TrialResult:
     """What is measured of them; of some episodes a part, if scenarios of evaluations differ."""
     recordings: dict[str, Recording]
     """Training episodes by name, those of `Trial.recorded`; none if the scenario is no
-    `RecordedScenario`. A function of the trial, too."""
+    `RecordedScenario`. Under `TEAM` the arrays of the trained team, if it is to be kept. A function
+    of the trial, too."""
     seconds: dict[str, float]
     """Time spent in each part of the control loop; differs from run to run."""
     numbers: Mapping[str, float] = field(default_factory=dict)
@@ -156,17 +159,13 @@ def trials_of(spec: Spec) -> tuple[Trial, ...]:
     """Return the trials of a spec: seed by seed, so that every condition advances alike."""
     first = [
         Trial(
-            study=spec.study,
             condition=condition.label,
             settings=condition.settings,
             seed=spec.seeds[0],
-            episodes=spec.episodes,
-            steps=spec.steps,
-            evaluation=spec.evaluation,
             evaluations=condition.evaluations,
             curriculum=condition.curriculum,
-            evaluation_steps=spec.evaluation_steps,
             sources=spec.sources,
+            **{name: getattr(spec, name) for name in AS_IN_SPEC},
         )
         for condition in spec.conditions()
     ]

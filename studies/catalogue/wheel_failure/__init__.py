@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ....core.agents.team import Team
+from ....core.agents.team import Team, of_fuzzy_agents
 from ....core.learners.frozen import FrozenSettings
 from ....core.learners.learner import LearnerSettings
 from ...errors import SpecError
@@ -33,7 +33,7 @@ from ...results.summary import Summary
 from ...results.verdicts import power_lines
 from ...spec.labels import label_but
 from ...spec.spec import Spec
-from ...trials.arrangement import build
+from ...trials.arrangement import arrange
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..study import check_rule_bases
@@ -113,7 +113,7 @@ def _keeping_weights(session: Session) -> Team:
         if name != "kind"
     }
     frozen = settings.model_copy(update={"learner": FrozenSettings(**common)})
-    _, team = build(frozen, session.trial.seed)
+    team = of_fuzzy_agents(arrange(frozen, session.trial.seed).team)
     own, arrays = team.arrays(), session.team.arrays()
     team.restore({name: arrays.get(name, own[name]) for name in own})
     return team

@@ -21,23 +21,23 @@ from .. import options
 def command(directory: Path, condition: str | None, seed: int | None, trust: bool) -> int:
     """Explain a trained team: its rules in words, its policy, its self-model.
 
-    DIR is where the study is kept. Text and figures go into its folder explain. Training is run
-    again for it, which takes seconds, and must give the episodes that are kept.
+    DIR is where the study is kept. Text and figures go into its folder explain. Unless the study
+    keeps its teams (keep_teams = true in its spec), training is run again, which takes seconds, and
+    must give the episodes that are kept.
     """
     from ...explain import team
     from ...explain.figures import draw
     from ...explain.text import MOST_AGENTS, text
     from ...presentation.figures import save
-    from ...presentation.progress import say
     from ...store import durable
+    from ...trials.keeping import finished_trial
     from ..loading import opened, trust_files
 
     if trust:
         trust_files(directory)
     with opened(directory) as store:
-        trial = team.choose(store, condition, seed)
+        trial = finished_trial(store, condition, seed)
         conditions = list(store.columns())
-        say(f"training {trial.condition}, seed {trial.seed} again: {trial.lengths}")
         explanation = team.explain(store, trial)
     folder = team.folder_of(directory, trial, conditions)
     folder.mkdir(parents=True, exist_ok=True)

@@ -9,7 +9,7 @@ from nested_agents.core.agents.loop import control_loop, world_seed
 from nested_agents.core.decision.exploration import BoltzmannExploration, PaperExploration
 from nested_agents.scenarios.matrix_games.plays import parts_of
 from nested_agents.studies.spec.conditions import ConditionSettings
-from nested_agents.studies.trials.arrangement import build
+from nested_agents.studies.trials.arrangement import arrange
 
 PLAYS = 40
 FULL = {"joint": 2, "own": 1, "above": 2}
@@ -59,7 +59,7 @@ EXPLORATIONS = [
 def test_a_compiled_episode_is_the_control_loops(case, exploration):
     learner = CASES[case].learner.model_copy(update={"exploration": exploration})
     condition = CASES[case].model_copy(update={"learner": learner})
-    (game, team), (other, reference) = build(condition, 3), build(condition, 3)
+    (_, game, team), (_, other, reference) = arrange(condition, 3), arrange(condition, 3)
     for episode, learn in enumerate([True, False, True]):
         records = control_loop(
             other, reference, episodes=1, steps=PLAYS, seed=3, first_episode=episode, learn=learn
@@ -97,7 +97,7 @@ def test_a_compiled_episode_is_the_control_loops(case, exploration):
 )
 def test_what_the_kernel_does_not_know_is_left_to_the_control_loop(changes):
     condition = settings("td-lambda", "joint", "chain", "best-response", **changes)
-    game, team = build(condition, 0)
+    _, game, team = arrange(condition, 0)
     assert parts_of(game, team, learn=True) is None
     assert game.run_episode(team, world_seed(0, 0), 0, 5, learn=True) is None
     assert len(list(control_loop(game, team, episodes=1, steps=5, seed=0))) == 5

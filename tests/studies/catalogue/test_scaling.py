@@ -9,7 +9,7 @@ from nested_agents.studies.catalogue.scaling import analyse, draw, exponents_of,
 from nested_agents.studies.catalogue.study import drawn
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.arrangement import build, check
+from nested_agents.studies.trials.arrangement import arrange, check
 from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import trials_of
 
@@ -106,7 +106,7 @@ def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("topology", "count"), [("chain", 6), ("star", 3), ("independent", 0)])
 def test_messages_are_the_edges_of_the_transitive_closure(topology: str, count: int) -> None:
     (condition,) = Spec.of({"topology": topology}).conditions()
-    hierarchy = build(condition.settings, 0)[1].hierarchy
+    hierarchy = arrange(condition.settings, 0).team.hierarchy
     assert hierarchy.messages == count
 
 

@@ -13,6 +13,7 @@ from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store import integrity
 from nested_agents.studies.store.schema import RESULTS_VERSION
 from nested_agents.studies.store.store import DATABASE, Store
+from nested_agents.studies.trials.keeping import finished_trial
 from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import trials_of
 from nested_agents.studies.workers.runner import save
@@ -91,7 +92,7 @@ def test_pairs_of_variables_and_nothing_learned(study, capsys):
     [
         (["--condition", "oder 1"], "did you mean 'order 1'"),
         (["--seed", "4"], "seed = 4: known: 3"),
-        (["--condition", "unfinished"], "unfinished, seed 3 has not finished"),
+        (["--condition", "unfinished"], "unfinished, seed 3: has not finished"),
     ],
 )
 def test_what_the_user_can_mend(arguments, complaint, study, capsys):
@@ -127,7 +128,7 @@ def test_results_of_another_version_are_refused(study, monkeypatch, capsys):
 
 def test_another_team_than_the_one_that_was_measured_is_not_explained(study, monkeypatch):
     with Store.open(study) as store:
-        trial = explain.choose(store, None, None)
+        trial = finished_trial(store, None, None)
         kept = explain._kept(store, trial)
         monkeypatch.setattr(explain, "_kept", lambda *_: [*kept[:2], (*kept[2][:-1], 0.0)])
         with pytest.raises(ValueError, match="gives another episode 2 than the one that is kept"):

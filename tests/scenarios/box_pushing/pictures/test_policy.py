@@ -3,12 +3,12 @@ import pytest
 
 from nested_agents.scenarios.box_pushing.pictures.policy import Field
 from nested_agents.studies.spec.conditions import ConditionSettings
-from nested_agents.studies.trials.arrangement import build
+from nested_agents.studies.trials.arrangement import arrange
 
 
 @pytest.mark.parametrize(("slope", "to_the_box"), [(-1.0, True), (1.0, False)])
 def test_a_team_that_likes_the_box_drives_to_it(slope, to_the_box):
-    scenario, team = build(ConditionSettings(), 0)
+    _, scenario, team = arrange(ConditionSettings(), 0)
     partitions = team.evaluator.rules.partitions
     gap = [v.name for v in scenario.state_space.variables].index("gap")
     begin = sum(p.size for p in partitions[:gap])

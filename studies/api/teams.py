@@ -1,0 +1,125 @@
+"""Trained teams that a study keeps, evaluated under other hierarchies."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from itertools import product
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+from ...core.plugins.sources import Sources
+from ..errors import SpecError, show
+from ..results.results import DONE, read
+from ..spec.labels import label
+from ..spec.objects import plain
+from ..spec.spec import Spec
+from ..store.durable import TEAM
+from ..store.schema import EVALUATION
+from ..store.store import Store
+from ..trials.arrangement import check
+from ..trials.keeping import check_teams, open_to_run
+from ..trials.session import Session
+from ..trials.trial import Trial, TrialResult, trials_of
+from ..workers.runner import run_trials
+from ..workers.workers import start_workers
+from .study import Place, StudyResults, load
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+
+def reevaluate(
+    study: StudyResults | Place,
+    topology: Sequence[Any] = (),
+    decision: Sequence[Any] = (),
+    *,
+    jobs: int | None = None,
+) -> DataFrame:
+    """Evaluate the trained teams of a study under other topologies and ways to decide.
+
+    Every team acts with its weights on the worlds of its own evaluation, and begins with the random
+    numbers that it began that one with: under what it was trained with, it does the same again.
+    Files of yours that the study keeps are taken as it keeps them.
+
+    Parameters
+    ----------
+    study
+        What `load` or `run` returned, or a part of it by ``where``; or the directory of a study
+        that keeps its teams (``keep_teams = true``).
+    topology
+        Topologies, as a spec has them: text, or a table laid over that of training.
+    decision
+        Tables laid over ``learner.decision`` of training. If both are given, each of these is
+        evaluated with each topology.
+    jobs
+        Processes; None: one for every core.
+
+    Returns
+    -------
+    DataFrame
+        A row per episode as in `StudyResults.episodes`, with a column `entry`: which of the
+        topologies and decisions it is of.
+
+    Raises
+    ------
+    SpecError
+        If there are no such teams, or they cannot act so; one line.
+    """
+    study = study if isinstance(study, StudyResults) else load(study)
+    done = study.trials[study.trials["state"] == DONE]
+    identities = {(row.condition, row.seed): str(row.identity) for row in done.itertuples()}
+    directory = study.directory.resolve()
+    with Store.open(directory) as store:
+        check_teams(store, {*identities.values()})
+        table = {**store.spec(), "evaluations": _entries(topology, decision), "keep_teams": False}
+        sources = Sources(Path(), store.sources(), brought_by=str(directory))
+    spec = Spec.of(table, sources)
+    if spec.evaluation < 1:
+        raise SpecError("evaluation = 0: reevaluate needs a study of 1 or more")
+    measures = check(spec, {condition for condition, _ in identities})
+    trials = [t for t in trials_of(spec) if (t.condition, t.seed) in identities]
+    with (
+        TemporaryDirectory() as folder,
+        start_workers("loky", jobs, None, len(trials)) as workers,
+        open_to_run(Path(folder), spec, trials, measures) as store,
+    ):
+        evaluate = partial(_evaluate, directory, identities)
+        for outcome in run_trials(trials, store, evaluate, workers):
+            if outcome.error is not None:
+                where = f"{outcome.trial.condition}, seed {outcome.trial.seed}"
+                raise SpecError(f"{where}: {outcome.error.splitlines()[-1]}")
+        frame = read(store).episodes
+    frame.insert(0, "entry", frame["phase"].str.removeprefix(EVALUATION))
+    meaning = "topology and decision by which the trained team acts"
+    frame.attrs["columns"]["entry"] = {"unit": "", "meaning": meaning}
+    return frame
+
+
+def _entries(topology: Sequence[Any], decision: Sequence[Any]) -> dict[str, dict[str, Any]]:
+    """Return the table of ``[evaluations]``, by what tells its entries apart."""
+    given = {"topology": topology, "decision": decision}
+    lists = {key: plain(values, key) for key, values in given.items() if values}
+    if not lists or not all(isinstance(values, list | tuple) for values in lists.values()):
+        asked = ", ".join(f"{key} = {show(values)}" for key, values in given.items())
+        raise SpecError(f"{asked}: must be lists, one of them not empty")
+    entries = {}
+    for values in product(*lists.values()):
+        point: dict[str, Any] = dict(zip(lists, values, strict=True))
+        name = label(point)
+        if "decision" in point:
+            point["learner"] = {"decision": point.pop("decision")}
+        entries[name] = point
+    return entries
+
+
+def _evaluate(
+    directory: Path, identities: Mapping[tuple[str, int], str], trial: Trial
+) -> TrialResult:
+    """Evaluate the kept team of a trial in its `evaluations`; imported by name in workers."""
+    with Store.open(directory) as store:
+        arrays = store.recording(identities[trial.condition, trial.seed], TEAM)
+    session = Session.restored(trial, arrays)
+    session.run_other_evaluations()
+    return session.result()
