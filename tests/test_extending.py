@@ -1,10 +1,13 @@
 """The examples of docs/extending.md: short, and run from outside the repository."""
 
 import re
+from dataclasses import fields as fields_of
 from pathlib import Path
 
 import pytest
 
+from nested_agents.core.evaluators.evaluator import DecisionProblem, Deliberation
+from nested_agents.studies.api.study import run
 from nested_agents.studies.cli.main import main
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "extending.md"
@@ -40,3 +43,25 @@ def test_an_example_is_short_and_runs(
         assert main(arguments) == 0
         (tmp_path / name).unlink(missing_ok=True)  # the study has its own copy
     assert (tmp_path / "out" / "report.html").is_file()
+
+
+def test_what_decides_is_documented_field_by_field() -> None:
+    page = PAGE.read_text()
+    for fields in (Deliberation._fields, (field.name for field in fields_of(DecisionProblem))):
+        assert all(f"| `{name}`" in page for name in fields)
+
+
+def test_the_example_of_a_recording_is_drawn(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (code,) = re.findall(r"```python\n# filmed.py\n(.*?)```", PAGE.read_text(), re.DOTALL)
+    (tmp_path / "filmed.py").write_text(code)
+    monkeypatch.chdir(tmp_path)
+    spec = {
+        "study": "learning-curve", "seeds": 1, "episodes": 1, "steps": 3, "evaluation": 1,
+        "scenario": {"kind": str(tmp_path / "filmed.py:Filmed")},
+    }  # fmt: skip
+    study = run(spec, tmp_path / "out", jobs=1, progress=False)
+    assert study.replay().path.read_bytes().startswith(b"GIF8")
+    assert str(study).startswith(str(study.table()))
+    assert repr(study) == str(study)

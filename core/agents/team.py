@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from inspect import signature
 from pathlib import Path
 from typing import Any, cast
 
@@ -95,6 +96,9 @@ class Team:
         rows = self.rows if self.mirror is None else self.mirror.rows(self.rows)
         rules = RuleBase.build(scenario.state_space, settings.rule_base)
         self.learner: Learner = settings.build(rules, rows)
+        self._asked = signature(self.learner.observe).parameters.keys() & {"left", "joint_action"}
+        self._states: FloatArray = np.zeros((len(hierarchy), scenario.state_space.n_variables))
+        self._left: FloatArray = self._states
         self.evaluator: Evaluator | None = None
         decision = settings.decision
         if decision.rule != "random":
@@ -163,8 +167,10 @@ class Team:
     def predict(self, scenario: Scenario, states: FloatArray | None = None) -> Prediction:
         """Predict from the scenario's present state, by what has been learned of it.
 
-        The agents' `states` are not needed.
+        The agents' `states` ``(n, d)`` are needed by learners and evaluators that ask for them.
         """
+        if states is not None:
+            self._states = states
         if self.self_model is None and self.calibration is None:
             return scenario.predict()
         embodied = cast(EmbodiedScenario, scenario)
@@ -180,8 +186,10 @@ class Team:
         is, apart from the random numbers that break ties.
         """
         n, n_actions = len(self.hierarchy), len(self.action_set)
+        self._left = self._states
         if self.evaluator is None:
-            return self.rng.integers(n_actions, size=n)
+            self._last = self.rng.integers(n_actions, size=n)
+            return self._last
         frequencies = self.seen / self.seen.sum(axis=1, keepdims=True)
         theta = self.learner.theta
         weights = [theta[row] for row in self.rows]
@@ -189,8 +197,9 @@ class Team:
         for i in self.hierarchy.order:
             senders, known = self._known(i, joint)
             deliberation = Deliberation(
-                i, known, prediction, weights, frequencies, self.rng, self._given_by(i), senders
-            )
+                i, known, prediction, weights, frequencies, self.rng, self._given_by(i), senders,
+                self._states,
+            )  # fmt: skip
             values = self.evaluator.values(deliberation)
             if explore:
                 joint[i] = self.explorer.choose(i, values, self.rng)
@@ -254,10 +263,13 @@ class Team:
 
     def learn(self, transition: Transition) -> None:
         """Take in what a step led to."""
-        states, reward = transition.states, transition.reward
+        states, reward, left, taken = transition.states, transition.reward, self._left, self._last
         if self.mirror is not None:
             states, reward = self.mirror.states(states), self.mirror.reward(reward)
-        self._count(self.learner.observe(states, reward, transition.terminated))
+            left, taken = self.mirror.states(left), np.tile(taken, 2)
+        offered = {"left": left, "joint_action": taken}
+        asked: Any = {name: offered[name] for name in self._asked}
+        self._count(self.learner.observe(states, reward, transition.terminated, **asked))
 
     def end_episode(self) -> None:
         """Learn what is learned after an episode."""

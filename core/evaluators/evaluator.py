@@ -30,6 +30,8 @@ Plan = Literal["private", "common"]
 
 NOTHING_GIVEN: FloatArray = np.zeros((0, 0, 0))
 """Conditional frequencies that nobody counts."""
+NO_STATES: FloatArray = np.zeros((0, 0))
+"""States that nobody looks at."""
 NOBODY: IntArray = np.zeros(0, dtype=np.int64)
 """No agents."""
 
@@ -55,6 +57,8 @@ class Deliberation(NamedTuple):
     the teammate model asks for it, else empty."""
     told: IntArray = NOBODY
     """``(k,)`` the agents of whose actions it was told."""
+    present: FloatArray = NO_STATES
+    """``(n, d)`` the states that all agents are in."""
 
     @property
     def own_weights(self) -> FloatArray:

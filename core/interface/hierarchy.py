@@ -132,19 +132,16 @@ class Hierarchy:
         self.bodies = tuple(bodies) or tuple((name,) for name in agents)
         place = {index[name]: k for k, body in enumerate(self.bodies) for name in body}
 
-        def related(agent: int, relation: Any, every: str) -> set[int]:
+        def related(agent: int, relation: Any, every: str) -> Iterable[int]:
             if isinstance(relation, str):
-                return set(RELATIONS[relation](graph, agent))
+                return RELATIONS[relation](graph, agent)
             away = {j: abs(place[j] - place[agent]) for j in RELATIONS[every](graph, agent)}
-            return {j for j, bodies in away.items() if WHERE[min(bodies, 2)] in relation}
+            return [j for j, bodies in away.items() if WHERE[min(bodies, 2)] in relation]
 
-        self._below = tuple(
-            tuple(sorted(related(i, considers, "descendants") | beside[i]))
-            for i in range(len(agents))
-        )
-        self._above = tuple(
-            tuple(sorted(related(i, told, "ancestors"))) for i in range(len(agents))
-        )
+        below = [{*related(i, considers, "descendants"), *own} for i, own in enumerate(beside)]
+        self._below = tuple(tuple(sorted(agents)) for agents in below)
+        above = (related(i, told, "ancestors") for i in range(len(agents)))
+        self._above = tuple(tuple(sorted(agents)) for agents in above)
         self.told, self.considers = told, considers
         self.depth: int = nx.dag_longest_path_length(graph) + 1
         """Number of agents on the longest path."""

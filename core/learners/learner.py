@@ -23,6 +23,10 @@ class Learner(Protocol):
     Agents that share weights have one row of them in common; `rows`, which a learner is built with,
     says which row is whose.
 
+    A learner whose ``observe`` has arguments of these names is also given, by name, ``left``
+    ``(n, d)``, the states that the agents were in, and ``joint_action`` ``(n,)``, what they then
+    did: what learners of state-action values, such as SARSA, learn from.
+
     A learner that can begin with what one of the same settings has learned for other agents also
     has ``continue_from(former, rows)``: ``rows`` ``(n_rows,)`` says from which row of ``former``,
     which is not modified and whose episodes are over, each row goes on.

@@ -168,7 +168,7 @@ OWN_HIERARCHY = Lab(
             hint="find the least n with 2 ** (1 - n) < .05",
         ),
         "absent": Choice(
-            "A comparison of six seeds ends with 'no difference found'. What does that say?",
+            "A comparison of six seeds ends with 'no significant difference'. What does it say?",
             {
                 "a": "The hierarchies are equally good.",
                 "b": "A difference as large as the ends of the interval may remain.",

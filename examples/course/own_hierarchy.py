@@ -80,7 +80,7 @@ answers = {
     "chain": None,  # how many joint actions does a decision of the chain of four try?
     "independent": None,  # and if nobody sees anybody?
     "seeds": None,  # with how many seeds can one comparison reach p < .05 at all?
-    "absent": None,  # "no difference found": a: equal, b: one may remain, c: the study was faulty
+    "absent": None,  # "no significant difference": a: equal, b: may remain, c: the study was faulty
     "edges": None,  # your hierarchy of eight wheels
 }
 print(grade("own-hierarchy", answers))

@@ -114,14 +114,14 @@ def check_scenario(
     for name, check in CHECKS.items():
         try:
             fault = check(examination)
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             fault = _raised(error)
         if fault is not None:
             raise ScenarioError(f"{name}: {fault}")
     return tuple(CHECKS)
 
 
-def _raised(error: Exception) -> str:
+def _raised(error: BaseException) -> str:
     """Return in one line what was raised, and where."""
     where = extract_tb(error.__traceback__)[-1]
     place = f"{where.name}, {Path(where.filename).name}:{where.lineno}"

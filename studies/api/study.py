@@ -59,7 +59,7 @@ Place = str | PathLike[str]
 class StudyResults:
     """What the finished trials of a study measured, or those of several studies together.
 
-    Made by `run` and `load`. A notebook shows it as its table.
+    Made by `run` and `load`. Printed, or shown by a notebook, it is its table.
     """
 
     outline: StudyOutline
@@ -282,6 +282,11 @@ class StudyResults:
         if len(self._directories) != 1:
             raise SpecError("these are not the results of one study that is kept in a directory")
         return self._directories[0]
+
+    def __str__(self) -> str:
+        return "\n".join([str(self.table()), "", *self.notes])
+
+    __repr__ = __str__
 
     def _repr_html_(self) -> str:
         return f"<h4>{self.outline.study}</h4>{self.table().html}"

@@ -48,7 +48,7 @@ class SummaryTable:
         """What must be said of intervals of few seeds, if there are any; else nothing."""
         if all(seeds >= FEW for _, seeds, _ in self.rows):
             return ""
-        return f"Means of fewer than {FEW} seeds have Student's intervals, rates Wilson's."
+        return f"Intervals of fewer than {FEW} seeds: Student's (short if skewed), rates Wilson's."
 
     def __str__(self) -> str:
         if not self.rows:

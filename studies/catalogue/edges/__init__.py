@@ -63,16 +63,14 @@ def measure(trial: Trial) -> TrialResult:
     session.run_other_evaluations({name: partial(note, name) for name in deciding})
     numbers = {"robots": float(len(groups_of(session.world)))}
     for name, settings in ((TRAINED, trial.settings), *trial.evaluations):
-        _, hierarchy = settings.arrange(session.world)
-        numbers[f"messages.{name}"] = float(hierarchy.messages)
+        numbers[f"messages.{name}"] = float(settings.arrange(session.world)[1].messages)
     usage = {f"decision.{name}": float(np.median(d)) for name, d in deciding.items()}
     return session.result(numbers, usage)
 
 
 def analyse(results: Results) -> Analysis:
     """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
-    cases = []
-    conditions = results.of_phase("evaluation")
+    cases, conditions = [], results.of_phase("evaluation")
     sizes = {c: int(results.numbers(c)["robots"][0]) for c in conditions}
     for condition, robots in sizes.items():
         numbers, columns = results.numbers(condition), results.columns.get(condition, {})

@@ -4,8 +4,8 @@ Conditions are topologies, crossed with whose value decides and with the number 
 the same worlds, seed by seed. One measure was fixed beforehand: evaluation success. For each number
 of robots and each choice of whose value decides, every hierarchy is compared with the chain (with
 the first hierarchy if there is no chain) by permutation of signs; p is adjusted by Holm's method
-over all of these comparisons. Few seeds cannot give a small p whatever the outcome: what they
-leave undecided is called so, and how many seeds it takes is printed.
+over all of these comparisons. Few seeds cannot give a small p whatever the outcome: how many it
+takes is printed.
 
 A trial is measured as one of the scaling study, messages included: one for every edge of the
 hierarchy's transitive closure. Decisions to the goal are those of successful episodes alone: a
@@ -14,21 +14,19 @@ hierarchy that succeeds only where it is easy looks quick.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from textwrap import wrap
 
 import numpy as np
 
+from ....core.interface.measures import SUCCESS
 from ...errors import SpecError
 from ...results.analysis import Analysis, Figures
-from ...results.comparison import Array, Difference, adjusted, difference, of_shared_seeds
-from ...results.paired_tests import LEVEL
-from ...results.power import seeds_needed
+from ...results.comparison import Array, Difference, adjusted, of_shared_seeds
+from ...results.contrasts import Contrasts, Group
 from ...results.results import Results
 from ...results.statistics import Estimate, bootstrap, rate
 from ...results.summary import EVALUATED, Summary
-from ...results.verdicts import WIDTH, power_lines
 from ...spec.labels import label_but
 from ...spec.spec import Spec
 from ..scaling import NUMBERS, measure
@@ -42,7 +40,6 @@ REFERENCE = "chain"
 """The hierarchy that others are compared with, if it is there."""
 DECIDING = "decision [ms]"
 """Title of the time that a decision takes."""
-UNBROKEN = "\N{NO-BREAK SPACE}"
 
 
 def check(spec: Spec) -> None:
@@ -80,41 +77,6 @@ class HierarchyCase:
         return f"{counted}, {self.value_of}" if self.value_of else counted
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """Whether the hierarchy matters, given the number of robots and whose value decides."""
-
-    setting: str
-    """Those two."""
-    reference: str
-    """The hierarchy that the others are compared with."""
-    comparisons: tuple[Difference, ...]
-    """Every other hierarchy less the reference, by evaluation success."""
-    among: int
-    """How many comparisons of the study p is adjusted over."""
-
-    @property
-    def different(self) -> tuple[Difference, ...]:
-        """Those that differ significantly."""
-        return tuple(d for d in self.comparisons if d.p < LEVEL)
-
-    @property
-    def undecided(self) -> tuple[Difference, ...]:
-        """Those of too few seeds, and those whose interval leaves out 0 though p is too large."""
-        needed = seeds_needed(self.among)
-        return tuple(
-            d
-            for d in self.comparisons
-            if d.p >= LEVEL and (d.seeds < needed or not d.estimate.low <= 0.0 <= d.estimate.high)
-        )
-
-    @property
-    def alike(self) -> tuple[Difference, ...]:
-        """Those in which no difference was found, though there are seeds enough to find one."""
-        rest = (*self.different, *self.undecided)
-        return tuple(d for d in self.comparisons if d not in rest)
-
-
 def analyse(results: Results) -> Analysis:
     """Estimate and compare; 95 % intervals, seeds as the unit of sampling.
 
@@ -144,11 +106,10 @@ def analysis_of(results: Results, cases: Sequence[HierarchyCase], reference: str
         Summary(f"{c.setting}, {c.hierarchy}", len(results.seeds(c.condition)), c.values)
         for c in cases
     ]
-    verdicts = verdicts_of(results, cases, reference)
-    compared = tuple(d for verdict in verdicts for d in verdict.comparisons)
-    legend = "Rows: number of robots, what else is swept, hierarchy."
-    notes = [legend] if any(case.value_of for case in cases) else []
-    return Analysis(tuple(table), (*notes, *_verdict_lines(verdicts)), cases, compared)
+    contrasts = contrasts_of(results, cases, reference)
+    legend = ["Rows: number of robots, what else is swept, hierarchy.", ""]
+    notes = (*(legend if any(case.value_of for case in cases) else []), *contrasts.notes)
+    return Analysis(tuple(table), notes if cases else (), cases, contrasts.differences)
 
 
 def sizes_of(columns: Mapping[str, Mapping[str, object]], robots: Mapping[str, int]) -> list[str]:
@@ -188,63 +149,31 @@ def to_the_goal(success: Array, steps: Array) -> Array:
     return np.array([run[reached].mean() for reached, run in runs if reached.any()])
 
 
-def verdicts_of(
+def contrasts_of(
     results: Results, cases: Sequence[HierarchyCase], reference: str = REFERENCE
-) -> tuple[Verdict, ...]:
-    """Return where the hierarchy matters: the comparisons of each setting, p adjusted over all.
-
-    Intervals are those of independent rates, which have a width even if all runs ended alike.
-    """
+) -> Contrasts:
+    """Compare each hierarchy with the reference in every setting, p adjusted over all settings."""
     hierarchies = list(dict.fromkeys(case.hierarchy for case in cases))
     reference = reference if reference in hierarchies else next(iter(hierarchies), "")
     bases = {case.setting: case for case in cases if case.hierarchy == reference}
-    compared: list[tuple[str, Difference]] = []
+    settings, compared = [], []
     for case in cases:
         base = bases.get(case.setting, case)
         own, other = of_shared_seeds(
             [results.seeds(one.condition) for one in (case, base)],
-            [results.success(one.condition, one.phase).astype(float) for one in (case, base)],
+            [results.success(one.condition, one.phase).mean(axis=1) for one in (case, base)],
         )
         if base is not case and len(own) >= 2:
-            runs, estimate = (own.mean(axis=1), other.mean(axis=1)), difference(own, other)
+            settings.append(case.setting)
             compared.append(
-                (case.setting, Difference.of(case.hierarchy, EVALUATED, *runs, estimate))
+                Difference.between(case.hierarchy, EVALUATED, own, other, of_rates=True)
             )
-    settings = [setting for setting, _ in compared]
-    every = tuple(zip(settings, adjusted([d for _, d in compared]), strict=True))
-    return tuple(
-        Verdict(setting, reference, tuple(d for s, d in every if s == setting), len(every))
+    every = tuple(zip(settings, adjusted(compared), strict=True))
+    groups = tuple(
+        Group(setting, reference, tuple(d for s, d in every if s == setting), ())
         for setting in dict.fromkeys(settings)
     )
-
-
-def _verdict_lines(verdicts: Sequence[Verdict]) -> Iterator[str]:
-    """Yield lines that say where the hierarchy matters, and where that is undecided."""
-    if not verdicts:
-        return
-    reference, among = verdicts[0].reference, verdicts[0].among
-    text = (
-        f"Does the hierarchy matter? Evaluation success less that of {reference!r}, seed by seed; "
-        f"p is adjusted over {among} comparisons, so fewer than {seeds_needed(among)} seeds cannot "
-        "tell."
-    )
-    yield from ("", *wrap(text, WIDTH, break_on_hyphens=False))
-    for verdict in verdicts:
-        count = f"{len(verdict.different)} of {len(verdict.comparisons)}"
-        yield f"{verdict.setting}: {count} found to differ"
-        yield from (f"  {d.condition} differs by {d.shown}" for d in verdict.different)
-        yield from _listed("no difference found", verdict.alike)
-        yield from _listed("undecided", verdict.undecided)
-    yield from power_lines([d for verdict in verdicts for d in verdict.comparisons])
-
-
-def _listed(what: str, comparisons: Sequence[Difference]) -> Iterator[str]:
-    """Yield differences with their intervals as lines, none of which is broken in two."""
-    if comparisons:
-        shown = [f"{d.condition} {d.shown.rpartition(', ')[0]}" for d in comparisons]
-        text = f"  {what}: " + ", ".join(one.replace(" ", UNBROKEN) for one in shown)
-        lines = wrap(text, WIDTH, subsequent_indent="    ", break_on_hyphens=False)
-        yield from (line.replace(UNBROKEN, " ") for line in lines)
+    return Contrasts(SUCCESS, "evaluation", groups)
 
 
 def draw(analysis: Analysis) -> Figures:

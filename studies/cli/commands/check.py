@@ -63,7 +63,7 @@ def _cases(source: str, changes: tuple[str, ...]) -> Iterator[Case]:
             raise SpecError(" ".join(str(error).split())) from None
         try:
             factory()
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             message = f"raised {type(error).__name__}: {' '.join(str(error).split())}"
             raise SpecError(f"{source}, called without arguments, {message}") from None
         yield source.rpartition(":")[2], factory, [0, 1]

@@ -10,15 +10,19 @@ import numpy as np
 import pytest
 
 from nested_agents.core.agents.joint_agents import join_agents
+from nested_agents.core.agents.loop import control_loop
 from nested_agents.core.agents.messages import AbsentAgents, LostMessages
 from nested_agents.core.agents.rows import carried_rows
 from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.exploration import BurstExploration
+from nested_agents.core.decision.settings import Decision
+from nested_agents.core.evaluators.evaluator import Counts, EvaluatorSettings
 from nested_agents.core.evaluators.exact import ExactEnumeration
 from nested_agents.core.evaluators.sampling import Sampling
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.interface.spaces import ActionSet, StateSpace
 from nested_agents.core.learners import LEARNERS, LearnerSettings
+from tests.scenarios.test_examples import Tank
 
 PAPER = {"kind": "paper", "decay": 0.05, "clock": "episode"}
 BURST = {"kind": "burst", "rate": 0.4}
@@ -422,3 +426,91 @@ def test_failures_of_messages_leave_worlds_and_ties_as_they_are(world) -> None:
     team, _ = acting(world, "maintain", "ancestors")
     broken, _ = acting(world, "maintain", "ancestors", [LostMessages(agents="*", probability=0.0)])
     assert team.rng.bit_generator.state == broken.rng.bit_generator.state
+
+
+class SarsaSettings(LearnerSettings):
+    """SARSA: a value for every action in every state, learned from the action taken next."""
+
+    step_size: float = 0.2
+
+    def build(self, rules, rows):
+        return Sarsa(self, rules, rows)
+
+
+class Sarsa:
+    """Its ``theta`` holds a row of weights for every action, one behind the other."""
+
+    def __init__(self, settings, rules, rows):
+        self.settings, self.rules = settings, rules
+        self.theta = np.zeros((len(rows), 3 * rules.n_rules))
+        self.met = []
+
+    def begin_episode(self):
+        self.before = None
+
+    def observe(self, states, reward, terminated, left, joint_action):
+        self.met.append((left, joint_action, states))
+        features, every = self.rules.features(left), np.arange(len(left))
+        weights = self.theta.reshape(len(left), 3, -1)
+        values = (weights[every, joint_action] * features).sum(axis=1)
+        if self.before is not None:
+            self.update(*self.before, self.settings.discount * values)
+        self.before = features, joint_action, reward
+        if terminated:
+            self.update(*self.before, reward / (1 - self.settings.discount))
+        return self.theta.size
+
+    def update(self, features, joint_action, reward, ahead):
+        every, weights = np.arange(len(features)), self.theta.reshape(len(features), 3, -1)
+        values = (weights[every, joint_action] * features).sum(axis=1)
+        steps = self.settings.step_size * (reward + ahead - values)
+        weights[every, joint_action] += steps[:, None] * features
+
+    def end_episode(self):
+        return 0
+
+    def arrays(self):
+        return {"theta": self.theta}
+
+    def restore(self, arrays):
+        self.theta = arrays["theta"].copy()
+
+
+class StateActionValues:
+    """Values actions by what has been learned of them in the present state."""
+
+    class Settings(EvaluatorSettings):
+        def build(self, problem):
+            return StateActionValues(problem)
+
+    def __init__(self, problem):
+        self.problem, self.counts = problem, Counts()
+
+    def values(self, deliberation):
+        features = self.problem.rules.features(deliberation.present[[deliberation.agent]])[0]
+        return deliberation.own_weights.reshape(self.problem.n_actions, -1) @ features
+
+
+def test_a_learner_that_asks_is_given_what_was_done_where() -> None:
+    """So that SARSA is a learner of a hierarchy like any other."""
+    scenario = Tank(Tank.Settings(pumps=1))
+    decision = Decision().model_copy(update={"evaluator": StateActionValues.Settings()})
+    settings = SarsaSettings(decision=decision, discount=0.8)
+    hierarchy = Hierarchy(scenario.agents, [])
+    team = Team(settings, scenario, hierarchy, np.random.SeedSequence(0))
+
+    def success(first: int, episodes: int, *, learn: bool) -> float:
+        loop = control_loop(
+            scenario, team, episodes=episodes, steps=30, seed=0, first_episode=first, learn=learn
+        )
+        records = list(loop)
+        if learn:
+            for record, (left, taken, entered) in zip(records, team.learner.met, strict=True):
+                np.testing.assert_array_equal(record.states, left)
+                np.testing.assert_array_equal(record.joint_action, taken)
+                np.testing.assert_array_equal(record.transition.states, entered)
+        return sum(record.transition.terminated for record in records) / episodes
+
+    before = success(1000, 20, learn=False)
+    success(0, 60, learn=True)
+    assert success(1000, 20, learn=False) > before + 0.3

@@ -119,12 +119,12 @@ def test_the_fraction_of_explorative_decisions_is_the_rate(
     settings = BurstExploration(rate=rate, floor=0.0, length=length)
     explorer = Bursts(settings, 1)
     explorer.begin_episode()
-    # Of a thousand actions the greatest is hardly ever drawn as a random one.
-    decisions, values = 30000, np.eye(1000)[0]
+    decisions, values = 30000, np.eye(20)[0]
     random = np.count_nonzero([explorer.choose(0, values, rng) for _ in range(decisions)])
     # Bursts of mean length l give as much certainty as decisions / 2 l independent ones.
     deviation = np.sqrt(rate * (1 - rate) * 2 * length / decisions)
-    assert random / decisions == pytest.approx(rate, abs=5 * deviation + 0.005)
+    # One in twenty random actions is the greatest.
+    assert random / decisions / 0.95 == pytest.approx(rate, abs=5 * deviation + 0.005)
 
 
 def test_a_random_action_is_held(rng: np.random.Generator) -> None:

@@ -2,6 +2,7 @@
 
 import random
 import re
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import count
@@ -305,6 +306,10 @@ def perceiving(variable: StateVariable, robots: int = 1) -> Callable[[], Scenari
     return BoxPushingSettings(robots=robots, state_space=("gap", variable)).build  # type: ignore[arg-type]
 
 
+def leaving(self: Any, *args: Any) -> Any:
+    sys.exit(0)
+
+
 BLOCKS = "predictions: blocks of agent 1: "
 SENSED = "sensed and predicted: "
 
@@ -407,6 +412,8 @@ FAULTS: dict[str, tuple[Callable[[], Scenario], str]] = {
     ),
     "not common": (perceiving(not_common, 2), SENSED + "not_common of agent . is"),
     "hidden state": (perceiving(stale), "equal seeds: two runs with seed 0 differ"),
+    "leaves in a step": (line(step=leaving), "form: SystemExit in leaving, .*: 0"),
+    "leaves at the start": (line(reset=leaving), "form: SystemExit in leaving, .*: 0"),
     "no scenario": (lambda: object(), "form: object lacks agents, .*predict"),  # type: ignore[dict-item,return-value]
 }
 

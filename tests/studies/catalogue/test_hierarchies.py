@@ -8,18 +8,18 @@ from made_up_results import NOTHING, Arrays, hierarchies
 
 from nested_agents.studies.catalogue import hierarchies as module
 from nested_agents.studies.catalogue.hierarchies import (
-    Verdict,
     analyse,
     check,
+    contrasts_of,
     draw,
     measure,
-    seeds_needed,
-    verdicts_of,
 )
 from nested_agents.studies.catalogue.study import drawn
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.presentation.tables import tabulate
+from nested_agents.studies.results.contrasts import Group, contrasts
+from nested_agents.studies.results.power import seeds_needed
 from nested_agents.studies.results.results import read
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import check as measures_of
@@ -34,38 +34,44 @@ CHANCES = {
 }
 
 
-def verdicts(results: Arrays) -> tuple[Verdict, ...]:
+def groups(results: Arrays) -> tuple[Group, ...]:
     frames = results.frames()
-    return verdicts_of(frames, analyse(frames).cases)
+    return contrasts_of(frames, analyse(frames).cases).groups
 
 
 def test_where_a_hierarchy_matters_is_told_and_where_not() -> None:
     analysis = analyse(hierarchies(CHANCES).frames())
-    own = verdicts(hierarchies(CHANCES))
-    assert [verdict.setting for verdict in own] == [
+    own = groups(hierarchies(CHANCES))
+    assert [group.setting for group in own] == [
         "2 robots, own", "2 robots, team", "8 robots, own", "8 robots, team",
     ]  # fmt: skip
-    assert {(verdict.reference, verdict.among) for verdict in own} == {("chain", 8)}
+    assert {group.reference for group in own} == {"chain"}
     *others, last = own
-    assert all(not verdict.different and not verdict.undecided for verdict in others)
-    (star,) = last.different
-    assert (star.condition, star.seeds) == ("star", 20)
-    assert star.estimate.low < -0.7 < star.estimate.high < -0.4
-    assert [alike.condition for alike in last.alike] == ["tree:2"]
+    assert all(d.p > 0.05 for group in others for d in group.differences)
+    star, tree = last.differences
+    assert (star.condition, star.seeds, tree.condition) == ("star", 20, "tree:2")
+    assert star.p < 0.05 < tree.p
+    assert star.estimate.low < -0.6 < star.estimate.high < -0.4
     text = "\n".join(analysis.notes)
-    assert "8 robots, team: 1 of 2 found to differ\n  star differs by -0." in text
-    assert "8 robots, own: 0 of 2 found to differ\n  no difference found: star " in text
+    of_team = "8 robots, team: success, evaluation, less that of chain:\n  worse: star, -0."
+    assert of_team in text
+    assert "adjusted over 8 comparisons (Holm)." in text
     assert max(map(len, text.splitlines())) <= 80
+
+
+def test_differences_are_those_that_compare_prints() -> None:
+    frames = hierarchies(CHANCES).frames()
+    (star,) = [d for d in analyse(frames).differences if d.condition == "star"][-1:]
+    compared = contrasts(frames, by="topology", reference="chain")
+    (same,) = [d for d in compared.differences if d.condition == "star"][-1:]
+    assert (star.shown, star.seeds) == (same.shown, same.seeds)
 
 
 def test_with_few_seeds_nothing_can_be_told() -> None:
     analysis = analyse(hierarchies(CHANCES, seeds=5).frames())
-    own = verdicts(hierarchies(CHANCES, seeds=5))
-    assert all(len(verdict.undecided) == 2 for verdict in own)
     text = "\n".join(analysis.notes)
-    assert "adjusted over 8 comparisons, so fewer than 9 seeds cannot tell." in text
-    assert "differs by" not in text
-    assert "no difference found" not in text
+    assert "Power: 5 seeds and 8 comparisons cannot give an adjusted p below .05" in text
+    assert "worse" not in text
 
 
 @pytest.mark.parametrize("comparisons", [1, 8, 63, 1000])
@@ -74,20 +80,9 @@ def test_the_seeds_needed_are_the_fewest_whose_least_p_is_small_enough(compariso
     assert 2.0 ** (1 - n) * comparisons < 0.05 <= 2.0 ** (2 - n) * comparisons
 
 
-def test_an_interval_without_zero_is_not_called_no_difference() -> None:
-    found = hierarchies({("chain", "own", 4): 0.9, ("star", "own", 4): 0.9}, seeds=12)
-    one, other = (arrays["success"] for arrays in found.evaluation.values())
-    one[:], other[:] = 1, 1
-    other[:5] = 0  # p of five seeds that differ in one direction is 1/16
-    (verdict,) = verdicts(found)
-    (star,) = verdict.undecided
-    assert (star.p, star.estimate.value) == (0.0625, pytest.approx(-5 / 12))
-    assert star.estimate.high < 0.0
-
-
 def test_the_first_hierarchy_is_the_reference_where_there_is_no_chain() -> None:
     chances = {key: chance for key, chance in CHANCES.items() if key[0] != "chain"}
-    assert {verdict.reference for verdict in verdicts(hierarchies(chances))} == {"star"}
+    assert {group.reference for group in groups(hierarchies(chances))} == {"star"}
 
 
 def test_what_the_reference_has_not_finished_is_not_compared() -> None:
@@ -96,8 +91,7 @@ def test_what_the_reference_has_not_finished_is_not_compared() -> None:
         arrays.pop("topology=chain, value_of=team, robots=8")
     results.seeds["topology=chain, value_of=own, robots=8"] = tuple(range(40, 60))
     analysis = analyse(results.frames())
-    own = verdicts(results)
-    assert [verdict.setting for verdict in own] == ["2 robots, own", "2 robots, team"]
+    assert [group.setting for group in groups(results)] == ["2 robots, own", "2 robots, team"]
     assert len(analysis.table) == 11
 
 
@@ -178,7 +172,7 @@ def test_a_tiny_study_is_run_and_read(tmp_path: Path) -> None:
     ]  # fmt: skip
     messages = [float(line.estimates["messages"].value) for line in analysis.table]
     assert messages == [1.0, 0.0, 1.0, 0.0, 6.0, 1.0, 6.0, 1.0]
-    assert len(verdicts_of(results, analysis.cases)) == 4
+    assert len(contrasts_of(results, analysis.cases).groups) == 4
 
 
 def test_the_spec_crosses_hierarchies_whose_value_and_sizes_over_seeds_enough() -> None:

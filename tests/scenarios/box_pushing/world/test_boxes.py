@@ -96,7 +96,7 @@ def test_box2d_has_the_same_mass(name: str) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=500)
+@settings(max_examples=150)
 @given(
     seed=st.integers(0, 2**32 - 1),
     corners=st.integers(3, 12),
