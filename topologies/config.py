@@ -229,11 +229,15 @@ def read(path: str) -> nx.DiGraph | TopologySettings:
     if isinstance(content, nx.Graph):
         return content
     try:
-        return parse(content)
+        settings = parse(content)
     except RecursionError:
         raise ValueError(f"{path}: is nested too deeply") from None
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
+    for key in ("told", "considers", "failures"):
+        if key in settings.model_fields_set:
+            raise ValueError(f"{path}: {key} must stand in the [topology] table of the spec")
+    return settings
 
 
 def _named(agents: Names, bodies: Sequence[Any]) -> Bodies:

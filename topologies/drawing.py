@@ -19,6 +19,7 @@ from ..core.plugins.deferred import nx
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+Indices = Sequence[int]
 COLUMNS = 6
 """Levels side by side before the picture is folded."""
 WIDTH, HEIGHT = 1.25, 0.3
@@ -38,6 +39,7 @@ def draw(
     *,
     bodies: Sequence[Sequence[int]] | None = None,
     title: str = "",
+    failing: Sequence[int] = (),
 ) -> None:
     """Write a picture of a hierarchy: SVG, PNG or PDF by the suffix of `path`.
 
@@ -51,6 +53,8 @@ def draw(
         Agent indices by robot: one colour each. None: one colour.
     title
         Stands above the picture.
+    failing
+        Agents whose messages fail; framed in red.
 
     Raises
     ------
@@ -75,7 +79,7 @@ def draw(
     # Edges without which everyone would see the same agents.
     implied = set(hierarchy.edges) - set(nx.transitive_reduction(nx.DiGraph(hierarchy.edges)).edges)
     _arrows(axes, hierarchy, places, implied)
-    _agents(axes, hierarchy, places, bodies or [])
+    _agents(axes, hierarchy, places, bodies or [], failing)
     notes = ["numbers: order of decision"]
     if hierarchy.neighbours:
         notes = ["lines: neighbours, who decide at the same time"]
@@ -83,6 +87,8 @@ def draw(
         notes.append("colours: bodies")
     if implied:
         notes.append("grey arrows: implied by the others")
+    styles = {_style(hierarchy, edge)[1] for edge in hierarchy.edges} - {""}
+    notes += sorted(styles) + ["dashed frame: messages fail"] * bool(failing)
     middle: dict[str, Any] = {"ha": "center", "va": "center"}
     axes.text(centre, top + 0.27, title, fontsize=10, **middle)
     axes.text(
@@ -133,8 +139,20 @@ def _arrows(
         colour, thickness, order = ("#c4c4c4", 0.6, 1) if edge in implied else ("#444444", 1.0, 2)
         start, end, bend = _route(*places[list(edge)])
         look = {"linewidth": thickness, "color": colour, "zorder": order, **ARROW}
+        look["linestyle"] = _style(hierarchy, edge)[0]
         bent = f"arc3,rad={bend}"
         axes.add_patch(FancyArrowPatch(tuple(start), tuple(end), connectionstyle=bent, **look))
+
+
+def _style(hierarchy: Hierarchy, edge: tuple[int, int]) -> tuple[str, str]:
+    """Return the line of an edge of which one relation alone holds, and what it means."""
+    a, b = edge
+    return {
+        (True, True): ("-", ""),
+        (False, True): ("--", "dashed arrows: considered, not told"),
+        (True, False): (":", "dotted arrows: told, not considered"),
+        (False, False): ("", "heads alone: neither told nor considered"),
+    }[a in hierarchy.above(b), b in hierarchy.below(a)]
 
 
 def _route(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray, float]:
@@ -150,7 +168,11 @@ def _route(a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray, float]
 
 
 def _agents(
-    axes: Axes, hierarchy: Hierarchy, places: FloatArray, bodies: Sequence[Sequence[int]]
+    axes: Axes,
+    hierarchy: Hierarchy,
+    places: FloatArray,
+    bodies: Sequence[Indices],
+    failing: Indices,
 ) -> None:
     from matplotlib.patches import FancyBboxPatch
 
@@ -159,8 +181,9 @@ def _agents(
         (x, y), name = places[i], hierarchy.agents[i]
         corner = x - WIDTH / 2 + 0.05, y - HEIGHT / 2 + 0.05
         fill = COLOURS[body_of.get(i, 0) % len(COLOURS)]
+        frame = BOX | {"edgecolor": "#B00020", "linestyle": "--"} if i in failing else BOX
         axes.add_patch(
-            FancyBboxPatch(corner, WIDTH - 0.1, HEIGHT - 0.1, facecolor=fill, zorder=3, **BOX)
+            FancyBboxPatch(corner, WIDTH - 0.1, HEIGHT - 0.1, facecolor=fill, zorder=3, **frame)
         )
         size = min(8.5, 8.5 * 15 / len(name))
         left = x - WIDTH / 2 + 0.07

@@ -12,6 +12,7 @@ from typing import Literal
 
 from ..core.agents.cost import below_counts
 from ..core.agents.joint_agents import Agents, joint_blocks
+from ..core.agents.messages import MessageFailure
 from ..core.interface.hierarchy import Hierarchy
 from . import TOPOLOGIES, TopologySettings, build, parse
 from .builders import names_of
@@ -37,6 +38,24 @@ class HierarchyView:
     """Its agents by body."""
     tries: tuple[int, ...]
     """Joint actions that each agent tries per step, in agent order."""
+    failures: tuple[MessageFailure, ...] = ()
+    """What fails of the messages."""
+
+    @property
+    def failing(self) -> tuple[int, ...]:
+        """The agents whose messages fail at some time."""
+        masks = [f.mask(self.hierarchy.agents, "topology.failures") for f in self.failures]
+        return tuple(i for i in range(len(self.hierarchy)) if any(mask[i] for mask in masks))
+
+    @property
+    def remarks(self) -> list[str]:
+        """How the two relations are parted, if they are, and what fails, a line each."""
+        both = self.hierarchy.told, self.hierarchy.considers
+        told, considers = (one if isinstance(one, str) else " and ".join(one) for one in both)
+        passed = f"{self.hierarchy.messages:,} messages a step"
+        lines = [f"told: {told}; considers: {considers}; {passed}"]
+        parted = both != ("ancestors", "descendants")
+        return lines * parted + [f"fails: {failure.text}" for failure in self.failures]
 
     @property
     def title(self) -> str:
@@ -82,8 +101,9 @@ def named_by(settings: TopologySettings) -> tuple[str, ...]:
         if isinstance(content, TopologySettings):
             return named_by(content)
         names = [str(node) for node in content]
-    else:  # lists in settings are lists of names
-        table = settings.model_dump() if settings.kind in TOPOLOGIES.built_in else {}
+    else:  # lists in settings are lists of names, but for those that all topologies have
+        shared = set(TopologySettings.model_fields)
+        table = settings.model_dump(exclude=shared) if settings.kind in TOPOLOGIES.built_in else {}
         names = names_of(value for value in table.values() if isinstance(value, tuple))
     check_legible(names)
     return tuple(dict.fromkeys(names))
@@ -153,6 +173,7 @@ def printed(shown: HierarchyView, form: Form) -> str:
             "neighbours": [(names[a], names[b]) for a, b in hierarchy.neighbours],
             "order": [names[i] for i in hierarchy.order],
             "below": dict(zip(names, below, strict=True)),
+            "remarks": shown.remarks,
             "depth": hierarchy.depth,
             "joint_actions_per_step": sum(shown.tries),
         }
@@ -172,6 +193,7 @@ def printed(shown: HierarchyView, form: Form) -> str:
     return "\n".join(
         [
             shown.title,
+            *shown.remarks,
             "",
             *aligned(rows, "><>><"),
             "",

@@ -35,6 +35,13 @@ class MessageFailure(Scheduled):
     agents: Names
     """Agents by name or pattern, one or a list."""
 
+    @property
+    def text(self) -> str:
+        """What fails, in a line."""
+        written = self.model_dump(exclude={"kind", "agents"}, exclude_defaults=True).items()
+        rest = "".join(f", {key} {value}" for key, value in written)
+        return f"{getattr(self, 'kind', 'failing')}: {', '.join(self.agents)}{rest}"
+
     def passed(
         self, actions: IntArray, past: Sequence[IntArray], n_actions: int, rng: Generator
     ) -> tuple[BoolArray, IntArray]:
@@ -195,6 +202,14 @@ class Messages:
     def _strike(self) -> None:
         now = self._episode, self._step
         self._active = [k for k, f in enumerate(self._failures) if f.lasts(*now)]
+
+    def failing(self, episode: int, moments: int) -> BoolArray:
+        """Return whose messages fail before each of the first decisions of an episode.
+
+        The array is ``(moments, n)``; of agents with another superior, those to them fail.
+        """
+        when = [[f.lasts(episode, step) for f in self._failures] for step in range(moments)]
+        return np.array(when) @ np.array(self._masks)
 
     def is_absent(self, agent: int) -> bool:
         """Return whether an agent takes no part in the present decision."""

@@ -53,7 +53,8 @@ class BestResponse(Aggregation):
     Raises
     ------
     ValueError
-        If the teammate model is another than best response.
+        If the teammate model is another than best response, or nobody plans for whom all are to
+        have a common plan.
     """
 
     plans = True
@@ -67,6 +68,12 @@ class BestResponse(Aggregation):
             )
         hierarchy, groups = problem.hierarchy, problem.groups
         n = len(hierarchy)
+        nobody = problem.unseen != "plan" and not any(map(hierarchy.below, range(n)))
+        if problem.plan == "common" and nobody:
+            raise ValueError(
+                "learner.decision.plan = 'common': nobody considers another, so that there is "
+                "nothing to plan, use private, or unseen = 'plan'"
+            )
         self._group_of = {i: g for g, group in enumerate(groups) for i in group}
         self._planner = _planners(problem)
         self._kept_up = _kept_up(problem, self._planner)

@@ -64,6 +64,7 @@ def page(directory: Path) -> str:
         ],
         pictures=pictures(figures),
         replays=packed,
+        topologies=words.topologies(outline),
         failed=failed,
         seeds=words.runs(outline.seeds),
         spec=dumps(outline.table),

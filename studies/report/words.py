@@ -8,6 +8,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from ..errors import show
 from ..presentation.words import count
 from ..spec.outline import StudyOutline
 from ..workers.worker import installed
@@ -57,6 +58,15 @@ def extent(outline: StudyOutline) -> str:
         f"{outline.lengths.replace('episode', 'training episode')} of up to "
         f"{count(outline.steps, 'step')}{after}"
     )
+
+
+def topologies(outline: StudyOutline) -> dict[str, str]:
+    """Return the topologies that a spec names, as it writes them, failures included, by where."""
+    own = {o["name"]: o for o in outline.table.get("overrides", ())}
+    tables = {"every condition": outline.table} | own | dict(outline.table.get("evaluations", {}))
+    return {
+        name: show(t["topology"], width=None) for name, t in tables.items() if t.get("topology")
+    }
 
 
 def standing(total: int, done: int, failed: int) -> str:

@@ -19,8 +19,9 @@ from ..errors import SpecError
 
 Recording = dict[str, NDArray[Any]]
 """Arrays of one episode of T steps by name: what the scenario's ``recorded`` names, each
-``(T + 1, ...)``; ``reward`` ``(T,)``, or ``(T, n)`` if agents are rewarded one by one; and what
-its ``constants_of_episode`` returns."""
+``(T + 1, ...)``; ``reward`` ``(T,)``, or ``(T, n)`` if agents are rewarded one by one; what its
+``constants_of_episode`` returns; and ``messages_fail`` ``(T + 1, n)``, whose messages fail, if any
+are to."""
 
 TEAM = "team"
 """The name of what is kept of a trained team, beside those of recorded episodes."""

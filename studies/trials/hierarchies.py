@@ -6,12 +6,14 @@ from ...core.agents.cost import below_counts
 from ...core.interface.scenario import groups_of
 from ...topologies.view import HierarchyView
 from ..errors import SpecError
-from ..spec.conditions import Condition
+from ..spec.conditions import ConditionSettings
 from ..spec.spec import Spec
 
 
 def views(spec: Spec) -> list[HierarchyView]:
-    """Return the distinct hierarchies of a spec's conditions, called by the first that has each.
+    """Return the distinct hierarchies of a spec's conditions and evaluations.
+
+    Each is called by the first that has it.
 
     Raises
     ------
@@ -21,17 +23,21 @@ def views(spec: Spec) -> list[HierarchyView]:
     distinct: dict[tuple[object, ...], HierarchyView] = {}
     with spec.sources.active():
         for condition in spec.conditions():
-            try:
-                view = _view(condition)
-            except ValueError as error:
-                raise SpecError(f"{error} (condition {condition.label!r})") from None
-            distinct.setdefault((view.hierarchy.agents, view.hierarchy.edges, view.tries), view)
+            others = {f"{condition.label}, {name}": s for name, s in condition.evaluations}
+            for label, settings in ({condition.label: condition.settings} | others).items():
+                try:
+                    view = _view(label, settings)
+                except ValueError as error:
+                    raise SpecError(f"{error} (condition {label!r})") from None
+                hierarchy = view.hierarchy
+                parts = hierarchy.told, hierarchy.considers, view.failures, view.tries
+                distinct.setdefault((hierarchy.agents, hierarchy.edges, *parts), view)
     return list(distinct.values())
 
 
-def _view(condition: Condition) -> HierarchyView:
-    settings = condition.settings
+def _view(label: str, settings: ConditionSettings) -> HierarchyView:
     scenario, hierarchy = settings.arrange(settings.scenario.build())
     actions = len(scenario.action_set)
     tries = tuple(actions ** (1 + below) for below in below_counts(hierarchy))
-    return HierarchyView(condition.label, hierarchy, groups_of(scenario), tries)
+    failures = settings.topology.failures
+    return HierarchyView(label, hierarchy, groups_of(scenario), tries, failures)

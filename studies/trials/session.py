@@ -116,7 +116,11 @@ class Session:
                     recorder = EpisodeRecorder(_opened(self.trial, record.episode))
                 recorder.add(record.transition)
                 if record.last:
-                    self._recordings[kept[record.episode]] = recorder.recording()
+                    recording = recorder.recording()
+                    if isinstance(acting, Team) and acting.messages.fail:
+                        failing = acting.messages.failing(record.episode, record.step + 2)
+                        recording["messages_fail"] = failing
+                    self._recordings[kept[record.episode]] = recording
             if team is None:
                 self._watch.add(record)
                 self.deciding.append(record.deciding)

@@ -38,7 +38,8 @@
     const speeds = many(wheels, () => column(Int8Array));
     const contact = many(episode.robots, () => column(Uint8Array));
     const failed = many(wheels, () => column(Uint8Array));
-    return { ...episode, shape: body, box, robots, speeds, contact, failed, bounds: bounds(episode, body, box, robots) };
+    const silent = many(episode.talking, () => column(Uint8Array));
+    return { ...episode, shape: body, box, robots, speeds, contact, failed, silent, bounds: bounds(episode, body, box, robots) };
   }
 
   function bounds(episode, body, box, robots) {
@@ -174,6 +175,15 @@
     context.lineTo(0.4 * radius, -0.35 * radius);
     context.fillStyle = "#fff";
     context.fill();
+    const each = shown.talking / shown.robots.length;
+    if (shown.silent.slice(r * each, (r + 1) * each).some((column) => column[now])) {
+      context.beginPath();
+      context.arc(0, 0, 1.3 * radius, 0, 2 * Math.PI);
+      context.strokeStyle = ink("failed");
+      context.setLineDash([0.3 * radius, 0.2 * radius]);
+      context.stroke();
+      context.setLineDash([]);
+    }
     wheels.forEach(([x, y], w) => {
       const agent = r * wheels.length + w, failed = shown.failed[agent][now];
       const fast = shown.speeds[agent][now] / 127;
@@ -216,9 +226,12 @@
     const away = Math.hypot(box.x[now] - gx, box.y[now] - gy), turn = box.turn[now] - gt;
     const turned = Math.abs(Math.atan2(Math.sin(turn), Math.cos(turn))) * 180 / Math.PI;
     const failed = shown.shape.agents.filter((_, i) => shown.failed[i][now]);
+    const names = shown.talking > shown.robots.length ? shown.shape.agents : shown.robots.map((_, r) => `robot${r + 1}`);
+    const silent = names.filter((_, i) => shown.silent[i]?.[now]);
     const end = now < shown.steps ? "" : shown.reached ? " – goal reached" : " – goal not reached";
     const text = `step ${now} of ${shown.steps}, ${(now * shown.dt).toFixed(1)} s: box ${(100 * away).toFixed(0)} cm ` +
-      `from the goal, turned ${turned.toFixed(0)}°${failed.length ? `; failed: ${failed.join(", ")}` : ""}${end}`;
+      `from the goal, turned ${turned.toFixed(0)}°${failed.length ? `; failed: ${failed.join(", ")}` : ""}` +
+      `${silent.length ? `; messages fail: ${silent.join(", ")}` : ""}${end}`;
     at("moment").textContent = text;
     scrub.setAttribute("aria-valuetext", text);
   }
@@ -283,7 +296,8 @@
     };
     const robots = shown.robots.slice(0, COLOURS.length).map((_, r) => mark(COLOURS[r], `robot ${r + 1}`));
     at("legend").replaceChildren(...robots, mark("var(--box)", "box"), mark("dashed", "goal"),
-      "pale: no contact; line at a wheel: its speed; red cross: failed wheel");
+      "pale: no contact; line at a wheel: its speed; red cross: failed wheel" +
+      (shown.talking ? "; dashed ring: its messages fail" : ""));
   }
 
   scrub.addEventListener("input", () => { pause(); go(Number(scrub.value)); });

@@ -2,7 +2,8 @@
 
 A packed episode is a zlib stream in base64. It holds, one whole column of ``T + 1`` moments after
 the other: as 16-bit differences from moment to moment x, y, heading of the box and of every robot;
-then as bytes the commanded speed of every wheel, contact of every robot, failure of every wheel.
+then as bytes the commanded speed of every wheel, contact of every robot, failure of every wheel,
+and whether messages of each agent fail, if they ever are to.
 Lengths are in units of `scale` metres, headings in 1/32768 of half a turn, which wraps by itself,
 wheel speeds in 1/127 of the greatest one.
 """
@@ -81,16 +82,19 @@ def pack(recording: Recording, scene: Mapping[str, Any]) -> dict[str, Any]:
     steps = np.diff(columns, axis=1, prepend=0)
     speeds = np.round(np.clip(recording["wheel_speeds"] / scene["speed"], -1, 1) * 127)
     # astype to 16 bits keeps the low ones: a difference of headings across the cut wraps.
+    silent = recording.get("messages_fail", np.zeros((len(whole), 0)))
     parts = [
         (steps & 0xFFFF).astype("<u2"),
         speeds.T.astype(np.int8),
         recording["contact"].T.astype(np.uint8),
         recording["failed"].T.astype(np.uint8),
+        silent.T.astype(np.uint8),
     ]
     content = zlib.compress(b"".join(np.ascontiguousarray(p).tobytes() for p in parts), 9)
     return {
         "steps": len(box) - 1,
         "robots": robots.shape[1],
+        "talking": silent.shape[1],
         "scale": round(scale, 9),
         "dt": float(recording["dt"]),
         "goal": [round(float(v), 5) for v in recording["goal_pose"]],

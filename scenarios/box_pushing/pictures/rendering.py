@@ -2,15 +2,16 @@
 
 A recording is a mapping of arrays: ``robot_poses (T + 1, M, 3)``, ``box_pose (T + 1, 3)``,
 ``goal_pose (3,)``, ``wheel_speeds (T + 1, n)``, ``contact (T + 1, M)``, ``reward (T,)`` or
-``(T, n)``, optionally ``failed (T + 1, n)``; and constants of no dimension: ``robot`` and ``box``
-by name or described, ``dt`` [s], optionally ``infrared`` described.
+``(T, n)``, optionally ``failed (T + 1, n)`` and ``messages_fail (T + 1, n)``; and constants of no
+dimension: ``robot`` and ``box`` by name or described, ``dt`` [s], optionally ``infrared``
+described.
 
 Robots show their heading by a white nose, their wheels with the speed commanded, and turn solid in
-contact; failed wheels are crossed out. The dashed outline is the goal pose; it and the box point
-ahead. Trails show where all have been. With ``sensors`` rays are drawn as far as infrared sensors
-see; those that meet something are violet and end there, the wider the stronger the reading. Robots
-too small to show wheels show a line ahead, always solid, and are never drawn smaller than a few
-pixels.
+contact; failed wheels are crossed out, and a dashed ring is around robots whose messages fail. The
+dashed outline is the goal pose; it and the box point ahead. Trails show where all have been. With
+``sensors`` rays are drawn as far as infrared sensors see; those that meet something are violet and
+end there, the wider the stronger the reading. Robots too small to show wheels show a line ahead,
+always solid, and are never drawn smaller than a few pixels.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from matplotlib.patches import Circle, Patch, PathPatch, Polygon, Rectangle
 from matplotlib.path import Path as Curve
 from matplotlib.transforms import Affine2D
 
-from ....core.numerics.arrays import FloatArray
+from ....core.numerics.arrays import BoolArray, FloatArray
 from ...movies import DPI, Pixels, Scene, film
 from ..world.boxes import BoxSpec, box_for
 from ..world.infrared import infrared_readings, sensor_directions
@@ -111,12 +112,19 @@ class _BoxScene(Scene):
             self._robot(r, step, slice(r * wheels, (r + 1) * wheels))
         goal = self.recording["goal_pose"]
         gap = float(np.hypot(*(box[step, :2] - goal[:2])))
+        silent = ", ".join(str(r + 1) for r in np.flatnonzero(self._silent(step)))
         self.axes.set_title(
             f"step {step}, {step * float(self.recording['dt']):.1f} s: box {100 * gap:.0f} cm "
-            "from the goal",
+            f"from the goal{f'; messages of robots {silent} fail' * bool(silent)}",
             loc="left",
             fontsize=11,
         )
+
+    def _silent(self, step: int) -> BoolArray:
+        """Return of which robots ``(M,)`` messages fail."""
+        robots = self.recording["robot_poses"].shape[1]
+        fail = self.recording.get("messages_fail", np.zeros((step + 1, robots)))
+        return fail[step].reshape(robots, -1).any(axis=1)
 
     def _robot(self, r: int, step: int, wheels: slice) -> None:
         poses = self.recording["robot_poses"][:, r]
@@ -131,6 +139,9 @@ class _BoxScene(Scene):
         small = self.pixels_of_robot < WHEELS_FROM
         fill = to_rgba(colour, 0.9 if touching or small else 0.4)
         self._patch(Circle((0, 0), radius, fc=fill, ec=colour, lw=scale), poses[step])
+        if self._silent(step)[r]:
+            ring = Circle((0, 0), 1.3 * radius, fill=False, ec=FAILED_COLOUR, ls="--", lw=1)
+            self._patch(ring, poses[step])
         if small:
             edge = FAILED_COLOUR if failed.any() else "black"
             line = [(0.0, 0.0), (radius, 0.0)]  # no longer, or a row of robots looks like a comb

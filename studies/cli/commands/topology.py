@@ -80,7 +80,8 @@ def show(
             if plot is not None:
                 several = f"-{number}" if len(views) > 1 else ""
                 path = plot.with_name(f"{plot.stem}{several}{plot.suffix}")
-                draw(shown.hierarchy, path, bodies=shown.bodies, title=shown.title)
+                bodies, failing = shown.bodies, shown.failing
+                draw(shown.hierarchy, path, bodies=bodies, title=shown.title, failing=failing)
             print(printed(shown, form), end="\n\n" if number < len(views) else "\n")
     except ValueError as error:
         raise SpecError(str(error)) from None

@@ -91,12 +91,21 @@ def test_the_same_seed_loses_the_same_messages() -> None:
     assert lost[0] == lost[1] != lost[2]
 
 
+def test_whose_messages_fail_when_is_known_beforehand() -> None:
+    silent = LostMessages(agents="b", step=1, end_episode=0, end_step=2)
+    made = messages(silent, NoisyMessages(agents=["a"], episode=1))
+    assert made.failing(0, 3).astype(int).tolist() == [[0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 0]]
+    assert made.failing(1, 1).astype(int).tolist() == [[1, 0, 0, 0]]
+    assert LostMessages(agents=["a", "c*"], probability=0.5).text == "lost: a, c*, probability 0.5"
+
+
 @pytest.mark.parametrize(
     ("failure", "complaint"),
     [
         (LostMessages(agents="e"), r"topology.failures\[0\].agents = 'e': no such agent, allowed"),
         (ReparentedAgents(agents="b", superior="z"), "superior = 'z': no such agent, allowed a, b"),
         (ReparentedAgents(agents="b", superior="c"), "superior = 'c': must decide before 'b'"),
+        (ReparentedAgents(agents="b", superior="b"), "superior = 'b': must decide before 'b'"),
     ],
 )
 def test_failures_of_agents_that_do_not_exist_are_refused(failure, complaint) -> None:

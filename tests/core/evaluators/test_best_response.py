@@ -258,6 +258,14 @@ def test_agents_with_a_common_plan_agree_without_a_word() -> None:
     assert max(chosen("private", seed) for seed in range(5)) > 1
 
 
+def test_a_common_plan_needs_somebody_who_plans_for_others(world, rules) -> None:
+    apart = Hierarchy(world.agents, [])
+    fields = vars(problem_of(world, rules, "chain", "own")) | {"plan": "common", "hierarchy": apart}
+    with pytest.raises(ValueError, match="plan = 'common': nobody considers another"):
+        BestResponse(DecisionProblem(**fields))
+    assert BestResponse(DecisionProblem(**fields | {"unseen": "plan"})).plans
+
+
 def test_a_plan_needs_an_evaluator_that_makes_one(world, rules) -> None:
     fields = vars(problem_of(world, rules, "chain", "own"))
     for key, value in (("unseen", "plan"), ("plan", "common")):

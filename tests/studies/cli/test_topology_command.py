@@ -51,6 +51,29 @@ def test_show_as_table(said) -> None:
     assert max(map(len, out.splitlines())) <= 80
 
 
+def test_parted_relations_and_failures_are_shown(said, tmp_path) -> None:
+    spec = tmp_path / "study.toml"
+    spec.write_text(
+        "scenario.robots = 2\n[evaluations]\n"
+        "near.topology.told = ['body', 'next']\n"
+        "lost.topology = { considers = 'none', failures = [{ kind = 'lost', agents = 'r*t' }] }\n"
+    )
+    status, out, _ = said("show", str(spec), "--plot", str(tmp_path / "shown.svg"))
+    assert status == 0
+    assert "told: body and next; considers: descendants; 6 messages a step\n" in out
+    assert "told: ancestors; considers: none; 6 messages a step\nfails: lost: r*t\n" in out
+    third = (tmp_path / "shown-3.svg").read_text(encoding="utf-8")
+    assert "dotted arrows: told, not considered; dashed frame: messages fail" in third
+
+
+def test_a_file_of_a_topology_does_not_part_relations(said, tmp_path) -> None:
+    teams = tmp_path / "teams.toml"
+    teams.write_text('members = ["robot1.left", "robot1.right"]\ntold = "none"\n')
+    status, _, err = said("show", str(teams))
+    assert status == 2
+    assert "told must stand in the [topology] table of the spec" in err
+
+
 @pytest.mark.parametrize(
     ("arguments", "agents"),
     [

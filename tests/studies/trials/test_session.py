@@ -61,6 +61,17 @@ def test_training_meets_the_worlds_that_it_meets_without_a_curriculum(taught, pl
     assert taught.rows[3:5] != plain.rows[:2]
 
 
+def test_recordings_tell_whose_messages_fail():
+    failure = {"kind": "lost", "agents": "robot1.left", "step": 2}
+    table = {"seeds": [7], "episodes": 1, "steps": 4, "topology": {"failures": [failure]}}
+    (trial,) = trials_of(Spec.of(table))
+    (recording,) = run_trial(trial).recordings.values()
+    fail = recording["messages_fail"]
+    assert fail.shape == recording["wheel_speeds"].shape
+    assert fail.any(axis=1).tolist() == [False, False, True, True, True]
+    assert not fail[:, 1:].any()
+
+
 def test_stages_have_worlds_of_their_own(monkeypatch):
     begun = []
     reset = LineUp.reset

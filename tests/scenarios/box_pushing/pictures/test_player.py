@@ -30,6 +30,14 @@ def test_an_episode_comes_out_as_it_went_in(recorded):
     assert (rest[:, 10:] == recording["failed"]).all()
 
 
+def test_whose_messages_fail_is_packed_last(recorded):
+    recording = recorded()
+    recording["messages_fail"] = np.arange(len(recording["box_pose"]))[:, None] > [2, 4]
+    packed = pack(recording, {"speed": 0.13})
+    assert (packed["talking"], pack(recorded(), {"speed": 0.13})["talking"]) == (2, 0)
+    assert (unpack(packed)[1][:, -2:] == recording["messages_fail"]).all()
+
+
 def test_robots_that_go_far_are_kept_coarser(recorded):
     recording = recorded()
     recording["robot_poses"][-1, 0, :2] = 40.0, -40.0

@@ -43,6 +43,12 @@ def test_a_picture_of_one_moment(recording, tmp_path: Path) -> None:
     assert len(np.unique(picture.reshape(-1, picture.shape[2]), axis=0)) > 20
 
 
+def test_robots_whose_messages_fail_have_a_ring(recording) -> None:
+    fine = picture(recording, 0)
+    recording["messages_fail"] = np.array([[False, False, True, False]] * 5)
+    assert (picture(recording, 0) != fine).any()
+
+
 @pytest.mark.parametrize("suffix", [".gif", ".mp4"])
 def test_a_replay_of_all_moments(recording, tmp_path: Path, suffix: str) -> None:
     animate(recording, tmp_path / f"replay{suffix}")
