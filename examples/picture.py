@@ -28,7 +28,7 @@ env = BoxPushingEnv(
     sensors=True,
 )
 env.reset(seed=1)
-speed_up = [0] * len(env.game.scenario.agents)
+speed_up = [0] * len(env.scenario.agents)
 for _ in range(8):
     env.step(speed_up)
 imageio.imwrite(sys.argv[1] if len(sys.argv) > 1 else "push.png", env.render())

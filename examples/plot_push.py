@@ -18,7 +18,7 @@ env = BoxPushingEnv(
 )
 env.reset(seed=3)
 
-speed_up = [0] * len(env.game.scenario.agents)
+speed_up = [0] * len(env.scenario.agents)
 figure, axes = plt.subplots(1, 3, figsize=(9, 3), layout="constrained")
 for step in range(21):
     if step % 10 == 0:

@@ -43,6 +43,8 @@ MOST_ACTIONS = {"body": 4**4, "team": 4**6}
 """The most actions of a body, those of four wheels, and of a team."""
 OF_JOINT_ACTIONS = ("rewards", "commands", "slips", "outcomes")
 """What a prediction may offer whose first argument are joint actions."""
+OF_BODIES = ("nominal_effects", "constants", "levers")
+"""What a scenario open to self-models, and perhaps to calibration, tells of its bodies."""
 
 
 def join_agents(scenario: Scenario, agents: Agents) -> Scenario:
@@ -64,8 +66,7 @@ def join_agents(scenario: Scenario, agents: Agents) -> Scenario:
     own = _named((scenario.agents[i].rpartition(".")[2] for i in blocks[0]), space.own)
     roles = tuple("+".join(roles_of(scenario)[i] for i in block) for block in blocks)
     joint = StateSpace(f"bodies' {space.name}", (*own, *space.shared), len(own))
-    kind = EmbodiedJointAgents if isinstance(scenario, EmbodiedScenario) else JointAgents
-    return kind(scenario, blocks, names, roles, joint)
+    return JointAgents(scenario, blocks, names, roles, joint)
 
 
 def joint_blocks(
@@ -158,6 +159,11 @@ class JointAgents:
         zeros = (0.0,) * len(names)
         self.action_set = ActionSet(names, zeros, zeros, neutral)
         self._n_each = space.n_variables if whole else space.n_own
+        if not whole and isinstance(scenario, EmbodiedScenario):
+            for name in OF_BODIES:
+                if hasattr(scenario, name):
+                    setattr(self, name, getattr(scenario, name))
+            self.predict_with = self._predict_with
 
     def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
         """Start an episode; return the states of those who act."""
@@ -172,6 +178,10 @@ class JointAgents:
     def predict(self) -> JointPrediction:
         """Predict from the present state."""
         return JointPrediction(self.scenario.predict(), self)
+
+    def _predict_with(self, *beliefs: Any) -> JointPrediction:
+        """Predict from the present state, believing in effects, and in constants if given."""
+        return JointPrediction(cast(Any, self.scenario).predict_with(*beliefs), self)
 
     def actions(self, joint_actions: IntArray) -> IntArray:
         """Return the actions ``(..., n)`` of all agents for those of who acts for them."""
@@ -189,32 +199,6 @@ class JointAgents:
 
     def _states(self, states: FloatArray) -> FloatArray:
         return np.array([self.joined([states[i] for i in block]) for block in self.blocks])
-
-
-class EmbodiedJointAgents(JointAgents):
-    """The same of a scenario that is open to self-models, and perhaps to calibration."""
-
-    @property
-    def nominal_effects(self) -> tuple[FloatArray, ...]:
-        """Per body the effect of its wheel speeds on its twist."""
-        return cast(EmbodiedScenario, self.scenario).nominal_effects
-
-    @property
-    def constants(self) -> Names:
-        """Names of the constants that can be calibrated, if any."""
-        return getattr(self.scenario, "constants", ())
-
-    @property
-    def levers(self) -> FloatArray:
-        """Speed per turning rate of what is pushed and of the bodies."""
-        return cast(Any, self.scenario).levers
-
-    def predict_with(
-        self, effects: Sequence[FloatArray], constants: FloatArray | None = None
-    ) -> JointPrediction:
-        """Predict from the present state, believing in these effects and constants."""
-        beliefs = (effects,) if constants is None else (effects, constants)
-        return JointPrediction(cast(Any, self.scenario).predict_with(*beliefs), self)
 
 
 class JointPrediction:

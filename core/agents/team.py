@@ -312,10 +312,8 @@ class Team:
         )
         if self.given.shape == former.given.shape:
             self.given = former.given.copy()
-        if self.self_model is not None and former.self_model is not None:
-            self.self_model.continue_from(former.self_model)
-        if self.calibration is not None and former.calibration is not None:
-            self.calibration.continue_from(former.calibration)
+        for name in self._adapting.keys() & former._adapting.keys():
+            self._adapting[name].continue_from(former._adapting[name])
 
     def save(self, path: Path | str) -> None:
         """Write everything that the team remembers to an ``.npz`` file: arrays only."""
@@ -339,17 +337,13 @@ class Team:
         words = [state["state"]["state"], state["state"]["inc"]]
         generator = [word >> shift & (2**64 - 1) for word in words for shift in (64, 0)]
         generator += [state["has_uint32"], state["uinteger"]]
-        learner = {f"learner.{name}": array for name, array in self.learner.arrays().items()}
-        if self.self_model is not None:
-            learner |= {f"self_model.{k}": v for k, v in self.self_model.arrays().items()}
-        if self.calibration is not None:
-            learner |= {f"calibration.{k}": v for k, v in self.calibration.arrays().items()}
+        parts = {"learner": self.learner, **self._adapting}
         return {
             "generator": np.array(generator, dtype=np.uint64),
             "explorer": self.explorer.memory,
             "seen": self.seen,
             **({"given": self.given} if self.given.size else {}),
-            **learner,
+            **{f"{p}.{k}": array for p in parts for k, array in parts[p].arrays().items()},
         }
 
     def restore(self, arrays: Mapping[str, FloatArray]) -> None:
@@ -378,11 +372,15 @@ class Team:
         self.seen = arrays["seen"].copy()
         if self.given.size:
             self.given = arrays["given"].copy()
-        self.learner.restore(_part(arrays, "learner."))
-        if self.self_model is not None:
-            self.self_model.restore(_part(arrays, "self_model."))
-        if self.calibration is not None:
-            self.calibration.restore(_part(arrays, "calibration."))
+        for name, part in {"learner": self.learner, **self._adapting}.items():
+            its = {k: array for k, array in arrays.items() if k.startswith(f"{name}.")}
+            part.restore({k.removeprefix(f"{name}."): array for k, array in its.items()})
+
+    @property
+    def _adapting(self) -> dict[str, Any]:
+        """What adapts beside the learner, by name."""
+        parts = {"self_model": self.self_model, "calibration": self.calibration}
+        return {name: part for name, part in parts.items() if part is not None}
 
 
 def _self_model_of(scenario: Scenario, settings: LearnerSettings) -> SelfModel | None:
@@ -402,11 +400,6 @@ def _calibration_of(scenario: Scenario, settings: LearnerSettings) -> Calibratio
             "learner.calibration.enabled: the scenario's predictor has no constants to calibrate"
         )
     return Calibration(settings.calibration, len(constants), cast(Any, scenario).levers)
-
-
-def _part(arrays: Mapping[str, FloatArray], prefix: str) -> dict[str, FloatArray]:
-    """Return the arrays whose names begin with `prefix`, without it."""
-    return {k.removeprefix(prefix): v for k, v in arrays.items() if k.startswith(prefix)}
 
 
 def of_fuzzy_agents(team: Actors) -> Team:

@@ -65,7 +65,7 @@ class TDLambda(Online):
             self.weights, self.rows, self.trace, self.reach, states,
             states if entered is None else entered, rewards,
             0.0 if entered is None else self.discount, self.settings.step_size, lengths,
-            self.discount * self.settings.trace_decay,
+            self.discount * self.settings.trace_decay, self.rules.layout,
         )  # fmt: skip
         if self.settings.averaging > 1:
             self.updates += 1.0

@@ -114,7 +114,7 @@ class Kernel:
         with _threads:
             compiled = self.compiled
             file = _cache_file(compiled)
-            with _alone(file), _hoarding():
+            with _alone(file):
                 if file is not None:
                     self._compile_apart(compiled, args)
                 result = compiled(*args)
@@ -165,9 +165,11 @@ def serve() -> None:
             sys.path[:], module, name, types = pickle.load(sys.stdin.buffer)
         except EOFError:
             return
-        with contextlib.suppress(Exception), _hoarding():
+        gc.disable()  # that takes a tenth of a compilation
+        with contextlib.suppress(Exception):
             kernel = getattr(importlib.import_module(module), name)
             kernel.compiled.compile(pickle.loads(types))
+        gc.enable()
         sys.stdout.buffer.write(b".")
         sys.stdout.buffer.flush()
 
@@ -206,23 +208,11 @@ def _alone(file: Any) -> Iterator[None]:
         yield
 
 
-@contextlib.contextmanager
-def _hoarding() -> Iterator[None]:
-    """Let no garbage be collected but between kernels: that takes a tenth of their compilation."""
-    collects = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if collects:
-            gc.enable()
-
-
 def stamp(path: Path) -> str:
     """Return a digest of a file and of all files that it imports, directly or not."""
     paths, left = {path}, [path]
     while left:
-        new = set(_imported(left.pop())) - paths
+        new = _imported(left.pop()) - paths
         paths |= new
         left += new
     texts = hashlib.sha256()
@@ -232,18 +222,16 @@ def stamp(path: Path) -> str:
 
 
 @cache
-def _imported(path: Path) -> tuple[Path, ...]:
-    return tuple(_targets(path))
-
-
-def _targets(path: Path) -> Iterator[Path]:
-    """Yield the files that a file imports; of a package from which modules may come, all."""
+def _imported(path: Path) -> set[Path]:
+    """Return the files that a file imports; of a package from which modules may come, all."""
+    files: set[Path] = set()
     for dots, name in IMPORT.findall(_text(path)):
         place = path.parents[len(dots) - 1].joinpath(*filter(None, name.split(".")))
         if place.is_dir():
-            yield from sorted(place.glob("*.py"))
+            files.update(place.glob("*.py"))
         elif (module := place.with_suffix(".py")).exists():
-            yield module
+            files.add(module)
+    return files
 
 
 @cache

@@ -102,7 +102,8 @@ class RuleBase:
         self.dtype = np.dtype(dtype)
         self.compact = self.partitions[0].membership == "triangular"
         self._enumerate = enumerate_dense
-        self._td_update = td_compact if self.compact else td_dense
+        # One TD(lambda) update of all agents, see `td_dense`, given the layout; shapes are trusted.
+        self.td_update = td_compact if self.compact else td_dense
         if self.compact:
             # Looking up 2 ** order corners is cheaper than contracting theta, unless the order is
             # high and most variables are own ones, contracted once for many joint actions.
@@ -204,14 +205,8 @@ class RuleBase:
             If theta or the states have another shape.
         """
         states = np.ascontiguousarray(states, dtype=float)
-        if states.shape[2:] != (len(self.partitions),):
-            raise ValueError(
-                f"rule base: states of shape {states.shape}, must be (n, s, {len(self.partitions)})"
-            )
-        if theta.shape != (len(states), self.n_rules):
-            raise ValueError(
-                f"rule base: theta of shape {theta.shape}, must be {(len(states), self.n_rules)}"
-            )
+        self._check_states(states, "n, s")
+        self._check_theta(theta, len(states))
         if self.compact:
             return each_compact(theta, states, self.layout)
         return each_dense(theta, states, self.layout)
@@ -237,29 +232,6 @@ class RuleBase:
         states = np.concatenate([own[agents], shared[body]], axis=2)
         total: FloatArray = each_dense(weights[0], states, self.layout).sum(axis=0)
         return total
-
-    def td_update(
-        self,
-        theta: FloatArray,
-        rows: IntArray,
-        trace: FloatArray,
-        reach: FloatArray,
-        states: FloatArray,
-        entered: FloatArray,
-        rewards: FloatArray,
-        discount: float,
-        step_size: float,
-        lengths: FloatArray,
-        decay: float,
-    ) -> None:
-        """Make one TD(lambda) update of all agents, see `core.rules.kernels.few_states.td_dense`.
-
-        Shapes are trusted: a learner calls this at every step.
-        """
-        self._td_update(
-            theta, rows, trace, reach, states, entered, rewards, discount, step_size, lengths,
-            decay, self.layout,
-        )  # fmt: skip
 
     def squared_lengths(self, states: FloatArray) -> FloatArray:
         """Return the squared length ``(m,)`` of phi of states ``(m, d)``.
@@ -342,12 +314,12 @@ class RuleBase:
         tables = blocks.own, blocks.own_rows, blocks.shared, blocks.shared_rows, blocks.divisor
         return self._enumerate(theta, tables, tried, joint_action, probabilities, self.layout)
 
-    def _check_states(self, states: FloatArray) -> None:
-        if states.shape[1:] != (len(self.partitions),):
-            raise ValueError(
-                f"rule base: states of shape {states.shape}, must be (m, {len(self.partitions)})"
-            )
+    def _check_states(self, states: FloatArray, sets: str = "m") -> None:
+        d = len(self.partitions)
+        if states.shape[len(sets.split()) :] != (d,):
+            raise ValueError(f"rule base: states of shape {states.shape}, must be ({sets}, {d})")
 
-    def _check_theta(self, theta: FloatArray) -> None:
-        if theta.shape != (self.n_rules,):
-            raise ValueError(f"rule base: theta of shape {theta.shape}, must be {(self.n_rules,)}")
+    def _check_theta(self, theta: FloatArray, *agents: int) -> None:
+        shape = (*agents, self.n_rules)
+        if theta.shape != shape:
+            raise ValueError(f"rule base: theta of shape {theta.shape}, must be {shape}")

@@ -15,7 +15,9 @@ Importing this module registers ``NestedAgents/BoxPushing-v0`` with Gymnasium::
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import Any, ClassVar
 
 import gymnasium
@@ -33,13 +35,6 @@ ENV_ID = "NestedAgents/BoxPushing-v0"
 RENDER_MODES = ["rgb_array", "human"]
 
 SettingsLike = BoxPushingSettings | Mapping[str, Any] | None
-
-
-def as_settings(settings: SettingsLike) -> BoxPushingSettings:
-    """Return the settings that a ``[scenario]`` table stands for; none: the default ones."""
-    if isinstance(settings, BoxPushingSettings):
-        return settings
-    return BoxPushingSettings.model_validate(settings or {})
 
 
 class Seat:
@@ -86,19 +81,21 @@ class Seat:
         return float(reward if np.ndim(reward) == 0 else np.mean(np.take(reward, self.wheels)))
 
 
-class Game:
-    """A scenario with a clock, a stream of seeds and a screen.
+class Game(ABC):
+    """A scenario with seats, a clock, a stream of seeds and a screen; inherit it beside an API.
 
     Parameters
     ----------
     settings
-        Of the scenario; a mapping is read as a ``[scenario]`` table.
+        Of the scenario; a mapping is read as a ``[scenario]`` table, none as the default ones.
     steps
         Most steps of an episode.
     render_mode
         ``None``, ``"rgb_array"`` or ``"human"``.
     sensors
         Whether pictures show the rays of the infrared sensors.
+    by_wheel
+        Whether an agent observes the state of every wheel in a row of its own.
 
     Raises
     ------
@@ -107,19 +104,37 @@ class Game:
     """
 
     def __init__(
-        self, settings: SettingsLike, steps: int, render_mode: str | None, *, sensors: bool
+        self,
+        settings: SettingsLike = None,
+        *,
+        steps: int = 450,
+        render_mode: str | None = None,
+        sensors: bool = False,
+        by_wheel: bool = False,
     ) -> None:
         if steps < 1:
             raise ValueError(f"steps = {steps}, must be at least 1")
         if render_mode not in (None, *RENDER_MODES):
             raise ValueError(f"render_mode = {render_mode!r}, allowed None, {RENDER_MODES}")
-        self.scenario = BoxPushing(as_settings(settings))
-        self.steps = steps
+        if not isinstance(settings, BoxPushingSettings):
+            settings = BoxPushingSettings.model_validate(settings or {})
+        self.scenario = BoxPushing(settings)
+        self.steps, self.render_mode = steps, render_mode
         self.screen = Screen(self.scenario, render_mode, sensors=sensors) if render_mode else None
+        self.seats = {
+            name: Seat(self.scenario, wheels, by_wheel=by_wheel)
+            for name, wheels in self._teams().items()
+        }
+        self.possible_agents = list(self.seats)
+        self.agents: list[str] = []
         self._seeds = np.random.default_rng()
         self._episode, self._step = -1, 0
 
-    def reset(self, seed: int | None, options: Mapping[str, Any] | None) -> FloatArray:
+    @abstractmethod
+    def _teams(self) -> dict[str, Sequence[int]]:
+        """Return the wheels that each agent drives, by its name."""
+
+    def begin(self, seed: int | None, options: Mapping[str, Any] | None) -> FloatArray:
         """Start the next episode; a seed starts the stream of worlds and their count afresh.
 
         The option ``episode`` sets the number of the episode, by which failures are scheduled.
@@ -127,13 +142,13 @@ class Game:
         if seed is not None:
             self._seeds, self._episode = np.random.default_rng(seed), -1
         self._episode = int((options or {}).get("episode", self._episode + 1))
-        self._step = 0
+        self._step, self.agents = 0, list(self.possible_agents)
         states = self.scenario.reset(int(self._seeds.integers(2**63)), self._episode)
         if self.screen is not None:
             self.screen.begin()
         return states
 
-    def step(self, joint_action: IntArray) -> tuple[Transition, bool]:
+    def advance(self, joint_action: IntArray) -> tuple[Transition, bool]:
         """Return what a joint action ``(n,)`` leads to, and whether the episode is truncated."""
         transition = self.scenario.step(joint_action)
         self._step += 1
@@ -151,7 +166,7 @@ class Game:
         }
 
     def render(self) -> Any:
-        """Return a picture, or show it."""
+        """Return a picture ``(height, width, 3)`` of the present, or show it."""
         return None if self.screen is None else self.screen.render()
 
     def close(self) -> None:
@@ -160,13 +175,8 @@ class Game:
             self.screen.close()
 
 
-class WheelsEnv(ParallelEnv):
-    """Box pushing as a PettingZoo environment whose agents are the wheels.
-
-    Parameters
-    ----------
-    settings, steps, render_mode, sensors
-        As in `Game`.
+class WheelsEnv(Game, ParallelEnv):
+    """Box pushing as a PettingZoo environment whose agents are the wheels; see `Game`.
 
     Examples
     --------
@@ -183,23 +193,8 @@ class WheelsEnv(ParallelEnv):
         "is_parallelizable": True,
     }
 
-    def __init__(
-        self,
-        settings: SettingsLike = None,
-        *,
-        steps: int = 450,
-        render_mode: str | None = None,
-        sensors: bool = False,
-    ) -> None:
-        self.game = Game(settings, steps, render_mode, sensors=sensors)
-        self.render_mode = render_mode
-        self.seats = self._seats(self.game.scenario)
-        self.possible_agents = list(self.seats)
-        self.agents: list[str] = []
-
-    @staticmethod
-    def _seats(scenario: BoxPushing) -> dict[str, Seat]:
-        return {name: Seat(scenario, [i]) for i, name in enumerate(scenario.agents)}
+    def _teams(self) -> dict[str, Sequence[int]]:
+        return {name: [i] for i, name in enumerate(self.scenario.agents)}
 
     def observation_space(self, agent: str) -> Box:
         """Return the space of an agent's observations."""
@@ -212,10 +207,8 @@ class WheelsEnv(ParallelEnv):
     def reset(
         self, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> tuple[dict[str, FloatArray], dict[str, dict[str, Any]]]:
-        """Start an episode, see `Game.reset`; return observations and infos by agent."""
-        states = self.game.reset(seed, options)
-        self.agents = list(self.possible_agents)
-        return self._observe(states, self.game.scenario.measure())
+        """Start an episode, see `Game.begin`; return observations and infos by agent."""
+        return self._observe(self.begin(seed, options), self.scenario.measure())
 
     def step(self, actions: Mapping[str, Any]) -> tuple[dict[str, Any], ...]:
         """Carry out one action of every agent.
@@ -232,10 +225,10 @@ class WheelsEnv(ParallelEnv):
             missing = [name for name in self.agents if name not in actions]
             problem = f"{missing[0]!r} is missing" if missing else "some of these do not act"
             raise ValueError(f"step: actions of {list(actions)}: {problem}; agents: {self.agents}")
-        joint = np.empty(len(self.game.scenario.agents), dtype=np.int64)
+        joint = np.empty(len(self.scenario.agents), dtype=np.int64)
         for name in self.agents:
             joint[self.seats[name].wheels] = actions[name]
-        transition, truncated = self.game.step(joint)
+        transition, truncated = self.advance(joint)
         observations, infos = self._observe(transition.states, transition.info)
         rewards = {name: self.seats[name].paid(transition.reward) for name in self.agents}
         ends, breaks = (
@@ -250,20 +243,12 @@ class WheelsEnv(ParallelEnv):
     ) -> tuple[dict[str, FloatArray], dict[str, dict[str, Any]]]:
         return (
             {name: self.seats[name].observe(states) for name in self.agents},
-            {name: self.game.info(measured) for name in self.agents},
+            {name: self.info(measured) for name in self.agents},
         )
-
-    def render(self) -> Any:
-        """Return a picture ``(height, width, 3)`` of the present, or show it."""
-        return self.game.render()
-
-    def close(self) -> None:
-        """Close the window, if there is one."""
-        self.game.close()
 
 
 class RobotsEnv(WheelsEnv):
-    """Box pushing as a PettingZoo environment whose agents are the robots.
+    """Box pushing as a PettingZoo environment whose agents are the robots; see `Game`.
 
     Examples
     --------
@@ -274,20 +259,12 @@ class RobotsEnv(WheelsEnv):
 
     metadata: ClassVar[dict[str, Any]] = WheelsEnv.metadata | {"name": "box_pushing_robots_v0"}
 
-    @staticmethod
-    def _seats(scenario: BoxPushing) -> dict[str, Seat]:
-        return {f"robot{r + 1}": Seat(scenario, group) for r, group in enumerate(scenario.groups)}
+    def _teams(self) -> dict[str, Sequence[int]]:
+        return {f"robot{r + 1}": group for r, group in enumerate(self.scenario.groups)}
 
 
-class BoxPushingEnv(gymnasium.Env):
-    """Box pushing as a Gymnasium environment: one agent drives all wheels.
-
-    Parameters
-    ----------
-    settings, steps, render_mode, sensors
-        As in `Game`.
-    by_wheel
-        Whether it observes the state of every wheel in a row of its own.
+class BoxPushingEnv(Game, gymnasium.Env):
+    """Box pushing as a Gymnasium environment: one agent drives all wheels; see `Game`.
 
     Examples
     --------
@@ -298,44 +275,33 @@ class BoxPushingEnv(gymnasium.Env):
 
     metadata: dict[str, Any] = {"render_modes": RENDER_MODES, "render_fps": 2}  # noqa: RUF012
 
-    def __init__(
-        self,
-        settings: SettingsLike = None,
-        *,
-        steps: int = 450,
-        render_mode: str | None = None,
-        sensors: bool = False,
-        by_wheel: bool = False,
-    ) -> None:
-        self.game = Game(settings, steps, render_mode, sensors=sensors)
-        self.render_mode = render_mode
-        wheels = range(len(self.game.scenario.agents))
-        self.seat = Seat(self.game.scenario, wheels, by_wheel=by_wheel)
-        self.observation_space = self.seat.observation_space
-        self.action_space = self.seat.action_space
+    def _teams(self) -> dict[str, Sequence[int]]:
+        return {"single": range(len(self.scenario.agents))}
+
+    @cached_property
+    def observation_space(self) -> Box:  # type: ignore[override]
+        """The space of observations."""
+        return self.seats["single"].observation_space
+
+    @cached_property
+    def action_space(self) -> Discrete | MultiDiscrete:  # type: ignore[override]
+        """The space of actions."""
+        return self.seats["single"].action_space
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[FloatArray, dict[str, Any]]:
-        """Start an episode, see `Game.reset`; return observation and info."""
+        """Start an episode, see `Game.begin`; return observation and info."""
         super().reset(seed=seed)
-        states = self.game.reset(seed, options)
-        return self.seat.observe(states), self.game.info(self.game.scenario.measure())
+        states = self.begin(seed, options)
+        return self.seats["single"].observe(states), self.info(self.scenario.measure())
 
     def step(self, action: Any) -> tuple[FloatArray, float, bool, bool, dict[str, Any]]:
         """Return observation, reward, terminated, truncated and info after an action ``(n,)``."""
-        transition, truncated = self.game.step(np.asarray(action, dtype=np.int64))
-        seen, info = self.seat.observe(transition.states), self.game.info(transition.info)
-        paid = self.seat.paid(transition.reward)
+        transition, truncated = self.advance(np.asarray(action, dtype=np.int64))
+        seat, info = self.seats["single"], self.info(transition.info)
+        seen, paid = seat.observe(transition.states), seat.paid(transition.reward)
         return seen, paid, transition.terminated, truncated, info
-
-    def render(self) -> Any:
-        """Return a picture ``(height, width, 3)`` of the present, or show it."""
-        return self.game.render()
-
-    def close(self) -> None:
-        """Close the window, if there is one."""
-        self.game.close()
 
 
 if ENV_ID not in gymnasium.registry:

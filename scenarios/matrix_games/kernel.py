@@ -34,8 +34,6 @@ class Exploring(NamedTuple):
     """How it explores; meanings of the fields are those of `PaperExploration`."""
 
     kind: int
-    uniform: bool
-    greatest: bool
     max_temperature: float
     decay: float
     epsilon: float
@@ -155,10 +153,8 @@ def _choose(values, exploring, clock, rng) -> int:  # type: ignore[no-untyped-de
     if exploring.kind == DECREASING:
         rate = exploring.epsilon * (temperature - 1.0) / (exploring.max_temperature - 1.0)
         if rng.random() < min(1.0, rate):
-            if exploring.uniform:
-                return rng.integers(0, len(values))
-        elif exploring.greatest:
-            return _greatest(values, rng)
+            return rng.integers(0, len(values))
+        return _greatest(values, rng)
     ladder = np.exp((values - values.max()) / temperature)
     ladder /= ladder.sum()
     ladder = ladder.cumsum()

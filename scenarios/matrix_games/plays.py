@@ -8,7 +8,8 @@ is tested against. Games are those of `nested_agents.scenarios.matrix_games.scen
 
 It knows exact enumeration by an agent's own value, with all teammate models and hierarchies; tables
 (rule bases of full order) that stay as they are, or are learned without discount by `TDLambda`,
-`OptimisticTD` or `FMQ`; exploration by `Boltzmann` and `EpsilonDecreasingBoltzmann`.
+`OptimisticTD` or `FMQ`; exploration by `Boltzmann`, and by `EpsilonDecreasingBoltzmann`
+if that explores uniformly and else takes the greatest value.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ TEAMMATES = ("best-response", "uniform", "empirical", "conditional")
 """Teammate models in the order of the kernel."""
 NONE: FloatArray = np.zeros((0, 0))
 STILL = Learning(False, 0.0, 1.0, 0.0, NONE, NONE, NONE, NONE)
-NO_EXPLORATION = Exploring(GREEDY, False, False, 0.0, 0.0, 0.0)
+NO_EXPLORATION = Exploring(GREEDY, 0.0, 0.0, 0.0)
 
 
 Parts = tuple[Deciding, Exploring, Learning]
@@ -129,9 +130,9 @@ def _exploring(explorer: Any) -> Exploring | None:
     """Return how an explorer explores; None if it is not known."""
     if type(explorer) is Boltzmann:
         s = explorer.settings
-        return Exploring(SAMPLED, False, False, s.max_temperature, s.decay, 0.0)
+        return Exploring(SAMPLED, s.max_temperature, s.decay, 0.0)
     if type(explorer) is EpsilonDecreasingBoltzmann:
         p = explorer.settings
-        uniform, greatest = p.explore == "uniform", p.exploit == "greatest"
-        return Exploring(DECREASING, uniform, greatest, p.max_temperature, p.decay, p.epsilon)
+        if (p.explore, p.exploit) == ("uniform", "greatest"):
+            return Exploring(DECREASING, p.max_temperature, p.decay, p.epsilon)
     return None

@@ -129,6 +129,10 @@ def test_enumerate(base: RuleBase, rng: np.random.Generator, agent: int, average
     assert not base.enumerate(0.0 * theta, blocks, tried, joint, np.zeros((0, 0))).any()
 
 
+def td_update(base: RuleBase, *given: object) -> None:
+    base.td_update(*given, base.layout)
+
+
 @pytest.mark.parametrize("discount", [0.95, 0.0])
 def test_td_update(base: RuleBase, rng: np.random.Generator, discount: float) -> None:
     theta, trace = rng.normal(size=(2, 3, base.n_rules))
@@ -140,8 +144,8 @@ def test_td_update(base: RuleBase, rng: np.random.Generator, discount: float) ->
         now, ahead = (
             np.einsum("ij,ij->i", base.features(met), theta_expected) for met in (states, entered)
         )
-        base.td_update(
-            theta, ROWS, trace, reach, states, entered, rewards, discount, 0.1, lengths, 0.38
+        td_update(
+            base, theta, ROWS, trace, reach, states, entered, rewards, discount, 0.1, lengths, 0.38
         )
         steps = 0.1 * (rewards + discount * ahead - now) / lengths
         oracle.td_update(base, theta_expected, trace_expected, states, steps, 0.38)
@@ -203,7 +207,7 @@ def test_single_precision(base: RuleBase, rng: np.random.Generator) -> None:
         assert found == pytest.approx(expected, rel=1e-5, abs=1e-5 * scale)
     reach, lengths = np.full((3, base.n_parts), 5.0), np.ones(3)
     steps = 0.1 * (rewards - np.einsum("ij,ij->i", base.features(states), wide[0]))
-    base.td_update(theta, ROWS, trace, reach, states, states, rewards, 0.0, 0.1, lengths, 0.38)
+    td_update(base, theta, ROWS, trace, reach, states, states, rewards, 0.0, 0.1, lengths, 0.38)
     oracle.td_update(base, *wide, states, steps, 0.38)
     assert theta.dtype == trace.dtype == np.float32
     assert trace == pytest.approx(wide[1], rel=1e-5, abs=1e-5)
@@ -251,8 +255,19 @@ def test_the_papers_78125_rules(membership: str, rng: np.random.Generator) -> No
     rewards, lengths = np.array([1.0, -2.0]), np.ones(2)
     reach = np.full((2, base.n_parts), 5.0)
     steps = 0.01 * (rewards - np.einsum("ij,ij->i", base.features(states[:2]), theta))
-    base.td_update(
-        theta, ROWS[:2], trace, reach, states[:2], states[:2], rewards, 0.0, 0.01, lengths, 0.3996
+    td_update(
+        base,
+        theta,
+        ROWS[:2],
+        trace,
+        reach,
+        states[:2],
+        states[:2],
+        rewards,
+        0.0,
+        0.01,
+        lengths,
+        0.3996,
     )
     oracle.td_update(base, theta_expected, trace_expected, states[:2], steps, 0.3996)
     assert np.abs(trace - trace_expected).max() <= 1e-12
@@ -274,8 +289,8 @@ def test_agents_of_one_row_change_it_in_turn(base: RuleBase, rng: np.random.Gene
     reach, lengths, rewards = np.zeros((3, base.n_parts)), np.ones(3), rng.normal(size=3)
     for _ in range(4):
         states, entered = states_of(rng, 6).reshape(2, 3, -1)
-        base.td_update(
-            theta, rows, trace, reach, states, entered, rewards, discount, 0.1, lengths, 0.38
+        td_update(
+            base, theta, rows, trace, reach, states, entered, rewards, discount, 0.1, lengths, 0.38
         )
         for i, row in enumerate(rows):
             one = slice(i, i + 1)

@@ -160,7 +160,7 @@ def test_a_step_after_the_end_is_empty() -> None:
     assert env.step(dict.fromkeys(env.agents, 0))[3]["robot1.left"]
     assert env.agents == []
     assert env.step({}) == ({}, {}, {}, {}, {})
-    assert env.game.scenario.measure()["robot_poses"].shape == (2, 3)
+    assert env.scenario.measure()["robot_poses"].shape == (2, 3)
 
 
 def test_several_side_by_side_are_those_of_their_seeds() -> None:

@@ -50,12 +50,12 @@ CASES = [
 EXPLORATIONS = [
     BoltzmannExploration(),
     PaperExploration(decay=0.05),
-    PaperExploration(decay=0.05, clock="episode", exploit="sample", explore="boltzmann"),
+    PaperExploration(decay=0.05, clock="episode"),
 ]
 
 
 @pytest.mark.parametrize("case", range(len(CASES)))
-@pytest.mark.parametrize("exploration", EXPLORATIONS, ids=["boltzmann", "paper", "sampled"])
+@pytest.mark.parametrize("exploration", EXPLORATIONS, ids=["boltzmann", "paper", "afresh"])
 def test_a_compiled_episode_is_the_control_loops(case, exploration):
     learner = CASES[case].learner.model_copy(update={"exploration": exploration})
     condition = CASES[case].model_copy(update={"learner": learner})
@@ -89,6 +89,8 @@ def test_a_compiled_episode_is_the_control_loops(case, exploration):
         {"rule_base": {"order": 1}},
         {"rule_base": {"order": 2, "membership": "sigmoid"}},
         {"exploration": {"kind": "burst"}},
+        {"exploration": {"kind": "paper", "exploit": "sample"}},
+        {"exploration": {"kind": "paper", "explore": "boltzmann"}},
         {"decision": {"rule": "reward"}},
         {"decision": {"value_of": "team"}},
         {"decision": {"evaluator": "sampling"}},
