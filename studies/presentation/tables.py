@@ -44,13 +44,14 @@ class SummaryTable:
     it as HTML."""
 
     def __str__(self) -> str:
-        if not self.rows:
-            return NOTHING
-        return "\n".join([text_of(self.titles, self.rows), "", *self.legend])
+        table = [text_of(self.titles, self.rows), ""] if self.rows else []
+        return "\n".join([*table, *self.legend])
 
     @property
     def legend(self) -> list[str]:
         """Lines that say what stands in the cells."""
+        if not self.rows:
+            return [NOTHING]
         lines = ["Means over seeds, and below them their 95 % intervals."]
         if any(seeds < FEW for _, seeds, _ in self.rows):
             few = "Student's (short if skewed), rates Wilson's"
@@ -69,11 +70,9 @@ class SummaryTable:
             )
             first = f"<th>{escape(condition)}<br><small>{count(seeds, 'seed')}</small></th>"
             lines.append(f"<tr>{first}{''.join(f'<td>{cell}</td>' for cell in shown)}</tr>")
-        body = "".join(lines) or f"<tr><td>{NOTHING}</td></tr>"
-        legend = escape(" ".join(self.legend)) if self.rows else ""
         return (
-            f"<table><thead><tr>{heads}</tr></thead><tbody>{body}</tbody></table>"
-            f"<p><small>{legend}</small></p>"
+            f"<table><thead><tr>{heads}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
+            f"<p><small>{escape(' '.join(self.legend))}</small></p>"
         )
 
     def _repr_html_(self) -> str:
