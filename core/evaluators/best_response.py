@@ -61,11 +61,8 @@ class BestResponse(Aggregation):
 
     def __init__(self, problem: DecisionProblem) -> None:
         super().__init__(problem)
-        if problem.teammates != "best-response":
-            raise ValueError(
-                f"learner.decision.teammates = {problem.teammates!r}: best-response plans for "
-                "'best-response' only"
-            )
+        why = "best-response plans for 'best-response' only"
+        self.require("teammates", "best-response", why)
         hierarchy, groups = problem.hierarchy, problem.groups
         n = len(hierarchy)
         nobody = problem.unseen != "plan" and not any(map(hierarchy.below, range(n)))
