@@ -23,15 +23,11 @@ def print_table(table: SummaryTable) -> None:
     """Print estimates by condition, each over its 95 % interval."""
     from rich.console import Console
 
-    from ..presentation.tables import NOTHING
     from ..presentation.terminal_tables import print_rows
 
-    if not table.rows:
-        print(NOTHING)
-        return
-    print_rows(table.titles, table.rows, Console())
-    for line in table.legend:
-        print(line)
+    if table.rows:
+        print_rows(table.titles, table.rows, Console())
+    print(*table.legend, sep="\n")
 
 
 def print_study(study: StudyResults, columns: Sequence[str] = ()) -> None:

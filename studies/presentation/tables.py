@@ -43,25 +43,20 @@ class SummaryTable:
     """The whole table in Markdown. Printed, it is as on a terminal of 80 columns; a notebook shows
     it as HTML."""
 
-    @property
-    def remark(self) -> str:
-        """What must be said of intervals of few seeds, if there are any; else nothing."""
-        if all(seeds >= FEW for _, seeds, _ in self.rows):
-            return ""
-        return f"Intervals of fewer than {FEW} seeds: Student's (short if skewed), rates Wilson's."
-
     def __str__(self) -> str:
-        if not self.rows:
-            return NOTHING
-        return "\n".join([text_of(self.titles, self.rows), "", *self.legend])
+        table = [text_of(self.titles, self.rows), ""] if self.rows else []
+        return "\n".join([*table, *self.legend])
 
     @property
     def legend(self) -> list[str]:
         """Lines that say what stands in the cells."""
-        return [
-            "Means over seeds, and below them their 95 % intervals.",
-            *filter(None, [self.remark]),
-        ]
+        if not self.rows:
+            return [NOTHING]
+        lines = ["Means over seeds, and below them their 95 % intervals."]
+        if any(seeds < FEW for _, seeds, _ in self.rows):
+            few = "Student's (short if skewed), rates Wilson's"
+            lines.append(f"Intervals of fewer than {FEW} seeds: {few}.")
+        return lines
 
     @property
     def html(self) -> str:
@@ -75,11 +70,9 @@ class SummaryTable:
             )
             first = f"<th>{escape(condition)}<br><small>{count(seeds, 'seed')}</small></th>"
             lines.append(f"<tr>{first}{''.join(f'<td>{cell}</td>' for cell in shown)}</tr>")
-        body = "".join(lines) or f"<tr><td>{NOTHING}</td></tr>"
-        legend = escape(" ".join(self.legend)) if self.rows else ""
         return (
-            f"<table><thead><tr>{heads}</tr></thead><tbody>{body}</tbody></table>"
-            f"<p><small>{legend}</small></p>"
+            f"<table><thead><tr>{heads}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
+            f"<p><small>{escape(' '.join(self.legend))}</small></p>"
         )
 
     def _repr_html_(self) -> str:

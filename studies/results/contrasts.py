@@ -18,10 +18,8 @@ from .statistics import bootstrap, rate
 from .summary import Summary
 from .verdicts import WORDS, printed
 
-EPISODES = (
-    Measure("steps", "steps", "1", better="lower", least=0.0),
-    Measure("return", "return", "1", better="higher"),
-)
+STEPS = Measure("steps", "steps", "1", better="lower", least=0.0)
+EPISODES = (STEPS, Measure("return", "return", "1", better="higher"))
 """What is known of every episode besides the measures of its scenario."""
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -151,12 +151,6 @@ def chosen(results: Results, where: Where, settings: Mapping[str, Any]) -> Resul
     return select(results, np.array(keep, dtype=bool))
 
 
-def relabelled(results: Results, name: str, taken: Iterable[str]) -> dict[str, str]:
-    """Return new labels of conditions, by the old ones: with a name, where they are `taken`."""
-    known = set(taken)
-    return {c: f"{c} ({name})" if c in known else c for c in results.columns}
-
-
 def _apart(name: str, tables: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return labels of conditions of one name, by one or two settings that tell all apart; or none.
 
@@ -188,7 +182,10 @@ def together(
     """
     times = Counter(condition for _, results in studies for condition in results.columns)
     several = [condition for condition, count in times.items() if count > 1]
-    labels = [relabelled(results, name, several) for name, results in studies]
+    labels = [
+        {c: f"{c} ({name})" if c in several else c for c in results.columns}
+        for name, results in studies
+    ]
     for condition in several if settings else ():
         at = [i for i, (_, results) in enumerate(studies) if condition in results.columns]
         apart = _apart(condition, [settings[i].get(condition, {}) for i in at])

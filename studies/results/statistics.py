@@ -8,7 +8,7 @@ few different values: below `FEW` seeds intervals of means are Student's.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -16,16 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.plugins.deferred import special, stats
+from ...core.plugins.deferred import special
 
 Array = NDArray[np.float64]
-
-STATISTICS: dict[str, Callable[[Array], Array]] = {
-    "mean": lambda x: np.mean(x, axis=-1),
-    "iqm": lambda x: stats.trim_mean(x, 0.25, axis=-1),
-    "median": lambda x: np.median(x, axis=-1),
-}
-"""Statistics of the last axis by name; the interquartile mean leaves out a quarter at each end."""
 
 FEW = 8
 """Below so many seeds a bootstrap interval covers too seldom: of normal values a 95 % interval from
@@ -33,9 +26,6 @@ FEW = 8
 
 AT_ONCE = 2**20
 """Values that are resampled at a time, so that memory does not grow with the study; 8 MB."""
-
-SPREAD = {"mean": 1.0, "iqm": 1.1, "median": 1.26}
-"""Standard deviation of each statistic of few normal values, over that of their mean."""
 
 NOT_NEGATIVE = (0.0, np.inf)
 """The bounds of times, sizes and numbers of things, see `bootstrap`."""
@@ -56,29 +46,23 @@ class Estimate:
 
 
 def bootstrap(
-    *strata: ArrayLike,
-    statistic: str = "mean",
+    values: ArrayLike,
     level: float = 0.95,
     resamples: int = 4000,
     seed: int = 0,
     bounds: tuple[float, float] = (-np.inf, np.inf),
 ) -> Estimate:
-    """Return a statistic of values pooled over strata, with its stratified bootstrap interval.
+    """Return the mean of values of runs with its bootstrap interval.
 
-    Each stratum is resampled on its own, whole runs at a time, so that every stratum keeps its
-    weight (Agarwal et al. 2021, Section 4.1). The percentiles lie further out than `level` says, by
-    as much as Student's t distribution does and variances of few runs fall short (Hesterberg 2015,
-    Section 5.2). Of fewer than `FEW` runs the interval is Student's, with the degrees of freedom of
-    Welch and Satterthwaite if there are several strata: exact for means of normal values, near that
-    for the other statistics.
+    Whole runs are resampled. The percentiles lie further out than `level` says, by as much as
+    Student's t distribution does and variances of few runs fall short (Hesterberg 2015,
+    Section 5.2). Of fewer than `FEW` runs the interval is Student's, which is exact for normal
+    values.
 
     Parameters
     ----------
-    *strata
-        Values ``(n_runs,)`` or ``(n_runs, n_points)``; the number of runs may differ. Points are
-        estimated apart, on the same resamples.
-    statistic
-        Name in `STATISTICS`.
+    values
+        ``(n_runs,)`` or ``(n_runs, n_points)``. Points are estimated apart, on the same resamples.
     level
         Coverage of the interval.
     resamples, seed
@@ -91,7 +75,7 @@ def bootstrap(
     Raises
     ------
     ValueError
-        If the statistic is unknown, or a stratum is empty.
+        If there are no values, or they have another shape.
 
     Examples
     --------
@@ -99,26 +83,23 @@ def bootstrap(
     >>> f"{e.value:.2f} [{e.low:.2f}, {e.high:.2f}]"
     '2.50 [0.45, 4.55]'
     """
-    if statistic not in STATISTICS:
-        raise ValueError(f"statistic = {statistic!r}: known: {', '.join(STATISTICS)}")
-    arrays = [np.asarray(stratum, dtype=float) for stratum in strata]
-    if not arrays or any(array.ndim not in (1, 2) or len(array) == 0 for array in arrays):
-        raise ValueError("bootstrap: every stratum needs values (n_runs,) or (n_runs, n_points)")
-    compute = STATISTICS[statistic]
-    value = compute(np.concatenate(arrays).T)
-    if any(len(array) < 2 for array in arrays):
+    array = np.asarray(values, dtype=float)
+    if array.ndim not in (1, 2) or len(array) == 0:
+        raise ValueError(
+            f"bootstrap: values of shape {array.shape}, allowed (n_runs,) or (n_runs, n_points)"
+        )
+    n_runs, value = len(array), array.copy().T.mean(axis=-1)
+    if n_runs < 2:
         return Estimate(value, np.full_like(value, np.nan), np.full_like(value, np.nan))
-    if sum(map(len, arrays)) < FEW:
-        half = _student(arrays, level) * SPREAD[statistic]
-        return _bounded(value, value - half, value + half, bounds, level, sum(map(len, arrays)))
-    drawn = _drawn(tuple(map(len, arrays)), resamples, seed)
-    n_runs, statistics = sum(map(len, arrays)), []
-    for part in _parts(resamples, sum(array.size for array in arrays)):
-        samples = [_taken(array, runs[part]) for array, runs in zip(arrays, drawn, strict=True)]
-        pooled = samples[0] if len(samples) == 1 else np.concatenate(samples)
-        statistics.append(compute(np.moveaxis(pooled, 0, -1)))
+    if n_runs < FEW:
+        reach = special.stdtrit(n_runs - 1, 0.5 + level / 2.0)
+        half = reach * np.sqrt(array.var(axis=0, ddof=1) / n_runs)
+        return _bounded(value, value - half, value + half, bounds, level, n_runs)
+    drawn, means = _drawn(n_runs, resamples, seed), []
+    for part in _parts(resamples, array.size):
+        means.append(np.moveaxis(_taken(array, drawn[part]), 0, -1).mean(axis=-1))
     tail = _tail(level, n_runs)
-    low, high = np.quantile(np.concatenate(statistics), [tail, 1.0 - tail], axis=0)
+    low, high = np.quantile(np.concatenate(means), [tail, 1.0 - tail], axis=0)
     return _bounded(value, low, high, bounds, level, n_runs)
 
 
@@ -129,19 +110,17 @@ def _parts(resamples: int, size: int) -> Iterator[slice]:
 
 
 @lru_cache(maxsize=1)
-def _drawn(sizes: tuple[int, ...], resamples: int, seed: int) -> list[NDArray[Any]]:
-    """Return of strata of n runs each the ``(resamples, n)`` that resamples are made of.
+def _drawn(n_runs: int, resamples: int, seed: int) -> NDArray[Any]:
+    """Return the runs ``(resamples, n_runs)`` that resamples are made of.
 
     In few bytes. They are kept, as the conditions of a study mostly have equally many seeds.
     """
-    rng, drawn = np.random.default_rng(seed), []
-    for n in sizes:
-        runs = np.empty((resamples, n), np.min_scalar_type(n - 1))
-        for part in _parts(resamples, n):
-            runs[part] = rng.integers(n, size=runs[part].shape)
-        runs.flags.writeable = False
-        drawn.append(runs)
-    return drawn
+    rng = np.random.default_rng(seed)
+    runs = np.empty((resamples, n_runs), np.min_scalar_type(n_runs - 1))
+    for part in _parts(resamples, n_runs):
+        runs[part] = rng.integers(n_runs, size=runs[part].shape)
+    runs.flags.writeable = False
+    return runs
 
 
 def _taken(array: Array, runs: NDArray[Any]) -> Array:
@@ -167,18 +146,6 @@ def _bounded(
         low = np.where(value >= greatest, np.minimum(low, greatest - reach), low)
         high = np.where(value <= least, np.maximum(high, least + reach), high)
     return Estimate(value, low, high)
-
-
-def _student(strata: list[Array], level: float) -> Array:
-    """Return half the width of Student's interval of the mean of all values of some strata."""
-    n = sum(map(len, strata))
-    parts = np.array([len(s) * s.var(axis=0, ddof=1) / n**2 for s in strata])
-    freedom = np.array([len(s) - 1 for s in strata]).reshape(-1, *[1] * (parts.ndim - 1))
-    variance = parts.sum(axis=0)
-    shares = np.divide(parts, variance, out=np.zeros_like(parts), where=variance > 0)
-    # Where nothing varies the interval has no width, with any degrees of freedom.
-    degrees = 1.0 / np.maximum((shares**2 / freedom).sum(axis=0), 1e-300)
-    return special.stdtrit(degrees, 0.5 + level / 2.0) * np.sqrt(variance)
 
 
 def _tail(level: float, n_runs: int) -> float:

@@ -25,14 +25,11 @@ def verdict_lines(
 
     `words` are what lower and higher values are called.
     """
-    ranked = sorted(differences, key=lambda d: float(d.estimate.value))
-    for word, sign in zip(words, (-1, 1), strict=True):
-        for d in ranked:
-            if d.p < LEVEL and d.estimate.value * sign > 0:
-                yield from _line(word, d)
-    for d in ranked:
-        if d.p >= LEVEL:
-            yield from _line("no significant difference", d)
+    for d in sorted(differences, key=lambda d: (d.p >= LEVEL, float(d.estimate.value))):
+        is_higher = bool(d.estimate.value > 0)
+        word = words[is_higher] if d.p < LEVEL else "no significant difference"
+        text = f"  {word}: {d.condition}, {d.shown}"
+        yield from wrap(text, WIDTH, subsequent_indent="    ", break_on_hyphens=False)
 
 
 def verdicts(differences: Sequence[Difference], reference: str) -> list[str]:
@@ -71,11 +68,6 @@ def printed(
     return lines + power_lines(compared, of_rates=of_rates)
 
 
-def _line(verdict: str, d: Difference) -> list[str]:
-    text = f"{verdict}: {d.condition}, {d.shown}"
-    return wrap(text, WIDTH, initial_indent="  ", subsequent_indent="    ", break_on_hyphens=False)
-
-
 def power_lines(differences: Sequence[Difference], *, of_rates: bool = True) -> list[str]:
     """Return lines on which differences the comparisons could find, and how many seeds it takes.
 
@@ -107,14 +99,6 @@ def power_text(
     Power: with 20 seeds, a difference of .17 is found with probability .80. For a
       difference of .20 it takes about 15 seeds.
     """
-    text = f"Power: {power_sentence(seeds, comparisons, deviation, smallest)}"
-    return wrap(text, WIDTH, subsequent_indent="  ", break_on_hyphens=False)
-
-
-def power_sentence(
-    seeds: int, comparisons: int, deviation: float | None, smallest: float | None
-) -> str:
-    """Return the same in one piece, without its head."""
     counted = f"{seeds} seed{'s' * (seeds != 1)}"
     among = f" and {comparisons} comparisons" if comparisons > 1 else ""
     needed = seeds_needed(comparisons)
@@ -138,4 +122,4 @@ def power_sentence(
         text += f"{two_figures(WANTED)}."
         if smallest is not None and wanted is not None:
             text += f" For a difference of {two_figures(smallest)} it takes about {wanted} seeds."
-    return text
+    return wrap(f"Power: {text}", WIDTH, subsequent_indent="  ", break_on_hyphens=False)

@@ -14,7 +14,7 @@ hierarchy that succeeds only where it is easy looks quick.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,7 +29,7 @@ from ...results.statistics import Estimate, bootstrap, rate
 from ...results.summary import EVALUATED, Summary
 from ...spec.labels import label_but
 from ...spec.spec import Spec
-from ..scaling import NUMBERS, measure
+from ..scaling import NUMBERS, measure, sizes_of
 from ..study import check_evaluated
 
 PUBLISHED = ("success",)
@@ -110,16 +110,6 @@ def analysis_of(results: Results, cases: Sequence[HierarchyCase], reference: str
     legend = ["Rows: number of robots, what else is swept, hierarchy.", ""]
     notes = (*(legend if any(case.value_of for case in cases) else []), *contrasts.notes)
     return Analysis(tuple(table), notes if cases else (), cases, contrasts.differences)
-
-
-def sizes_of(columns: Mapping[str, Mapping[str, object]], robots: Mapping[str, int]) -> list[str]:
-    """Return the swept keys that are the number of robots, whatever the scenario calls it."""
-    keys = dict.fromkeys(key for swept in columns.values() for key in swept)
-    return [
-        key
-        for key in keys
-        if all(str(columns.get(c, {}).get(key)) == str(count) for c, count in robots.items())
-    ]
 
 
 def estimates(
@@ -209,4 +199,4 @@ def draw(analysis: Analysis) -> Figures:
     return {"hierarchies": figure}
 
 
-__all__ = ["NUMBERS", "analyse", "check", "draw", "measure"]
+__all__ = ["NUMBERS", "analyse", "check", "draw", "measure", "sizes_of"]

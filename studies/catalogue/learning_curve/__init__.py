@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Literal
 from ....core.interface.measures import SUCCESS, Measure
 from ...errors import SpecError
 from ...results.analysis import Analysis, Figures
+from ...results.contrasts import STEPS
 from ...results.results import Array, Results
-from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, rates
+from ...results.statistics import Estimate, bootstrap, rate, rates
 from ...results.summary import EVALUATED, Summary, evaluated
 from ..study import run_training as measure
 
@@ -47,20 +48,17 @@ class Metric:
 
     title: str
     """Its heading."""
-    measure: str
-    """Which measurement: a measure of `Results.measures`, or ``steps``."""
+    measure: Measure
+    """Which measurement."""
     block: Literal["first", "last", "evaluation"]
     """Which episodes: the first or the last `BLOCK` of training, or those of the evaluation."""
-    is_rate: bool = False
-    """Whether each episode is a success or not."""
-    bounds: tuple[float, float] = NOT_NEGATIVE
-    """The least and the greatest value that there can be."""
 
     def estimate(self, values: Array) -> Estimate:
         """Return the mean over the block of values ``(n_seeds, n_episodes)``."""
         if self.block != "evaluation":
             values = values[:, :BLOCK] if self.block == "first" else values[:, -BLOCK:]
-        return rate(values) if self.is_rate else bootstrap(values.mean(axis=1), bounds=self.bounds)
+        m = self.measure
+        return rate(values) if m.is_rate else bootstrap(values.mean(axis=1), bounds=m.bounds)
 
 
 def metrics_of(measures: Sequence[Measure], episodes: int) -> tuple[Metric, ...]:
@@ -71,18 +69,14 @@ def metrics_of(measures: Sequence[Measure], episodes: int) -> tuple[Metric, ...]
     no longer than a block, its begin is its end.
     """
     others = [m for m in measures if m.name != SUCCESS.name]
-    begin = [Metric(f"success first {BLOCK}", SUCCESS.name, "first", is_rate=True)]
+    begin = [Metric(f"success first {BLOCK}", SUCCESS, "first")]
     return (
         *(begin if episodes > BLOCK else ()),
-        Metric(f"success last {BLOCK}", SUCCESS.name, "last", is_rate=True),
-        Metric(EVALUATED, SUCCESS.name, "evaluation", is_rate=True),
-        *(
-            Metric(f"{m.title}, evaluation", m.name, "evaluation", is_rate=True)
-            for m in others
-            if m.is_rate
-        ),
-        Metric("evaluation steps", "steps", "evaluation"),
-        *(Metric(m.heading, m.name, "last", bounds=m.bounds) for m in others if not m.is_rate),
+        Metric(f"success last {BLOCK}", SUCCESS, "last"),
+        Metric(EVALUATED, SUCCESS, "evaluation"),
+        *(Metric(f"{m.title}, evaluation", m, "evaluation") for m in others if m.is_rate),
+        Metric("evaluation steps", STEPS, "evaluation"),
+        *(Metric(m.heading, m, "last") for m in others if not m.is_rate),
     )
 
 
@@ -112,8 +106,9 @@ def analyse(results: Results) -> Analysis:
         episodes = results.success(condition).shape[1]
         for metric in metrics_of(results.measures, episodes):
             phase = "evaluation" if metric.block == "evaluation" else "training"
-            if results.has(condition, phase, metric.measure):  # published results keep a part
-                values = results.values(condition, metric.measure, phase)
+            name = metric.measure.name
+            if results.has(condition, phase, name):  # published results keep a part
+                values = results.values(condition, name, phase)
                 estimates[metric.title] = metric.estimate(values)
             if metric.title == EVALUATED:
                 estimates |= evaluated(results, condition)

@@ -201,14 +201,18 @@ def counted_bodies(columns: Mapping[str, Mapping[str, Any]], sizes: Mapping[str,
     >>> counted_bodies({"2": {"scenario.joints": 2}, "8": {"scenario.joints": 8}}, {"2": 2, "8": 8})
     'joints'
     """
-    keys = dict.fromkeys(key for own in columns.values() for key in own)
-    swept = (
-        key.removeprefix("scenario.")
+    swept = (key for key in sizes_of(columns, sizes) if key.startswith("scenario."))
+    return next(swept, "scenario.robots").removeprefix("scenario.")
+
+
+def sizes_of(columns: Mapping[str, Mapping[str, object]], robots: Mapping[str, int]) -> list[str]:
+    """Return the swept keys that are the number of bodies, whatever the scenario calls it."""
+    keys = dict.fromkeys(key for swept in columns.values() for key in swept)
+    return [
+        key
         for key in keys
-        if key.startswith("scenario.")
-        and all(columns.get(c, {}).get(key) == size for c, size in sizes.items())
-    )
-    return next(swept, "robots")
+        if all(str(columns.get(c, {}).get(key)) == str(count) for c, count in robots.items())
+    ]
 
 
 def _counted(size: int, bodies: str) -> str:
