@@ -79,8 +79,8 @@ class ScriptedController:
         ]
         # With steps as coarse as the actions' a robot may find no better place than it has.
         stuck = not any(speeds) and not any(
-            self._drivers.next(r, speeds[w][None])[0][0, k].any()
-            for r, (w, k) in enumerate(zip(self._drivers.wheels, local, strict=True))
+            self._drivers.next(speeds[w][None])[0][0, k].any()
+            for w, k in zip(self._drivers.wheels, local, strict=True)
         )
         if stuck or not away:
             local = self._push(robots, box, goal, speeds, side, slots)
@@ -88,8 +88,7 @@ class ScriptedController:
 
     def _joint(self, local: Sequence[int]) -> IntArray:
         """Return the joint action ``(n,)`` of robot actions."""
-        choices = zip(self._drivers.choices, local, strict=True)
-        return np.concatenate([robot[k] for robot, k in choices])
+        return self._drivers.choices[np.array(local)].ravel()
 
     def _plan(
         self, robots: FloatArray, box: FloatArray, goal: FloatArray
@@ -170,9 +169,7 @@ class ScriptedController:
         slots: FloatArray,
     ) -> list[int]:
         """Return the robot actions that push best, as far as the push predictor can tell."""
-        tables = [
-            self._drivers.next(r, speeds[w][None])[1][0] for r, w in enumerate(self._drivers.wheels)
-        ]
+        tables = [self._drivers.next(speeds[w][None])[1][0] for w in self._drivers.wheels]
         twists = np.zeros((len(tables), max(map(len, tables)), 3))
         for r, table in enumerate(tables):
             twists[r, : len(table)] = table

@@ -82,8 +82,8 @@ class Crowd:
     def __init__(self, drivers: Drivers, sides: Sequence[Side]) -> None:
         self.box, self.sides = drivers.box, tuple(sides)
         self._model, self._drivers = drivers.model, drivers
-        self._radius = max(robot.radius for robot in drivers.robots)
-        self._n = len(drivers.robots)
+        self._radius = drivers.robot.radius
+        self._n = len(drivers.wheels)
 
     def choose(
         self, robots: FloatArray, box: FloatArray, goal: FloatArray, speeds: FloatArray
@@ -100,7 +100,7 @@ class Crowd:
                 for r in range(self._n)
             ]
         )
-        tables = [drivers.next(r, speeds[w][None]) for r, w in enumerate(drivers.wheels)]
+        tables = [drivers.next(speeds[w][None]) for w in drivers.wheels]
         moves = any(after[0, k].any() for (after, _), k in zip(tables, local, strict=True))
         teams = [team for team in (plan.second, ~plan.second) if team.any()]
         ready = all(stands[team].mean() >= ENOUGH for team in teams)

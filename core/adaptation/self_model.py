@@ -77,15 +77,13 @@ class SelfModel:
         self._units = tuple(
             np.array([1.0, 1.0, max(1.0, float(np.abs(effect[2]).max()))]) for effect in nominal
         )
-        self._prior = tuple(self._spread(effect.shape[1]) for effect in nominal)
+        of_effect, of_constant = settings.prior_effect**2, settings.prior_constant**2
+        self._prior = tuple(
+            np.diag([of_effect] * (effect.shape[1] - 1) + [of_constant]) for effect in nominal
+        )
         self._covariances = tuple(np.stack([prior] * 3) for prior in self._prior)
         # Mean squared innovation of each component in units of the expected square.
         self._ratios = tuple(np.ones(3) for _ in nominal)
-
-    def _spread(self, size: int) -> FloatArray:
-        spread = np.full(size, self.settings.prior_effect**2)
-        spread[-1] = self.settings.prior_constant**2
-        return np.diag(spread)
 
     @property
     def deviations(self) -> tuple[FloatArray, ...]:

@@ -219,6 +219,8 @@ class JointPrediction:
         for name in OF_JOINT_ACTIONS:
             if hasattr(prediction, name):
                 setattr(self, name, partial(_ask, getattr(prediction, name), joint))
+        if hasattr(prediction, "groups"):
+            self.groups = prediction.groups
         if joint.whole:
             self.blocks = partial(_whole_blocks, prediction, joint)
             if hasattr(prediction, "rewards"):
@@ -226,12 +228,6 @@ class JointPrediction:
         elif hasattr(prediction, "reward_table"):  # which the tables of next states are used with
             self.blocks = partial(_body_blocks, prediction, joint)
             self.reward_table = prediction.reward_table
-
-    @property
-    def groups(self) -> tuple[tuple[int, ...], ...]:
-        """Actuators by body."""
-        groups: tuple[tuple[int, ...], ...] = cast(Any, self._prediction).groups
-        return groups
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of who acts for a block, for actions ``(m, M)``."""

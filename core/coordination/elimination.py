@@ -97,11 +97,6 @@ class Elimination:
         self._n_scopes = len(scopes)
         self._steps = tuple(self._planned(scopes))
 
-    @property
-    def beside(self) -> tuple[int, ...]:
-        """Agents in the table that is left when each agent is eliminated, in that order."""
-        return tuple(len(step.beside) for step in self._steps)
-
     def _planned(self, scopes: Sequence[Scope]) -> list[_Step]:
         known: dict[int, Scope] = dict(enumerate(scopes))
         steps = []

@@ -60,11 +60,8 @@ class BestResponse(Aggregation):
 
     def __init__(self, problem: DecisionProblem) -> None:
         super().__init__(problem)
-        if problem.teammates != "best-response":
-            raise ValueError(
-                f"learner.decision.teammates = {problem.teammates!r}: best-response plans for "
-                "'best-response' only"
-            )
+        why = "best-response plans for 'best-response' only"
+        self.require("teammates", "best-response", why)
         hierarchy, groups = problem.hierarchy, problem.groups
         n = len(hierarchy)
         self._group_of = {i: g for g, group in enumerate(groups) for i in group}

@@ -81,16 +81,10 @@ class Coordination(Aggregation):
                 f"learner.decision.evaluator = {name!r}: the topology joins no neighbours, "
                 "use coordination-graph"
             )
-        for key, value, allowed in (
-            ("rule", problem.rule, "value"),
-            ("teammates", problem.teammates, "best-response"),
-            ("value_of", problem.value_of, "own"),
-        ):
-            if value != allowed:
-                raise ValueError(
-                    f"learner.decision.{key} = {value!r}: {name} adds up own values over "
-                    f"neighbours, allowed: {allowed!r}"
-                )
+        allowed = {"rule": "value", "teammates": "best-response", "value_of": "own"}
+        for key, value in allowed.items():
+            why = f"{name} adds up own values over neighbours, allowed: {value!r}"
+            self.require(key, value, why)
         n = len(hierarchy)
         self.scopes: tuple[Scope, ...] = tuple(
             tuple(sorted((i, *hierarchy.below(i)))) for i in range(n)

@@ -53,10 +53,7 @@ class CrossEntropy(Aggregation):
 
     def __init__(self, settings: CrossEntropySettings, problem: DecisionProblem) -> None:
         super().__init__(problem)
-        if problem.rule != "reward":
-            raise ValueError(
-                f"learner.decision.rule = {problem.rule!r}: {NAME} plans by 'reward' only"
-            )
+        self.require("rule", "reward", f"{NAME} plans by 'reward' only")
         hierarchy = problem.hierarchy
         if len(hierarchy.below(hierarchy.order[0])) < len(hierarchy) - 1:
             raise ValueError(

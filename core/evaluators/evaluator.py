@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, NamedTuple, Protocol
 
@@ -28,6 +28,8 @@ Plan = Literal["private", "common"]
 """Whether each agent makes its own plan, or all work out the same one."""
 
 
+Predicted = Callable[[], FloatArray]
+"""Predicts something of joint actions."""
 NOTHING_GIVEN: FloatArray = np.zeros((0, 0, 0))
 """Conditional frequencies that nobody counts."""
 NO_STATES: FloatArray = np.zeros((0, 0))
@@ -181,6 +183,12 @@ class Aggregation:
         self._pooling = Pooling(problem.rules, problem.groups)
         self._last: tuple[Sequence[FloatArray], IntArray, Pooled] | None = None
 
+    def require(self, key: str, allowed: str, why: str) -> None:
+        """Refuse decision settings whose `key` is not what is allowed here."""
+        value = getattr(self.problem, key)
+        if value != allowed:
+            raise ValueError(f"learner.decision.{key} = {value!r}: {why}")
+
     def count(self, agent: int, joint_actions: int) -> None:
         """Note that joint actions have been tried: valued by each agent concerned, or rewarded."""
         valued = 0 if self.problem.rule == "reward" else len(self.concerned[agent])
@@ -201,17 +209,14 @@ class Aggregation:
         prediction: Any = deliberation.prediction
         concerned = self.concerned[deliberation.agent]
         self.count(deliberation.agent, len(joint_actions))
-        rewards = values = None
-        if self.problem.rule != "value":
-            rewards = prediction.rewards(joint_actions)
-        if self.problem.rule != "reward":
-            if len(concerned) == 1:
-                states = prediction.states(deliberation.agent, joint_actions)
-                values = self.rules.values(deliberation.own_weights, states)
-            else:
-                pooled = self._pooled(deliberation)
-                values = self._pooling.mean(pooled, prediction, joint_actions)
-        return self.combine(rewards, values)
+
+        def values() -> FloatArray:
+            if len(concerned) > 1:
+                return self._pooling.mean(self._pooled(deliberation), prediction, joint_actions)
+            states = prediction.states(deliberation.agent, joint_actions)
+            return self.rules.values(deliberation.own_weights, states)
+
+        return self.combine(lambda: prediction.rewards(joint_actions), values)
 
     def _pooled(self, deliberation: Deliberation) -> Pooled:
         """Return the pooled weights of those concerned, once for agents of one decision."""
@@ -228,13 +233,13 @@ class Aggregation:
         joint[:, list(self.hierarchy.below(agent))] = np.tile(tried, (a, 1))
         return self.worth(deliberation, joint).reshape(a, -1)
 
-    def combine(self, rewards: FloatArray | None, values: FloatArray | None) -> FloatArray:
-        """Return what the decision rule makes of predicted rewards and values."""
-        if rewards is None or values is None:
-            combined = values if rewards is None else rewards
-            assert combined is not None
-            return combined
-        return rewards + self.problem.discount * values
+    def combine(self, rewards: Predicted, values: Predicted) -> FloatArray:
+        """Return what the decision rule makes of rewards and values; it predicts what it needs."""
+        if self.problem.rule == "value":
+            return values()
+        if self.problem.rule == "reward":
+            return rewards()
+        return rewards() + self.problem.discount * values()
 
     def aggregate(self, values: FloatArray, probabilities: FloatArray | None) -> FloatArray:
         """Return per row ``(A, m)`` the maximum, mean or weighted mean, by the teammate model.

@@ -94,12 +94,11 @@ class ExactEnumeration(Aggregation):
         concerned = self.concerned[deliberation.agent]
         indices = (tried + int(deliberation.joint_action @ places)).ravel()
         self.count(deliberation.agent, len(indices))
-        rewards = values = None
-        if self.problem.rule != "value":
-            rewards = prediction.reward_table()[indices]
-        if self.problem.rule != "reward":
-            values = self._mean(deliberation, concerned)[indices]
-        return self.combine(rewards, values).reshape(self.n_actions, -1)
+        worth = self.combine(
+            lambda: prediction.reward_table()[indices],
+            lambda: self._mean(deliberation, concerned)[indices],
+        )
+        return worth.reshape(self.n_actions, -1)
 
     def _mean(self, deliberation: Deliberation, concerned: IntArray) -> FloatArray:
         """Return the mean value ``(A ** n,)`` of all joint actions, once for a whole decision."""

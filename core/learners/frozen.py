@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar, Literal
 
-from ..numerics.arrays import FloatArray, IntArray
-from ..rules.rule_base import RuleBase
+from ..numerics.arrays import FloatArray
 from .learner import LearnerSettings
 from .online import Online
 
@@ -22,9 +21,6 @@ class Frozen(Online):
     """Never learns: the consequent weights stay as they are, zero from the start."""
 
     kept = ("theta",)
-
-    def __init__(self, settings: FrozenSettings, rules: RuleBase, rows: IntArray) -> None:
-        super().__init__(settings.discount, rules, rows)
 
     def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
         return 0

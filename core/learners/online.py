@@ -26,8 +26,9 @@ class Online(ABC):
     """Names of the arrays that are saved: those of rows, and of agents the `traces`."""
     traces = ("trace", "reach")
 
-    def __init__(self, discount: float, rules: RuleBase, rows: IntArray) -> None:
-        self.discount, self.rules, self.rows = discount, rules, rows
+    def __init__(self, settings: Any, rules: RuleBase, rows: IntArray) -> None:
+        self.settings, self.discount = settings, settings.discount
+        self.rules, self.rows = rules, rows
         n_rows = int(rows.max()) + 1
         self.theta: FloatArray = np.zeros((n_rows, rules.n_rules), rules.dtype)
         self.weights = self.theta
@@ -119,10 +120,6 @@ class OneStepSettings(LearnerSettings):
 
 class OneStep(Online):
     """TD(0) whose steps are divided by the squared lengths of feature vectors."""
-
-    def __init__(self, settings: OneStepSettings, rules: RuleBase, rows: IntArray) -> None:
-        super().__init__(settings.discount, rules, rows)
-        self.settings: Any = settings
 
     def _step(
         self, states: FloatArray, delta: FloatArray, lengths: FloatArray | np.float64 | None = None

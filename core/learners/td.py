@@ -50,8 +50,7 @@ class TDLambda(Online):
     """
 
     def __init__(self, settings: TDLambdaSettings, rules: RuleBase, rows: IntArray) -> None:
-        super().__init__(settings.discount, rules, rows)
-        self.settings = settings
+        super().__init__(settings, rules, rows)
         self.updates: FloatArray = np.zeros(())
         if settings.averaging > 1:
             self.weights = np.zeros_like(self.theta)

@@ -111,8 +111,7 @@ class RuleBase:
                 len(term) <= 3 or 2 ** len(term) <= size
                 for term, size in zip(self.terms, lay.shared_sizes, strict=True)
             )
-            kind = enumerate_looked_up if looks_up else enumerate_contracted
-            self._enumerate = kind
+            self._enumerate = enumerate_looked_up if looks_up else enumerate_contracted
 
     @classmethod
     def build(cls, space: StateSpace, settings: RuleBaseSettings) -> RuleBase:

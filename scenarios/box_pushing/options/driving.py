@@ -7,7 +7,7 @@ within reach count.
 
 from __future__ import annotations
 
-from itertools import pairwise, product
+from itertools import product
 from math import log
 from typing import Any
 
@@ -42,38 +42,34 @@ class Drivers:
     seconds
         The decision period [s].
     choices
-        Per robot ``(k, w)``: its robot actions.
+        ``(k, w)`` the robot actions, the same of every robot.
     wheels
         Per robot: where its wheels stand among those of all.
     """
 
     def __init__(self, scenario: BoxPushing) -> None:
-        self.robots = robots = scenario.world.robots
-        self.box, self.actions = scenario.box, scenario.action_set
-        self.model = push_model("push", list(robots), self.box)
+        self.robot, self.box, self.actions = scenario.robot, scenario.box, scenario.action_set
+        self.model = push_model("push", list(scenario.world.robots), self.box)
         self.increment = scenario.settings.speed_increment
         self.seconds = scenario.settings.period
-        self.choices = [_robot_actions(robot, len(self.actions)) for robot in robots]
-        counts = np.cumsum([0] + [len(robot.wheels) for robot in robots])
-        self.wheels = [slice(a, b) for a, b in pairwise(counts)]
-        self._effects = [nominal_effect(robot) for robot in robots]
-        self._radii: FloatArray = np.array([robot.radius for robot in robots])
+        self.choices = _robot_actions(self.robot, len(self.actions))
+        self.wheels = [slice(group[0], group[-1] + 1) for group in scenario.groups]
+        self._effect = nominal_effect(self.robot)
 
-    def next(self, robot: int, speeds: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def next(self, speeds: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return wheel speeds ``(m, k, w)`` and twists ``(m, k, 3)`` after the k robot actions.
 
         `speeds` is ``(m, w)``.
         """
-        limit = np.full(speeds.shape[-1], self.robots[robot].max_speed)
+        limit = np.full(speeds.shape[-1], self.robot.max_speed)
         after = self.actions.apply(
-            speeds[:, None], self.choices[robot][None], self.increment * limit, limit
+            speeds[:, None], self.choices[None], self.increment * limit, limit
         )
-        effect = self._effects[robot]
-        return after, after @ effect[:, :-1].T + effect[:, -1]
+        return after, after @ self._effect[:, :-1].T + self._effect[:, -1]
 
     def rest(self, robot: int, speeds: FloatArray) -> int:
         """Return the robot action after which a robot's wheels are slowest."""
-        after, _ = self.next(robot, speeds[self.wheels[robot]][None])
+        after, _ = self.next(speeds[self.wheels[robot]][None])
         return int(np.abs(after[0]).sum(axis=1).argmin())
 
     def drive(
@@ -90,16 +86,16 @@ class Drivers:
         wheels.
         """
         now = speeds[self.wheels[robot]][None]
-        depth = int(log(LONGEST_SEARCH) / log(len(self.choices[robot])))
-        spans = self._radii[robot] + self._radii + CLEARANCE
-        within = spans + depth * self.seconds * self.robots[robot].max_speed
+        depth = int(log(LONGEST_SEARCH) / log(len(self.choices)))
+        span = self.robot.radius + self.robot.radius + CLEARANCE
+        within = span + depth * self.seconds * self.robot.max_speed
         near = np.hypot(*(robots[:, :2] - robots[robot, :2]).T) < within
         near[robot] = False
-        others, spans = robots[near, :2], spans[near]
+        others = robots[near, :2]
         poses, first = robots[robot][None], None
         cost = np.zeros(1)
         for _ in range(depth):
-            after, twists = self.next(robot, now)
+            after, twists = self.next(now)
             row, option = np.nonzero(_distinct(after))
             poses, cost = poses[row], cost[row]
             first = option if first is None else first[row]
@@ -107,10 +103,10 @@ class Drivers:
             for _ in range(2):
                 poses = moved(poses, twists, self.seconds / 2)
                 apart = np.hypot(*(poses[:, None, :2] - others).transpose(2, 0, 1))
-                cost = cost + 10.0 * np.maximum(spans - apart, 0.0).sum(axis=1)
+                cost = cost + 10.0 * np.maximum(span - apart, 0.0).sum(axis=1)
                 path = paths(
                     poses, target[:2], box, self.model.edges, self.model.rounding,
-                    self._radii[robot] + CLEARANCE, self.box.reach,
+                    self.robot.radius + CLEARANCE, self.box.reach,
                 )  # fmt: skip
                 turn = np.abs(wrap(poses[:, 2] - target[2]))
                 cost = cost + 0.1 * (path + 0.06 * turn * np.exp(-path / 0.05))

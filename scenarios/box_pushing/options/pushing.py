@@ -56,13 +56,13 @@ class Pushing:
                 local = self._straight_on(robot, pose, speeds, target[2])
             else:
                 local = self._drivers.drive(robot, robots, box, speeds, target)
-            actions.append(self._drivers.choices[robot][local])
+            actions.append(self._drivers.choices[local])
         return np.concatenate(actions)
 
     def _straight_on(self, robot: int, pose: FloatArray, speeds: FloatArray, way: float) -> int:
         """Return the robot action that pushes fastest without turning away from `way` [rad]."""
         own = speeds[self._drivers.wheels[robot]][None]
-        twists = self._drivers.next(robot, own)[1][0]
+        twists = self._drivers.next(own)[1][0]
         seconds = self._drivers.seconds
         turned = np.abs(wrap(pose[2] + seconds * twists[:, 2] - way))
         return int((STRAIGHT * turned - seconds * twists[:, 0]).argmin())

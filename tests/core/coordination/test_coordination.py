@@ -53,8 +53,9 @@ def test_the_order_has_the_width_that_is_told():
             left.add_edges_from((a, b) for a in beside for b in beside if a < b)
         assert widest <= width
         elimination = Elimination(pairwise(graph), 12, 2)
-        assert max(elimination.beside) == widest
-        assert Problem(actions=2).decision(elimination.beside) <= 12 * 2 ** (1 + width)
+        beside = [len(step.beside) for step in elimination._steps]
+        assert max(beside) == widest
+        assert Problem(actions=2).decision(beside) <= 12 * 2 ** (1 + width)
 
 
 def test_max_plus_is_exact_on_trees():

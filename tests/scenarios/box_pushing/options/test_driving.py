@@ -13,7 +13,7 @@ def drivers(robots: int) -> Drivers:
 
 
 def wheels_after(team: Drivers, choice: int, speeds: np.ndarray) -> np.ndarray:
-    return team.next(0, speeds[:2][None])[0][0, choice]
+    return team.next(speeds[:2][None])[0][0, choice]
 
 
 def test_a_robot_sets_out_for_a_place_ahead_and_rests() -> None:
