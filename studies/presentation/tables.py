@@ -53,10 +53,14 @@ class SummaryTable:
         if not self.rows:
             return [NOTHING]
         lines = ["Means over seeds, and below them their 95 % intervals."]
-        if any(seeds < FEW for _, seeds, _ in self.rows):
-            few = "Student's (short if skewed), rates Wilson's"
-            lines.append(f"Intervals of fewer than {FEW} seeds: {few}.")
-        return lines
+        return lines + [self.remark] * bool(self.remark)
+
+    @property
+    def remark(self) -> str:
+        """What must be said of intervals of few seeds, if there are any; else nothing."""
+        if all(seeds >= FEW for _, seeds, _ in self.rows):
+            return ""
+        return f"Intervals of fewer than {FEW} seeds: Student's (short if skewed), rates Wilson's."
 
     @property
     def html(self) -> str:
