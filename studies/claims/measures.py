@@ -16,7 +16,6 @@ from ..catalogue.chain_order import order_tests
 from ..catalogue.hierarchies import VALUE_OF
 from ..catalogue.shapes import ratios_of
 from ..catalogue.wheel_failure import courses_of
-from ..presentation.words import count
 from ..results.comparison import aligned, difference, of_shared_seeds, ratio
 from ..results.results import Results
 from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
@@ -196,7 +195,7 @@ def lost_without(evaluation: str) -> Compute:
             np.hstack(of_shared_seeds(seeds, [results.success(c, phase) for c in cases]))
             for phase in ("evaluation", other)
         )
-        return Measured(difference(whole, part), len(whole), note=count(len(cases), "size"))
+        return Measured(difference(whole, part), len(whole), note=f"{len(cases)} sizes")
 
     return compute
 

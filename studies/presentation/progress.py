@@ -1,11 +1,10 @@
-"""How a study goes, shown while it runs: a bar on a terminal or in a notebook, else lines."""
+"""How a study goes, shown while it runs: a bar on a terminal, else lines."""
 
 from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Iterable, Iterator
-from html import escape
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,10 +26,7 @@ def say(line: str) -> None:
 
 
 class Terminal(Observer):
-    """Shows how a study goes.
-
-    On standard error; in a notebook as a bar below the cell.
-    """
+    """Shows on standard error how a study goes."""
 
     def announce(self, spec: Spec, directory: Path, processes: int) -> None:
         """Say what is about to be run."""
@@ -51,12 +47,8 @@ class Terminal(Observer):
             say(f"{done} of {total} trials were run before")
         if done == total:
             return
-        from rich.console import Console
-
         if sys.stderr.isatty():
             _follow_bar(outcomes, total, done)
-        elif Console().is_jupyter:
-            _follow_notebook(outcomes, total, done)
         else:
             _follow_lines(outcomes, total, done)
 
@@ -84,37 +76,15 @@ def _follow_bar(outcomes: Iterable[Outcome], total: int, done: int) -> None:
 
 
 def _follow_lines(outcomes: Iterable[Outcome], total: int, done: int) -> None:
-    last = time.monotonic()
-    for finished, line, outcome in _counted(outcomes, total, done):
+    begin = last = time.monotonic()
+    for here, outcome in enumerate(outcomes, 1):
+        now, finished = time.monotonic(), done + here
         if outcome.error is not None:
             say(_failure(outcome))
-        if time.monotonic() - last >= PLAIN_SECONDS or finished == total:
-            last = time.monotonic()
-            say(line)
-
-
-def _follow_notebook(outcomes: Iterable[Outcome], total: int, done: int) -> None:
-    from IPython.display import HTML, display
-
-    bar = "<progress value='{}' max='{}'></progress> {}"
-    shown = display(HTML(bar.format(done, total, f"{done} of {total} trials")), display_id=True)
-    failures = ""
-    for finished, line, outcome in _counted(outcomes, total, done):
-        if outcome.error is not None:
-            failures += f"<br>{escape(_failure(outcome))}"
-        shown.update(HTML(bar.format(finished, total, line) + failures))
-
-
-def _counted(
-    outcomes: Iterable[Outcome], total: int, done: int
-) -> Iterator[tuple[int, str, Outcome]]:
-    """Yield how many trials are done, how long that took and what is left, and what has arrived."""
-    begin = time.monotonic()
-    for here, outcome in enumerate(outcomes, 1):
-        spent, finished = time.monotonic() - begin, done + here
-        left = duration(spent / here * (total - finished))
-        line = f"{finished} of {total} trials, {duration(spent)}, about {left} left"
-        yield finished, line, outcome
+        if now - last >= PLAIN_SECONDS or finished == total:
+            last = now
+            left = duration((now - begin) / here * (total - finished))
+            say(f"{finished} of {total} trials, {duration(now - begin)}, about {left} left")
 
 
 def _failure(outcome: Outcome) -> str:

@@ -131,8 +131,7 @@ def _world(columns: Mapping[str, Any]) -> str:
 def draw(analysis: Analysis) -> Figures:
     """Return the figure: the systems one below the other, a colour for each world.
 
-    Bars are 95 % intervals. Hollow marks are operations by formula, where they differ from those
-    counted.
+    Bars are 95 % intervals.
     """
     from matplotlib.ticker import SymmetricalLogLocator  # matplotlib takes its time
 
@@ -148,11 +147,6 @@ def draw(analysis: Analysis) -> Figures:
             which = worlds.index(case.world)
             colour = f.look(which)["color"]
             row = systems.index(case.system) + APART * (which - (len(worlds) - 1) / 2)
-            formula = case.values["formula"].value
-            if name == "counted" and formula > 0:
-                axes.plot(
-                    float(formula), row, "o", color=colour, markerfacecolor="white", markersize=4
-                )
             f.draw_row(axes, row, case.values[name], colour, markersize=3)
         axes.set_title(title, loc="left")
         axes.grid(axis="x", alpha=0.25)
@@ -168,8 +162,7 @@ def draw(analysis: Analysis) -> Figures:
         f.handle(world or "all", color=f.look(i)["color"], marker="o")
         for i, world in enumerate(worlds)
     ]
-    hollow = {"color": "black", "marker": "o", "markerfacecolor": "white", "linewidth": 0}
-    f.add_legend(figure, [*handles, f.handle("by formula", **hollow)], ncols=5)
+    f.add_legend(figure, handles, ncols=5)
     return {"related": figure}
 
 

@@ -318,11 +318,8 @@ def draw_messages(axes: Axes, points: Sequence[Point]) -> None:
         for index, evaluator in enumerate(dict.fromkeys(p.evaluator for p in points)):
             own = sorted((p.robots, p.messages) for p in points if p.evaluator == evaluator)
             axes.plot(*zip(*own, strict=True), **by_robots.style(index))
-    if min(passed for _, passed in counts):
-        figures.log_axis(axes)
-    else:  # agents that see nobody pass nothing
-        axes.set_yscale("symlog", linthresh=1.0)
-        axes.set_ylim(bottom=-0.2)
+    axes.set_yscale("symlog", linthresh=1.0)  # agents that see nobody pass nothing
+    axes.set_ylim(bottom=-0.2)
     axes.set_title("messages passed down, per step", loc="left")
 
 

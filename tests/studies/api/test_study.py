@@ -1,15 +1,11 @@
 """A study in Python, with made-up results: nothing here simulates."""
 
-import sys
-from types import ModuleType
-
 import made_up
 import pytest
 
 import nested_agents as na
 from nested_agents.studies.api import run_study as studies_run
 from nested_agents.studies.catalogue import learning_curve
-from nested_agents.studies.presentation import progress
 
 TABLE = {"seeds": 3, "episodes": 4, "steps": 5, "evaluation": 2,
          "sweep": {"preset": ["default", "frozen"]}}  # fmt: skip
@@ -132,33 +128,3 @@ def test_failed_trials_are_warned_of(tmp_path, monkeypatch) -> None:
     ((condition, seed, error),) = study.failed
     assert (condition, seed) == ("frozen", 1)
     assert "a wheel came off" in error
-
-
-class Cell:
-    """What a notebook's display shows."""
-
-    def __init__(self) -> None:
-        self.shown: list[str] = []
-
-    def display(self, content: str, display_id: bool = False) -> "Cell":
-        self.shown.append(content)
-        return self
-
-    def update(self, content: str) -> None:
-        self.shown.append(content)
-
-
-def test_progress_in_a_notebook_is_a_bar_below_the_cell(monkeypatch) -> None:
-    cell, module = Cell(), ModuleType("IPython.display")
-    module.HTML, module.display = str, cell.display  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "IPython", ModuleType("IPython"))
-    monkeypatch.setitem(sys.modules, "IPython.display", module)
-    trials = made_up.TRIALS[:2]
-    outcomes = [
-        progress.Outcome(trials[0], None, 1.0),
-        progress.Outcome(trials[1], "Traceback\nRuntimeError: <off>", 1.0),
-    ]
-    progress._follow_notebook(outcomes, 3, 1)
-    assert "<progress value='1' max='3'>" in cell.shown[0]
-    assert "3 of 3 trials" in cell.shown[-1]
-    assert "RuntimeError: &lt;off&gt;" in cell.shown[-1]
