@@ -309,7 +309,7 @@ def draw(analysis: Analysis) -> Figures:
 
 def draw_messages(axes: Axes, points: Sequence[Point]) -> None:
     """Draw a black line if all evaluators agree, as one topology's do, else a line of each."""
-    from ...presentation import by_robots, figures
+    from ...presentation import by_robots
 
     counts = {(p.robots, p.messages) for p in points}
     if len(counts) == len({robots for robots, _ in counts}):
