@@ -13,7 +13,6 @@ import numpy as np
 
 from ...core.agents.cost import Problem
 from ..catalogue.chain_order import order_tests
-from ..catalogue.hierarchies import VALUE_OF
 from ..catalogue.shapes import ratios_of
 from ..catalogue.wheel_failure import courses_of
 from ..results.comparison import aligned, difference, of_shared_seeds, ratio
@@ -26,6 +25,7 @@ Compute = Callable[[Results], "Measured | None"]
 """Computes what a claim is about from the results of a study."""
 
 CONTACT = "contact_fraction"
+VALUE_OF = "learner.decision.value_of"
 LAST = slice(-5, None)
 FIRST = slice(None, 5)
 UNREWARDED = ("frozen", "random")
