@@ -12,10 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core.agents.cost import Problem
-from ..catalogue.chain_order import order_tests
 from ..catalogue.shapes import ratios_of
 from ..catalogue.wheel_failure import courses_of
-from ..results.comparison import aligned, difference, of_shared_seeds, ratio
+from ..results.comparison import aligned, difference, of_shared_seeds, order_tests, ratio
 from ..results.results import Results
 from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
 from ..results.summary import EVALUATED

@@ -8,11 +8,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .paired_tests import holm, paired_permutation
+from .paired_tests import LEVEL, Friedman, friedman, holm, paired_permutation
 from .results import Results
 from .statistics import Estimate, bootstrap, rate
+from .summary import EVALUATED
 
 Array = NDArray[np.float64]
+
+PHASES = {"training success": "training", EVALUATED: "evaluation"}
+"""Measures that conditions are compared by: success rates in these phases."""
 
 
 @dataclass(frozen=True)
@@ -200,3 +204,51 @@ def ratio(numerator: ArrayLike, denominator: ArrayLike, level: float = 0.95) -> 
         root = product**2 - a.high * (2.0 * a.value - a.high) * high_scale
         high = np.asarray((product + np.sqrt(np.maximum(root, 0.0))) / high_scale)
     return Estimate(a.value / b.value, low, high)
+
+
+def phases_of(results: Results) -> dict[str, str]:
+    """Return those of `PHASES` that all trained conditions have."""
+    conditions = results.of_phase("training")
+    return {
+        title: phase
+        for title, phase in PHASES.items()
+        if all(results.has(condition, phase) for condition in conditions)
+    }
+
+
+@dataclass(frozen=True)
+class OrderTest:
+    """Whether the orders differ at all by one measure."""
+
+    title: str
+    """The measure."""
+    orders: int
+    """How many there are."""
+    seeds: int
+    """How many seeds all orders have finished."""
+    test: Friedman
+    """The test."""
+    p: float
+    """Its p, adjusted over the measures."""
+
+    @property
+    def verdict(self) -> str:
+        """What the test found, in words."""
+        differ = "differ" if self.p < LEVEL else "do not differ significantly"
+        return (
+            f"{self.title}: {self.orders} orders {differ} (Friedman {self.test.statistic:.1f}, "
+            f"p = {self.test.p:.2g}, adjusted {self.p:.2g}; W = {self.test.concordance:.3f}; "
+            f"{self.seeds} seeds)"
+        )
+
+
+def order_tests(results: Results) -> tuple[OrderTest, ...]:
+    """Return the tests of all orders together, one for each measure that all of them have."""
+    conditions = results.of_phase("training")
+    made = []
+    for title, phase in phases_of(results).items() if len(conditions) > 1 else ():
+        values = np.stack(aligned(results, conditions, mean_success(phase)), axis=1)
+        if len(values) >= 2:
+            made.append((title, len(conditions), len(values), friedman(values)))
+    ps = holm([test.p for *_, test in made])
+    return tuple(OrderTest(*own, float(p)) for own, p in zip(made, ps, strict=True))

@@ -14,17 +14,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...results.analysis import Analysis, Figures
-from ...results.comparison import differences, mean_success, with_first
+from ...results.comparison import differences, mean_success, phases_of, with_first
 from ...results.results import Results
 from ...results.statistics import Estimate, rate
-from ...results.summary import EVALUATED, Summary
+from ...results.summary import Summary
 from ...results.verdicts import by_measure, verdicts
 from ..study import run_training as measure
 
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
-PHASES = {"training success": "training", EVALUATED: "evaluation"}
-"""The measures: success rates in these phases."""
 
 
 def analyse(results: Results) -> Analysis:
@@ -49,16 +47,6 @@ def compared_with_first(results: Results, names: Sequence[str]) -> Analysis:
         table.append(Summary(name, len(results.seeds(condition)), estimates))
     notes = verdicts(compared, names[0]) if compared else []
     return Analysis(tuple(table), tuple(notes), differences=compared)
-
-
-def phases_of(results: Results) -> dict[str, str]:
-    """Return those of `PHASES` that all trained conditions have."""
-    conditions = results.of_phase("training")
-    return {
-        title: phase
-        for title, phase in PHASES.items()
-        if all(results.has(condition, phase) for condition in conditions)
-    }
 
 
 def draw(analysis: Analysis) -> Figures:

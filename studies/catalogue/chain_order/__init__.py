@@ -10,13 +10,10 @@ tests; and every order is compared with the first one as the study `ablation` co
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-
-import numpy as np
+from dataclasses import replace
 
 from ...results.analysis import Analysis, Figures
-from ...results.comparison import aligned, mean_success
-from ...results.paired_tests import LEVEL, Friedman, friedman, holm
+from ...results.comparison import order_tests
 from ...results.results import Results
 from ...results.verdicts import by_measure
 from .. import ablation
@@ -24,32 +21,6 @@ from ..study import run_training as measure
 
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
-
-
-@dataclass(frozen=True)
-class OrderTest:
-    """Whether the orders differ at all by one measure."""
-
-    title: str
-    """The measure."""
-    orders: int
-    """How many there are."""
-    seeds: int
-    """How many seeds all orders have finished."""
-    test: Friedman
-    """The test."""
-    p: float
-    """Its p, adjusted over the measures."""
-
-    @property
-    def verdict(self) -> str:
-        """What the test found, in words."""
-        differ = "differ" if self.p < LEVEL else "do not differ significantly"
-        return (
-            f"{self.title}: {self.orders} orders {differ} (Friedman {self.test.statistic:.1f}, "
-            f"p = {self.test.p:.2g}, adjusted {self.p:.2g}; W = {self.test.concordance:.3f}; "
-            f"{self.seeds} seeds)"
-        )
 
 
 def analyse(results: Results) -> Analysis:
@@ -81,18 +52,6 @@ def _legend(orders: Sequence[str]) -> list[str]:
     named = orders[0].removeprefix("chain:").split(",") if orders else []
     numbered = (f"{k + 1} = {name}" for k, name in enumerate(named))
     return [f"agents: {', '.join(numbered)}"] if len(named) > 1 else []
-
-
-def order_tests(results: Results) -> tuple[OrderTest, ...]:
-    """Return the tests of all orders together, one for each measure that all of them have."""
-    conditions = results.of_phase("training")
-    made = []
-    for title, phase in ablation.phases_of(results).items() if len(conditions) > 1 else ():
-        values = np.stack(aligned(results, conditions, mean_success(phase)), axis=1)
-        if len(values) >= 2:
-            made.append((title, len(conditions), len(values), friedman(values)))
-    ps = holm([test.p for *_, test in made])
-    return tuple(OrderTest(*own, float(p)) for own, p in zip(made, ps, strict=True))
 
 
 def draw(analysis: Analysis) -> Figures:
