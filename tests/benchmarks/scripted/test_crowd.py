@@ -56,11 +56,11 @@ def test_nobody_waits_for_a_few_that_are_away() -> None:
     poses[3, :2] -= 0.5
     local = crowd.choose(poses, measured["box_pose"], goal, measured["wheel_speeds"])
     drivers = crowd._drivers
-    ahead = [drivers.next(r, np.zeros((1, 2)))[0][0, k].mean() for r, k in enumerate(local)]
+    ahead = [drivers.next(np.zeros((1, 2)))[0][0, k].mean() for k in local]
     assert np.count_nonzero(np.array(ahead) > 0) >= 6
     poses[:4, :2] -= 0.5
     local = crowd.choose(poses, measured["box_pose"], goal, measured["wheel_speeds"])
-    assert not any(drivers.next(r, np.zeros((1, 2)))[0][0, local[r]].any() for r in range(4, 8))
+    assert not any(drivers.next(np.zeros((1, 2)))[0][0, local[r]].any() for r in range(4, 8))
 
 
 @pytest.mark.parametrize("start", ["easy", "medium"])
