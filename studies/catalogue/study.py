@@ -14,7 +14,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
 from ..errors import SpecError
+from ..results.analysis import Analysis
 from ..results.results import Results
+from ..results.verdicts import identity_lines
 from ..spec.studies import STUDIES
 
 if TYPE_CHECKING:
@@ -122,7 +124,10 @@ def analysed(name: str, results: Results) -> Any:
                     f"study = {name!r}: needs {needed} of every trial, which those of "
                     f"{condition!r} have not measured"
                 )
-    return study.analyse(results)
+    analysis, same = study.analyse(results), identity_lines(results.identical)
+    if same and isinstance(analysis, Analysis):
+        analysis = replace(analysis, notes=(*analysis.notes, *same))
+    return analysis
 
 
 def published_part(name: str, results: Results) -> Results:

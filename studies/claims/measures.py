@@ -16,6 +16,7 @@ from ..catalogue.shapes import ratios_of
 from ..catalogue.wheel_failure import courses_of
 from ..results.comparison import aligned, difference, of_shared_seeds, order_tests, ratio
 from ..results.results import Results
+from ..results.sizes import Sizes
 from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
 from ..results.summary import EVALUATED
 from ..store.schema import EVALUATION
@@ -199,41 +200,38 @@ def lost_without(evaluation: str) -> Compute:
     return compute
 
 
-def _sizes(results: Results) -> dict[int, list[str]]:
-    """Return the conditions by number of robots."""
-    sizes: dict[int, list[str]] = {}
-    for condition in results.conditions:
-        if (robots := results.numbers(condition).get("robots")) is not None:
-            sizes.setdefault(int(robots[0]), []).append(condition)
-    return sizes
+def _by_size(results: Results) -> tuple[dict[int, list[str]], Sizes]:
+    """Return the conditions by number of bodies, and what these are called."""
+    counted = (c for c in results.conditions if "robots" in results.numbers(c))
+    sizes, by_size = Sizes.of(results, counted), dict[int, list[str]]()
+    for condition, number in sizes.counts.items():
+        by_size.setdefault(number, []).append(condition)
+    return by_size, sizes
 
 
 def decision_share(results: Results) -> Measured | None:
     """Measure what share of its period a decision takes with most robots, fastest evaluator."""
-    sizes = _sizes(results)
-    if not sizes or any("period_s" not in results.numbers(c) for c in results.conditions):
+    by_size, sizes = _by_size(results)
+    if not by_size or any("period_s" not in results.numbers(c) for c in results.conditions):
         return None
-    most = max(sizes)
-    numbers = [results.numbers(condition) for condition in sizes[most]]
+    most = max(by_size)
+    numbers = [results.numbers(condition) for condition in by_size[most]]
     shares = [of["decision_median"] / of["period_s"] for of in numbers]
     fastest = min(shares, key=lambda share: float(share.mean()))
-    return Measured(bootstrap(fastest, bounds=NOT_NEGATIVE), len(fastest), note=f"{most} robots")
+    return Measured(bootstrap(fastest, bounds=NOT_NEGATIVE), len(fastest), note=sizes.shown(most))
 
 
 def success_by_size(results: Results) -> Measured | None:
     """Measure the success of most robots relative to fewest, each by its best evaluator."""
-    sizes = {
-        robots: [c for c in conditions if results.has(c, "evaluation")]
-        for robots, conditions in _sizes(results).items()
-    }
-    if len(sizes) < 2 or not all(sizes.values()):
+    every, sizes = _by_size(results)
+    by_size = {n: [c for c in own if results.has(c, "evaluation")] for n, own in every.items()}
+    if len(by_size) < 2 or not all(by_size.values()):
         return None
-
     fewest, most = (
-        max(sizes[robots], key=lambda c: float(_evaluation_success(results, c).mean()))
-        for robots in (min(sizes), max(sizes))
+        max(by_size[number], key=lambda c: float(_evaluation_success(results, c).mean()))
+        for number in (min(by_size), max(by_size))
     )
-    note = f"{max(sizes)} against {min(sizes)} robots"
+    note = f"{max(by_size)} against {sizes.shown(min(by_size))}"
     return _compare(results, most, fewest, _evaluation_success, ratio, note=note)
 
 

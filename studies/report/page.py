@@ -14,6 +14,7 @@ from ..presentation.tables import tabulate
 from ..presentation.words import count
 from ..results.contrasts import contrasts
 from ..results.results import read
+from ..results.verdicts import identity_lines
 from ..spec.outline import StudyOutline, sources_of
 from ..spec.toml import dumps
 from ..store.schema import RESULTS_VERSION
@@ -47,8 +48,8 @@ def page(directory: Path) -> str:
         analysis = analysed(outline.study, results)
         figures = drawn(load_study(outline.study), analysis)
     notes = getattr(analysis, "notes", ())
-    if not notes and len(results.conditions) > 1:  # what `compare` says of it
-        notes = contrasts(results).notes
+    if len(results.conditions) > 1 and [*notes] == identity_lines(results.identical):
+        notes = contrasts(results).notes  # what `compare` says of it, this included
     return _template().render(
         study=outline.study,
         extent=words.extent(outline),

@@ -16,7 +16,7 @@ from .numbers import shown
 from .results import SECONDS, Results
 from .statistics import bootstrap, rate
 from .summary import Summary
-from .verdicts import WORDS, printed
+from .verdicts import WORDS, identity_lines, printed
 
 STEPS = Measure("steps", "steps", "1", better="lower", least=0.0)
 EPISODES = (STEPS, Measure("return", "return", "1", better="higher"))
@@ -47,6 +47,8 @@ class Contrasts:
     """In which episodes; empty if it is a number of whole trials."""
     groups: tuple[Group, ...]
     """The comparisons."""
+    identical: tuple[tuple[str, ...], ...] = ()
+    """Conditions of which there is nothing to tell apart, see `Results.identical`."""
 
     @property
     def differences(self) -> tuple[Difference, ...]:
@@ -75,7 +77,8 @@ class Contrasts:
             for g in self.groups
         }
         lines = printed(groups, words, of_rates=self.measure.is_rate)
-        return tuple(lines or ["Nothing to compare: no two conditions share two seeds."])
+        lines = lines or ["Nothing to compare: no two conditions share two seeds."]
+        return (*lines, *identity_lines(self.identical))
 
 
 def contrasts(
@@ -125,7 +128,7 @@ def contrasts(
         own = tuple(compared[c] for _, c in members if c in compared)
         lines = _lines(results, shown_as, phase, setting, members, values, own)
         made.append(Group(setting, members[0][0], own, lines))
-    return Contrasts(shown_as, phase, tuple(made))
+    return Contrasts(shown_as, phase, tuple(made), results.identical)
 
 
 Members = list[tuple[str, str]]

@@ -130,6 +130,21 @@ class Results:
         }
 
     @cached_property
+    def identical(self) -> tuple[tuple[str, ...], ...]:
+        """Groups of conditions of equal seeds, episodes and measures, to the last digit.
+
+        None of results without returns: published ones keep a part of what is measured.
+        """
+        frame, groups = self.episodes, dict[tuple[bytes, bytes], list[str]]()
+        counted = [frame["seed"], frame["episode"], *self._measured.values()]
+        values = np.column_stack([np.asarray(column, dtype=float) for column in counted])
+        for condition, rows in frame.groupby("condition", sort=False).indices.items():
+            if not np.isnan(self._measured["return"][rows]).any():
+                phases = "\n".join(frame["phase"].iloc[rows]).encode()
+                groups.setdefault((phases, values[rows].tobytes()), []).append(str(condition))
+        return tuple(tuple(same) for same in groups.values() if len(same) > 1)
+
+    @cached_property
     def _rows(self) -> dict[tuple[str, str], NDArray[np.intp]]:
         """Numbers of the rows of episodes, by phase and condition."""
         return dict(self.episodes.groupby(["phase", "condition"], sort=False).indices)

@@ -68,6 +68,17 @@ def printed(
     return lines + power_lines(compared, of_rates=of_rates)
 
 
+def identity_lines(groups: Sequence[Sequence[str]]) -> list[str]:
+    """Return lines that say which conditions are identical, see `Results.identical`.
+
+    >>> print(*identity_lines([("chain", "star")]), sep="\\n")
+    Identical in every episode, by every measure:
+      chain = star
+    """
+    head = ["Identical in every episode, by every measure:"] if groups else []
+    return head + [f"  {line}" for same in groups for line in wrap(" = ".join(same), WIDTH - 2)]
+
+
 def power_lines(differences: Sequence[Difference], *, of_rates: bool = True) -> list[str]:
     """Return lines on which differences the comparisons could find, and how many seeds it takes.
 

@@ -150,6 +150,8 @@ def scaling(success: dict[int, float], seconds_per_agent: float = 1e-4) -> Array
     }
     base = ablation(chances)
     for condition in chances:
+        name, _, robots = condition.partition(", robots=")
+        base.columns[condition] = {"name": name, "scenario.robots": int(robots)}
         agents = 2 * int(condition.rpartition("=")[2])
         steps = base.training[condition]["steps"].sum(axis=1)
         power = 1 if condition.startswith("sums") else 2

@@ -21,12 +21,13 @@ from ....core.interface.scenario import groups_of
 from ...errors import SpecError
 from ...results.analysis import Analysis, Figures
 from ...results.results import Results
+from ...results.sizes import Sizes
 from ...results.summary import EVALUATED, two_figures
 from ...spec.labels import label_but
 from ...spec.spec import Spec
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
-from ..hierarchies import HierarchyCase, analysis_of, estimates, sizes_of
+from ..hierarchies import HierarchyCase, analysis_of, estimates
 from ..study import check_evaluated, check_rule_bases
 
 if TYPE_CHECKING:
@@ -70,15 +71,14 @@ def measure(trial: Trial) -> TrialResult:
 
 def analyse(results: Results) -> Analysis:
     """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
-    cases, conditions = [], results.of_phase("evaluation")
-    sizes = {c: int(results.numbers(c)["robots"][0]) for c in conditions}
-    for condition, robots in sizes.items():
+    cases, sizes = [], Sizes.of(results, results.of_phase("evaluation"))
+    for condition, robots in sizes.counts.items():
         numbers, columns = results.numbers(condition), results.columns.get(condition, {})
-        value_of = label_but(columns, sizes_of(results.columns, sizes))
+        value_of = label_but(columns, sizes.keys)
         for name, phase in ({TRAINED: "evaluation"} | results.other_evaluations(condition)).items():
             cost = numbers[f"decision.{name}"], numbers[f"messages.{name}"]
             values = estimates(results, condition, phase, *cost)
-            cases.append(HierarchyCase(condition, name, value_of, robots, values, phase))
+            cases.append(HierarchyCase(condition, name, value_of, robots, sizes, values, phase))
     return analysis_of(results, cases, TRAINED)
 
 

@@ -25,11 +25,12 @@ from ...results.analysis import Analysis, Figures
 from ...results.comparison import Array, Difference, adjusted, of_shared_seeds
 from ...results.contrasts import Contrasts, Group
 from ...results.results import Results
+from ...results.sizes import Sizes
 from ...results.statistics import Estimate, bootstrap, rate
 from ...results.summary import EVALUATED, Summary
 from ...spec.labels import label_but
 from ...spec.spec import Spec
-from ..scaling import NUMBERS, measure, sizes_of
+from ..scaling import NUMBERS, measure
 from ..study import check_evaluated
 
 PUBLISHED = ("success",)
@@ -64,7 +65,9 @@ class HierarchyCase:
     value_of: str
     """Whose value decides; empty if that is not swept."""
     robots: int
-    """Their number."""
+    """Number of bodies."""
+    sizes: Sizes
+    """Those of all cases, and what bodies are called."""
     values: dict[str, Estimate]
     """Estimates by title."""
     phase: str = "evaluation"
@@ -73,8 +76,7 @@ class HierarchyCase:
     @property
     def setting(self) -> str:
         """What it has in common with those that it is compared with."""
-        counted = f"{self.robots} robot{'s' * (self.robots != 1)}"
-        return f"{counted}, {self.value_of}" if self.value_of else counted
+        return ", ".join(filter(None, (self.sizes.shown(self.robots), self.value_of)))
 
 
 def analyse(results: Results) -> Analysis:
@@ -84,17 +86,16 @@ def analyse(results: Results) -> Analysis:
     decision of the whole team.
     """
     conditions = results.of_phase("evaluation")
-    robots = {c: int(results.numbers(c)["robots"][0]) for c in conditions}
-    apart = (VALUE_OF, *sizes_of(results.columns, robots))
-    cases = []
-    for condition in conditions:
+    sizes, cases = Sizes.of(results, conditions), []
+    apart = (VALUE_OF, *sizes.keys)
+    for condition, robots in sizes.counts.items():
         columns = results.columns.get(condition, {"name": condition})
         hierarchy, value_of = label_but(columns, apart), str(columns.get(VALUE_OF, ""))
         numbers = results.numbers(condition)
         values = estimates(
             results, condition, "evaluation", numbers["decision_median"], numbers["messages"]
         )
-        cases.append(HierarchyCase(condition, hierarchy, value_of, robots[condition], values))
+        cases.append(HierarchyCase(condition, hierarchy, value_of, robots, sizes, values))
     return analysis_of(results, cases, REFERENCE)
 
 
@@ -103,11 +104,11 @@ def analysis_of(results: Results, cases: Sequence[HierarchyCase], reference: str
     whose = list(dict.fromkeys(case.value_of for case in cases))
     cases = sorted(cases, key=lambda case: (case.robots, whose.index(case.value_of)))
     table = [
-        Summary(f"{c.setting}, {c.hierarchy}", len(results.seeds(c.condition)), c.values)
+        Summary(", ".join(filter(None, (c.setting, c.hierarchy))), len(results.seeds(c.condition)), c.values)
         for c in cases
     ]
     contrasts = contrasts_of(results, cases, reference)
-    legend = ["Rows: number of robots, what else is swept, hierarchy.", ""]
+    legend = ["Rows: what else is swept, hierarchy.", ""]
     notes = (*(legend if any(case.value_of for case in cases) else []), *contrasts.notes)
     return Analysis(tuple(table), notes if cases else (), cases, contrasts.differences)
 
@@ -188,7 +189,7 @@ def draw(analysis: Analysis) -> Figures:
                 if own:
                     by_robots.draw_line(axes, robots, values, index, len(hierarchies))
         column[0].set_title(f"value of: {value_of}" if value_of else "", loc="left")
-        column[1].set_xlabel("robots")
+        column[1].set_xlabel(cases[0].sizes.word)
     for axes in panels.flat:
         by_robots.scale_axis(axes, sorted({case.robots for case in cases}))
     figures.as_rates(panels[0, 0])
@@ -199,4 +200,4 @@ def draw(analysis: Analysis) -> Figures:
     return {"hierarchies": figure}
 
 
-__all__ = ["NUMBERS", "analyse", "check", "draw", "measure", "sizes_of"]
+__all__ = ["NUMBERS", "analyse", "check", "draw", "measure"]

@@ -13,10 +13,10 @@ from __future__ import annotations
 
 import re
 import tracemalloc
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from ...presentation.words import count
 from ...results.analysis import Analysis, Figures
 from ...results.comparison import Array, of_shared_seeds
 from ...results.results import Results
+from ...results.sizes import Sizes
 from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
 from ...results.summary import EVALUATED, Summary, evaluated
 from ...spec.spec import Spec
@@ -152,26 +153,26 @@ class Point:
 def analyse(results: Results) -> Analysis:
     """Estimate; 95 % intervals, seeds as the unit of sampling. Times are per step."""
     conditions = results.of_phase("training")
-    sizes = {c: int(results.numbers(c)["robots"][0]) for c in conditions}
-    bodies = counted_bodies(results.columns, sizes)
-    points = [_point(results, c, sizes, bodies) for c in conditions]
+    sizes = Sizes.of(results, conditions)
+    points = [_point(results, c, sizes) for c in conditions]
     table: list[Summary] = []
     for condition, point in zip(conditions, points, strict=True):
         evaluations = evaluated(results, condition)
         titles = (*COLUMNS[:1], *evaluations, *COLUMNS[1:])
         shown = {title: point.values[title] for title in titles if title in point.values}
-        label = condition if condition != str(point.robots) else _counted(point.robots, bodies)
+        is_size = condition == str(point.robots)
+        label = sizes.shown(point.robots) if is_size else condition
         table.append(Summary(label, len(point.seeds), shown))
     notes = [
         f"\n{evaluator}, time with n agents: "
         + ", ".join(f"{what} n^{_exponent_text(power)}" for what, power in by_what.items())
         for evaluator, by_what in exponents_of(points).items()
     ]
-    notes += _messages_by_size(points, bodies)
+    notes += _messages_by_size(points, sizes)
     return Analysis(tuple(table), tuple(notes), points)
 
 
-def _point(results: Results, condition: str, sizes: Mapping[str, int], bodies: str) -> Point:
+def _point(results: Results, condition: str, sizes: Sizes) -> Point:
     numbers = results.numbers(condition)
     steps = results.values(condition, "steps").sum(axis=1)
     costs = {
@@ -188,51 +189,22 @@ def _point(results: Results, condition: str, sizes: Mapping[str, int], bodies: s
     if "all_touching" in numbers:
         values["all touch"] = bootstrap(numbers["all_touching"], bounds=(0, 1))
     return Point(
-        _without_size(condition, sizes, bodies), bodies, sizes[condition],
+        _without_size(condition, sizes), sizes.word, sizes.counts[condition],
         int(numbers["agents"][0]), int(numbers["messages"][0]),
         float(numbers["period_s"][0]) if "period_s" in numbers else None,
         results.seeds(condition), values, {title: costs[title] for title in TIMES.values()},
     )  # fmt: skip
 
 
-def counted_bodies(columns: Mapping[str, Mapping[str, Any]], sizes: Mapping[str, int]) -> str:
-    """Return what a spec sweeps for the number of bodies; robots if it is not known.
-
-    >>> counted_bodies({"2": {"scenario.joints": 2}, "8": {"scenario.joints": 8}}, {"2": 2, "8": 8})
-    'joints'
-    """
-    swept = (key for key in sizes_of(columns, sizes) if key.startswith("scenario."))
-    return next(swept, "scenario.robots").removeprefix("scenario.")
-
-
-def sizes_of(columns: Mapping[str, Mapping[str, object]], robots: Mapping[str, int]) -> list[str]:
-    """Return the swept keys that are the number of bodies, whatever the scenario calls it."""
-    keys = dict.fromkeys(key for swept in columns.values() for key in swept)
-    return [
-        key
-        for key in keys
-        if all(str(columns.get(c, {}).get(key)) == str(count) for c, count in robots.items())
-    ]
-
-
-def _counted(size: int, bodies: str) -> str:
-    """Return a number of bodies in words.
-
-    >>> _counted(8, "robots"), _counted(1, "joints")
-    ('8 robots', '1 joint')
-    """
-    return count(size, bodies.removesuffix("s"))
-
-
-def _without_size(condition: str, sizes: Mapping[str, int], bodies: str) -> str:
+def _without_size(condition: str, sizes: Sizes) -> str:
     """Return a condition's label without its number of bodies, which may be all it says."""
-    if all(label == str(size) for label, size in sizes.items()):
+    if all(label == str(size) for label, size in sizes.counts.items()):
         return "default"
     parts = condition.split(", ")
-    return ", ".join(part for part in parts if part != f"{bodies}={sizes[condition]}")
+    return ", ".join(part for part in parts if part != f"{sizes.word}={sizes.counts[condition]}")
 
 
-def _messages_by_size(points: Sequence[Point], bodies: str) -> list[str]:
+def _messages_by_size(points: Sequence[Point], sizes: Sizes) -> list[str]:
     """Return lines that say how many messages are passed, one per number where all agree."""
     lines = []
     for robots in dict.fromkeys(p.robots for p in points):
@@ -241,10 +213,10 @@ def _messages_by_size(points: Sequence[Point], bodies: str) -> list[str]:
             if p.robots == robots:
                 labels.setdefault((p.agents, p.messages), []).append(p.evaluator)
         for (agents, passed), own in labels.items():
-            whose = f" ({'; '.join(own)})" if len(labels) > 1 else ""
-            lines.append(
-                f"{robots} {bodies}{whose}: {agents} agents, {count(passed, 'message')} a step"
-            )
+            whose = f"({'; '.join(own)})" if len(labels) > 1 else ""
+            head = " ".join(filter(None, (sizes.shown(robots), whose)))
+            text = f"{agents} agents, {count(passed, 'message')} a step"
+            lines.append(": ".join(filter(None, (head, text))))
     return lines
 
 

@@ -120,8 +120,15 @@ def test_hierarchies_may_be_overrides_and_value_of_need_not_be_swept() -> None:
     for condition, columns in results.columns.items():
         results.columns[condition] = {"name": columns["topology"], "scenario.carts": 2}
     assert [line.condition for line in analyse(results.frames()).table] == [
-        "2 robots, chain", "2 robots, star",
+        "2 carts, chain", "2 carts, star",
     ]  # fmt: skip
+    for columns in results.columns.values():
+        del columns["scenario.carts"]
+    assert [line.condition for line in analyse(results.frames()).table] == ["chain", "star"]
+    results.numbers["topology=star, value_of=own, robots=2"]["robots"][:] = 4.0
+    assert {c.setting for c in analyse(results.frames()).cases} == {
+        "2 agent groups", "4 agent groups",
+    }  # fmt: skip
 
 
 def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:

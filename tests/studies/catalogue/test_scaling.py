@@ -44,6 +44,7 @@ def by_topology(passed: dict[str, dict[int, int]], first: str = "topology") -> A
             ):
                 kept[new] = found[old]
             base.numbers[new]["messages"][:] = count
+            base.columns[new] = {"topology": name, "scenario.robots": robots}
     return base
 
 
@@ -75,6 +76,17 @@ def test_as_many_agents_of_fewer_robots_have_a_line_of_their_own() -> None:
         "2 robots (topology=two wheels): 4 agents, 6 messages a step",
         "2 robots (topology=four wheels): 8 agents, 28 messages a step",
         "4 robots: 8 agents, 28 messages a step",
+    ]
+
+
+def test_who_is_no_robot_is_called_none() -> None:
+    results = by_topology({"chain": {3: 6}, "star": {3: 3}})
+    for columns in results.columns.values():
+        del columns["scenario.robots"]
+    told = [note for note in analyse(results.frames()).notes if "messages" in note]
+    assert told == [
+        "(topology=chain, robots=3): 6 agents, 6 messages a step",
+        "(topology=star, robots=3): 6 agents, 3 messages a step",
     ]
 
 

@@ -1,6 +1,7 @@
 import pytest
 from made_up_results import hierarchies, scaling
 
+from nested_agents.studies.catalogue.study import analysed
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.results.contrasts import contrasts
 from nested_agents.studies.results.paired_tests import LEVEL
@@ -88,3 +89,28 @@ def test_what_is_compared_goes_by_any_of_its_names() -> None:
     times = scaling({2: 0.9, 4: 0.8}).frames()
     for name in ("seconds.learning", "learning", "seconds.learning [s]"):
         assert contrasts(times, name).title == "seconds.learning [s]"
+
+
+def test_conditions_that_are_identical_in_every_episode_are_said_to_be() -> None:
+    results = hierarchies(CHANCES)
+    star, chain = (f"topology={t}, value_of=team, robots=2" for t in ("star", "chain"))
+    for arrays in (results.training, results.evaluation):
+        arrays[star] = {name: values.copy() for name, values in arrays[chain].items()}
+    said = "Identical in every episode, by every measure:"
+    notes = contrasts(results.frames(), by="topology").notes
+    own = notes[notes.index(said) + 1 :]
+    assert " ".join(map(str.strip, own)) == f"{chain} = {star}"
+    assert analysed("learning-curve", results.frames()).notes == (said, *own)
+    results.evaluation[star]["final_distance_m"][3, 2] += 1e-9
+    assert said not in contrasts(results.frames()).notes
+    assert analysed("learning-curve", results.frames()).notes == ()
+
+
+def test_what_was_published_in_part_is_not_called_identical() -> None:
+    results = hierarchies(CHANCES)
+    for arrays in (*results.training.values(), *results.evaluation.values()):
+        arrays["success"][:], arrays["steps"][:] = 0, 450
+        for name in [*arrays][1:]:
+            if name != "steps":
+                del arrays[name]
+    assert results.frames().identical == ()
