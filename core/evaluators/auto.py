@@ -11,8 +11,7 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from . import EVALUATORS
-from .evaluator import DecisionProblem, Evaluator, EvaluatorSettings
-from .exact import MOST_JOINT_ACTIONS
+from .evaluator import MOST_JOINT_ACTIONS, DecisionProblem, Evaluator, EvaluatorSettings
 from .sampling import Samples, SamplingSettings
 
 
@@ -38,7 +37,7 @@ class AutoSettings(EvaluatorSettings):
         if problem.unseen == "plan" or problem.plan == "common":
             return EVALUATORS.parsed("best-response")
         free = max(1 + len(hierarchy.below(i)) for i in range(len(hierarchy)))
-        if free <= self.exact_up_to and problem.n_actions**free <= MOST_JOINT_ACTIONS:
+        if free <= self.exact_up_to and problem.n_actions ** (free - 1) <= MOST_JOINT_ACTIONS:
             return EVALUATORS.parsed("exact")
         is_large = free > self.sampling_up_to or problem.value_of != "own"
         if is_large and problem.teammates == "best-response":

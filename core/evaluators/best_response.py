@@ -78,7 +78,8 @@ class BestResponse(Aggregation):
         for group in groups:
             self._place[list(group)] = np.arange(len(group))
         sizes = {2, *(k for group in groups for k in range(1, len(group) + 1))}
-        self._actions = {k: combinations(tuple(range(k)), self.n_actions) for k in sizes}
+        largest_first = sorted(sizes, reverse=True)  # which is refused before others are made
+        self._actions = {k: combinations(tuple(range(k)), self.n_actions) for k in largest_first}
         self._widest = max(map(len, groups))
         # Per agent, whom it considers, itself included, in the order of decision; those of its
         # body; the others.

@@ -28,6 +28,8 @@ Plan = Literal["private", "common"]
 """Whether each agent makes its own plan, or all work out the same one."""
 
 
+MOST_JOINT_ACTIONS = 4**11
+"""The most of some agents that are tried with each action of another: more fill the memory."""
 Predicted = Callable[[], FloatArray]
 """Predicts something of joint actions."""
 NOTHING_GIVEN: FloatArray = np.zeros((0, 0, 0))
@@ -123,7 +125,18 @@ class EvaluatorSettings(PartSettings):
 
 
 def combinations(agents: tuple[int, ...], n_actions: int) -> IntArray:
-    """Return all joint actions ``(A ** k, k)`` of k agents, in lexicographic order."""
+    """Return all joint actions ``(A ** k, k)`` of k agents, in lexicographic order.
+
+    Raises
+    ------
+    ValueError
+        If they are too many; before anything is allocated.
+    """
+    if n_actions ** len(agents) > MOST_JOINT_ACTIONS:
+        raise ValueError(
+            f"learner.decision.evaluator: {n_actions} ** {len(agents)} joint actions of "
+            f"{len(agents)} agents would be tried, allowed {MOST_JOINT_ACTIONS}; use sampling"
+        )
     if not agents:
         return np.zeros((1, 0), dtype=np.int64)
     grid = np.indices((n_actions,) * len(agents)).reshape(len(agents), -1)

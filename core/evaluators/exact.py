@@ -10,9 +10,6 @@ from ..numerics.arrays import FloatArray, IntArray
 from ..rules.kernels.enumeration import Tried
 from .evaluator import Aggregation, DecisionProblem, Deliberation, combinations, probabilities_of
 
-MOST_JOINT_ACTIONS = 4**12
-"""The most that one agent enumerates: beyond, the tables do not fit into memory."""
-
 
 class ExactEnumeration(Aggregation):
     """Tries every joint action of the agents below, as the paper: ``A ** (1 + len(below))`` each.
@@ -30,13 +27,6 @@ class ExactEnumeration(Aggregation):
     def __init__(self, problem: DecisionProblem) -> None:
         super().__init__(problem)
         n, a = len(self.hierarchy), self.n_actions
-        for i, name in enumerate(self.hierarchy.agents):
-            free = 1 + len(self.hierarchy.below(i))
-            if a**free > MOST_JOINT_ACTIONS:
-                raise ValueError(
-                    f"learner.decision.evaluator: agent {name!r} would try {a} ** {free} joint "
-                    f"actions, exact enumeration allows {MOST_JOINT_ACTIONS}; use sampling"
-                )
         self._below = [combinations(self.hierarchy.below(i), a) for i in range(n)]
         uniform = problem.teammates == "uniform"
         self._expected = np.full((n, a), 1.0 / a) if uniform else np.zeros((0, 0))

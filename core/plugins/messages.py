@@ -59,11 +59,14 @@ def rule(message: str) -> str:
     'must be at least 1'
     >>> rule("Input should be a valid integer, unable to parse string as an integer")
     'must be a whole number'
+    >>> rule("Tuple should have at most 8 items after validation, not 9")
+    'must have at most 8 items, not 9'
     """
     message = message.removeprefix("Value error, ").replace("Input should be", "must be")
     message = re.sub(r"a (valid )?dictionary( or .*)?$", "a table", message)
     message = re.sub(r"a (valid )?(tuple|list)$", "a list", message)
     message = re.sub(r"a valid integer.*$", "a whole number", message)
+    message = re.sub(r"^\w+ should have (.*) after validation", r"must have \1", message)
     return (
         message.replace("a valid ", "a ")
         .replace("less than or equal to", "at most")

@@ -1,9 +1,10 @@
 """What a study will take and what it can find, before anything is spent on it.
 
-Two episodes of every condition are run to see what a step takes, on a seed that no study reports.
-Deciding and simulating take a time per step. Learning may take one per step, too, and one per step
-kept so far: a regression over all of training grows with the square of its length. A worker has to
-start, too, and to load or compile what each condition needs: that is measured here once.
+Two episodes of every condition are trained, and one is evaluated, to see what a step takes, on a
+seed that no study reports. Deciding and simulating take a time per step. Learning may take one per
+step, too, and one per step kept so far: a regression over all of training grows with the square of
+its length. A worker has to start, too, to load or compile what each condition needs, and to build
+each trial: that is measured here once.
 """
 
 from __future__ import annotations
@@ -12,8 +13,9 @@ import resource
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from textwrap import wrap
 from typing import Any
@@ -23,11 +25,11 @@ import numpy as np
 from ...core.plugins.deferred import optimize
 from ..errors import SpecError
 from ..presentation.words import count, duration
-from ..results.power import SMALLEST, USUAL_DEVIATION, detectable, seeds_for
+from ..results.power import SMALLEST, USUAL_DEVIATION
 from ..results.verdicts import WIDTH, power_text
 from ..spec.outline import StudyOutline
 from ..spec.spec import Spec
-from ..trials.session import Session
+from ..trials.session import Session, run_trial
 from ..trials.trial import Trial, trials_of
 from ..workers.worker import cores
 from ..workers.workers import check_jobs
@@ -38,7 +40,7 @@ SEED = 10_000
 EPISODES = 2
 """Tried of every condition; one that is cut short goes before them, in which code is compiled."""
 QUICK = 0.25
-"""Share of its steps that an episode takes if the goal is reached early."""
+"""Share of the steps tried that an episode takes if the goal is reached sooner by the trained."""
 FASTER, SLOWER = 0.5, 2.5
 """By what a machine is faster or slower than when it was tried: others use it, caches are cold."""
 WORKER = f"import {Session.__module__}, matplotlib.pyplot"
@@ -50,15 +52,19 @@ class Pace:
     """What the trials of a condition take."""
 
     acting: float
-    """Seconds of a step but for learning."""
+    """Seconds of a step of evaluation."""
     learning: float
-    """Seconds of learning for a step of the episode that has ended."""
+    """Seconds that a step of training takes more: for each of the episode that has ended."""
     regression: float
     """The same for every step that is kept by then."""
     bytes: tuple[float, float]
     """What the team holds [bytes], and how much more for every step of training."""
-    start: float = 0.0
-    """Seconds before the first step: what is imported, loaded and compiled."""
+    building: float = 0.0
+    """Seconds to build a trial's world and team."""
+    loading: float = 0.0
+    """Seconds to import, load and compile what the first step needs, once a process."""
+    early: float = QUICK
+    """Share of its steps that an episode takes if it ends early: `QUICK` of what was tried."""
 
     def seconds(self, steps: float, training: Sequence[int], evaluation: float) -> float:
         """Return the time of a trial whose episodes take so many steps.
@@ -77,7 +83,7 @@ class Pace:
             self.learning * steps * n + self.regression * steps**2 * n * (n + 1) / 2
             for n in training
         )
-        return acting + learning
+        return self.building + acting + learning
 
 
 @dataclass(frozen=True)
@@ -91,8 +97,8 @@ class Plan:
     processes: int
     """How many run at a time."""
     seconds: tuple[float, float] | None
-    """Time of the whole study [s], from and to: from `QUICK` of the steps of its episodes on a
-    machine that is `FASTER` to all of them on one that is `SLOWER`."""
+    """Time of the whole study [s], from and to: from `QUICK` of the steps of episodes tried on a
+    machine that is `FASTER` to all that they may have on one that is `SLOWER`."""
     memory: float | None
     """Of all processes together [bytes], about."""
     comparisons: int
@@ -103,16 +109,6 @@ class Plan:
     """The smallest difference of success rates that is of interest."""
     warnings: tuple[str, ...] = ()
     """What looks wrong and is not refused, a line each."""
-
-    @property
-    def detectable(self) -> float:
-        """The least difference of success rates that is found with a power of .8."""
-        return detectable(self.deviation, len(self.outline.seeds), max(self.comparisons, 1))
-
-    @property
-    def seeds_needed(self) -> int | None:
-        """How many seeds it takes to find the smallest difference of interest with that power."""
-        return seeds_for(self.smallest, self.deviation, max(self.comparisons, 1))
 
     def __str__(self) -> str:
         return "\n".join(self._lines())
@@ -192,61 +188,56 @@ def _taken(
     spec: Spec, trials: Sequence[Trial], processes: int
 ) -> tuple[tuple[float, float], float]:
     """Return the time of a study [s], from and to, and its memory [bytes]."""
-    spent = np.zeros(2)
-    largest = 0.0
-    begin = time.perf_counter()
-    subprocess.run([sys.executable, "-c", WORKER], check=True)
-    started = 3 * (time.perf_counter() - begin)  # this process, a worker, and the figures
-    loaded = 0.0
+    quick = slow = longest = loaded = largest = 0.0
+    # This process, a worker, and the figures.
+    started = 3 * _seconds(lambda: subprocess.run([sys.executable, "-c", WORKER], check=True))
     with spec.sources.active():
         for trial in trials[: len(spec.conditions())]:
             training = [*(stage.episodes for stage in trial.curriculum), trial.episodes]
             evaluations = trial.evaluation * (1 + len(trial.evaluations))
             pace = paced(trial)
             evaluated = evaluations * (trial.evaluation_steps or trial.steps)
-            for i, share in enumerate((QUICK, 1.0)):
-                seconds = pace.seconds(share * trial.steps, training, share * evaluated)
-                spent[i] += len(spec.seeds) * seconds
-            loaded += pace.start
+            most = pace.seconds(trial.steps, training, evaluated)
+            quick += pace.seconds(pace.early * trial.steps, training, pace.early * evaluated)
+            slow += most
+            longest, loaded = max(longest, most), loaded + pace.loading
             held, more = pace.bytes
             largest = max(largest, held + more * trial.steps * sum(training))
-    quick, slow = (float(seconds) for seconds in spent / processes)
-    whole = FASTER * (started + quick), SLOWER * (started + loaded + slow)
-    return whole, processes * (_resident() + largest)
+    each = len(spec.seeds) / processes
+    # Processes that have no trial left wait for the last one.
+    seconds = started + quick * each, started + loaded + slow * each + longest
+    return (FASTER * seconds[0], SLOWER * seconds[1]), processes * (_resident() + largest)
 
 
 def paced(trial: Trial) -> Pace:
     """Return what a condition's trials take, by trying one of them out."""
-    alone = replace(trial, seed=SEED, curriculum=(), evaluations=(), evaluation_steps=None)
-    begin = time.perf_counter()
-    warming = Session(replace(alone, episodes=1, steps=2, evaluation=1))
-    warming.train(1)
-    warming.evaluate()
-    start = time.perf_counter() - begin
-    session = Session(replace(trial, seed=SEED, episodes=EPISODES, curriculum=()))
+    alone = replace(
+        trial, seed=SEED, episodes=EPISODES, evaluation=1, curriculum=(), evaluations=()
+    )
+    brief = replace(alone, episodes=1, steps=2, evaluation_steps=None)
+    loading, building = _seconds(partial(run_trial, brief)), _seconds(partial(Session, alone))
+    session = Session(alone)
     held = _bytes(session)
-    acting: list[float] = []
-    learning: list[list[float]] = []
-
-    def note(record: Any) -> None:
-        if record.step == 0:
-            learning.append([])
-        learning[-1].append(record.learning)
-        seconds = record.transition.info.get("seconds", {})
-        acting.append(record.deciding + sum(seconds.values()))
-
-    session.train(EPISODES, observe=note)
-    steps = np.array([len(episode) for episode in learning], dtype=float)
-    taken = np.array([sum(episode) for episode in learning])
+    taken = [_seconds(partial(session.train, 1, k)) for k in range(EPISODES)]
+    evaluated = _seconds(session.evaluate)
+    *trained, evaluation = (float(row.steps) for row in session.result().rows)
+    steps, acting = np.array(trained), evaluated / evaluation
     # An episode of T steps takes T (a + b N) to learn from, N being the steps kept by its end.
     (per_step, per_kept), _ = optimize.nnls(
-        np.stack([steps, steps * np.cumsum(steps)], axis=1), taken
+        np.stack([steps, steps * np.cumsum(steps)], axis=1),
+        np.maximum(np.array(taken) - acting * steps, 0.0),
     )
     more = max(_bytes(session) - held, 0.0) / steps.sum()
-    # The median: what else a machine does now and then is not the study's.
+    early = QUICK * min(evaluation, float(steps.mean())) / trial.steps
     return Pace(
-        float(np.median(acting)), float(per_step), float(per_kept), (held, float(more)), start
+        acting, float(per_step), float(per_kept), (held, float(more)), building, loading, early
     )
+
+
+def _seconds(call: Callable[[], object]) -> float:
+    begin = time.perf_counter()
+    call()
+    return time.perf_counter() - begin
 
 
 def _bytes(session: Session) -> float:

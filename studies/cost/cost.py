@@ -61,8 +61,6 @@ LEAST_SECONDS, MOST_TIMES = 0.3, 100
 class StepCost:
     """What one step of the running system costs."""
 
-    formula: Counts
-    """What the formulas say, for the whole team."""
     counted: Counts
     """What was counted, for the whole team."""
     deciding: float
@@ -83,6 +81,8 @@ class CostRow:
     nested_closed_form: int | None
     nested_asymptotic: Fraction | None
     single_agent: int
+    formula: Counts | None = None
+    """What a step of the whole team comes to by the formulas, if it was to be measured."""
     measured: StepCost | None = None
 
     @property
@@ -114,6 +114,7 @@ def cost_rows(
                 nested_closed_form=problem.chain_closed_form(n) if chain else None,
                 nested_asymptotic=problem.chain_asymptotic(n) if chain else None,
                 single_agent=problem.single_agent(n),
+                formula=step_formula(text, n) if measured else None,
                 measured=measure(text, n) if measured else None,
             )
 
@@ -142,18 +143,19 @@ def pairs(n: int) -> tuple[tuple[int, ...], ...]:
     return tuple(tuple(range(i, min(i + 2, n))) for i in range(0, n, 2))
 
 
+def step_formula(text: str, n: int) -> Counts:
+    """Return what a step of the running system comes to by the formulas, for the whole team."""
+    if text == SINGLE_AGENT:
+        return Counts(PAPER.actions**n, (PAPER.actions * RULES) ** n, RULES**n)
+    joint = PAPER.decision(agents_below(text, n))
+    return Counts(joint, joint * RULES, n * RULES)
+
+
 def measure(text: str, n: int) -> StepCost | None:
     """Count and time a step of n agents; none where it would take too long or too much memory."""
-    line_up = LineUpSettings(carts=n).build()
-    actions = len(line_up.action_set)
-    if text == SINGLE_AGENT:
-        formula = Counts(actions**n, (actions * RULES) ** n, RULES**n)
-    else:
-        joint = Problem(RULES, actions).decision(agents_below(text, n))
-        formula = Counts(joint, joint * RULES, n * RULES)
-    if formula.rule_evaluations > MOST_OPERATIONS:
+    if step_formula(text, n).rule_evaluations > MOST_OPERATIONS:
         return None
-    learner, scenario, hierarchy = _arrange(text, line_up)
+    learner, scenario, hierarchy = _arrange(text, LineUpSettings(carts=n).build())
     _warm_up()
     tracemalloc.start()
     try:
@@ -172,7 +174,7 @@ def measure(text: str, n: int) -> StepCost | None:
     steps = 2 * len(times), 2 * len(times), len(times)
     after = astuple(team.evaluator.counts)
     counted = (int(b - a) // n for a, b, n in zip(before, after, steps, strict=True))
-    return StepCost(formula, Counts(*counted), deciding, learning, memory)
+    return StepCost(Counts(*counted), deciding, learning, memory)
 
 
 def _arrange(text: str, line_up: LineUp) -> tuple[TDLambdaSettings, Scenario, Hierarchy]:

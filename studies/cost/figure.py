@@ -67,7 +67,8 @@ def _draw_series(all_axes: Sequence[Axes], rows: Sequence[CostRow], index: int) 
     costs = [(row.agents, row.measured) for row in rows if row.measured is not None]
     if not costs:
         return
-    formula = [(n, _log10(m.formula.rule_evaluations)) for n, m in costs]
+    by_formula = {row.agents: row.formula.rule_evaluations for row in rows if row.formula}
+    formula = [(n, _log10(by_formula[n])) for n, _ in costs]
     counted = [(n, _log10(m.counted.rule_evaluations)) for n, m in costs]
     timed = [(n, log10(m.deciding + m.learning)) for n, m in costs]
     grown = [(n, value - formula[-1][1] + timed[-1][1]) for n, value in formula]

@@ -1,6 +1,6 @@
 """Tables of cost: for the terminal, as JSON, CSV and LaTeX. Integers keep every digit in the files.
 
-A ratio is written as an integer where it is one or no floating-point number holds it.
+A ratio beyond 2 ** 53, where floating-point numbers lie farther apart, is rounded to an integer.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any, Literal
 from ...topologies.view import aligned, readable
 from ..presentation.csv_text import write_csv
 from ..presentation.tables import escaped, tabular
-from .cost import PAPER, RULES, CostRow, StepCost
+from .cost import PAPER, RULES, CostRow
 
 Form = Literal["table", "json", "csv", "latex"]
 
@@ -30,10 +30,8 @@ FORMULAS = (
 """Columns by name, with their heading."""
 MEASURED = ("formula", "counted", "rules valued", "updates", "ms", "MB")
 """Headings of what was measured per step."""
-PRINTED = ("2.45e12", "1.1e27")
-"""Operations of four agents as the paper prints them (Section VIII)."""
 OF_THE_PAPER = PAPER.chain_closed_form(4)
-"""The same by Eq. 19, with the paper's |S|, |A| and L."""
+"""Operations of four agents by Eq. 19, with the paper's |S|, |A| and L."""
 COUNTS = ("joint_actions", "rule_evaluations", "weight_updates")
 
 
@@ -42,7 +40,7 @@ def written(rows: Sequence[CostRow], form: Form) -> str:
     if form == "table":
         return _table(rows)
     if form == "latex":
-        return _latex(rows)
+        return "\n\n".join(map(_tabular, _cells(rows)))
     records = [_record(row) for row in rows]
     with _all_digits():
         if form == "json":
@@ -73,24 +71,16 @@ def _record(row: CostRow) -> dict[str, Any]:
     asymptotic = row.nested_asymptotic
     record = {name: getattr(row, name) for name in ("agents", "topology", *dict(FORMULAS))}
     record["nested_asymptotic"] = None if asymptotic is None else round(asymptotic)
-    record["ratio"] = _ratio(row.ratio)
-    if row.measured is None:
-        return record
-    for count in COUNTS:
-        record[f"{count}_formula_per_step"] = getattr(row.measured.formula, count)
-        record[f"{count}_per_step"] = getattr(row.measured.counted, count)
-    record["deciding_s"] = row.measured.deciding
-    record["learning_s"] = row.measured.learning
-    record["memory_bytes"] = row.measured.memory
+    if row.ratio is not None:
+        record["ratio"] = float(row.ratio) if row.ratio < 2**53 else round(row.ratio)
+    for what, counts in (("_formula", row.formula), ("", row.measured and row.measured.counted)):
+        if counts is not None:
+            record |= {f"{name}{what}_per_step": getattr(counts, name) for name in COUNTS}
+    if row.measured is not None:
+        record["deciding_s"] = row.measured.deciding
+        record["learning_s"] = row.measured.learning
+        record["memory_bytes"] = row.measured.memory
     return record
-
-
-def _ratio(ratio: Fraction | None) -> int | float | None:
-    if ratio is None:
-        return None
-    if ratio.denominator == 1 or ratio > sys.float_info.max:
-        return round(ratio)
-    return float(ratio)
 
 
 @contextmanager
@@ -104,65 +94,50 @@ def _all_digits() -> Iterator[None]:
         sys.set_int_max_str_digits(most)
 
 
-def _table(rows: Sequence[CostRow]) -> str:
-    cells = [["n", "topology", *(title for _, title in FORMULAS)]]
+def _cells(rows: Sequence[CostRow]) -> list[list[list[str]]]:
+    """Return the formulas line by line, headings first; then, if asked, what was measured."""
+    tables = [[["n", "topology", *titles]] for titles in (dict(FORMULAS).values(), MEASURED)]
     for row in rows:
-        values = (scientific(getattr(row, name)) for name, _ in FORMULAS)
-        cells.append([str(row.agents), row.topology, *values])
-    lines = [*aligned(cells, "><>>>>>"), ""]
+        formulas = [scientific(getattr(row, name)) for name, _ in FORMULAS]
+        for table, cells in zip(tables, (formulas, _measured_cells(row)), strict=True):
+            table.append([str(row.agents), row.topology, *cells])
+    return tables[: 1 + any(row.formula is not None for row in rows)]
+
+
+def _table(rows: Sequence[CostRow]) -> str:
+    formulas, *measured = _cells(rows)
+    lines = [*aligned(formulas, "><>>>>>"), ""]
     lines.append("Operations: nested by Eq. 18, chains by Eq. 19 and 21; single agent by Eq. 23.")
     if any(row.agents == 4 and row.nested_closed_form == OF_THE_PAPER for row in rows):
-        nested, single = PRINTED
-        lines.append(f"The paper prints {nested} (nested) and {single} (single agent) for n = 4.")
-    if any(row.measured is not None for row in rows):
-        lines += ["", *_measured(rows)]
+        lines.append("The paper prints 2.45e12 (nested) and 1.1e27 (single agent) for n = 4.")
+    for cells in measured:
+        agree = [row.formula == row.measured.counted for row in rows if row.measured is not None]
+        lines += ["", f"Per step of the running system (line-up scenario, |A| = 4, |S| = {RULES}):"]
+        lines += ["", *aligned(cells, "><>>>>>>"), ""]
+        lines += ["formula, counted: joint actions tried; ms: deciding and learning;"]
+        lines += ["-: not measured, beyond a second or so a step."]
+        lines += [f"All counts equal the formulas in {sum(agree)} of {len(agree)} rows."]
     return "\n".join(lines)
 
 
-def _measured(rows: Sequence[CostRow]) -> list[str]:
-    cells = [["n", "topology", *MEASURED]]
-    cells += [[str(row.agents), row.topology, *_measured_cells(row.measured)] for row in rows]
-    measured = [row.measured for row in rows if row.measured is not None]
-    agreeing = sum(m.formula == m.counted for m in measured)
-    lines = [f"Per step of the running system (line-up scenario, |A| = 4, |S| = {RULES}):", ""]
-    lines += [*aligned(cells, "><>>>>>>"), ""]
-    lines += ["formula, counted: joint actions tried; ms: deciding and learning;"]
-    lines += ["-: beyond a second or so a step."]
-    lines += [f"All counts equal the formulas in {agreeing} of {len(measured)} rows."]
-    return lines
-
-
-def _measured_cells(measured: StepCost | None) -> list[str]:
-    if measured is None:
-        return ["-"] * len(MEASURED)
-    c = measured.counted
-    counts = measured.formula.joint_actions, c.joint_actions, c.rule_evaluations, c.weight_updates
-    amounts = (1e3 * (measured.deciding + measured.learning), 1e-6 * measured.memory)
+def _measured_cells(row: CostRow) -> list[str]:
+    joint = None if row.formula is None else row.formula.joint_actions
+    if row.measured is None:
+        return [scientific(joint), *["-"] * len(MEASURED[1:])]
+    c = row.measured.counted
+    counts = joint, c.joint_actions, c.rule_evaluations, c.weight_updates
+    amounts = (1e3 * (row.measured.deciding + row.measured.learning), 1e-6 * row.measured.memory)
     return [*map(scientific, counts), *(f"{a:.3g}" if a < 1000 else f"{a:,.0f}" for a in amounts)]
 
 
-def _latex(rows: Sequence[CostRow]) -> str:
-    """Return a tabular of the formulas and, if anything was measured, a second one of that."""
-    titles = ["nested (18)", "closed form (19)", "asymptotic (21)", "single agent (23)", "ratio"]
-    formulas = [[scientific(getattr(row, name)) for name, _ in FORMULAS] for row in rows]
-    tables = [_tabular(rows, titles, formulas)]
-    if any(row.measured is not None for row in rows):
-        cells = [_measured_cells(row.measured) for row in rows]
-        tables.append(_tabular(rows, MEASURED, cells))
-    return "\n\n".join(tables)
-
-
-def _tabular(rows: Sequence[CostRow], titles: Sequence[str], cells: Sequence[Sequence[str]]) -> str:
-    lines = [["$n$", "topology", *titles]]
-    for row, values in zip(rows, cells, strict=True):
-        topology = escaped(row.topology).replace(">", "$>$")
-        lines.append([str(row.agents), topology, *map(_latex_cell, values)])
-    return tabular("{booktabs}", f"{{rl{'r' * len(titles)}}}", lines)
+def _tabular(cells: Sequence[Sequence[str]]) -> str:
+    lines = [list(map(_latex_cell, line)) for line in cells]
+    return tabular("{booktabs}", f"{{rl{'r' * (len(cells[0]) - 2)}}}", lines)
 
 
 def _latex_cell(text: str) -> str:
-    """Return a number as it is printed, for LaTeX."""
-    if text == "-":
-        return "--"
+    """Return a cell for LaTeX, numbers as they are printed."""
+    if not text[0].isdigit():
+        return "--" if text == "-" else escaped(text).replace(">", "$>$")
     mantissa, e, power = text.partition("e")
     return rf"${mantissa}\times 10^{{{int(power)}}}$" if e else mantissa.replace(",", r"\,")

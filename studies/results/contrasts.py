@@ -76,8 +76,8 @@ class Contrasts:
             )
             for g in self.groups
         }
-        lines = printed(groups, words, of_rates=self.measure.is_rate)
-        lines = lines or ["Nothing to compare: no two conditions share two seeds."]
+        nothing = ["Nothing to compare: no two conditions share two seeds."]
+        lines = printed(groups, words, of_rates=self.measure.is_rate) or nothing
         return (*lines, *identity_lines(self.identical))
 
 

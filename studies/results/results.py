@@ -135,13 +135,11 @@ class Results:
 
         None of results without returns: published ones keep a part of what is measured.
         """
-        frame, groups = self.episodes, dict[tuple[bytes, bytes], list[str]]()
-        counted = [frame["seed"], frame["episode"], *self._measured.values()]
-        values = np.column_stack([np.asarray(column, dtype=float) for column in counted])
-        for condition, rows in frame.groupby("condition", sort=False).indices.items():
-            if not np.isnan(self._measured["return"][rows]).any():
-                phases = "\n".join(frame["phase"].iloc[rows]).encode()
-                groups.setdefault((phases, values[rows].tobytes()), []).append(str(condition))
+        names, groups = ["seed", "phase", "episode", *self._measured], dict[bytes, list[str]]()
+        for condition, rows in self.episodes.groupby("condition", sort=False)[names]:
+            if rows["return"].notna().all():
+                key = pd.util.hash_pandas_object(rows, index=False).to_numpy().tobytes()
+                groups.setdefault(key, []).append(str(condition))
         return tuple(tuple(same) for same in groups.values() if len(same) > 1)
 
     @cached_property

@@ -69,9 +69,9 @@ def printed(
 
 
 def identity_lines(groups: Sequence[Sequence[str]]) -> list[str]:
-    """Return lines that say which conditions are identical, see `Results.identical`.
+    r"""Return lines that say which conditions are identical, see `Results.identical`.
 
-    >>> print(*identity_lines([("chain", "star")]), sep="\\n")
+    >>> print(*identity_lines([("chain", "star")]), sep="\n")
     Identical in every episode, by every measure:
       chain = star
     """

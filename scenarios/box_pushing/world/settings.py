@@ -17,6 +17,10 @@ GRAVITY = 9.81
 CONTROL_PERIOD = 0.064
 """Time between commands to the wheels [s]; the basic time step of the e-puck in Webots."""
 
+Quantity = Annotated[float, Field(ge=1e-9, le=1e9)]
+"""In SI units; the physics engine computes in single precision."""
+Coefficient = Annotated[float, Field(ge=0, le=1e6)]
+"""Of friction."""
 Periods = Annotated[int, Field(ge=1, le=10_000)]
 """Control periods: ten minutes at most."""
 
@@ -88,11 +92,11 @@ class BoxSettings(Described):
     """Outline, counter-clockwise [m]; concave outlines are allowed."""
     holes: tuple[Vertices, ...] = ()
     """Outlines of holes [m]."""
-    mass: Positive = 0.4
+    mass: Quantity = 0.4
     """Mass of the box [kg]."""
-    friction: NonNegative = 0.2
+    friction: Coefficient = 0.2
     """Coefficient of friction with the ground."""
-    contact_friction: NonNegative = 0.3
+    contact_friction: Coefficient = 0.3
     """Coefficient of friction with robots."""
     grows: bool | Literal["width"] = False
     """Whether it grows with the number of robots, as the boxes known by name do; or along its
@@ -113,19 +117,19 @@ class WheelSettings(Settings):
 class RobotSettings(Described):
     """A robot; what is not given is the e-Puck's."""
 
-    wheels: Annotated[tuple[WheelSettings, ...], Field(min_length=1)]
-    """Its wheels, one agent each."""
+    wheels: Annotated[tuple[WheelSettings, ...], Field(min_length=1, max_length=6)]
+    """Its wheels, one agent each; predictions make a table of all that they may do together."""
     radius: Annotated[float, Field(ge=0.001, le=10)] = 0.037
     """Radius of the round body [m]."""
-    mass: Positive = 0.15
+    mass: Quantity = 0.15
     """Mass of the robot [kg], spread evenly over the disc and resting evenly on the wheels."""
-    max_speed: Positive = 0.13
+    max_speed: Quantity = 0.13
     """Greatest wheel speed [m/s]; state spaces lay the memberships of wheel speeds over it."""
-    stiffness: Positive = 6.5
+    stiffness: Quantity = 6.5
     """Stiffness of one wheel's servo [N per m/s]."""
-    lateral_stiffness: Positive = 20.0
+    lateral_stiffness: Quantity = 20.0
     """Stiffness of one wheel's grip sideways [N per m/s]."""
-    traction: Positive = 0.8
+    traction: Quantity = 0.8
     """Coefficient of friction between wheels and ground."""
     sensors: tuple[float, ...] | None = None
     """Directions of the infrared sensors [rad]; none: those of the e-Puck."""

@@ -76,7 +76,7 @@ class HierarchyCase:
     @property
     def setting(self) -> str:
         """What it has in common with those that it is compared with."""
-        return ", ".join(filter(None, (self.sizes.shown(self.robots), self.value_of)))
+        return f"{self.sizes.shown(self.robots)}, {self.value_of}".strip(", ")
 
 
 def analyse(results: Results) -> Analysis:
@@ -104,7 +104,11 @@ def analysis_of(results: Results, cases: Sequence[HierarchyCase], reference: str
     whose = list(dict.fromkeys(case.value_of for case in cases))
     cases = sorted(cases, key=lambda case: (case.robots, whose.index(case.value_of)))
     table = [
-        Summary(", ".join(filter(None, (c.setting, c.hierarchy))), len(results.seeds(c.condition)), c.values)
+        Summary(
+            f"{c.setting}, {c.hierarchy}".removeprefix(", "),
+            len(results.seeds(c.condition)),
+            c.values,
+        )
         for c in cases
     ]
     contrasts = contrasts_of(results, cases, reference)

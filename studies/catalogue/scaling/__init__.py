@@ -29,6 +29,7 @@ from ...results.results import Results
 from ...results.sizes import Sizes
 from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
 from ...results.summary import EVALUATED, Summary, evaluated
+from ...spec.labels import label_but
 from ...spec.spec import Spec
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
@@ -188,20 +189,13 @@ def _point(results: Results, condition: str, sizes: Sizes) -> Point:
     values |= {title: bootstrap(cost, bounds=NOT_NEGATIVE) for title, cost in costs.items()}
     if "all_touching" in numbers:
         values["all touch"] = bootstrap(numbers["all_touching"], bounds=(0, 1))
+    evaluator = label_but(results.columns.get(condition, {}), sizes.keys) or "default"
     return Point(
-        _without_size(condition, sizes), sizes.word, sizes.counts[condition],
+        evaluator, sizes.word, sizes.counts[condition],
         int(numbers["agents"][0]), int(numbers["messages"][0]),
         float(numbers["period_s"][0]) if "period_s" in numbers else None,
         results.seeds(condition), values, {title: costs[title] for title in TIMES.values()},
     )  # fmt: skip
-
-
-def _without_size(condition: str, sizes: Sizes) -> str:
-    """Return a condition's label without its number of bodies, which may be all it says."""
-    if all(label == str(size) for label, size in sizes.counts.items()):
-        return "default"
-    parts = condition.split(", ")
-    return ", ".join(part for part in parts if part != f"{sizes.word}={sizes.counts[condition]}")
 
 
 def _messages_by_size(points: Sequence[Point], sizes: Sizes) -> list[str]:

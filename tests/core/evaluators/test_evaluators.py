@@ -1,12 +1,16 @@
 """Evaluators against brute force over every joint action, one at a time."""
 
+import dataclasses
+import time
 from itertools import product
 from typing import Any
 
 import numpy as np
 import pytest
 
+from nested_agents.core.evaluators import EVALUATORS
 from nested_agents.core.evaluators.evaluator import (
+    MOST_JOINT_ACTIONS,
     DecisionProblem,
     Deliberation,
     Rule,
@@ -14,7 +18,7 @@ from nested_agents.core.evaluators.evaluator import (
     combinations,
     probabilities_of,
 )
-from nested_agents.core.evaluators.exact import MOST_JOINT_ACTIONS, ExactEnumeration
+from nested_agents.core.evaluators.exact import ExactEnumeration
 from nested_agents.core.evaluators.sampling import Sampling, SamplingSettings
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.interface.prediction import Blocks
@@ -300,13 +304,29 @@ def test_too_many_joint_actions_are_refused() -> None:
     names = [f"agent{i}" for i in range(13)]
     edges = [("agent0", name) for name in names[1:]]
     rules = RuleBase.build(ONE_VARIABLE, RuleBaseSettings())
-    assert MOST_JOINT_ACTIONS == A**12
+    assert MOST_JOINT_ACTIONS == A**11
     with pytest.raises(
         ValueError,
-        match=r"^learner\.decision\.evaluator: agent 'agent0' would try 4 \*\* 13 joint actions",
+        match=r"^learner\.decision\.evaluator: 4 \*\* 12 joint actions of 12 agents would be",
     ) as caught:
         ExactEnumeration(problem_of(rules, Hierarchy(names, edges), "value", "best-response"))
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("evaluator", ["best-response", "variable-elimination"])
+def test_no_evaluator_makes_more_joint_actions_than_there_is_room_for(evaluator: str) -> None:
+    names = [f"wheel{i}" for i in range(1000)]
+    rules = RuleBase.build(ONE_VARIABLE, RuleBaseSettings())
+    edges = [(names[0], name) for name in names[1:]]
+    of_graph = evaluator == "variable-elimination"
+    hierarchy = Hierarchy(names, (), edges) if of_graph else Hierarchy(names, edges)
+    problem = problem_of(rules, hierarchy, "value", "best-response")
+    problem = dataclasses.replace(problem, groups=(tuple(range(1000)),))
+    begin = time.process_time()
+    with pytest.raises(ValueError, match=r"4 \*\* 1000|allowed: 1,048,576") as error:
+        EVALUATORS.parsed(evaluator).build(problem)
+    assert "\n" not in str(error.value)
+    assert time.process_time() - begin < 5.0
 
 
 def test_probabilities_are_products_of_frequencies(rng: np.random.Generator) -> None:

@@ -67,12 +67,37 @@ def test_a_spec_that_describes_its_box_and_robot_runs_and_can_be_drawn() -> None
         ("scenario.robot=tank", "scenario.robot = 'tank': known: e-puck"),
         ("scenario.box=egg", "scenario.box = 'egg': known: L"),
         ("scenario.robots=9", "do not fit side by side"),
+        ("scenario.robot.mass=1e39", "scenario.robot.mass = 1e+39: must be at most 1000000000"),
+        (
+            "scenario.robot.traction=1e-40",
+            "scenario.robot.traction = 1e-40: must be at least 0.00",
+        ),
+        ("scenario.robot.stiffness=1e300", "scenario.robot.stiffness = 1e+300: must be at most"),
+        ("scenario.box.friction=1e39", "scenario.box.friction = 1e+39: must be at most 1000000"),
+        ("scenario.box.mass=1e-46", "scenario.box.mass = 1e-46: must be at least 0.00"),
     ],
 )
 def test_refusals(change: str, complaint: str) -> None:
     with pytest.raises(SpecError) as error:
         check(Spec.parse(SPEC, [change]))
     assert complaint in str(error.value)
+
+
+@pytest.mark.parametrize("wheels", [7, 14, 1000])
+def test_robots_of_more_wheels_than_a_table_holds_are_refused_at_once(wheels: int) -> None:
+    places = [{"name": f"w{i}", "x": 0.0, "y": 1e-5 * i} for i in range(wheels)]
+    with pytest.raises(SpecError) as error:
+        Spec.of({"scenario": {"robot": {"wheels": places}}})
+    assert f"must have at most 6 items, not {wheels}" in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("extreme", [1e-9, 1e9])
+def test_the_least_and_the_greatest_quantities_can_be_simulated(extreme: float) -> None:
+    changes = [f"scenario.robot.mass={extreme}", f"scenario.box.mass={1 / extreme}"]
+    (trial,) = trials_of(Spec.parse(SPEC, changes))
+    (row,) = run_trial(trial).rows
+    assert all(np.isfinite(value) for value in row.measures.values())
 
 
 def test_quantities_out_of_range_are_refused() -> None:
