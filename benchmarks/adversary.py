@@ -1,17 +1,20 @@
 """Attack studies and inputs, and count what survives: ``python -m benchmarks.adversary``.
 
-Three campaigns, each drawn from a seed:
+Campaigns, each drawn from a seed:
 
 - *kills*: the command that runs a study is killed (SIGKILL) at a random moment, the same command
   continues, and what it ends with must be equal byte by byte. Trials run in the process of the
   command and take no time, so that a hundred kills do not take an hour; `benchmarks.crashes` kills
   real workers;
+- *kills of others*: export, report, retry and watch are killed. What they have written is whole or
+  not there; the study is as it was, or the same command goes on, with the same end;
 - *flips*: one bit of one file of a finished study is flipped. Commands that read must print what
   they printed before, or name the file; a run must end with the rows and recordings of the sound
   study. A file may also be cut short or be a folder. With ``--every-byte`` every byte of a small
   database is tried;
-- *hostile input*: specs, files of topologies and polygons, mutated or absurd. Each is accepted or
-  refused in one line, within seconds.
+- *hostile input*: specs, topologies in files and in Python, polygons, mutated or absurd. Each is
+  accepted or refused in one line, within seconds;
+- *scenarios* that misbehave, see `benchmarks.misbehaving`: they are told, and others go on.
 
 Silence (other output, nothing said) and tracebacks are failures.
 """
@@ -54,6 +57,8 @@ from nested_agents.studies.trials.trial import Trial, TrialResult, trials_of
 from nested_agents.studies.workers.runner import save
 from nested_agents.studies.workers.worker import Outcome, RunTrial
 
+from . import misbehaving
+
 SPEC = Spec.of(
     {"seeds": 5, "episodes": 2, "steps": 10, "evaluation": 1,
      "sweep": {"preset": ["default", "frozen"]}}
@@ -88,7 +93,10 @@ class Adversary:
 
     def lines(self) -> list[str]:
         """Return the commands that read."""
-        return ["results --format csv", "status", "table --format csv", "report", "export"]
+        return [
+            "results --format csv", "status", "table --format csv", "compare", "watch --once",
+            "report", "export",
+        ]  # fmt: skip
 
     def command(self, line: str) -> Said:
         """Run a command on the study in this process."""
@@ -202,6 +210,57 @@ def kills(number: int, rng: random.Random, folder: Path) -> Counter[str]:
     return tally
 
 
+def kills_of_others(number: int, rng: random.Random, folder: Path) -> Counter[str]:
+    """Kill commands that read, and `retry`; return what happened."""
+    adversary, tally = Adversary(folder, rng), Counter[str]()
+    studies_run.start_workers = lambda *_: contextlib.nullcontext(Here(adversary))
+    failed = folder / "failed"
+    with open_to_run(failed, SPEC, adversary.trials, adversary.measures) as store:
+        for trial in adversary.trials[:5]:
+            store.fail(trial.planned, "Traceback: a fault")
+        for trial in adversary.trials[5:]:
+            save(store, trial, adversary.result(trial), 1.0)
+
+    def line(name: str, place: Path) -> list[str]:
+        """Return a command on a fresh copy of the study, which it writes beside."""
+        shutil.copytree(failed if name == "retry" else adversary.sound, place / "study")
+        out = ["--out", str(place / "page.html" if name == "report" else place / "out")]
+        options = {"watch": ["--once"], "retry": []}
+        return [name, str(place / "study"), *options.get(name, out)]
+
+    whole: dict[str, tuple[float, dict[str, bytes]]] = {}
+    for name in ("export", "report", "retry", "watch"):
+        command, begin = line(name, folder / "whole" / name), time.monotonic()
+        assert _wait(_child(command)) == 0, name
+        whole[name] = time.monotonic() - begin, _written(folder / "whole" / name)
+    while tally["kills"] < number:
+        name, place = rng.choice([*whole]), folder / f"k{tally['kills']}"
+        tally["kills"] += 1
+        seconds, expected = whole[name]
+        command = line(name, place)
+        child = _child(command)
+        time.sleep(rng.uniform(0.0, seconds))
+        os.kill(child, signal.SIGKILL)
+        _wait(child)
+        halves = {path for path, data in _written(place).items() if expected.get(path) != data}
+        status = _wait(_child(command))
+        is_equal = adversary.content(place / "study") == adversary.expected
+        if halves or status or not is_equal or _written(place) != expected:
+            print(f"{name}: {halves}, status {status}, study equal {is_equal}", file=sys.stderr)
+            tally[f"{name}: torn"] += 1
+        else:
+            tally[f"{name}: equal"] += 1
+        shutil.rmtree(place)
+    return tally
+
+
+def _written(place: Path) -> dict[str, bytes]:
+    """Return what a command has written beside the study, by path; hidden files are no results."""
+    paths = [path for path in place.rglob("*") if path.is_file() and path.name[0] != "."]
+    relative = {path: path.relative_to(place) for path in paths}
+    return {str(of): path.read_bytes() for path, of in relative.items() if of.parts[0] != "study"}
+
+
 def _child(line: list[str]) -> int:
     """Begin a command in a copy of this process; return its number."""
     child = os.fork()
@@ -237,7 +296,7 @@ def flips(number: int, rng: random.Random, folder: Path) -> Counter[str]:
         tally["flips"] += 1
         path = adversary.damage()
         lines = adversary.lines()
-        for line in lines if attempt % 10 == 0 else lines[:2]:
+        for line in lines:
             tally["reads"] += 1
             tally[_read(adversary, line, path)] += 1
         if attempt % 4 == 0:
@@ -311,10 +370,15 @@ def obstacles(rng: random.Random, folder: Path) -> Counter[str]:
 
 def hostile(number: int, rng: random.Random, folder: Path) -> Counter[str]:
     """Offer specs, topologies and polygons in turn; return what became of them."""
-    makers = {"specs": _specs(rng), "topologies": _topologies(rng), "polygons": _polygons(rng)}
+    makers = {
+        "specs": _specs(rng),
+        "topologies": _topologies(rng),
+        "polygons": _polygons(rng),
+        "functions": misbehaving.topologies(rng),
+    }
     tally = Counter[str]()
     for attempt in range(number):
-        kind = list(makers)[attempt % 3]
+        kind = list(makers)[attempt % len(makers)]
         tally[kind] += 1
         attack = next(makers[kind])
         begin = time.monotonic()
@@ -469,10 +533,13 @@ def _area(ring: list[list[float]]) -> float:
     return sum(a[0] * b[1] - b[0] * a[1] for a, b in zip(ring, following, strict=True)) / 2
 
 
-ATTEMPTS = ("kills", "flips", "reads", "runs", "studies", "specs", "topologies", "polygons")
+ATTEMPTS = (
+    "kills", "flips", "reads", "runs", "studies", "specs", "topologies", "polygons", "functions",
+    "scenarios",
+)  # fmt: skip
 FINE = (
     "equal", "told", "run: equal", "studies: equal", "kills with trials kept, and others left",
-    "accepted", "refused in one line",
+    "accepted", "refused in one line", ": told", "not reached",
 )  # fmt: skip
 
 
@@ -485,16 +552,24 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.adversary", description=__doc__)
     parser.add_argument("--kills", type=int, default=100, metavar="N", help="0: none")
     parser.add_argument("--flips", type=int, default=2000, metavar="N", help="0: none")
-    parser.add_argument("--hostile", type=int, default=600, metavar="N", help="0: none")
+    parser.add_argument("--hostile", type=int, default=800, metavar="N", help="0: none")
+    parser.add_argument("--others", type=int, default=60, metavar="N", help="kills; 0: none")
+    parser.add_argument("--scenarios", type=int, default=100, metavar="N", help="0: none")
     parser.add_argument("--every-byte", action="store_true", help="takes a quarter of an hour")
     parser.add_argument("--seed", type=int, default=20)
     options = parser.parse_args()
     durable.os.fsync = lambda _: None  # type: ignore[attr-defined]  # no power fails here
     campaigns: dict[str, Callable[[random.Random, Path], Counter[str]]] = {
         "kill -9": lambda rng, folder: kills(options.kills, rng, folder),
+        "kill -9 of export, report, retry, watch": lambda rng, folder: kills_of_others(
+            options.others, rng, folder
+        ),
         "flipped bits": lambda rng, folder: flips(options.flips, rng, folder),
         "files cut short, folders in their place": obstacles,
         "hostile input": lambda rng, folder: hostile(options.hostile, rng, folder),
+        "scenarios that misbehave": lambda rng, folder: misbehaving.scenarios(
+            options.scenarios, rng, folder
+        ),
         "a bit of every byte of the database": every_byte,
     }
     if not options.every_byte:
@@ -503,6 +578,10 @@ def main() -> int:
         del campaigns["kill -9"]
     if not options.flips:
         del campaigns["flipped bits"], campaigns["files cut short, folders in their place"]
+    if not options.others:
+        del campaigns["kill -9 of export, report, retry, watch"]
+    if not options.scenarios:
+        del campaigns["scenarios that misbehave"]
     if not options.hostile:
         del campaigns["hostile input"]
     begin, failed = time.process_time(), 0

@@ -39,7 +39,19 @@ def test_killed_studies_end_with_the_bytes_of_undisturbed_ones(backend: str, kil
 
 @pytest.mark.slow
 def test_an_adversary_finds_neither_silence_nor_tracebacks() -> None:
-    said = run("benchmarks.adversary", "--kills", "2", "--flips", "9", "--hostile", "12")
+    said = run(
+        "benchmarks.adversary",
+        "--kills",
+        "2",
+        "--flips",
+        "9",
+        "--hostile",
+        "12",
+        "--others",
+        "2",
+        "--scenarios",
+        "4",
+    )
     assert said.rstrip().endswith(", 0 failures")
 
 
