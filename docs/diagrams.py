@@ -1,7 +1,7 @@
 """Draws the diagrams of the guide, in the one style of all figures of the toolkit.
 
 ``conf.py`` calls `draw` before the pages are read. Each diagram is a function that returns a
-figure.
+figure. ``python docs/diagrams.py`` draws the one of the README, which is committed.
 """
 
 from collections.abc import Sequence
@@ -60,6 +60,50 @@ def arrow(
     )
     x, y = np.add(start, end) / 2
     axes.text(x, y + 0.2, text, ha="center", va="bottom", color=colour)
+
+
+def idea() -> Figure:
+    """Draw who decides after whom, in a world: four wheels as a hierarchy, and on two robots."""
+    figure, axes = canvas(7.2, 3.1)
+    places = {1: (1.85, 2.25), 2: (1.15, 1.15), 3: (2.55, 1.15), 4: (2.55, 0.3)}
+    axes.text(1.85, 2.8, "who decides after whom", ha="center", weight="bold")
+    axes.text(5.6, 2.8, "in a world", ha="center", weight="bold")
+    for above, below in ((1, 2), (1, 3), (3, 4)):
+        start, end = np.array(places[above]), np.array(places[below])
+        along = (end - start) / np.linalg.norm(end - start)
+        beside = 0.07 * np.array([-along[1], along[0]])
+        start, end = start + 0.27 * along, end - 0.27 * along
+        arrow(axes, start + beside, end + beside, colour=ORANGE)
+        arrow(axes, end - beside, start - beside, colour=GREEN)
+    axes.text(2.35, 1.85, "tells 3 what\nit decided", color=ORANGE, va="center", linespacing=1.1)
+    axes.text(1.35, 1.85, "considers what\n2 may do", color=GREEN, ha="right", va="center",
+              linespacing=1.1)  # fmt: skip
+    for name, place in places.items():
+        agent(axes, place, name)
+
+    turn = np.array([[np.cos(0.2), -np.sin(0.2)], [np.sin(0.2), np.cos(0.2)]])
+    square = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * 0.42
+    goal = np.array((6.6, 1.55))
+    axes.add_patch(Polygon(square @ turn.T + (5.4, 1.2), facecolor="#DDDDDD", edgecolor="black"))
+    axes.add_patch(Polygon(square + goal, fill=False, linestyle="--", edgecolor=GREY))
+    axes.text(*goal, "goal", ha="center", va="center", color=GREY)
+    for robot, (left, right) in zip(((4.45, 1.72), (4.5, 0.72)), ((1, 2), (3, 4)), strict=True):
+        axes.add_patch(Circle(robot, 0.27, facecolor="white", edgecolor="black", linewidth=1.5))
+        axes.plot(*zip(robot, np.add(robot, (0.27, 0.05)), strict=True), color="black")
+        for name, side in ((left, 0.3), (right, -0.3)):
+            agent(axes, np.add(robot, (0, side)), name, 0.14)
+    arrow(axes, (3.15, 1.35), (4.0, 1.35))
+    axes.text(3.58, 1.43, "joint action", ha="center", color=GREY)
+    arrow(axes, (4.0, 0.95), (3.15, 0.95))
+    axes.text(3.58, 0.87, "states,\nrewards", ha="center", va="top", color=GREY, linespacing=1.1)
+    return figure
+
+
+def agent(axes: Axes, place: Sequence[float], name: int, radius: float = 0.22) -> None:
+    """Draw an agent as a circle with its number in the order of decision; colours are robots."""
+    colour = BLUE if name <= 2 else "black"
+    axes.add_patch(Circle(tuple(place), radius, facecolor=colour, edgecolor="white", zorder=3))
+    axes.text(*place, str(name), ha="center", va="center", color="white", weight="bold", zorder=4)
 
 
 def nested_decision() -> Figure:
@@ -192,3 +236,9 @@ def program() -> Figure:
         start, height = 0.95 + 0.25 * indent, 2.3 - 0.35 * row
         axes.plot([start, start + length], [height] * 2, color=colour, linewidth=4)
     return figure
+
+
+if __name__ == "__main__":
+    with mpl.rc_context(SETTINGS | {"font.size": 12}):
+        readme = idea()
+    write(readme, Path(__file__).with_name("idea.png"))
