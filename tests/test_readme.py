@@ -1,4 +1,4 @@
-"""README.md, docs/start.md and docs/python.md: specs are specs, Python runs, figures are published."""
+"""README.md, docs/start.md, docs/python.md: specs are specs, Python runs, rates are published."""
 
 import re
 import tomllib
