@@ -14,7 +14,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyBboxPatch, Polygon, Wedge
 
 from nested_agents.core.rules.kernels.fuzzy import Partition
+from nested_agents.studies.claims import claims
+from nested_agents.studies.presentation import by_robots
 from nested_agents.studies.presentation.figures import COLOURS, SETTINGS, write
+from nested_agents.studies.results import published
+from nested_agents.studies.results.statistics import Estimate, rate
 
 BLUE, ORANGE, GREEN = COLOURS[:3]
 GREY = "#777777"
@@ -25,7 +29,7 @@ ACTIONS = ("increase", "decrease", "maintain", "zero")
 def draw(folder: Path) -> None:
     """Write all diagrams as SVG into a folder."""
     folder.mkdir(exist_ok=True)
-    for make in (nested_decision, perception, learner, predictions, house, program):
+    for make in (nested_decision, perception, learner, predictions, house, program, scale):
         with mpl.rc_context(SETTINGS):
             figure = make()
         write(figure, folder / f"{make.__name__}.svg")
@@ -225,6 +229,45 @@ def house() -> Figure:
                        ((2.2, 1.05), (2.6, 0.77)), ((5.0, 1.12), (4.6, 0.77))):  # fmt: skip
         arrow(axes, start, end)
     return figure
+
+
+SUCCESS = (
+    ("team's value (default), within 450 decisions", (
+        ("scaling", "2", 2), ("scaling", "4", 4), ("scaling", "8", 8), ("scaling", "16", 16),
+        ("crowds", "32", 32),
+    )),
+    ("the same, trained with eight robots", (("wide", "8, wide box", 64),)),
+    ("own value (own-value), within 200 decisions", tuple(
+        ("own-value", f"own value, robots={n}", n) for n in (2, 4, 8)
+    )),
+    ("planner, which has the reward function", tuple(
+        ("controls", f"planner, robots={n}", n) for n in (2, 4, 8, 16)
+    )),
+    ("frozen; random is the same", tuple(
+        ("controls", f"frozen, robots={n}", n) for n in (2, 4, 8, 16)
+    )),
+)  # fmt: skip
+"""Lines of `scale`, each of published tables, their conditions and numbers of robots."""
+
+
+def scale() -> Figure:
+    """Draw evaluation success by number of robots, of published rows, with their intervals."""
+    figure = Figure(figsize=(7.2, 3.6), layout="constrained")
+    axes = figure.subplots()
+    for i, (_, points) in enumerate(SUCCESS):
+        estimates = [published_rate(table, condition) for table, condition, _ in points]
+        by_robots.draw_line(axes, [n for *_, n in points], estimates, i, len(SUCCESS))
+    by_robots.scale_axis(axes, (2, 4, 8, 16, 32, 64))
+    axes.set(xlabel="robots", ylabel="evaluation success", ylim=(-0.03, 1.03))
+    by_robots.name_lines(figure, [label for label, _ in SUCCESS], "bars: 95 % intervals")
+    return figure
+
+
+def published_rate(table: str, condition: str) -> Estimate:
+    """Return the success in evaluation of a published table, of `wide` that with 64 robots."""
+    phase = "evaluation:sixty-four" if table == "wide" else "evaluation"
+    results = published.load(claims.PUBLISHED / f"{table}.json").results
+    return rate(results.success(condition, phase))
 
 
 def program() -> Figure:
