@@ -29,7 +29,7 @@ ACTIONS = ("increase", "decrease", "maintain", "zero")
 def draw(folder: Path) -> None:
     """Write all diagrams as SVG into a folder."""
     folder.mkdir(exist_ok=True)
-    for make in (nested_decision, perception, learner, predictions, house, program, scale):
+    for make in (nested_decision, perception, learner, predictions, program, scale):
         with mpl.rc_context(SETTINGS):
             figure = make()
         write(figure, folder / f"{make.__name__}.svg")
@@ -159,8 +159,8 @@ def perception() -> Figure:
     axes.text(4.6, 2.2, "where a push would pass the goal:\ncross-track error", color=ORANGE,
               ha="center")  # fmt: skip
     axes.text(2.1, 2.6, "the others: greatest gap", color=GREY, ha="center")
-    axes.text(5.3, 0.35, "not seen: the shape of the box, failures,\nactions of agents that are "
-              "neither above nor below", ha="center", color=GREY)  # fmt: skip
+    axes.text(5.3, 0.35, "not seen: the shape of the box, failed wheels,\nactions that nobody has "
+              "told it of", ha="center", color=GREY)  # fmt: skip
     return figure
 
 
@@ -206,28 +206,6 @@ def predictions() -> Figure:
     axes.text(5.9, 2.2, "rule base", ha="center", color=GREEN)
     axes.text(3.6, 0.1, "no reward enters: a learner knows of the reward only what it was paid",
               ha="center", color=GREY)  # fmt: skip
-    return figure
-
-
-def house() -> Figure:
-    """Draw the four packages and what they hold; arrows are imports."""
-    figure, axes = canvas(7.2, 2.9)
-    rows = (
-        ("studies", 2.45, ORANGE, "spec → trials → store → workers → analysis → presentation\n"
-         "→ catalogue → run → claims, cost, explain, report → cli"),
-        ("scenarios", 1.45, GREEN, "box pushing (world, states,\nprediction, pictures), line-up,\n"
-         "the checker"),
-        ("topologies", 1.45, GREEN, "builders, files,\nchecks, drawing"),
-        ("core", 0.45, BLUE, "rules, learners, evaluators, exploration, hierarchy, team, loop:\n"
-         "no physics, no files"),
-    )  # fmt: skip
-    places = {"studies": 3.6, "scenarios": 2.0, "topologies": 5.4, "core": 3.6}
-    for name, y, colour, text in rows:
-        width = 2.6 if y == 1.45 else 5.4
-        box(axes, places[name], y, f"{name}/\n{text}", colour, width)
-    for start, end in (((2.6, 2.1), (2.2, 1.83)), ((4.6, 2.1), (5.0, 1.76)),
-                       ((2.2, 1.05), (2.6, 0.77)), ((5.0, 1.12), (4.6, 0.77))):  # fmt: skip
-        arrow(axes, start, end)
     return figure
 
 
