@@ -1,7 +1,7 @@
 """Draws the diagrams of the guide, in the one style of all figures of the toolkit.
 
 ``conf.py`` calls `draw` before the pages are read. Each diagram is a function that returns a
-figure.
+figure. ``python docs/diagrams.py`` draws the one of the README, which is committed.
 """
 
 from collections.abc import Sequence
@@ -14,7 +14,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyBboxPatch, Polygon, Wedge
 
 from nested_agents.core.rules.kernels.fuzzy import Partition
+from nested_agents.studies.claims import claims
+from nested_agents.studies.presentation import by_robots
 from nested_agents.studies.presentation.figures import COLOURS, SETTINGS, write
+from nested_agents.studies.results import published
+from nested_agents.studies.results.statistics import Estimate, rate
 
 BLUE, ORANGE, GREEN = COLOURS[:3]
 GREY = "#777777"
@@ -25,7 +29,7 @@ ACTIONS = ("increase", "decrease", "maintain", "zero")
 def draw(folder: Path) -> None:
     """Write all diagrams as SVG into a folder."""
     folder.mkdir(exist_ok=True)
-    for make in (nested_decision, perception, learner, predictions, house, program):
+    for make in (nested_decision, perception, learner, predictions, program, scale):
         with mpl.rc_context(SETTINGS):
             figure = make()
         write(figure, folder / f"{make.__name__}.svg")
@@ -60,6 +64,50 @@ def arrow(
     )
     x, y = np.add(start, end) / 2
     axes.text(x, y + 0.2, text, ha="center", va="bottom", color=colour)
+
+
+def idea() -> Figure:
+    """Draw who decides after whom, in a world: four wheels as a hierarchy, and on two robots."""
+    figure, axes = canvas(7.2, 3.1)
+    places = {1: (1.85, 2.25), 2: (1.15, 1.15), 3: (2.55, 1.15), 4: (2.55, 0.3)}
+    axes.text(1.85, 2.8, "who decides after whom", ha="center", weight="bold")
+    axes.text(5.6, 2.8, "in a world", ha="center", weight="bold")
+    for above, below in ((1, 2), (1, 3), (3, 4)):
+        start, end = np.array(places[above]), np.array(places[below])
+        along = (end - start) / np.linalg.norm(end - start)
+        beside = 0.07 * np.array([-along[1], along[0]])
+        start, end = start + 0.27 * along, end - 0.27 * along
+        arrow(axes, start + beside, end + beside, colour=ORANGE)
+        arrow(axes, end - beside, start - beside, colour=GREEN)
+    axes.text(2.35, 1.85, "tells 3 what\nit decided", color=ORANGE, va="center", linespacing=1.1)
+    axes.text(1.35, 1.85, "considers what\n2 may do", color=GREEN, ha="right", va="center",
+              linespacing=1.1)  # fmt: skip
+    for name, place in places.items():
+        agent(axes, place, name)
+
+    turn = np.array([[np.cos(0.2), -np.sin(0.2)], [np.sin(0.2), np.cos(0.2)]])
+    square = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * 0.42
+    goal = np.array((6.6, 1.55))
+    axes.add_patch(Polygon(square @ turn.T + (5.4, 1.2), facecolor="#DDDDDD", edgecolor="black"))
+    axes.add_patch(Polygon(square + goal, fill=False, linestyle="--", edgecolor=GREY))
+    axes.text(*goal, "goal", ha="center", va="center", color=GREY)
+    for robot, (left, right) in zip(((4.45, 1.72), (4.5, 0.72)), ((1, 2), (3, 4)), strict=True):
+        axes.add_patch(Circle(robot, 0.27, facecolor="white", edgecolor="black", linewidth=1.5))
+        axes.plot(*zip(robot, np.add(robot, (0.27, 0.05)), strict=True), color="black")
+        for name, side in ((left, 0.3), (right, -0.3)):
+            agent(axes, np.add(robot, (0, side)), name, 0.14)
+    arrow(axes, (3.15, 1.35), (4.0, 1.35))
+    axes.text(3.58, 1.43, "joint action", ha="center", color=GREY)
+    arrow(axes, (4.0, 0.95), (3.15, 0.95))
+    axes.text(3.58, 0.87, "states,\nrewards", ha="center", va="top", color=GREY, linespacing=1.1)
+    return figure
+
+
+def agent(axes: Axes, place: Sequence[float], name: int, radius: float = 0.22) -> None:
+    """Draw an agent as a circle with its number in the order of decision; colours are robots."""
+    colour = BLUE if name <= 2 else "black"
+    axes.add_patch(Circle(tuple(place), radius, facecolor=colour, edgecolor="white", zorder=3))
+    axes.text(*place, str(name), ha="center", va="center", color="white", weight="bold", zorder=4)
 
 
 def nested_decision() -> Figure:
@@ -111,8 +159,8 @@ def perception() -> Figure:
     axes.text(4.6, 2.2, "where a push would pass the goal:\ncross-track error", color=ORANGE,
               ha="center")  # fmt: skip
     axes.text(2.1, 2.6, "the others: greatest gap", color=GREY, ha="center")
-    axes.text(5.3, 0.35, "not seen: the shape of the box, failures,\nactions of agents that are "
-              "neither above nor below", ha="center", color=GREY)  # fmt: skip
+    axes.text(5.3, 0.35, "not seen: the shape of the box, failed wheels,\nactions that nobody has "
+              "told it of", ha="center", color=GREY)  # fmt: skip
     return figure
 
 
@@ -161,26 +209,43 @@ def predictions() -> Figure:
     return figure
 
 
-def house() -> Figure:
-    """Draw the four packages and what they hold; arrows are imports."""
-    figure, axes = canvas(7.2, 2.9)
-    rows = (
-        ("studies", 2.45, ORANGE, "spec → trials → store → workers → analysis → presentation\n"
-         "→ catalogue → run → claims, cost, explain, report → cli"),
-        ("scenarios", 1.45, GREEN, "box pushing (world, states,\nprediction, pictures), line-up,\n"
-         "the checker"),
-        ("topologies", 1.45, GREEN, "builders, files,\nchecks, drawing"),
-        ("core", 0.45, BLUE, "rules, learners, evaluators, exploration, hierarchy, team, loop:\n"
-         "no physics, no files"),
-    )  # fmt: skip
-    places = {"studies": 3.6, "scenarios": 2.0, "topologies": 5.4, "core": 3.6}
-    for name, y, colour, text in rows:
-        width = 2.6 if y == 1.45 else 5.4
-        box(axes, places[name], y, f"{name}/\n{text}", colour, width)
-    for start, end in (((2.6, 2.1), (2.2, 1.83)), ((4.6, 2.1), (5.0, 1.76)),
-                       ((2.2, 1.05), (2.6, 0.77)), ((5.0, 1.12), (4.6, 0.77))):  # fmt: skip
-        arrow(axes, start, end)
+SUCCESS = (
+    ("team's value (default), within 450 decisions", (
+        ("scaling", "2", 2), ("scaling", "4", 4), ("scaling", "8", 8), ("scaling", "16", 16),
+        ("crowds", "32", 32),
+    )),
+    ("the same, trained with eight robots", (("wide", "8, wide box", 64),)),
+    ("own value (own-value), within 200 decisions", tuple(
+        ("own-value", f"own value, robots={n}", n) for n in (2, 4, 8)
+    )),
+    ("planner, which has the reward function", tuple(
+        ("controls", f"planner, robots={n}", n) for n in (2, 4, 8, 16)
+    )),
+    ("frozen; random is the same", tuple(
+        ("controls", f"frozen, robots={n}", n) for n in (2, 4, 8, 16)
+    )),
+)  # fmt: skip
+"""Lines of `scale`, each of published tables, their conditions and numbers of robots."""
+
+
+def scale() -> Figure:
+    """Draw evaluation success by number of robots, of published rows, with their intervals."""
+    figure = Figure(figsize=(7.2, 3.6), layout="constrained")
+    axes = figure.subplots()
+    for i, (_, points) in enumerate(SUCCESS):
+        estimates = [published_rate(table, condition) for table, condition, _ in points]
+        by_robots.draw_line(axes, [n for *_, n in points], estimates, i, len(SUCCESS))
+    by_robots.scale_axis(axes, (2, 4, 8, 16, 32, 64))
+    axes.set(xlabel="robots", ylabel="evaluation success", ylim=(-0.03, 1.03))
+    by_robots.name_lines(figure, [label for label, _ in SUCCESS], "bars: 95 % intervals")
     return figure
+
+
+def published_rate(table: str, condition: str) -> Estimate:
+    """Return the success in evaluation of a published table, of `wide` that with 64 robots."""
+    phase = "evaluation:sixty-four" if table == "wide" else "evaluation"
+    results = published.load(claims.PUBLISHED / f"{table}.json").results
+    return rate(results.success(condition, phase))
 
 
 def program() -> Figure:
@@ -192,3 +257,9 @@ def program() -> Figure:
         start, height = 0.95 + 0.25 * indent, 2.3 - 0.35 * row
         axes.plot([start, start + length], [height] * 2, color=colour, linewidth=4)
     return figure
+
+
+if __name__ == "__main__":
+    with mpl.rc_context(SETTINGS | {"font.size": 12}):
+        readme = idea()
+    write(readme, Path(__file__).with_name("idea.png"))

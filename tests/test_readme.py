@@ -1,4 +1,4 @@
-"""README.md and docs/start.md: their specs are specs, their Python runs."""
+"""README.md, docs/start.md, docs/python.md: specs are specs, Python runs, rates are published."""
 
 import re
 import tomllib
@@ -6,25 +6,29 @@ from pathlib import Path
 
 import pytest
 
-from nested_agents.studies.cli.main import COMMANDS
+from nested_agents.studies.claims import claims
+from nested_agents.studies.cli.main import COMMANDS, main
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import check
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGES = {name: (ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "docs/start.md")}
+WITH_SPECS = ("README.md", "docs/start.md")
+PAGES = {
+    name: (ROOT / name).read_text(encoding="utf-8") for name in (*WITH_SPECS, "docs/python.md")
+}
 
 
 def blocks(page: str, language: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", PAGES[page], re.DOTALL)
 
 
-@pytest.mark.parametrize("page", PAGES)
+@pytest.mark.parametrize("page", WITH_SPECS)
 def test_the_spec_is_one(page: str) -> None:
     (spec,) = blocks(page, "toml")
     check(Spec.parse(spec))
 
 
-@pytest.mark.parametrize("page", PAGES)
+@pytest.mark.parametrize("page", WITH_SPECS)
 def test_the_commands_exist(page: str) -> None:
     lines = [line for block in blocks(page, "sh") for line in block.splitlines()]
     assert {"./dev demo"} <= {line.partition(" #")[0].strip() for line in lines}
@@ -37,7 +41,7 @@ def test_the_python_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    (code,) = blocks("README.md", "python")
+    (code,) = [block for block in blocks("docs/python.md", "python") if "leaders" in block]
     assert len([line for line in code.splitlines() if line]) <= 12
     small = "seeds=2, episodes=1, steps=4, evaluation=1"
     assert "seeds=8, episodes=20, steps=200" in code
@@ -45,6 +49,22 @@ def test_the_python_runs(
     exec(code, {})
     assert "evaluation" in capsys.readouterr().out
     assert (tmp_path / "out" / "leaders.pdf").is_file()
+
+
+def test_the_table_of_the_readme_is_published(capsys: pytest.CaptureFixture[str]) -> None:
+    edges = claims.PUBLISHED / "edges.json"
+    assert (
+        main(["table", str(edges), "--columns", "evaluation success", "--format", "markdown"]) == 0
+    )
+    cells = dict(re.findall(r"\| (.*?) \| 20 \| (.*?) \|", capsys.readouterr().out))
+    entries = ("as trained", "considered only, private plans", "told only", "neither")
+    for robots in (2, 4, 8):
+        rates = [cells[f"{robots} robots, own, {entry}"] for entry in entries]
+        assert f"| {robots} | {2 * robots} | {' | '.join(rates)} |" in PAGES["README.md"]
+
+
+def test_the_readme_is_short() -> None:
+    assert len(PAGES["README.md"].splitlines()) <= 90
 
 
 def test_the_replay_is_small_and_the_version_is_one() -> None:

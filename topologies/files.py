@@ -93,7 +93,9 @@ def _called(build: Callable[..., Any], name: str, agents: Names, bodies: Bodies)
             list(map(str, result))  # an object of the user's may refuse to
             return result
         edges = _pairs(result, most)
-    except Exception as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
         ours = {__file__, plugged.__file__}
         frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename not in ours]
         # Of the user's file, whatever library it has called.

@@ -99,13 +99,15 @@ def control_loop(
     Raises
     ------
     ValueError
-        If the scenario does not predict what the team decides by, see `Team.check`.
+        If the scenario does not predict what the team decides by, see `Team.check`, or its states
+        cannot be learned from, see `StateSpace.checked`.
     """
     first_world = first_episode if first_world is None else first_world
+    space, agents = scenario.state_space, scenario.agents
     for k in range(episodes):
         episode = first_episode + k
         world = world_seed(seed, first_world + k)
-        states = scenario.reset(world, episode)
+        states = space.checked(scenario.reset(world, episode), agents)
         if hasattr(team, "begin_world"):
             team.begin_world(world, episode)
         if learn:
@@ -118,6 +120,7 @@ def control_loop(
             decided = perf_counter()
             transition = scenario.step(joint_action)
             last = transition.terminated or transition.truncated or step == steps - 1
+            space.checked(transition.states, agents)
             moved = perf_counter()
             if learn:
                 team.adapt(prediction, joint_action, transition)

@@ -8,13 +8,18 @@ enumerated, so that its part of a rule base is contracted once.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from math import isfinite
 from typing import Literal
 
 import numpy as np
 
 from ..numerics.arrays import FloatArray, IntArray
+
+FARTHEST = 1000.0
+"""Ranges of a variable beyond which its value cannot be meant."""
 
 
 @dataclass(frozen=True)
@@ -111,6 +116,39 @@ class StateSpace:
         for name in self.actions:
             if name not in names:
                 raise ValueError(f"state space {self.name!r}: action {name!r} is no variable")
+
+    def checked(self, states: FloatArray, agents: Sequence[str]) -> FloatArray:
+        """Return the states of some agents, if they can be learned from.
+
+        Raises
+        ------
+        ValueError
+            If they are no ``(n, d)`` finite numbers, or one is farther than `FARTHEST` times the
+            range of its variable from its lower end; the first that is wrong is named.
+        """
+        wanted = len(agents), self.n_variables
+        try:
+            array = np.asarray(states, float)
+        except (TypeError, ValueError):
+            array = np.empty(0)
+        if array.shape != wanted:
+            given = f"shape {array.shape}" if array.ndim == 2 else type(states).__name__
+            raise ValueError(f"states of agents: {given}, allowed: numbers of shape {wanted}")
+        low, width = self._ranges
+        near = np.abs((array - low) / width) <= FARTHEST
+        if not near.all():
+            agent, variable = np.argwhere(~near)[0]
+            v = self.variables[variable]
+            raise ValueError(
+                f"{v.name} of {agents[agent]} is {array[agent, variable]:.6g}, "
+                f"allowed: finite, and at most {FARTHEST:g} times its range from {v.low:g}"
+            )
+        return array
+
+    @cached_property
+    def _ranges(self) -> tuple[FloatArray, FloatArray]:
+        low, high = np.array([(v.low, v.high) for v in self.variables]).T
+        return low, high - low
 
     @property
     def n_variables(self) -> int:

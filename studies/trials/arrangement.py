@@ -20,6 +20,7 @@ from ...core.interface.measures import Measure, measures_of
 from ...core.interface.scenario import Scenario
 from ...core.learners import LearnerSettings, TeamSettings
 from ...core.numerics.arrays import IntArray
+from ...core.plugins.sources import format_error
 from ..errors import SpecError
 from ..spec.conditions import Condition, ConditionSettings
 from ..spec.curriculum import Stage
@@ -160,8 +161,10 @@ def check(spec: Spec, chosen: Container[str] | None = None) -> tuple[Measure, ..
                     _check_saved(condition.settings)
             except ValueError as error:
                 raise SpecError(f"{error}{where}") from None
-            except SystemExit as error:
-                problem = f"the scenario or topology calls sys.exit({error.code})"
+            except (KeyboardInterrupt, Exception):
+                raise
+            except BaseException as error:
+                problem = f"the scenario or topology raises {format_error(error)}"
                 raise SpecError(f"{problem}{where}") from None
     return joined(measures, conditions[0].columns)
 

@@ -30,7 +30,6 @@ COLUMNS = ("success last 5", "evaluation success", "evaluation steps")
         ("from-eight", ("evaluation success", "success, sixty-four")),
         ("wide", ("evaluation success", "success, sixty-four")),
         ("large-team", LARGE_TEAM),
-        ("controls", ("evaluation success",)),
         ("four-robots-hard", ("evaluation success", "evaluation steps")),
         ("own-value", ("evaluation success",)),
         ("transfer", ("evaluation success", "success, four", "success, eight")),
@@ -40,6 +39,13 @@ COLUMNS = ("success last 5", "evaluation success", "evaluation steps")
 def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
     table = print_table(name, columns, capsys)
     assert table in PAGE.read_text(encoding="utf-8"), f"docs/learning.md: put in\n{table}"
+
+
+def test_the_planner(capsys: pytest.CaptureFixture[str]) -> None:
+    path = str(claims.PUBLISHED / "controls.json")
+    choice = ["--where", "preset == planner", "--columns", "evaluation success"]
+    assert main(["table", path, *choice, "--format", "markdown"]) == 0
+    assert capsys.readouterr().out in PAGE.read_text(encoding="utf-8")
 
 
 def test_failures_of_large_teams(capsys: pytest.CaptureFixture[str]) -> None:

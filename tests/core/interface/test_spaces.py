@@ -1,3 +1,5 @@
+import re
+
 import numpy as np
 import pytest
 
@@ -43,6 +45,26 @@ def test_a_state_space_splits_into_own_and_shared() -> None:
 def test_a_state_space_refuses(names: str, n_own: int, complaint: str) -> None:
     with pytest.raises(ValueError, match=complaint):
         StateSpace("demo", tuple(Variable(name, "m", 0.0, 1.0) for name in names), n_own)
+
+
+@pytest.mark.parametrize(
+    ("states", "complaint"),
+    [
+        (None, "NoneType, allowed: numbers of shape (2, 2)"),
+        ([[0.0], [0.0, 1.0]], "list"),
+        (np.zeros((9, 9)), "shape (9, 9)"),
+        (np.array([["a", "b"], ["c", "d"]]), "ndarray, allowed: numbers"),
+        (np.array([[0.0, 0.0], [0.0, np.nan]]), "gap of second is nan, allowed: finite"),
+        (np.array([[0.0, np.inf], [0.0, 0.0]]), "gap of first is inf"),
+        (np.array([[1e300, 0.0], [0.0, 0.0]]), "speed of first is 1e+300"),
+    ],
+)
+def test_states_that_cannot_be_learned_from_are_refused(states, complaint: str) -> None:
+    space = StateSpace("demo", (Variable("speed", "m/s", -1, 1), Variable("gap", "m", 0, 2)), 1)
+    agents = ("first", "second")
+    assert space.checked(np.array([[5.0, -9.0], [0.0, 0.0]]), agents)[0, 0] == 5.0
+    with pytest.raises(ValueError, match=re.escape(complaint)):
+        space.checked(states, agents)
 
 
 def test_the_papers_four_actions() -> None:

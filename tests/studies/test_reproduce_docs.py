@@ -1,0 +1,36 @@
+"""docs/reproduce.md names every published table, and the spec that it came from."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from nested_agents.studies.claims import claims
+from nested_agents.studies.results import published
+from nested_agents.studies.spec.spec import Spec
+
+ROOT = Path(__file__).resolve().parents[2]
+TEXT = (ROOT / "docs" / "reproduce.md").read_text(encoding="utf-8")
+ROWS = re.findall(r"^\| `([\w-]+)` \| `([\w/]+\.toml)` \| ([\d,]+) \| ([\d,]*) ?\|", TEXT, re.M)
+
+
+def test_every_published_table_has_its_row() -> None:
+    committed = sorted(path.stem for path in claims.PUBLISHED.glob("*.json"))
+    assert sorted(name for name, *_ in ROWS) == committed
+
+
+@pytest.mark.parametrize(("name", "spec", "trials", "minutes"), ROWS)
+def test_the_spec_gives_the_table(name: str, spec: str, trials: str, minutes: str) -> None:
+    rows = published.load(claims.PUBLISHED / f"{name}.json")
+    source = Spec.load(ROOT / "studies" / "catalogue" / spec)
+    assert source.study == rows.outline.study
+    table = source.table()
+    same = ("episodes", "steps", "evaluation")
+    assert all(rows.outline.table.get(k) == table.get(k) for k in same)
+    assert set(rows.results.conditions) <= {c.label for c in source.conditions()}
+    seeds = [rows.results.seeds(c) for c in rows.results.conditions]
+    assert all(set(some) <= set(source.seeds) for some in seeds)
+    assert int(trials.replace(",", "")) == sum(map(len, seeds))
+    total = rows.results.trials.get("seconds.total")
+    if total is not None and total.notna().any():
+        assert float(minutes.replace(",", "")) == pytest.approx(total.sum() / 60, abs=0.51)
