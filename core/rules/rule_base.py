@@ -25,12 +25,7 @@ from ..interface.spaces import StateSpace
 from ..numerics.arrays import FloatArray, IntArray
 from .kernels.compact import active_compact, each_compact, td_compact, total_compact
 from .kernels.dense import values_dense
-from .kernels.enumeration import (
-    Tried,
-    enumerate_contracted,
-    enumerate_dense,
-    enumerate_looked_up,
-)
+from .kernels.enumeration import Tried, enumerate_dense, enumerate_looked_up
 from .kernels.few_states import each_dense, td_dense
 from .kernels.fuzzy import Partition
 from .kernels.layout import layout, unpack
@@ -101,17 +96,9 @@ class RuleBase:
         self.n_parts = int(lay.row_sizes @ lay.part_sizes)
         self.dtype = np.dtype(dtype)
         self.compact = self.partitions[0].membership == "triangular"
-        self._enumerate = enumerate_dense
+        self._enumerate = enumerate_looked_up if self.compact else enumerate_dense
         # One TD(lambda) update of all agents, see `td_dense`, given the layout; shapes are trusted.
         self.td_update = td_compact if self.compact else td_dense
-        if self.compact:
-            # Looking up 2 ** order corners is cheaper than contracting theta, unless the order is
-            # high and most variables are own ones, contracted once for many joint actions.
-            looks_up = all(
-                len(term) <= 3 or 2 ** len(term) <= size
-                for term, size in zip(self.terms, lay.shared_sizes, strict=True)
-            )
-            self._enumerate = enumerate_looked_up if looks_up else enumerate_contracted
 
     @classmethod
     def build(cls, space: StateSpace, settings: RuleBaseSettings) -> RuleBase:

@@ -45,6 +45,12 @@ class Estimate:
     high: Array
 
 
+def exactly(value: float) -> Estimate:
+    """Return a number without an interval, as a count is."""
+    unknown = np.asarray(np.nan)
+    return Estimate(np.asarray(value), unknown, unknown)
+
+
 def bootstrap(
     values: ArrayLike,
     level: float = 0.95,

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...numerics.arrays import IntArray
 from ...numerics.compiling import njit
-from .compact import contracted, looked_up
+from .compact import looked_up
 from .dense import folded
 from .layout import Packed, unpack
 
@@ -102,15 +102,6 @@ def enumerate_looked_up(theta, tables, tried, joint_action, probabilities, packe
     if not _learned(theta):
         return np.zeros(len(tried[0]))
     values = looked_up(theta, tables, _indices(tried, joint_action), unpack(packed))
-    return _aggregate(values, tried, probabilities)
-
-
-@njit(cache=True)
-def enumerate_contracted(theta, tables, tried, joint_action, probabilities, packed: Packed):  # type: ignore[no-untyped-def]
-    """Do what `enumerate_looked_up` does, by summing up the active own rules first."""
-    if not _learned(theta):
-        return np.zeros(len(tried[0]))
-    values = contracted(theta, tables, _indices(tried, joint_action), unpack(packed))
     return _aggregate(values, tried, probabilities)
 
 

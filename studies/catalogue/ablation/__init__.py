@@ -11,12 +11,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from ...results.analysis import Analysis, Figures
 from ...results.comparison import differences, mean_success, phases_of, with_first
 from ...results.results import Results
-from ...results.statistics import Estimate, rate
+from ...results.statistics import exactly, rate
 from ...results.summary import Summary
 from ...results.verdicts import by_measure, verdicts
 from ..study import run_training as measure
@@ -37,13 +35,12 @@ def compared_with_first(results: Results, names: Sequence[str]) -> Analysis:
     measures = {title: mean_success(phase) for title, phase in phases.items()}
     compared = differences(results, with_first(conditions, names), measures)
     by_place = {(d.condition, d.measure): d.estimate for d in compared}
-    unknown = Estimate(*(np.asarray(value) for value in (0.0, np.nan, np.nan)))
     table = []
     for condition, name in zip(conditions, names, strict=True):
         estimates = {}
         for title, phase in phases.items():
             estimates[title] = rate(results.success(condition, phase))
-            estimates[f"{title}, difference"] = by_place.get((name, title), unknown)
+            estimates[f"{title}, difference"] = by_place.get((name, title), exactly(0.0))
         table.append(Summary(name, len(results.seeds(condition)), estimates))
     notes = verdicts(compared, names[0]) if compared else []
     return Analysis(tuple(table), tuple(notes), differences=compared)

@@ -25,7 +25,7 @@ from ...results.analysis import Analysis, Figures
 from ...results.comparison import Array, Difference, adjusted, of_shared_seeds
 from ...results.contrasts import Contrasts, Group
 from ...results.results import Results
-from ...results.statistics import Estimate, bootstrap, rate
+from ...results.statistics import Estimate, bootstrap, exactly, rate
 from ...results.summary import EVALUATED, Summary
 from ...spec.labels import label_but
 from ...spec.spec import Spec
@@ -122,8 +122,7 @@ def estimates(
     if len(decisions):
         values["decisions to goal"] = bootstrap(decisions)
     values[DECIDING] = bootstrap(1e3 * deciding)
-    unknown = np.asarray(np.nan)  # a count has no interval
-    values["messages"] = Estimate(messages[0], unknown, unknown)
+    values["messages"] = exactly(messages[0])
     return values
 
 

@@ -16,7 +16,7 @@ import tracemalloc
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -26,16 +26,13 @@ from ...presentation.words import count
 from ...results.analysis import Analysis, Figures
 from ...results.comparison import Array, of_shared_seeds
 from ...results.results import Results
-from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
+from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, exactly, rate
 from ...results.summary import EVALUATED, Summary, evaluated
 from ...spec.spec import Spec
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..contact import ContactShares
 from ..study import check_rule_bases
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 NUMBERS = ("robots", "agents", "messages", "team_bytes", "decision_median", "step_bytes")
 """What of whole trials the analysis rests on."""
@@ -45,16 +42,18 @@ TIMES = {"deciding": "decision [ms]", "learning": "learning [ms]"}
 """Times whose growth with the number of agents is estimated, by what they are of."""
 COLUMNS = (
     "success", "all touch", "decision [ms]", "learning [ms]", "team [MB]", "process [MB]",
+    "messages",
 )  # fmt: skip
 """What the table shows, and after the first of them the evaluations."""
 PANELS = (
-    (EVALUATED, EVALUATED, False),
-    ("decision [ms]", "deciding, per step [ms]", True),
-    ("learning [ms]", "learning, per step [ms]", True),
-    ("team [MB]", "arrays of the team [MB]", True),
-    ("process [MB]", "process, peak [MB]", False),
+    (EVALUATED, EVALUATED, "linear"),
+    ("decision [ms]", "deciding, per step [ms]", "log"),
+    ("learning [ms]", "learning, per step [ms]", "log"),
+    ("team [MB]", "arrays of the team [MB]", "log"),
+    ("process [MB]", "process, peak [MB]", "linear"),
+    ("messages", "messages passed down, per step", "symlog"),
 )
-"""What the figure shows, its titles, and whether the axis is logarithmic."""
+"""What the figure shows, its titles, and the scale of the axis; agents may pass no messages."""
 MEMORY = Path("/proc/self/status")
 CLEAR = Path("/proc/self/clear_refs")
 
@@ -137,8 +136,6 @@ class Point:
     """Number of robots."""
     agents: int
     """Number of agents."""
-    messages: int
-    """Number of messages in one decision of all agents."""
     period: float | None
     """What a decision may take to keep up with the robots [s]; none: the scenario has no hurry."""
     seeds: tuple[int, ...]
@@ -167,7 +164,6 @@ def analyse(results: Results) -> Analysis:
         + ", ".join(f"{what} n^{_exponent_text(power)}" for what, power in by_what.items())
         for evaluator, by_what in exponents_of(points).items()
     ]
-    notes += _messages_by_size(points, bodies)
     return Analysis(tuple(table), tuple(notes), points)
 
 
@@ -185,11 +181,12 @@ def _point(results: Results, condition: str, sizes: Mapping[str, int], bodies: s
         costs["process [MB]"] = 1e-6 * numbers["process_bytes"]
     values = {"success": rate(results.success(condition)[:, -5:])} | evaluated(results, condition)
     values |= {title: bootstrap(cost, bounds=NOT_NEGATIVE) for title, cost in costs.items()}
+    values["messages"] = exactly(numbers["messages"][0])
     if "all_touching" in numbers:
         values["all touch"] = bootstrap(numbers["all_touching"], bounds=(0, 1))
     return Point(
         _without_size(condition, sizes, bodies), bodies, sizes[condition],
-        int(numbers["agents"][0]), int(numbers["messages"][0]),
+        int(numbers["agents"][0]),
         float(numbers["period_s"][0]) if "period_s" in numbers else None,
         results.seeds(condition), values, {title: costs[title] for title in TIMES.values()},
     )  # fmt: skip
@@ -232,22 +229,6 @@ def _without_size(condition: str, sizes: Mapping[str, int], bodies: str) -> str:
     return ", ".join(part for part in parts if part != f"{bodies}={sizes[condition]}")
 
 
-def _messages_by_size(points: Sequence[Point], bodies: str) -> list[str]:
-    """Return lines that say how many messages are passed, one per number where all agree."""
-    lines = []
-    for robots in dict.fromkeys(p.robots for p in points):
-        labels: dict[tuple[int, int], list[str]] = {}
-        for p in points:
-            if p.robots == robots:
-                labels.setdefault((p.agents, p.messages), []).append(p.evaluator)
-        for (agents, passed), own in labels.items():
-            whose = f" ({'; '.join(own)})" if len(labels) > 1 else ""
-            lines.append(
-                f"{robots} {bodies}{whose}: {agents} agents, {count(passed, 'message')} a step"
-            )
-    return lines
-
-
 def _exponent_text(e: Estimate) -> str:
     """Return an exponent with its interval, if there is one."""
     return f"{e.value:.2f}" + (f" [{e.low:.2f}, {e.high:.2f}]" if np.isfinite(e.low) else "")
@@ -283,21 +264,21 @@ def draw(analysis: Analysis) -> Figures:
     points = analysis.cases
     evaluators = list(dict.fromkeys(p.evaluator for p in points))
     figure, panels = figures.panels(2, 3, (8.4, 5.2), sharex=True)
-    for axes, (name, title, logarithmic) in zip(panels.flat, PANELS, strict=False):
+    for axes, (name, title, scale) in zip(panels.flat, PANELS, strict=True):
         for index, evaluator in enumerate(evaluators):
             own = [p for p in points if p.evaluator == evaluator and name in p.values]
             if own:
                 robots, values = [p.robots for p in own], [p.values[name] for p in own]
                 by_robots.draw_line(axes, robots, values, index, len(evaluators))
         axes.set_title(title, loc="left")
-        if logarithmic:
+        if scale == "log":
             figures.log_axis(axes)
         else:
+            axes.set_yscale(scale, **({"linthresh": 1.0} if scale == "symlog" else {}))
             axes.set_ylim(0.0, 1.1 * axes.get_ylim()[1])
     figures.as_rates(panels[0, 0])
     for period in {p.period for p in points if p.period is not None}:
         panels[0, 1].axhline(1e3 * period, color="#888888", linewidth=0.8, ls=":")
-    draw_messages(panels[1, 2], points)
     for axes in panels.flat:
         by_robots.scale_axis(axes, sorted({p.robots for p in points}))
     for axes in panels[-1]:
@@ -305,22 +286,6 @@ def draw(analysis: Analysis) -> Figures:
     title = "means over seeds, bars: 95 % intervals; dotted: the decision period"
     by_robots.name_lines(figure, evaluators, title)
     return {"scaling": figure}
-
-
-def draw_messages(axes: Axes, points: Sequence[Point]) -> None:
-    """Draw a black line if all evaluators agree, as one topology's do, else a line of each."""
-    from ...presentation import by_robots
-
-    counts = {(p.robots, p.messages) for p in points}
-    if len(counts) == len({robots for robots, _ in counts}):
-        axes.plot(*zip(*sorted(counts), strict=True), "k.-", linewidth=1.2)
-    else:
-        for index, evaluator in enumerate(dict.fromkeys(p.evaluator for p in points)):
-            own = sorted((p.robots, p.messages) for p in points if p.evaluator == evaluator)
-            axes.plot(*zip(*own, strict=True), **by_robots.style(index))
-    axes.set_yscale("symlog", linthresh=1.0)  # agents that see nobody pass nothing
-    axes.set_ylim(bottom=-0.2)
-    axes.set_title("messages passed down, per step", loc="left")
 
 
 __all__ = ["NUMBERS", "analyse", "check", "draw", "measure"]

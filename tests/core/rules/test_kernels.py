@@ -10,10 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nested_agents.core.interface.prediction import Blocks
-from nested_agents.core.rules.kernels.enumeration import (
-    enumerate_contracted,
-    enumerate_looked_up,
-)
 from nested_agents.core.rules.kernels.few_states import each_dense
 from nested_agents.core.rules.kernels.fuzzy import Partition
 from nested_agents.core.rules.kernels.layout import layout, unpack
@@ -92,14 +88,6 @@ def test_block_values(base: RuleBase, rng: np.random.Generator) -> None:
     indices = rng.integers(N_ACTIONS**N_AGENTS, size=90)
     expected = oracle.block_values(base, theta, blocks, indices)
     assert base.block_values(theta, blocks, indices) == pytest.approx(expected, rel=0, abs=1e-12)
-    # A rule base chooses by its terms.
-    none = np.zeros(0, dtype=np.int64)
-    tables = blocks.own, blocks.own_rows, blocks.shared, blocks.shared_rows, blocks.divisor
-    for kind in (enumerate_looked_up, enumerate_contracted) if base.compact else ():
-        found = kind(
-            theta, tables, (indices[:, None], none, none), none, np.zeros((0, 0)), base.layout
-        )
-        assert found == pytest.approx(expected, rel=0, abs=1e-12)
 
 
 @pytest.mark.parametrize("averaged", [False, True])

@@ -2,7 +2,6 @@ from pathlib import Path
 
 import pytest
 from made_up_results import NOTHING, Arrays, scaling
-from matplotlib.figure import Figure
 
 from nested_agents.studies.catalogue import scaling as module
 from nested_agents.studies.catalogue.scaling import analyse, draw, exponents_of, measure
@@ -23,9 +22,9 @@ def test_exponents_and_messages() -> None:
     assert exponents["sampling"]["deciding"].value == pytest.approx(2.0, abs=0.02)
     assert exponents["sums"]["deciding"].low > 0.95
     assert analysis.notes[0].startswith("\nsums, time with n agents: deciding n^")
-    assert [p.messages for p in analysis.cases[:3]] == [6, 120, 8128]
+    assert [p.values["messages"].value for p in analysis.cases[:3]] == [6, 120, 8128]
     assert [p.evaluator for p in analysis.cases] == ["sums"] * 3 + ["sampling"] * 3
-    assert "64 robots: 128 agents, 8128 messages a step" in analysis.notes
+    assert [line.estimates["messages"].value for line in analysis.table[:3]] == [6, 120, 8128]
 
 
 def by_topology(passed: dict[str, dict[int, int]], first: str = "topology") -> Arrays:
@@ -56,26 +55,8 @@ def test_messages_are_told_by_topology_where_they_differ(first: str) -> None:
     assert list(dict.fromkeys(p.evaluator for p in analysis.cases)) == [
         f"topology={name}" for name in PASSED
     ]
-    told = [note for note in analysis.notes if "messages" in note]
-    assert told == [
-        "2 robots (topology=chain): 4 agents, 6 messages a step",
-        "2 robots (topology=star): 4 agents, 3 messages a step",
-        "2 robots (topology=independent): 4 agents, 0 messages a step",
-        "4 robots (topology=chain): 8 agents, 28 messages a step",
-        "4 robots (topology=star): 8 agents, 7 messages a step",
-        "4 robots (topology=independent): 8 agents, 0 messages a step",
-    ]
-
-
-def test_as_many_agents_of_fewer_robots_have_a_line_of_their_own() -> None:
-    results = by_topology({"two wheels": {2: 6, 4: 28}, "four wheels": {2: 28}})
-    results.numbers["topology=four wheels, robots=2"]["agents"][:] = 8
-    told = [note for note in analyse(results.frames()).notes if "messages" in note]
-    assert told == [
-        "2 robots (topology=two wheels): 4 agents, 6 messages a step",
-        "2 robots (topology=four wheels): 8 agents, 28 messages a step",
-        "4 robots: 8 agents, 28 messages a step",
-    ]
+    told = [line.estimates["messages"].value for line in analysis.table]
+    assert told == [6, 28, 3, 7, 0, 0]
 
 
 def test_robots_alone_make_one_line() -> None:
@@ -87,14 +68,10 @@ def test_robots_alone_make_one_line() -> None:
     assert exponents_of(analysis.cases)["default"]["deciding"].value == pytest.approx(1.0, abs=0.02)
 
 
-@pytest.mark.parametrize(("made", "lines"), [(scaling(SIZES), 1), (by_topology(PASSED), 3)])
-def test_the_figure_has_a_line_of_messages_by_topology(made: Arrays, lines: int) -> None:
-    analysis = analyse(made.frames())
-    axes = Figure().subplots()
-    module.draw_messages(axes, analysis.cases)
-    shown = [list(line.get_ydata()) for line in axes.get_lines()]
-    counts = [[6, 120, 8128]] if lines == 1 else [list(c.values()) for c in PASSED.values()]
-    assert shown == counts
+def test_the_figure_has_a_line_of_messages_by_topology() -> None:
+    axes = draw(analyse(by_topology(PASSED).frames()))["scaling"].get_axes()[-1]
+    lines = [line.get_ydata() for line in axes.get_lines()]
+    assert [list(line) for line in lines] == [list(c.values()) for c in PASSED.values()]
 
 
 def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
