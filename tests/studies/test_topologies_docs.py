@@ -24,6 +24,30 @@ def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixtu
     assert table in PAGE.read_text(encoding="utf-8"), f"docs/topologies.md: put in\n{table}"
 
 
+EVALUATED_AS = (
+    "as trained", "told only", "considered only", "considered only, private plans",
+    "considered only, common plan", "neither",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["edges-hierarchies", "edges-arms", "edges-games"])
+def test_tables_with_a_column_for_each_evaluation(name: str, capsys) -> None:
+    lines = print_table(name, ["evaluation success"], capsys).splitlines()[2:]
+    success = {label: value for label, _, value in (line[2:-2].split(" | ") for line in lines)}
+    rows = [label.removesuffix(", neither") for label in success if label.endswith(", neither")]
+    for row in rows:
+        line = " | ".join([row, *(success[f"{row}, {how}"] for how in EVALUATED_AS)])
+        assert f"| {line} |" in PAGE.read_text(encoding="utf-8"), f"docs/topologies.md: {line}"
+
+
+def test_the_table_of_classes_of_edges(capsys) -> None:
+    columns = ("evaluation success", "decisions to goal", "messages")
+    for line in print_table("edges-classes", columns, capsys).splitlines()[2:]:
+        label, _, *values = line[2:-2].split(" | ")
+        row = " | ".join([label.removeprefix("default, "), *values])
+        assert f"| {row} |" in PAGE.read_text(encoding="utf-8"), f"docs/topologies.md: {row}"
+
+
 @pytest.mark.slow
 def test_kept_teams_are_evaluated_again_as_it_says(tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)

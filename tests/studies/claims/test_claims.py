@@ -239,6 +239,11 @@ def test_the_committed_results_make_the_page(capsys) -> None:
     files = list(claims.PUBLISHED.glob("*.json"))
     assert {path.stem for path in files} == {
         *claims.STUDIES_OF_CLAIMS,
+        "edges-classes",
+        "edges-hierarchies",
+        "edges-arms",
+        "edges-games",
+        "edges-broken",
         "arms",
         "arm-transfer",
         "long-arms",
