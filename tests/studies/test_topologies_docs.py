@@ -48,6 +48,23 @@ def test_the_table_of_classes_of_edges(capsys) -> None:
         assert f"| {row} |" in PAGE.read_text(encoding="utf-8"), f"docs/topologies.md: {row}"
 
 
+def test_the_tables_of_broken_hierarchies(capsys) -> None:
+    lines = print_table("edges-broken", ["evaluation success"], capsys).splitlines()[2:]
+    success = {label: value for label, _, value in (line[2:-2].split(" | ") for line in lines)}
+    others = (
+        "as trained", "lost .9, common plan", "delayed by 1", "noisy .3", "leader silent",
+        "leader absent",
+    )  # fmt: skip
+    for trained in ("chain", "tree:2", "teams"):
+        rows = [[trained, *(success[f"{trained}, {other}"] for other in others)]]
+        for read in ("maintain", "last", "plan"):
+            lost = [success[f"{trained}, lost {p}, {read}"] for p in ("0", ".3", ".6", ".9")]
+            rows.append([f"{trained}, {read}", *lost])
+        for row in rows:
+            line = f"| {' | '.join(row)} |"
+            assert line in PAGE.read_text(encoding="utf-8"), f"docs/topologies.md: {line}"
+
+
 @pytest.mark.slow
 def test_kept_teams_are_evaluated_again_as_it_says(tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.chdir(tmp_path)
