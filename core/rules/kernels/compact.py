@@ -37,6 +37,30 @@ def _corners(variables, counts, lows, highs, shares, rules, strengths) -> int:  
     return size
 
 
+@njit(cache=True, inline="always")
+def _value(theta, state, lay: Layout, functions, room) -> float:  # type: ignore[no-untyped-def]
+    """Return f of one state.
+
+    By `_add_values` in its place a TD update takes 1.1 times as long with rules over all variables
+    of two robots, and 1.3 times with rules over single ones of eight (paired).
+    """
+    lows, highs, shares = functions
+    rules, strengths = room
+    for j in range(len(state)):
+        lows[j], highs[j], shares[j] = pair(j, state[j], lay)
+    value = 0.0
+    for t in range(len(lay.lengths)):
+        at = lay.offsets[t]
+        if lay.lengths[t] == 1:
+            j = lay.terms[t, 0]
+            value += theta[at + lows[j]] + shares[j] * (theta[at + highs[j]] - theta[at + lows[j]])
+            continue
+        variables = lay.terms[t, : lay.lengths[t]]
+        for c in range(_corners(variables, lay.counts, lows, highs, shares, rules, strengths)):
+            value += strengths[c] * theta[at + rules[c]]
+    return value
+
+
 @njit(cache=True)
 def _add_values(  # type: ignore[no-untyped-def]
     theta, which: IntArray, own, own_rows: IntArray, shared, shared_rows: IntArray, skipped: int,
@@ -153,14 +177,12 @@ def td_compact(  # type: ignore[no-untyped-def]
     """Do what `core.rules.kernels.few_states.td_dense` does, triangular partitions."""
     lay = unpack(packed)
     strengths, spare = strengths_room(lay)
-    terms, one, now, ahead = _numbered(len(lay.lengths)), _numbered(1), np.empty(1), np.empty(1)
+    functions, room = _room(lay)
     for i in range(len(states)):
-        weights = theta[rows[i]]
-        for met, value in ((states[i : i + 1], now), (entered[i : i + 1], ahead)):
-            value[0] = 0.0
-            _add_values(weights, terms, met, one, met, one, 0, lay, value)
+        ahead = _value(theta[rows[i]], entered[i], lay, functions, room)
+        now = _value(theta[rows[i]], states[i], lay, functions, room)
         all_strengths(states[i], lay, strengths, spare)
-        step = step_size * (rewards[i] + discount * ahead[0] - now[0]) / lengths[i]
+        step = step_size * (rewards[i] + discount * ahead - now) / lengths[i]
         advance(theta[rows[i]], trace[i], reach[i], strengths, decay, step, lay)
 
 
