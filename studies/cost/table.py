@@ -115,7 +115,7 @@ def _table(rows: Sequence[CostRow]) -> str:
     if any(row.agents == 4 and row.nested_closed_form == OF_THE_PAPER for row in rows):
         lines.append("The paper prints 2.45e12 (nested) and 1.1e27 (single agent) for n = 4.")
     for cells in measured:
-        agree = [row.formula == row.measured.counted for row in rows if row.measured is not None]
+        same = [row.formula == row.measured.counted for row in rows if row.measured is not None]
         lines += ["", f"Per step of the running system (line-up scenario, |A| = 4, |S| = {RULES}):"]
         lines += ["", *aligned(cells, "><>>>>>>"), ""]
         lines += ["formula, counted: joint actions tried; ms: deciding and learning;"]
@@ -123,7 +123,7 @@ def _table(rows: Sequence[CostRow]) -> str:
         if most > 1:
             lines += [f"±: a 95 % interval of the mean of {most} repeats, each with a new team;"]
         lines += ["-: not measured, beyond a second or so a step."]
-        lines += [f"All counts equal the formulas in {sum(agree)} of {len(agree)} rows."]
+        lines += [f"All counts equal the formulas in {sum(same)} of {len(same)} rows."] * bool(same)
     return "\n".join(lines)
 
 

@@ -21,7 +21,9 @@ from nested_agents.studies.cost.cost import (
     measure,
     step_formula,
 )
+from nested_agents.studies.cost.figure import draw
 from nested_agents.studies.cost.table import written
+from nested_agents.studies.presentation import figures
 
 FIVE = ("chain", "teams", "tree:2", "star", "independent")
 
@@ -229,6 +231,21 @@ def test_the_formula_stands_beside_what_is_not_measured(said, form: str) -> None
     assert {"table": "1.815e39", "latex": r"1.815\times 10^{39}"}.get(form, str(joint)) in out
     assert err.startswith("measuring, first compiling what is not: no steps of more than a second")
     assert err.count("\n") == 1
+    assert "0 of 0" not in out
+
+
+def test_the_legend_is_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn = []
+    monkeypatch.setattr(figures, "write", lambda figure, path: drawn.append(figure))
+    labels = {"chain": "chain", "evenodd.py:even_odd": "star"}
+    rows = [row for t in labels.values() for row in cost_rows([t], [4, 8], Problem())]
+    names = {text: label for label, text in labels.items()}
+    draw([replace(row, topology=names[row.topology]) for row in rows], tmp_path / "cost.svg")
+    (figure,) = drawn
+    figure.draw_without_rendering()
+    box = figure.legends[0].get_window_extent()
+    assert box.x0 >= 0
+    assert box.x1 <= figure.bbox.width
 
 
 def test_measured_tables_and_figure(said, tmp_path: Path) -> None:
