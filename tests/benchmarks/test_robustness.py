@@ -28,7 +28,7 @@ def test_killed_studies_end_with_the_bytes_of_undisturbed_ones(backend: str, kil
         "--seed",
         "3",
         "--seeds",
-        "6",
+        "3",
     )
     killed = re.search(r"killed +(\d+) processes, (\d+) workers", said)
     assert killed is not None
