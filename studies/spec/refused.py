@@ -64,7 +64,7 @@ def explain(
     # The members of a union complain one by one about the same place: say what any would take.
     rules = dict.fromkeys(rule(e["msg"]) for there, e in problems if there == keys)
     owner = _owner(keys[:-1], model, data) if keys else None
-    other = mistaken(keys[-1], owner.model_fields) if owner is not None else ""
+    other = mistaken(keys[-1], owner.model_fields, first) if owner is not None else ""
     return f"{path} = {show(value)}: {', or '.join(rules)}{other}"
 
 
