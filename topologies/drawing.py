@@ -69,7 +69,7 @@ def draw(
     places = positions(hierarchy)
     low, high = places.min(axis=0), places.max(axis=0)
     width, height = high - low + (WIDTH + 0.6, HEIGHT + 1.1)
-    width, centre = max(width, 4.5), (low[0] + high[0]) / 2
+    width, centre = max(width, 4.5, 0.09 * len(title)), (low[0] + high[0]) / 2
     figure = Figure(figsize=(width, height))
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()

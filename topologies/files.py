@@ -108,7 +108,7 @@ def _called(build: Callable[..., Any], name: str, agents: Names, bodies: Bodies)
     if edges is None:
         raise ValueError(
             f"{name} returned {type(result).__name__}, allowed: a networkx DiGraph, a Graph "
-            "of neighbours, or pairs (superior, subordinate)"
+            "of neighbours, or a list of nothing but pairs (superior, subordinate)"
         )
     if len(edges) > most:
         raise ValueError(f"{name} gave more than {most} pairs of {len(agents)} agents")

@@ -201,6 +201,8 @@ class Team:
                 self._states,
             )  # fmt: skip
             values = self.evaluator.values(deliberation)
+            if len(values) != n_actions:
+                raise ValueError(f"the evaluator gave {len(values)} values of {n_actions} actions")
             if explore:
                 joint[i] = self.explorer.choose(i, values, self.rng)
             else:

@@ -87,7 +87,7 @@ class SettingsRegistry(Registry):
         own = thing if is_model else getattr(thing, "Settings", self.base)
         if not (isinstance(own, type) and issubclass(own, self.root)):
             base = f"{self.base.__module__}.{self.base.__qualname__}"
-            raise ValueError(f"the settings of a {self.kind} must inherit {base}")
+            raise ValueError(f"is no {self.kind}, whose Settings inherit {base}")
         if not callable(thing):
             raise ValueError(f"is no {self.kind}, but a {type(thing).__name__}")
         has_own = hasattr(thing, "Settings")
@@ -103,9 +103,15 @@ class SettingsRegistry(Registry):
         if not is_model:
 
             def build(settings: Settings, *given: Any) -> Any:
-                if has_own:
-                    return thing(settings, *given)
-                return thing(*given, **{field: getattr(settings, field) for field in fields})
+                given = (settings, *given) if has_own else given
+                named = {field: getattr(settings, field) for field in fields}
+                try:
+                    if isinstance(thing, type):  # a function says it itself
+                        signature(thing).bind(*given, **named)
+                except TypeError as error:
+                    lacks = "" if has_own else "; it has no nested class Settings"
+                    raise ValueError(f"{self.kind} {name!r}: {error}{lacks}") from None
+                return thing(*given, **named)
 
             model.build = build  # type: ignore[attr-defined]
         return cast(type[Settings], model)

@@ -10,6 +10,9 @@ from ...core.agents.cost import Problem
 from ..cost.cost import PAPER, CostRow, cost_rows
 from ..cost.table import written
 
+MOST_REPEATS = 1000
+"""A repeat takes a third of a second or more."""
+
 
 @dataclass(frozen=True)
 class CostTable:
@@ -43,23 +46,29 @@ def cost_table(
     problem: Problem = PAPER,
     *,
     measured: bool = False,
+    repeats: int = 1,
 ) -> CostTable:
     """Return what hierarchies cost, by Eq. 18-23 and, if asked, measured.
 
     Parameters
     ----------
     topologies
-        As in a spec.
+        As in a spec, or ``label=topology`` with a label of one's own.
     agents
         Numbers of agents.
     problem
         Rules and actions of an agent, and steps of an episode; those of the paper unless given.
     measured
         Whether to count and time steps of the running system, too.
+    repeats
+        How often steps are timed, each with a new team; from two on the time has an interval.
 
     Raises
     ------
     ValueError
         If a topology or a number is refused; one line.
     """
-    return CostTable(tuple(cost_rows(topologies, list(agents), problem, measured=measured)))
+    if not 1 <= repeats <= MOST_REPEATS:
+        raise ValueError(f"repeats = {repeats}, allowed: 1 to {MOST_REPEATS}")
+    times = repeats if measured else 0
+    return CostTable(tuple(cost_rows(topologies, list(agents), problem, times)))

@@ -41,8 +41,8 @@ def _print_table(findings: Sequence[Finding]) -> None:
             f"[{colour}]{finding.verdict}[/]",
         )
     Console().print(table)
-    print("Values with their 95 % intervals. A claim holds if the whole interval meets the")
-    print("criterion, does not if none of it does, and is not decided in between.")
+    print("With 95 % intervals. A claim holds if the whole interval meets the criterion,")
+    print("does not if none of it does, and is not decided in between or by under 5 seeds.")
 
 
 def markdown(findings: Sequence[Finding]) -> str:

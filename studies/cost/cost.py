@@ -13,11 +13,13 @@ membership functions, with which every rule does fire.
 
 from __future__ import annotations
 
+import re
 import tracemalloc
 from collections.abc import Iterator, Sequence
 from dataclasses import astuple, dataclass
 from fractions import Fraction
 from functools import cache
+from itertools import chain
 from statistics import median
 
 from ...core.agents.cost import Problem, below_counts, is_chain
@@ -34,6 +36,7 @@ from ...core.rules.settings import RuleBaseSettings
 from ...scenarios.line_up import LineUp, LineUpSettings
 from ...topologies import build, parse
 from ...topologies.view import team_of
+from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap
 
 SINGLE_AGENT = "single-agent"
 """Stands in place of a topology for the one agent of Eq. 23."""
@@ -54,7 +57,9 @@ COORDINATED = LEARNER.model_copy(
 MOST_OPERATIONS = 4 * 10**8
 """Rule evaluations a step beyond which nothing is measured: about a second a step."""
 LEAST_SECONDS, MOST_TIMES = 0.3, 100
-"""How long each case is timed at least, but no more times than that."""
+"""How long each repeat is timed at least, but no more times than that."""
+LABELLED = re.compile(r"([\w -]+)=(.+)")
+"""A topology with a label of one's own."""
 
 
 @dataclass(frozen=True)
@@ -69,6 +74,13 @@ class StepCost:
     """Median time of learning from a step [s]."""
     memory: int
     """Greatest memory held by team and step [bytes]."""
+    repeats: tuple[float, ...]
+    """The time of a step in each repeat, each with a new team [s]."""
+
+    @property
+    def step(self) -> Estimate:
+        """The mean time of a step over repeats with its 95 % interval [s]; of one, no interval."""
+        return bootstrap(self.repeats, bounds=NOT_NEGATIVE)
 
 
 @dataclass(frozen=True)
@@ -77,6 +89,7 @@ class CostRow:
 
     agents: int
     topology: str
+    """Its label, or how it is written in a spec."""
     nested_exact: int | None
     nested_closed_form: int | None
     nested_asymptotic: Fraction | None
@@ -92,30 +105,35 @@ class CostRow:
 
 
 def cost_rows(
-    topologies: Sequence[str], agents: Sequence[int], problem: Problem, *, measured: bool = False
+    topologies: Sequence[str], agents: Sequence[int], problem: Problem, repeats: int = 0
 ) -> Iterator[CostRow]:
-    """Yield the cost of every topology for every number of agents.
+    """Yield the cost of every topology for every number of agents, measured `repeats` times.
 
     Raises
     ------
     ValueError
-        If there is no topology, or one is refused.
+        If there is no topology, one is refused, or two have one label.
     """
     if not topologies:
         raise ValueError("topology = none, allowed: one or more, such as chain or tree:2")
-    for text in topologies:
+    written = [LABELLED.fullmatch(text) for text in topologies]
+    named = [m.groups() if m else (t, t) for m, t in zip(written, topologies, strict=True)]
+    labels = [label for label, _ in named]
+    for label, text in named:
+        if labels.count(label) > 1:
+            raise ValueError(f"topology = {label!r} more than once; name each: LABEL={text}")
         for n in agents:
             below = None if text == SINGLE_AGENT else agents_below(text, n)
-            chain = below is not None and is_chain(below)
+            is_one = below is not None and is_chain(below)
             yield CostRow(
                 agents=n,
-                topology=text,
+                topology=label,
                 nested_exact=None if below is None else problem.nested(below),
-                nested_closed_form=problem.chain_closed_form(n) if chain else None,
-                nested_asymptotic=problem.chain_asymptotic(n) if chain else None,
+                nested_closed_form=problem.chain_closed_form(n) if is_one else None,
+                nested_asymptotic=problem.chain_asymptotic(n) if is_one else None,
                 single_agent=problem.single_agent(n),
-                formula=step_formula(text, n) if measured else None,
-                measured=measure(text, n) if measured else None,
+                formula=step_formula(text, n) if repeats else None,
+                measured=measure(text, n, repeats) if repeats else None,
             )
 
 
@@ -151,7 +169,7 @@ def step_formula(text: str, n: int) -> Counts:
     return Counts(joint, joint * RULES, n * RULES)
 
 
-def measure(text: str, n: int) -> StepCost | None:
+def measure(text: str, n: int, repeats: int = 1) -> StepCost | None:
     """Count and time a step of n agents; none where it would take too long or too much memory."""
     if step_formula(text, n).rule_evaluations > MOST_OPERATIONS:
         return None
@@ -166,15 +184,26 @@ def measure(text: str, n: int) -> StepCost | None:
         tracemalloc.stop()
     assert team.evaluator is not None
     before = astuple(team.evaluator.counts)
+    times = [_timed(team, scenario)]
+    # An episode here has two steps, of which the second alone changes weights.
+    steps = 2 * len(times[0]), 2 * len(times[0]), len(times[0])
+    after = astuple(team.evaluator.counts)
+    counted = (int(b - a) // n for a, b, n in zip(before, after, steps, strict=True))
+    for seed in range(1, repeats):
+        team = Team(learner, scenario, hierarchy, policy_seed(seed))
+        _steps(team, scenario, 1)
+        times.append(_timed(team, scenario))
+    deciding, learning = (median(part) for part in zip(*chain(*times), strict=True))
+    each = tuple(sum(map(median, zip(*taken, strict=True))) for taken in times)
+    return StepCost(Counts(*counted), deciding, learning, memory, each)
+
+
+def _timed(team: Team, scenario: Scenario) -> list[tuple[float, float]]:
+    """Take steps until enough time has been measured; return (deciding, learning) [s] of each."""
     times = _steps(team, scenario, 1)
     while sum(map(sum, times)) < LEAST_SECONDS and len(times) < MOST_TIMES:
         times += _steps(team, scenario, 1)
-    deciding, learning = (median(part) for part in zip(*times, strict=True))
-    # An episode here has two steps, of which the second alone changes weights.
-    steps = 2 * len(times), 2 * len(times), len(times)
-    after = astuple(team.evaluator.counts)
-    counted = (int(b - a) // n for a, b, n in zip(before, after, steps, strict=True))
-    return StepCost(Counts(*counted), deciding, learning, memory)
+    return times
 
 
 def _arrange(text: str, line_up: LineUp) -> tuple[TDLambdaSettings, Scenario, Hierarchy]:

@@ -56,7 +56,7 @@ def draw(rows: Sequence[CostRow], path: Path) -> None:
             axes.yaxis.set_major_locator(MaxNLocator(integer=True, nbins=7))
             axes.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"$10^{{{y:g}}}$"))
             axes.grid(alpha=0.25)
-        add_legend(figure, _handles(list(series), measured), ncols=1 + columns)
+        add_legend(figure, _handles(list(series), measured), ncols=columns + (columns > 1))
         figures.write(figure, path)
 
 

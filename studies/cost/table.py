@@ -80,6 +80,10 @@ def _record(row: CostRow) -> dict[str, Any]:
         record["deciding_s"] = row.measured.deciding
         record["learning_s"] = row.measured.learning
         record["memory_bytes"] = row.measured.memory
+        step, repeats = row.measured.step, len(row.measured.repeats)
+        record |= {"repeats": repeats, "step_s": float(step.value)}
+        if repeats > 1:
+            record |= {"step_s_low": float(step.low), "step_s_high": float(step.high)}
     return record
 
 
@@ -111,12 +115,15 @@ def _table(rows: Sequence[CostRow]) -> str:
     if any(row.agents == 4 and row.nested_closed_form == OF_THE_PAPER for row in rows):
         lines.append("The paper prints 2.45e12 (nested) and 1.1e27 (single agent) for n = 4.")
     for cells in measured:
-        agree = [row.formula == row.measured.counted for row in rows if row.measured is not None]
+        same = [row.formula == row.measured.counted for row in rows if row.measured is not None]
         lines += ["", f"Per step of the running system (line-up scenario, |A| = 4, |S| = {RULES}):"]
         lines += ["", *aligned(cells, "><>>>>>>"), ""]
         lines += ["formula, counted: joint actions tried; ms: deciding and learning;"]
+        most = max((len(row.measured.repeats) for row in rows if row.measured), default=1)
+        if most > 1:
+            lines += [f"±: a 95 % interval of the mean of {most} repeats, each with a new team;"]
         lines += ["-: not measured, beyond a second or so a step."]
-        lines += [f"All counts equal the formulas in {sum(agree)} of {len(agree)} rows."]
+        lines += [f"All counts equal the formulas in {sum(same)} of {len(same)} rows."] * bool(same)
     return "\n".join(lines)
 
 
@@ -126,8 +133,18 @@ def _measured_cells(row: CostRow) -> list[str]:
         return [scientific(joint), *["-"] * len(MEASURED[1:])]
     c = row.measured.counted
     counts = joint, c.joint_actions, c.rule_evaluations, c.weight_updates
-    amounts = (1e3 * (row.measured.deciding + row.measured.learning), 1e-6 * row.measured.memory)
-    return [*map(scientific, counts), *(f"{a:.3g}" if a < 1000 else f"{a:,.0f}" for a in amounts)]
+    step = row.measured.step
+    wide = (
+        f"±{_amount(1e3 * float(step.high - step.value), 2)}"
+        if len(row.measured.repeats) > 1
+        else ""
+    )
+    amounts = _amount(1e3 * float(step.value)) + wide, _amount(1e-6 * row.measured.memory)
+    return [*map(scientific, counts), *amounts]
+
+
+def _amount(value: float, digits: int = 3) -> str:
+    return f"{value:.{digits}g}" if value < 1000 else f"{value:,.0f}"
 
 
 def _tabular(cells: Sequence[Sequence[str]]) -> str:
@@ -140,4 +157,6 @@ def _latex_cell(text: str) -> str:
     if not text[0].isdigit():
         return "--" if text == "-" else escaped(text).replace(">", "$>$")
     mantissa, e, power = text.partition("e")
-    return rf"${mantissa}\times 10^{{{int(power)}}}$" if e else mantissa.replace(",", r"\,")
+    if e:
+        return rf"${mantissa}\times 10^{{{int(power)}}}$"
+    return mantissa.replace(",", r"\,").replace("±", r"$\pm$")

@@ -86,7 +86,7 @@ def explain(store: Store, trial: Trial) -> Explanation:
 def _policy(team: Team, scenario: Any) -> Any:
     """Return what a scenario shows of what a team does, or why it does not."""
     if not hasattr(scenario, "show_policy"):
-        return "the scenario does not show what agents such as these do"
+        return "the scenario has no method show_policy for agents such as these"
     if team.evaluator is None:
         return "actions are drawn at random"
     try:

@@ -62,10 +62,12 @@ def explain(
         kinds = [kind_of(m) for m in models_of(getattr(slot, "annotation", slot))]
         return f"{path} = {show(value)}: {closest(value, [k for k in kinds if k])}"
     # The members of a union complain one by one about the same place: say what any would take.
-    rules = dict.fromkeys(rule(e["msg"]) for there, e in problems if there == keys)
+    text = ", or ".join(dict.fromkeys(rule(e["msg"]) for there, e in problems if there == keys))
     owner = _owner(keys[:-1], model, data) if keys else None
-    other = mistaken(keys[-1], owner.model_fields, first) if owner is not None else ""
-    return f"{path} = {show(value)}: {', or '.join(rules)}{other}"
+    is_other_type = ("string" in text) is not isinstance(value, str)
+    known = owner.model_fields if owner is not None and is_other_type else ()
+    other = mistaken(keys[-1], known, first)
+    return f"{path} = {show(value)}: {text}{other}"
 
 
 def misplaced(path: str, model: type[BaseModel], data: Mapping[str, Any]) -> str:

@@ -160,8 +160,8 @@ def analyse(results: Results) -> Analysis:
         label = sizes.shown(point.robots) if is_size else condition
         table.append(Summary(label, len(point.seeds), shown))
     notes = [
-        f"\n{evaluator}, time with n agents: "
-        + ", ".join(f"{what} n^{_exponent_text(power)}" for what, power in by_what.items())
+        f"\n{evaluator}, time with n agents:\n  "
+        + "\n  ".join(f"{what} n^{_exponent_text(power)}" for what, power in by_what.items())
         for evaluator, by_what in exponents_of(points).items()
     ]
     return Analysis(tuple(table), tuple(notes), points)

@@ -78,7 +78,7 @@ def _cases(source: str, changes: tuple[str, ...]) -> Iterator[Case]:
             factory()
         except (Exception, SystemExit) as error:
             message = f"raised {type(error).__name__}: {' '.join(str(error).split())}"
-            raise SpecError(f"{source}, called without arguments, {message}") from None
+            raise SpecError(f"{source}, called as a scenario is, {message}") from None
         yield source.rpartition(":")[2], factory, [0, 1]
         return
     seen: set[Any] = set()

@@ -31,7 +31,8 @@ RANGE = re.compile(r"(\d{1,6})(?::(\d{1,6})(?::(\*?)(\d{1,6}))?)?", re.ASCII)
     multiple=True,
     metavar="SPEC...",
     default=("chain",),
-    help="One or more topologies as in a spec: chain teams tree:2 ...; single-agent: Eq. 23.",
+    help="One or more topologies as in a spec: chain teams tree:2 ..., or LABEL=SPEC with a label "
+    "of your own; single-agent: Eq. 23.",
 )
 @click.option("--rules", type=int, metavar="N", default=5**7, help="|S|, rules of one agent.")
 @click.option("--actions", type=int, metavar="N", default=4, help="|A|, actions of one agent.")
@@ -43,6 +44,12 @@ RANGE = re.compile(r"(\d{1,6})(?::(\d{1,6})(?::(\*?)(\d{1,6}))?)?", re.ASCII)
     help="L, iterations (steps) of an epoch.",
 )
 @click.option("--measured/--no-measured", help="Also count and time steps of the running system.")
+@click.option(
+    "--repeats",
+    type=int,
+    metavar="N",
+    help="Measure so often, each time with a new team; from 2 on times have an interval.",
+)
 @options.formats("table", "json", "csv", "latex")
 @options.plot
 def command(
@@ -52,6 +59,7 @@ def command(
     actions: int,
     iterations: int,
     measured: bool,
+    repeats: int | None,
     form: Form,
     plot: Path | None,
 ) -> int:
@@ -64,9 +72,10 @@ def command(
 
     try:
         problem, sizes = Problem(rules, actions, iterations), numbers(agents)
-        if measured:
+        if measured := measured or repeats is not None:
             say("measuring, first compiling what is not: no steps of more than a second or so")
-        rows = cost_table(topology, sizes, problem, measured=measured).rows
+        often = 1 if repeats is None else repeats
+        rows = cost_table(topology, sizes, problem, measured=measured, repeats=often).rows
         if plot is not None:
             from ...cost.figure import draw
 

@@ -126,6 +126,16 @@ def test_a_team_of_ones_own_parts(line_world, tmp_path) -> None:
     assert (restored.learner.theta == team.learner.theta).all()
 
 
+def test_values_of_other_than_all_actions_are_refused(line_world) -> None:
+    world = line_world(carts=2, wheels=1)
+    team = team_of(BatchTDSettings(), world)
+    team.evaluator = SimpleNamespace(values=lambda deliberation: np.zeros(2))
+    team.begin_episode()
+    world.reset(0)
+    with pytest.raises(ValueError, match=r"^the evaluator gave 2 values of 4 actions$"):
+        team.act(world.predict())
+
+
 @pytest.mark.parametrize("name", ["auto", "exact", "sampling"])
 @pytest.mark.parametrize("agents", ["actuator", "body", "team"])
 def test_a_scenario_of_few_members_is_learned(name: str, agents, line_world) -> None:

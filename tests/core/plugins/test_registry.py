@@ -33,6 +33,17 @@ class Plain:
 def made(colour):
     return "made", colour
 
+class Bare:
+    def __init__(self, settings, colour):
+        self.colour = colour
+
+class Greedy:
+    class Settings(CartSettings):
+        pass
+
+    def __init__(self, settings, colour, load):
+        self.colour = colour
+
 class Foreign:
     class Settings(Settings):
         wheels: int = 2
@@ -141,7 +152,7 @@ def test_a_class_with_settings_of_its_own_gets_them(carts: SettingsRegistry) -> 
 @pytest.mark.parametrize(
     ("name", "complaint"),
     [
-        ("Foreign", r"^the settings of a cart must inherit \S+\.CartSettings$"),
+        ("Foreign", r"^is no cart, whose Settings inherit \S+\.CartSettings$"),
         ("NUMBER", r"^is no cart, but a int$"),
     ],
 )
@@ -151,6 +162,22 @@ def test_what_is_no_cart_is_refused(name: str, complaint: str, carts: SettingsRe
         pytest.raises(ValueError, match=complaint),
     ):
         carts.model(f"mine.py:{name}")
+
+
+@pytest.mark.parametrize(
+    ("name", "complaint"),
+    [
+        ("Bare", r"missing a required argument: 'colour'; it has no nested class Settings$"),
+        ("Greedy", r"missing a required argument: 'load'$"),
+    ],
+)
+def test_what_takes_other_arguments_is_refused(
+    name: str, complaint: str, carts: SettingsRegistry
+) -> None:
+    with Sources(texts={"mine.py": CARTS}).active():
+        model = carts.model(f"mine.py:{name}")
+        with pytest.raises(ValueError, match=rf"^cart 'mine\.py:{name}': {complaint}"):
+            model().build("red")  # type: ignore[attr-defined]
 
 
 def test_a_plugged_field_takes_names_tables_and_settings(carts: SettingsRegistry) -> None:

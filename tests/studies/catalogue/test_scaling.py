@@ -21,7 +21,7 @@ def test_exponents_and_messages() -> None:
     assert exponents["sums"]["deciding"].value == pytest.approx(1.0, abs=0.02)
     assert exponents["sampling"]["deciding"].value == pytest.approx(2.0, abs=0.02)
     assert exponents["sums"]["deciding"].low > 0.95
-    assert analysis.notes[0].startswith("\nsums, time with n agents: deciding n^")
+    assert analysis.notes[0].startswith("\nsums, time with n agents:\n  deciding n^")
     assert [p.values["messages"].value for p in analysis.cases[:3]] == [6, 120, 8128]
     assert [p.evaluator for p in analysis.cases] == ["sums"] * 3 + ["sampling"] * 3
     assert [line.estimates["messages"].value for line in analysis.table[:3]] == [6, 120, 8128]

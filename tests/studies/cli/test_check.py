@@ -139,7 +139,7 @@ def test_a_scenario_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert found.startswith("FAULT   drifting: equal seeds: two runs with seed 0 differ at step 2")
     assert found.count("\n") == 1
     for name, complaint in (
-        ("failing", "own.py:failing, called without arguments, raised ValueError: no cart"),
+        ("failing", "own.py:failing, called as a scenario is, raised ValueError: no cart"),
         ("exploding", "raised RuntimeError: no track"),
         ("sized", "raised TypeError: sized() missing 1 required positional argument: 'n'"),
         ("missing", "has no 'missing'"),

@@ -143,8 +143,13 @@ def test_a_copy_of_the_spec_that_means_the_same_is_not_noted(study, tmp_path, ca
     assert "is not the spec" not in " ".join(said_by(capsys, "status", own)[1:])
 
 
-@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
-@pytest.mark.parametrize("command", ["table", "watch", "results", "compare"])
+@pytest.mark.parametrize(
+    ("command", "encoding"),
+    [
+        *[(command, "ascii") for command in ("table", "watch", "results", "compare")],
+        *[("table", encoding) for encoding in ("latin-1", "utf-8")],
+    ],
+)
 def test_what_a_terminal_cannot_write_has_a_sign_in_its_place(study, command, encoding) -> None:
     line = [sys.executable, "-c", MAIN, command, str(study[0])]
     environment = os.environ | {"PYTHONIOENCODING": encoding}

@@ -21,7 +21,9 @@ from nested_agents.studies.cost.cost import (
     measure,
     step_formula,
 )
+from nested_agents.studies.cost.figure import draw
 from nested_agents.studies.cost.table import written
+from nested_agents.studies.presentation import figures
 
 FIVE = ("chain", "teams", "tree:2", "star", "independent")
 
@@ -120,6 +122,8 @@ def test_numbers() -> None:
         (("--topology", "per-robot"), "agents = 'body', topology = 'chain'"),
         (("--format", "xml"), "'xml' is not one of 'table', 'json', 'csv', 'latex'"),
         (("--plot", "cost.txt"), "cost.txt: suffix must be"),
+        (("--topology", "a=chain", "a=star"), "'a' more than once; name each: LABEL=chain"),
+        (("--topology", "a=b=chain"), "topology 'b=chain'"),
     ],
 )
 def test_what_the_user_can_mend_is_one_line(said, arguments: tuple[str, ...], message: str) -> None:
@@ -152,7 +156,8 @@ def test_the_single_agent_counts_as_its_formula() -> None:
 def made_up(n: int, power: float) -> CostRow:
     tried = 4**n
     counts = Counts(tried, tried, n)
-    measured = StepCost(counts, 1e-6 * tried**power, 1e-6, 10 * tried)
+    seconds = 1e-6 * tried**power
+    measured = StepCost(counts, seconds, 1e-6, 10 * tried, (seconds + 1e-6,))
     return CostRow(n, "chain", 1, None, None, 1, counts, measured)
 
 
@@ -182,6 +187,35 @@ def test_latex_has_what_was_measured() -> None:
     assert written([asked], "latex").count("tabular") == 2
 
 
+def test_repeats_have_an_interval_in_every_form() -> None:
+    row = made_up(2, 1.0)
+    assert row.measured is not None
+    repeated = [replace(row, measured=replace(row.measured, repeats=(0.001, 0.002, 0.003)))]
+    table = written(repeated, "table")
+    assert "2±2.5" in table  # Student's t of two degrees of freedom: 4.303 x 1 ms / sqrt(3)
+    assert "a 95 % interval of the mean of 3 repeats" in table
+    assert "±" not in written([row], "table")
+    assert r"2$\pm$2.5" in written(repeated, "latex")
+    (record,) = json.loads(written(repeated, "json"))
+    assert (record["repeats"], record["step_s"], record["step_s_low"]) == (3, 0.002, 0.0)
+    assert record["step_s_high"] == pytest.approx(0.002 + 4.3027 * 0.001 / 3**0.5, rel=1e-4)
+
+
+def test_labels_of_ones_own_stand_in_place_of_topologies(said, tmp_path: Path) -> None:
+    status, out, _ = said("--topology", "chain", "my tree=tree:2", "--format", "csv")
+    rows = list(csv.DictReader(io.StringIO(out)))
+    assert (status, [row["topology"] for row in rows]) == (0, ["chain", "my tree"])
+    assert rows[1]["nested_exact"] == str(Problem().nested(agents_below("tree:2", 4)))
+
+
+def test_repeats_are_measured(said) -> None:
+    status, out, err = said("--agents", "1", "--repeats", "2", "--format", "json")
+    (record,) = json.loads(out)
+    assert (status, record["repeats"]) == (0, 2)
+    assert record["step_s_low"] <= record["step_s"] <= record["step_s_high"]
+    assert err.startswith("measuring")
+
+
 def test_csv_has_columns_of_rows_that_were_measured_later() -> None:
     rows = [replace(made_up(1, 1.0), measured=None), made_up(2, 1.0)]
     first, second = csv.DictReader(io.StringIO(written(rows, "csv")))
@@ -197,6 +231,21 @@ def test_the_formula_stands_beside_what_is_not_measured(said, form: str) -> None
     assert {"table": "1.815e39", "latex": r"1.815\times 10^{39}"}.get(form, str(joint)) in out
     assert err.startswith("measuring, first compiling what is not: no steps of more than a second")
     assert err.count("\n") == 1
+    assert "0 of 0" not in out
+
+
+def test_the_legend_is_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn = []
+    monkeypatch.setattr(figures, "write", lambda figure, path: drawn.append(figure))
+    labels = {"chain": "chain", "evenodd.py:even_odd": "star"}
+    rows = [row for t in labels.values() for row in cost_rows([t], [4, 8], Problem())]
+    names = {text: label for label, text in labels.items()}
+    draw([replace(row, topology=names[row.topology]) for row in rows], tmp_path / "cost.svg")
+    (figure,) = drawn
+    figure.draw_without_rendering()
+    box = figure.legends[0].get_window_extent()
+    assert box.x0 >= 0
+    assert box.x1 <= figure.bbox.width
 
 
 def test_measured_tables_and_figure(said, tmp_path: Path) -> None:
@@ -207,6 +256,6 @@ def test_measured_tables_and_figure(said, tmp_path: Path) -> None:
     assert "All counts equal the formulas in 4 of 4 rows." in out
     assert max(map(len, out.splitlines())) <= 80
     assert "<svg" in figure.read_text()
-    rows = list(cost_rows(["chain"], [2], Problem(), measured=True))
+    rows = list(cost_rows(["chain"], [2], Problem(), repeats=1))
     (record,) = json.loads(written(rows, "json"))
     assert record["joint_actions_per_step"] == record["joint_actions_formula_per_step"] == 20

@@ -156,7 +156,7 @@ def test_an_agent_for_each_robot(tmp_path, capsys):
         save(store, trial, run_trial(trial), 1.0)
     status, said = run(capsys, tmp_path)
     assert status == 0
-    assert "Not drawn: the scenario does not show what agents such as these do." in said.out
+    assert "Not drawn: the scenario has no method show_policy for agents such as these." in said.out
     assert "turning  built" in said.out
 
 

@@ -10,6 +10,7 @@ from nested_agents.studies.cli.main import main
 from nested_agents.studies.report.page import page
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.store import DATABASE
+from nested_agents.studies.trials.trial import trials_of
 
 
 @pytest.fixture(scope="module")
@@ -116,10 +117,16 @@ def test_what_the_user_can_mend(arguments, complaint, finished, tmp_path, capsys
     assert list(tmp_path.iterdir()) == []
 
 
-SPECS = sorted((Path(studies.__file__).parent / "catalogue").rglob("*.toml"))
+SPECS = sorted((Path(studies.__file__).parent / "catalogue").rglob("*.toml"), reverse=True)
+ONE_EACH = {path.parent.name: path for path in SPECS}
 
 
 @pytest.mark.parametrize("path", SPECS, ids=[path.stem for path in SPECS])
+def test_every_spec_of_the_catalogue_is_read(path):
+    assert trials_of(Spec.load(path, ["seeds=1"]))
+
+
+@pytest.mark.parametrize("path", ONE_EACH.values(), ids=ONE_EACH)
 def test_every_study_has_a_report_before_it_has_begun(path, kept, tmp_path):
     spec = Spec.load(path, ["seeds=1"])
     html = page(kept(tmp_path, spec, done=0))

@@ -470,6 +470,10 @@ def test_edges_beside_neighbours_have_no_table():
 def test_a_key_that_is_nearly_another_one_is_suggested():
     with pytest.raises(SpecError, match=r"scenario\.robot = 4: .*; did you mean 'robots'\?"):
         Spec.of({"scenario": {"robot": 4}})
+    with pytest.raises(SpecError, match=r"scenario\.robots = 0: must be at least 1$"):
+        Spec.of({"scenario": {"robots": 0}})
+    with pytest.raises(SpecError, match=r"must be a whole number; did you mean 'robot'\?$"):
+        Spec.of({"scenario": {"robots": "e-puck"}})
 
 
 def test_agents_are_laid_over_and_swept_as_topologies_are() -> None:
