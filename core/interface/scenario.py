@@ -167,6 +167,13 @@ class EmbodiedScenario(Scenario, Protocol):
         """
 
 
+def lacking(scenario: object) -> str:
+    """Return what of `Scenario` an object has not, in words; nothing if it has all."""
+    members = ("agents", "state_space", "action_set", "reset", "step", "predict")
+    missing = ", ".join(name for name in members if not hasattr(scenario, name))
+    return f"{type(scenario).__name__} lacks {missing}" if missing else ""
+
+
 def can_draw(scenario: Scenario) -> bool:
     """Return whether recordings of a scenario's episodes can be drawn."""
     return isinstance(scenario, RecordedScenario) and hasattr(scenario, "animate")

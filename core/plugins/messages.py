@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
@@ -38,15 +38,20 @@ def closest(name: object, known: Iterable[str]) -> str:
     return f"{near(name, known)} known: {', '.join(known) or 'none'}".lstrip()
 
 
-def mistaken(key: object, known: Collection[str]) -> str:
+def mistaken(key: object, known: Collection[str], problem: Mapping[str, Any]) -> str:
     """Return "; did you mean ...?" if a key that refuses its value is nearly another one's name.
+
+    A value that is only out of range, by the `problem` that pydantic found, is of the right key.
 
     Examples
     --------
-    >>> mistaken("robot", ["robot", "robots", "box"]), mistaken("box", ["robot", "box"])
-    ("; did you mean 'robots'?", '')
+    >>> mistaken("robot", ["robot", "robots", "box"], {"type": "string_type"})
+    "; did you mean 'robots'?"
+    >>> mistaken("robots", ["robot", "robots"], {"type": "less_than_equal"})
+    ''
     """
-    hint = near(key, set(known) - {str(key)}, cutoff=0.85)
+    others = () if "_than" in problem["type"] else set(known) - {str(key)}
+    hint = near(key, others, cutoff=0.85)
     return f"; {hint}" if hint else ""
 
 
@@ -96,7 +101,7 @@ def one_line(error: ValidationError, data: Mapping[str, object], known: Collecti
         return f"{path} = {first['input']!r}: unknown key; {top}".removesuffix("; ")
     # The members of a union complain one by one about the same place: say what any would take.
     rules = dict.fromkeys(rule(e["msg"]) for keys_, e in problems if keys_ == keys)
-    message = ", or ".join(rules) + (mistaken(keys[0], known) if len(keys) == 1 else "")
+    message = ", or ".join(rules) + (mistaken(keys[0], known, first) if len(keys) == 1 else "")
     return f"{path} = {first['input']!r}: {message}" if keys else message
 
 

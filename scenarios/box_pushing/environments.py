@@ -117,7 +117,7 @@ class Game(ABC):
         if render_mode not in (None, *RENDER_MODES):
             raise ValueError(f"render_mode = {render_mode!r}, allowed None, {RENDER_MODES}")
         if not isinstance(settings, BoxPushingSettings):
-            settings = BoxPushingSettings.model_validate(settings or {})
+            settings = BoxPushingSettings(**(settings or {}))
         self.scenario = BoxPushing(settings)
         self.steps, self.render_mode = steps, render_mode
         self.screen = Screen(self.scenario, render_mode, sensors=sensors) if render_mode else None

@@ -21,7 +21,13 @@ from typing import Any
 
 import numpy as np
 
-from ...core.interface.scenario import RecordedScenario, Scenario, groups_of, roles_of
+from ...core.interface.scenario import (
+    RecordedScenario,
+    Scenario,
+    groups_of,
+    lacking,
+    roles_of,
+)
 from ...core.numerics.arrays import FloatArray
 from .frames import Examination, Frame, at, bits, difference, fields, measured, opening
 from .predictions import (
@@ -33,8 +39,6 @@ from .predictions import (
 )
 from .sensing import Findings, fault_of_sensing, met_variables, predicted_steps
 
-MEMBERS = ("agents", "state_space", "action_set", "reset", "step", "predict")
-"""Of the protocol `Scenario`."""
 STEPS = 5
 """Steps after which measurements are looked at, and predictions."""
 LEAST_STEPS = 2
@@ -110,9 +114,8 @@ def _raised(error: BaseException) -> str:
 def _form(of: Examination) -> str | None:
     """Check names, groups, shapes and types."""
     scenario: Any = of.factory()
-    if not isinstance(scenario, Scenario):
-        missing = [name for name in MEMBERS if not hasattr(scenario, name)]
-        return f"{type(scenario).__name__} lacks {', '.join(missing)}"
+    if problem := lacking(scenario):
+        return problem
     n, d = len(scenario.agents), scenario.state_space.n_variables
     if not n or len(set(scenario.agents)) != n:
         return f"agents {scenario.agents} must be at least one, of different names"

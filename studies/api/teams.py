@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...core.plugins.sources import Sources
 from ..errors import SpecError, show
+from ..presentation.progress import Terminal
 from ..results.results import DONE, read
 from ..spec.labels import label
 from ..spec.objects import plain
@@ -22,7 +23,8 @@ from ..trials.arrangement import check
 from ..trials.keeping import check_teams, open_to_run
 from ..trials.session import Session
 from ..trials.trial import Trial, TrialResult, trials_of
-from ..workers.runner import run_trials
+from ..workers.runner import Observer, run_trials
+from ..workers.worker import Outcome
 from ..workers.workers import start_workers
 from .study import Place, StudyResults, load
 
@@ -36,6 +38,7 @@ def reevaluate(
     decision: Sequence[Any] = (),
     *,
     jobs: int | None = None,
+    observer: Observer | None = None,
 ) -> DataFrame:
     """Evaluate the trained teams of a study under other topologies and ways to decide.
 
@@ -55,6 +58,8 @@ def reevaluate(
         evaluated with each topology.
     jobs
         Processes; None: one for every core.
+    observer
+        Is notified of the progress; None: it is shown on standard error.
 
     Returns
     -------
@@ -86,15 +91,22 @@ def reevaluate(
         open_to_run(Path(folder), spec, trials, measures) as store,
     ):
         evaluate = partial(_evaluate, directory, identities)
-        for outcome in run_trials(trials, store, evaluate, workers):
-            if outcome.error is not None:
-                where = f"{outcome.trial.condition}, seed {outcome.trial.seed}"
-                raise SpecError(f"{where}: {outcome.error.splitlines()[-1]}")
+        outcomes = _succeeding(run_trials(trials, store, evaluate, workers))
+        (observer or Terminal()).follow(outcomes, len(trials), 0)
         frame = read(store).episodes
     frame.insert(0, "entry", frame["phase"].str.removeprefix(EVALUATION))
     meaning = "topology and decision by which the trained team acts"
     frame.attrs["columns"]["entry"] = {"unit": "", "meaning": meaning}
     return frame
+
+
+def _succeeding(outcomes: Iterable[Outcome]) -> Iterator[Outcome]:
+    """Yield outcomes until one is a failure."""
+    for outcome in outcomes:
+        if outcome.error is not None:
+            where = f"{outcome.trial.condition}, seed {outcome.trial.seed}"
+            raise SpecError(f"{where}: {outcome.error.splitlines()[-1]}")
+        yield outcome
 
 
 def _entries(topology: Sequence[Any], decision: Sequence[Any]) -> dict[str, dict[str, Any]]:

@@ -34,7 +34,9 @@ def draw(panels: Mapping[str, Sequence[Difference]], unit: str, null: float = 0.
     *_, last = panels.values()
     ranked = sorted(last, key=lambda line: float(line.estimate.value))
     names = [line.condition for line in ranked]
-    size = (1.2 + 0.065 * max(map(len, names)) + 2.6 * len(panels), 1.5 + 0.25 * len(names))
+    width = 1.2 + 0.065 * max(map(len, names)) + 2.6 * len(panels)
+    # No narrower than the legend.
+    size = (max(width, 6.6), 1.5 + 0.25 * len(names))
     figure, all_axes = figures.panels(1, len(panels), size, sharey=True)
     for axes, (title, lines) in zip(all_axes[0], panels.items(), strict=True):
         _panel(axes, lines, names, null)

@@ -65,7 +65,7 @@ def explain(
     text = ", or ".join(dict.fromkeys(rule(e["msg"]) for there, e in problems if there == keys))
     owner = _owner(keys[:-1], model, data) if keys else None
     is_other_type = ("string" in text) is not isinstance(value, str)
-    other = mistaken(keys[-1], owner.model_fields) if owner is not None and is_other_type else ""
+    other = mistaken(keys[-1], owner.model_fields, first) if owner and is_other_type else ""
     return f"{path} = {show(value)}: {text}{other}"
 
 

@@ -120,7 +120,7 @@ class Spec(Settings):
             if not 1 <= value <= MOST_TRIALS:
                 raise ValueError(f"must be between 1 and {MOST_TRIALS}, or a list of seeds")
             return tuple(range(value))
-        if not isinstance(value, list | tuple):
+        if not isinstance(value, list | tuple | range):
             raise ValueError("must be a whole number or a list of whole numbers")
         if not 1 <= len(value) <= MOST_TRIALS:
             raise ValueError(f"must be a list of 1 to {MOST_TRIALS} seeds")

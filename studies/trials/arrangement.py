@@ -17,7 +17,7 @@ from ...core.agents.rows import carried_rows
 from ...core.agents.team import Team, of_fuzzy_agents
 from ...core.interface.acting import Actors
 from ...core.interface.measures import Measure, measures_of
-from ...core.interface.scenario import Scenario
+from ...core.interface.scenario import Scenario, lacking
 from ...core.learners import LearnerSettings, TeamSettings
 from ...core.numerics.arrays import IntArray
 from ...core.plugins.sources import format_error
@@ -69,6 +69,8 @@ def arrange(settings: ConditionSettings, seed: int) -> Arrangement:
         If the settings do not fit together; one line.
     """
     world = settings.scenario.build()
+    if problem := lacking(world):
+        raise ValueError(f"scenario.kind: {problem}")
     scenario, hierarchy = settings.arrange(world)
     learner, source = settings.learner, policy_seed(seed)
     if isinstance(learner, LearnerSettings):

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Literal
+from typing import Literal, get_args
 
+from ...core.plugins.messages import closest
 from ..errors import SpecError
 from .arrivals import Workers
 from .worker import cores
@@ -48,6 +49,8 @@ def start_workers(
     """
     if jobs is not None:
         check_jobs(jobs)
+    if backend not in (known := get_args(Backend)):
+        raise SpecError(f"backend = {backend!r}: {closest(backend, known)}")
     wanted = max(1, min(jobs or cores(), trials))
     if backend == "loky":
         from .loky import LokyWorkers

@@ -237,3 +237,23 @@ def test_the_world_is_asked_and_not_what_agents_see_of_it(carts):
     assert len(groups_of(session.world)) == 2
     session.train(1)
     assert np.isfinite(session.result().rows[0].measures["spread_m"])
+
+
+def test_what_is_no_scenario_is_told_before_anything_runs(tmp_path, capsys):
+    (tmp_path / "half.py").write_text("""
+import nested_agents as na
+from nested_agents.scenarios.line_up import LineUp, LineUpSettings
+
+class Half:
+    class Settings(na.ScenarioSettings):
+        pass
+
+    def __init__(self, settings):
+        whole = LineUp(LineUpSettings())
+        self.agents, self.action_set = whole.agents, whole.action_set
+        self.state_space, self.reset, self.step = whole.state_space, whole.reset, whole.step
+""")
+    (tmp_path / "half.toml").write_text('scenario.kind = "half.py:Half"\n')
+    assert main(["run", str(tmp_path / "half.toml"), "--out", str(tmp_path / "out")]) == 2
+    assert "error: scenario.kind: Half lacks predict\n" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

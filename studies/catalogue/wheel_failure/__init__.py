@@ -179,6 +179,8 @@ def analyse(results: Results) -> Analysis:
     courses = courses_of(results)
     gains = _gains(courses)
     notes = ["Named after the colon is what adapts to the failure."] if courses else []
+    if not all(course.before.any() for course in courses):
+        notes += ["No recovery is measured where no episode before the failure succeeded."]
     notes += verdicts(gains, "nothing adapting")
     return Analysis(tuple(map(_summary, courses)), tuple(notes), courses, gains)
 

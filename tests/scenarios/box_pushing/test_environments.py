@@ -225,3 +225,8 @@ def test_the_window(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_refusals(arguments: dict[str, Any], complaint: str) -> None:
     with pytest.raises(ValueError, match=complaint):
         BoxPushingEnv(**arguments)
+
+
+def test_wrong_settings_are_one_line() -> None:
+    with pytest.raises(ValueError, match="robot = 4: must be a string, or must be a table"):
+        WheelsEnv({"robot": 4})

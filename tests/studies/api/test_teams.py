@@ -85,10 +85,12 @@ def test_a_kept_team_acts_as_the_trained_one_did(place):
     assert study.team()[1].learner.theta.any()
 
 
-def test_under_what_it_was_trained_with_a_team_does_the_same_again(place):
+def test_under_what_it_was_trained_with_a_team_does_the_same_again(place, capsys):
     study = na.load(place)
     own = study.episodes.query("phase == 'evaluation'").reset_index(drop=True)
     frame = na.reevaluate(study, topology=["chain", "tree:2"], jobs=2)
+    trials = len(study.trials)
+    assert f"{trials} of {trials} trials, " in capsys.readouterr().err  # shows its progress
     assert set(frame.attrs["columns"]) == set(frame.columns)
     assert set(frame["phase"]) == {"evaluation:chain", "evaluation:tree:2"}
     trained = np.where(frame["condition"] == "online", "tree:2", "chain")

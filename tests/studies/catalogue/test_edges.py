@@ -49,6 +49,14 @@ def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:
     assert drawn(module, analyse(NOTHING)) == {}
 
 
+def test_the_legend_fits_a_narrow_figure() -> None:
+    (figure,) = draw(analyse(made_up().frames())).values()
+    figure.draw_without_rendering()
+    box = figure.legends[0].get_window_extent()
+    assert box.x0 >= 0
+    assert box.x1 <= figure.bbox.x1
+
+
 def test_conditions_that_differ_in_more_are_compared_with_their_own_training() -> None:
     results = made_up().frames()
     assert analyse(results).cases[0].setting == ""

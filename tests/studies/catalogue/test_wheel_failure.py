@@ -63,8 +63,12 @@ def test_what_never_succeeded_has_nothing_to_recover() -> None:
     for phase in (results.training, results.phases[KEPT]):
         for arrays in phase.values():
             arrays["success"][:] = 0
-    for line in analyse(results.frames()).table:
+    analysis = analyse(results.frames())
+    for line in analysis.table:
         assert list(line.estimates) == ["before", "just after", "end"]
+    assert (
+        "No recovery is measured where no episode before the failure succeeded." in analysis.notes
+    )
 
 
 @pytest.mark.parametrize(

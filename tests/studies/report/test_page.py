@@ -25,7 +25,7 @@ def sections(html):
 def test_a_finished_study_has_everything(finished):
     html = page(finished)
     assert sections(html) == [
-        "summary", "table", "claims", "figures", "replay", "spec", "versions",
+        "summary", "table", "figures", "replay", "spec", "versions",
     ]  # fmt: skip
     assert "All 6 trials are done." in html
     assert "success, evaluation, less that of default:" in html
@@ -33,12 +33,19 @@ def test_a_finished_study_has_everything(finished):
     assert len(html) < 500_000
 
 
-def test_what_a_study_says_of_the_paper(finished):
+def test_only_the_study_that_claims_rest_on_has_verdicts(finished, tmp_path, monkeypatch):
+    refers = "This study decides no claim of the paper; the published rows do"
+    assert refers in page(finished)
+    folder = tmp_path / "learning_curve"
+    folder.mkdir()
+    shutil.copy(finished / "study.toml", folder / "learning_curve.toml")
+    monkeypatch.setattr("nested_agents.studies.report.page.SPECS", tmp_path)
     html = page(finished)
     claims = html[html.index('<section id="claims"') : html.index('<section id="figures"')]
     assert "wheels learn over epochs to push the box to the goal<small>IX-A, Fig. 5b" in claims
     assert claims.count("<strong>not decided</strong>") == claims.count("<strong>") > 0
     assert "the shape of the box is indifferent" not in claims
+    assert refers not in html
 
 
 def test_equal_results_give_equal_bytes_wherever_they_are(finished, tmp_path):

@@ -597,3 +597,12 @@ def test_numbers_of_thousands_of_digits_are_refused_in_one_line(text: str) -> No
     with pytest.raises(SpecError, match=r"digits|must be|e\+6020") as refusal:
         Spec.parse(text)
     assert len(str(refusal.value)) < 300
+
+
+def test_seeds_may_be_a_range() -> None:
+    assert Spec.of({"seeds": range(10, 13)}).seeds == (10, 11, 12)
+
+
+def test_a_value_out_of_range_is_not_taken_for_that_of_another_key() -> None:
+    with pytest.raises(SpecError, match=r"robots = 200: must be at most 64$"):
+        Spec.of({"scenario": {"robots": 200}})
