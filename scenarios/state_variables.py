@@ -91,10 +91,7 @@ def guarded(view: Any) -> Any:
 
 
 def sensed(
-    things: Sequence[StateVariable],
-    trusted: Sequence[bool],
-    view: Any,
-    bodies: Sequence[int],
+    things: Sequence[StateVariable], trusted: Sequence[bool], view: Any, bodies: Sequence[int]
 ) -> FloatArray:
     """Return state variables ``(len(bodies), m, variables)`` of bodies, by the functions alone.
 

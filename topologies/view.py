@@ -67,11 +67,7 @@ class HierarchyView:
 
 
 def view(
-    text: str,
-    agents: int | None,
-    robots: int | None,
-    actions: int,
-    per: Agents = "actuator",
+    text: str, agents: int | None, robots: int | None, actions: int, per: Agents = "actuator"
 ) -> HierarchyView:
     """Build the topology written as `text`, over as many agents as asked for.
 

@@ -93,10 +93,7 @@ def first_alike(keys: IntArray | FloatArray) -> IntArray:
 
 
 def states_by_group(
-    prediction: Prediction,
-    joint_actions: IntArray,
-    groups: tuple[tuple[int, ...], ...],
-    n_own: int,
+    prediction: Prediction, joint_actions: IntArray, groups: tuple[tuple[int, ...], ...], n_own: int
 ) -> tuple[FloatArray, FloatArray]:
     """Return the own variables ``(n, m, n_own)`` and the shared ones ``(G, m, d - n_own)``."""
     own_way = getattr(prediction, "states_by_group", None)

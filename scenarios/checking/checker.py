@@ -21,13 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.interface.scenario import (
-    RecordedScenario,
-    Scenario,
-    groups_of,
-    lacking,
-    roles_of,
-)
+from ...core.interface.scenario import RecordedScenario, Scenario, groups_of, lacking, roles_of
 from ...core.numerics.arrays import FloatArray
 from .frames import Examination, Frame, at, bits, difference, fields, measured, opening
 from .predictions import (

@@ -62,10 +62,7 @@ directory = click.argument("directory", type=PATH, metavar="DIR")
 """An existing study."""
 
 jobs = click.option(
-    "--jobs",
-    type=int,
-    metavar="N",
-    help="Trials at a time; by default one for every core.",
+    "--jobs", type=int, metavar="N", help="Trials at a time; by default one for every core."
 )
 """Number of worker processes."""
 

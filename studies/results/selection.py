@@ -66,11 +66,7 @@ class Where:
             ) from None
 
     def __call__(
-        self,
-        condition: str,
-        seed: int,
-        settings: Mapping[str, Any],
-        columns: Mapping[str, Any],
+        self, condition: str, seed: int, settings: Mapping[str, Any], columns: Mapping[str, Any]
     ) -> bool:
         """Tell whether a trial is chosen.
 

@@ -239,9 +239,7 @@ class Session:
         return True
 
     def result(
-        self,
-        numbers: Mapping[str, float] | None = None,
-        usage: Mapping[str, float] | None = None,
+        self, numbers: Mapping[str, float] | None = None, usage: Mapping[str, float] | None = None
     ) -> TrialResult:
         """Return what has been measured, and what the measure adds to it."""
         if TEAM not in self._recordings:  # was never evaluated

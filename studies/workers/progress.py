@@ -69,10 +69,7 @@ def progress(store: Store) -> Progress:
 
 
 def _estimate(
-    means: Mapping[str, float],
-    left: list[str],
-    running: list[tuple[str, float]],
-    processes: int,
+    means: Mapping[str, float], left: list[str], running: list[tuple[str, float]], processes: int
 ) -> float | None:
     """Return the time left [s], by what the finished trials of each condition took on average.
 

@@ -23,15 +23,9 @@ from .. import options
     default="success",
     help="A measure of episodes, steps, return, or a number of whole trials.",
 )
+@click.option("--phase", metavar="PHASE", help="Of the episodes; evaluation, if there is one.")
 @click.option(
-    "--phase",
-    metavar="PHASE",
-    help="Of the episodes; evaluation, if there is one.",
-)
-@click.option(
-    "--reference",
-    metavar="LABEL",
-    help="What the others are compared with; by default the first.",
+    "--reference", metavar="LABEL", help="What the others are compared with; by default the first."
 )
 @options.where
 @options.form

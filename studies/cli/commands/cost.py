@@ -37,11 +37,7 @@ RANGE = re.compile(r"(\d{1,6})(?::(\d{1,6})(?::(\*?)(\d{1,6}))?)?", re.ASCII)
 @click.option("--rules", type=int, metavar="N", default=5**7, help="|S|, rules of one agent.")
 @click.option("--actions", type=int, metavar="N", default=4, help="|A|, actions of one agent.")
 @click.option(
-    "--iterations",
-    type=int,
-    metavar="N",
-    default=450,
-    help="L, iterations (steps) of an epoch.",
+    "--iterations", type=int, metavar="N", default=450, help="L, iterations (steps) of an epoch."
 )
 @click.option("--measured/--no-measured", help="Also count and time steps of the running system.")
 @click.option(

@@ -12,9 +12,7 @@ from .. import options
 @click.command()
 @options.directory
 @click.option(
-    "--condition",
-    metavar="LABEL",
-    help="Label of the condition; by default the first one.",
+    "--condition", metavar="LABEL", help="Label of the condition; by default the first one."
 )
 @click.option("--seed", type=int, metavar="SEED", help="The seed; by default the first one.")
 @options.trust
