@@ -28,6 +28,11 @@ def test_a_finished_study_has_everything(finished):
         "summary", "table", "figures", "replay", "spec", "versions",
     ]  # fmt: skip
     assert "All 6 trials are done." in html
+    rates = html[html.index('<dl class="rates" aria-label="evaluation success">') :]
+    rates = rates[: rates.index("</dl>")]
+    found = dict(re.findall("<dt>(.*?)</dt><dd>(.*?) <small>", rates))
+    assert list(found) == ["default", "frozen"]
+    assert all(f"<td>{value}<small>" in html for value in found.values())
     assert "success, evaluation, less that of default:" in html
     assert "preset = [\n    &#34;default&#34;,\n    &#34;frozen&#34;,\n]" in html
     assert len(html) < 500_000
