@@ -10,7 +10,9 @@ from typing import Any, cast
 import numpy as np
 
 from ..adaptation.calibration import Calibration
+from ..adaptation.learned_predictor import LearnedPredictor
 from ..adaptation.mirror import Mirror
+from ..adaptation.predictors import GivenPredictor, Persistence
 from ..adaptation.self_model import SelfModel
 from ..decision.exploration import Explorer
 from ..evaluators.evaluator import NOTHING_GIVEN, DecisionProblem, Deliberation, Evaluator
@@ -57,6 +59,8 @@ class Team:
         What the wheels do, as learned; none: prediction takes every robot as nominal.
     calibration
         The predictor's constants, as learned; none: as the scenario believes them to be.
+    predictor
+        What predicts in place of the scenario; none: the scenario does.
     mirror
         Doubles what is learned from; none: it is what the agents met.
     seen
@@ -90,6 +94,7 @@ class Team:
         n, n_actions = len(hierarchy), len(scenario.action_set)
         self.self_model = _self_model_of(scenario, settings)
         self.calibration = _calibration_of(scenario, settings)
+        self.predictor = _predictor_of(scenario, settings)
         is_mirrored = isinstance(settings, ReplaySettings) and settings.mirrored
         self.mirror = Mirror.of(scenario) if is_mirrored else None
         self.rows = rows_of(scenario, shared=settings.weights == "role")
@@ -145,8 +150,7 @@ class Team:
             return
         if not hasattr(prediction, "rewards"):
             raise ValueError(
-                f"learner.decision.rule = {problem.rule!r}: the scenario predicts no rewards, "
-                "use value"
+                f"learner.decision.rule = {problem.rule!r}: no rewards are predicted, use value"
             )
         if getattr(self.evaluator, "continues", False) and not hasattr(prediction, "after"):
             raise ValueError(
@@ -171,6 +175,8 @@ class Team:
         """
         if states is not None:
             self._states = states
+        if self.predictor is not None:
+            return self.predictor.predict(self._states)
         if self.self_model is None and self.calibration is None:
             return scenario.predict()
         embodied = cast(EmbodiedScenario, scenario)
@@ -245,6 +251,8 @@ class Team:
         What contact is predicted to take from the motion is given back to the self-model: a robot
         that moves a load is slow, not broken. The constants are held against how the load moved.
         """
+        if isinstance(self.predictor, LearnedPredictor):
+            self.predictor.observe(self._states, joint_action, transition.states)
         if self.calibration is not None:
             self._calibrate(prediction, joint_action, transition)
         if self.self_model is None or transition.twists is None:
@@ -276,6 +284,8 @@ class Team:
     def end_episode(self) -> None:
         """Learn what is learned after an episode."""
         self._count(self.learner.end_episode())
+        if isinstance(self.predictor, LearnedPredictor):
+            self.predictor.end_episode()
 
     def _count(self, updates: int) -> None:
         if self.evaluator is not None:
@@ -381,8 +391,11 @@ class Team:
     @property
     def _adapting(self) -> dict[str, Any]:
         """What adapts beside the learner, by name."""
-        parts = {"self_model": self.self_model, "calibration": self.calibration}
-        return {name: part for name, part in parts.items() if part is not None}
+        parts = {
+            "self_model": self.self_model, "calibration": self.calibration,
+            "predictor": self.predictor,
+        }  # fmt: skip
+        return {name: part for name, part in parts.items() if hasattr(part, "arrays")}
 
 
 def _self_model_of(scenario: Scenario, settings: LearnerSettings) -> SelfModel | None:
@@ -402,6 +415,22 @@ def _calibration_of(scenario: Scenario, settings: LearnerSettings) -> Calibratio
             "learner.calibration.enabled: the scenario's predictor has no constants to calibrate"
         )
     return Calibration(settings.calibration, len(constants), cast(Any, scenario).levers)
+
+
+def _predictor_of(
+    scenario: Scenario, settings: LearnerSettings
+) -> LearnedPredictor | Persistence | None:
+    if isinstance(settings.predictor, GivenPredictor):
+        return None
+    for name in ("self_model", "calibration"):
+        if getattr(settings, name).enabled:
+            raise ValueError(
+                f"learner.{name}.enabled: revises what the scenario predicts, and "
+                f"learner.predictor.kind = {settings.predictor.kind!r} predicts in its place; use "
+                "'given'"
+            )
+    predictor: LearnedPredictor | Persistence = settings.predictor.build(scenario)
+    return predictor
 
 
 def of_fuzzy_agents(team: Actors) -> Team:

@@ -8,12 +8,13 @@ from typing import Annotated, Literal, Protocol
 from pydantic import Field
 
 from ..adaptation.calibration import CalibrationSettings
+from ..adaptation.predictors import GivenPredictor, Predictor
 from ..adaptation.self_model import SelfModelSettings
 from ..decision.exploration import EXPLORATIONS, BurstExploration, ExplorationSettings
 from ..decision.settings import Decision
 from ..numerics.arrays import FloatArray
 from ..plugins.plugged import Plugged
-from ..plugins.settings import PartSettings
+from ..plugins.settings import PartSettings, unwritten
 from ..rules.settings import RuleBaseSettings
 
 
@@ -91,3 +92,5 @@ class LearnerSettings(TeamSettings):
     """What robots learn of their own wheels."""
     calibration: CalibrationSettings = CalibrationSettings()
     """What the team learns of the constants of its predictor."""
+    predictor: Annotated[Predictor, unwritten(GivenPredictor())] = GivenPredictor()
+    """What predicts: the scenario, nothing but persistence, or what has been learned."""
