@@ -48,7 +48,7 @@ def test_rows_are_data_frames_whose_columns_are_told(study) -> None:
         assert set(frame.attrs["columns"]) == set(frame.columns)
     assert episodes.attrs["columns"]["final_distance_m"]["unit"] == "m"
     assert trials.attrs["columns"]["seconds.total"] == {"unit": "s", "meaning": "time spent"}
-    part = study.where("seed < 2 and condition == frozen")
+    part = study.where("seed < 2 and condition == 'frozen'")
     assert set(part.episodes["seed"]) == {0, 1}
     assert len(part.trials) == 2
 
