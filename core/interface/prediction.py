@@ -105,9 +105,7 @@ class Exploring(NamedTuple):
 
 NOT_EXPLORING = Exploring(np.zeros(0), -1.0, 1.0)
 """Nobody explores."""
-BestResponses = Callable[
-    [FloatArray, IntArray, IntArray, Exploring, np.random.Generator], IntArray
-]
+BestResponses = Callable[[FloatArray, IntArray, IntArray, Exploring, np.random.Generator], IntArray]
 """Returns the joint action ``(n,)`` by the agents' weights ``(n, n_rules)``, a plan ``(n,)`` to
 start from, the order of decision ``(n,)``, how they explore, and a source of randomness."""
 
