@@ -66,20 +66,11 @@ jobs = click.option(
 )
 """Number of worker processes."""
 
-backend = click.option(
-    "--backend",
-    type=click.Choice(["loky", "dask"]),
-    default="loky",
-    help="Who runs the trials: loky, processes of this machine, or dask, workers of a Dask cluster "
-    "(extra nested-agents[dask]). The results are the same.",
-)
-"""Kind of workers, see `nested_agents.studies.workers.workers`."""
-
 address = click.option(
     "--address",
     metavar="tcp://HOST:PORT",
-    help="Of the scheduler of a running Dask cluster, all of whose workers are used unless --jobs "
-    "says otherwise. If missing, a cluster is started here.",
+    help="Of the scheduler of a running Dask cluster, whose workers run the trials, all of them "
+    "unless --jobs says otherwise (extra nested-agents[dask]). The results are the same.",
 )
 """Of a Dask scheduler."""
 
@@ -133,9 +124,9 @@ as_study = click.option(
 where = click.option(
     "--where",
     metavar="CHOICE",
-    help='Only the trials of a choice: "robots == 8 and seed < 5", "box in [square, circle]".',
+    help="Only the trials of a choice, a query of pandas: \"robots == 8 and box == 'circle'\".",
 )
-"""A part of the trials, see `nested_agents.studies.results.selection.Where`."""
+"""A part of the trials, see `nested_agents.studies.results.selection.chosen`."""
 
 
 def formats(
