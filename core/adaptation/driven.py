@@ -8,7 +8,6 @@ rules of a rule base. It moves the variables of its own body and those of all ot
 
 from __future__ import annotations
 
-import os
 from itertools import combinations
 
 import numpy as np
@@ -32,8 +31,8 @@ class Bodies:
     ----------
     scenario
         Whose bodies they are.
-    paired
-        Whether rules are over pairs of variables, too.
+    products
+        Which pairs of variables have rules, too.
     memberships
         Membership functions per variable; none: the state space's own centres.
 
@@ -48,10 +47,10 @@ class Bodies:
     common
         ``(v,)`` whether a variable is the same for all of several bodies.
     rules
-        The rule base over the variables of a body: single ones, and pairs of one group's private.
+        The rule base over the variables of a body: single ones, and pairs of one group's.
     """
 
-    def __init__(self, scenario: Scenario, *, paired: bool, memberships: int | None) -> None:
+    def __init__(self, scenario: Scenario, products: str, memberships: int | None) -> None:
         space, groups, roles = scenario.state_space, groups_of(scenario), roles_of(scenario)
         common = {j for j, v in enumerate(space.variables) if v.name in space.common}
         columns = range(space.n_own, space.n_variables)
@@ -71,13 +70,11 @@ class Bodies:
         first = owned[0]
         self.common = np.array([len(owned) > 1 and j in common for _, j in first])
         terms: list[tuple[int, ...]] = [(v,) for v in range(len(first))]
-        if paired:
-            private = [
-                v
-                for v, (_, j) in enumerate(first)
-                if len(groups) == 1 or j not in common or os.environ.get("ALLP")
-            ]
-            pairs = combinations(private, 2)
+        if products != "none":
+            is_all = products == "all" or len(groups) == 1
+            pairs = combinations(
+                [v for v, (_, j) in enumerate(first) if is_all or j not in common], 2
+            )
             terms += [(v, u) for v, u in pairs if first[v][0] == first[u][0]]
         parts = [Partition.of(space.variables[j], count=memberships) for _, j in first]
         self.rules = RuleBase(parts, terms)
@@ -86,7 +83,7 @@ class Bodies:
 @njit(cache=True)
 def driven_states(  # type: ignore[no-untyped-def]
     present, drivers: FloatArray, weights: FloatArray, keep: FloatArray, ranges: FloatArray,
-    periods: FloatArray, horizon: int, mid: bool, packed: Packed,
+    periods: FloatArray, horizon: int, packed: Packed,
 ) -> FloatArray:  # fmt: skip
     """Return the states ``(m, b, v)`` of bodies some decisions ahead, the drivers being held.
 
@@ -108,23 +105,21 @@ def driven_states(  # type: ignore[no-untyped-def]
         Layout of the rule base.
     """
     (m, b, k), v = drivers.shape, present.shape[1]
-    states, at, moved = np.empty((m * b, v)), np.empty((m * b, v)), np.empty((b, 2 * v))
+    states, moved = np.empty((m * b, v)), np.empty((b, 2 * v))
     for c in range(m):
         states[c * b : (c + 1) * b] = present
-    halves = 2 if mid else 1
-    for half in range(horizon * halves):
-        is_whole = half % halves == halves - 1
-        rules, strengths = active_compact(states if half % halves == 0 else at, packed)
+    for _ in range(horizon):
+        rules, strengths = active_compact(states, packed)
         for c in range(m):
             moved[:] = 0.0
             for i in range(b):
+                at = c * b + i
                 for j in range(k):
                     driver = drivers[c, i, j]
                     if driver == 0.0:
                         continue
                     for a in range(rules.shape[1]):
-                        share = driver * strengths[c * b + i, a]
-                        effect = weights[j, rules[c * b + i, a]]
+                        share, effect = driver * strengths[at, a], weights[j, rules[at, a]]
                         for x in range(2 * v):
                             moved[i, x] += share * effect[x]
             for x in range(v):
@@ -132,11 +127,8 @@ def driven_states(  # type: ignore[no-untyped-def]
                 for i in range(b):
                     others += moved[i, v + x]
                 for i in range(b):
-                    start = states[c * b + i, x]
-                    value = keep[x] * start + moved[i, x] + (others - moved[i, v + x])
-                    if not is_whole:
-                        at[c * b + i, x] = 0.5 * (start + value)
-                        continue
+                    value = keep[x] * states[c * b + i, x]
+                    value += moved[i, x] + (others - moved[i, v + x])
                     if periods[x] > 0.0:
                         value -= periods[x] * np.floor((value - ranges[0, x]) / periods[x])
                     else:

@@ -35,9 +35,9 @@ class LearnedPredictorSettings(PartSettings):
     scenario's own predictions do, 1 without such."""
     ridge: Positive = 10.0
     """Weight of the squared weights against the squared errors."""
-    order: Literal[1, 2] = 2
-    """Whether what an agent moves depends on the variables of its body one by one, or on pairs of
-    its private ones as well."""
+    products: Literal["none", "private", "all"] = "private"
+    """What an agent moves depends on the variables of its body one by one, and besides on no pairs
+    of them, on pairs of those that other bodies do not share, or on all pairs."""
     memberships: Annotated[int, Field(ge=2, le=15)] | None = None
     """Membership functions per variable, spread evenly; none: the state space's own centres."""
     mirrored: bool | None = None

@@ -153,7 +153,7 @@ class Predicting:
 @pytest.mark.parametrize("world", WORLDS)
 def test_predictions_agree_with_each_other_in_any_world(world: str) -> None:
     scenario = WORLDS[world]()
-    settings = LearnedPredictorSettings(order=1)
+    settings = LearnedPredictorSettings(products="none")
     predictor, states = trained(scenario, settings, decisions=60)
     rng = np.random.default_rng(2)
     joint = rng.integers(len(scenario.action_set), size=(7, len(scenario.agents)))
@@ -169,7 +169,7 @@ def test_actions_that_reach_the_same_are_alike() -> None:
 
 
 def team_of(scenario: Any, seed: int = 0, **settings: Any) -> Team:
-    table = {"predictor": {"kind": "learned", "order": 1}, **settings}
+    table = {"predictor": {"kind": "learned", "products": "none"}, **settings}
     learner = BatchTDSettings.model_validate(table)
     hierarchy = build("chain", scenario.agents)
     return Team(learner, scenario, hierarchy, np.random.SeedSequence(seed))
@@ -224,9 +224,10 @@ def test_the_image_in_the_mirror_is_experience() -> None:
     for predictor in (plain, double):
         predictor.observe(before, joint, after)
         predictor.end_episode()
-    # Speed and bearing are of opposite sign there; of what is the same, twice as much is known.
-    assert plain.memory["own_gram"].sum() == 2.0
-    assert double.memory["own_gram"].sum() == 4.0
+    # Of what moves bodies; what an action is in the mirror, and so of own variables, is not known.
+    assert double.memory["own_gram"].sum() == plain.memory["own_gram"].sum() == 2.0
+    of_one, of_both = (predictor.memory["squares"][:3] for predictor in (plain, double))
+    assert of_both == pytest.approx(2.0 * of_one)
 
 
 @pytest.mark.parametrize(
@@ -245,7 +246,7 @@ def test_nothing_of_the_given_predictor_is_revised_beside_it(
 
 def test_what_it_cannot_regress_is_refused() -> None:
     four = BoxPushingSettings(robot="four-wheel").build()
-    with pytest.raises(ValueError, match=r"^learner.predictor: \d+ features .* lower order or"):
+    with pytest.raises(ValueError, match=r"^learner.predictor: \d+ features .* lower products or"):
         LearnedPredictor(LearnedPredictorSettings(memberships=15), four)
     alone = Rails()
     alone.state_space = StateSpace("alone", alone.state_space.variables, 3)
