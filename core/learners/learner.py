@@ -68,6 +68,11 @@ class TeamSettings(PartSettings):
     whoever acts for all by itself are built as they are, see `core.policies`.
     """
 
+    @property
+    def needs_prediction(self) -> bool:
+        """Whether it acts only in scenarios that predict, see `core.interface.scenario`."""
+        return False
+
 
 class LearnerSettings(TeamSettings):
     """What the settings of all learners share.
@@ -91,3 +96,8 @@ class LearnerSettings(TeamSettings):
     """What robots learn of their own wheels."""
     calibration: CalibrationSettings = CalibrationSettings()
     """What the team learns of the constants of its predictor."""
+
+    @property
+    def needs_prediction(self) -> bool:
+        """Whether it acts only in scenarios that predict: unless it acts at random."""
+        return self.decision.rule != "random"
