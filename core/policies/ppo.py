@@ -12,7 +12,6 @@ off in (Pardo et al. 2018).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -28,7 +27,7 @@ from .inputs import Inputs, RewardScale
 from .networks import Layers, drawing_from, prepare, weights_of
 from .passing import Passing
 from .peer import Peer, Seen
-from .settings import HierarchyPPOSettings, PolicyGradientSettings
+from .settings import MultiAgentPPOSettings, PolicyGradientSettings
 from .split_policy import SplitPolicy
 
 
@@ -246,7 +245,7 @@ class HierarchyPPO(PolicyGradient):
 
     def __init__(
         self,
-        settings: HierarchyPPOSettings,
+        settings: MultiAgentPPOSettings,
         scenario: Scenario,
         seed: np.random.SeedSequence,
         hierarchy: Hierarchy | None = None,
@@ -260,27 +259,18 @@ class HierarchyPPO(PolicyGradient):
                 "each other nothing, use a topology without them"
             )
         self.inputs = Inputs(scenario, numbered=settings.numbered)
-        self.passing = Passing(hierarchy, n_actions)
+        owners = {"all": ("all",) * n, "role": roles_of(scenario), "own": scenario.agents}
+        names, rows = np.unique(owners[settings.weights], return_inverse=True)
+        self.passing = Passing(hierarchy, n_actions, rows)
         self._n_joint = self.inputs.n_joint if settings.critic == "central" else 0
         widths = self.passing.width, self.inputs.n_own, self._n_joint
-        owners = {"all": ("all",) * n, "role": roles_of(scenario), "own": scenario.agents}
-        of_each = np.array(owners[settings.weights])
         self.parts = {
-            str(owner): ActorCritic(
-                settings, np.flatnonzero(of_each == owner), Discrete(n_actions), widths, self.rng
+            str(name): ActorCritic(
+                settings, np.flatnonzero(rows == row), Discrete(n_actions), widths, self.rng
             )
-            for owner in dict.fromkeys(of_each)
+            for row, name in enumerate(names)
         }
-        self._turns = [
-            (level, list(self._actors_of(level.agents))) for level in self.passing.levels
-        ]
-
-    def _actors_of(self, agents: IntArray) -> Iterator[tuple[Layers, slice | IntArray]]:
-        """Yield the actors of some agents, and which of these each acts for."""
-        for part in self.parts.values():
-            its = np.intersect1d(agents, part.agents)
-            if len(its):
-                yield part.actor, _as_slice(its)
+        self._actors = [part.actor for part in self.parts.values()]
 
     def of_actors(self, states: FloatArray) -> FloatArray:
         """Return what nobody has been told yet, and each agent's own state."""
@@ -301,15 +291,9 @@ class HierarchyPPO(PolicyGradient):
         """Decide from the top down; what is decided is written into what others see."""
         seen = self.of_actors(states)
         logits, joint = np.empty(self.shape, dtype=np.float32), np.empty(len(seen), dtype=np.int64)
-        for level, actors in self._turns:
-            for actor, agents in actors:
-                logits[agents] = own = actor(seen[agents])
-                joint[agents] = (own + noise[agents]).argmax(axis=1)
-            self.passing.tell(level, joint, seen)
+        for turn in self.passing.turns:
+            agents = turn.agents
+            logits[agents] = own = self._actors[turn.weights](seen[agents])
+            joint[agents] = (own + noise[agents]).argmax(axis=1)
+            self.passing.tell(turn, joint, seen)
         return seen, logits, joint
-
-
-def _as_slice(agents: IntArray) -> slice | IntArray:
-    """Return agents as a slice, by which arrays are not copied, if they are consecutive."""
-    first, last = int(agents[0]), int(agents[-1])
-    return slice(first, last + 1) if last - first + 1 == len(agents) else agents

@@ -77,12 +77,10 @@ class PPOSettings(PolicyGradientSettings):
     factory: ClassVar[str] = f"{__package__}.ppo:CentralPPO"
 
 
-class HierarchyPPOSettings(PolicyGradientSettings):
-    """PPO of agents in a hierarchy: each acts by its own state and the actions that it is told."""
+class MultiAgentPPOSettings(PolicyGradientSettings):
+    """What the settings of PPO with a policy for every agent share."""
 
-    kind: Literal["hierarchy-ppo"] = "hierarchy-ppo"
     factory: ClassVar[str] = f"{__package__}.ppo:HierarchyPPO"
-    uses_hierarchy: ClassVar[bool] = True
     weights: Annotated[Literal["all", "role", "own"], unwritten("all")] = "all"
     """Whether all agents share the weights of one policy and one critic, those of a role do, or
     every agent has its own."""
@@ -90,21 +88,27 @@ class HierarchyPPOSettings(PolicyGradientSettings):
     """Whether an agent's inputs say which one it is."""
     critic: Annotated[Literal["central", "own"], unwritten("central")] = "central"
     """Whether critics see all states beside the agent's own, or that alone."""
-    value_of: Annotated[Literal["own", "team"], unwritten("team")] = "team"
-    """Whether an agent's reward is its own, or the mean of all agents'."""
-
-
-class MAPPOSettings(HierarchyPPOSettings):
-    """Multi-agent PPO (Yu et al. 2022): agents are told nothing, critics see all states."""
-
-    kind: Literal["mappo"] = "mappo"
-    uses_hierarchy: ClassVar[bool] = False
     value_of: Annotated[Literal["own", "team"], unwritten("own")] = "own"
     """Whether an agent's reward is its own, or the mean of all agents'."""
 
 
-class IPPOSettings(MAPPOSettings):
-    """Independent PPO (de Witt et al. 2020): as multi-agent PPO, but critics see the own state."""
+class HierarchyPPOSettings(MultiAgentPPOSettings):
+    """PPO of agents in a hierarchy: each acts by its own state and the actions that it is told."""
+
+    kind: Literal["hierarchy-ppo"] = "hierarchy-ppo"
+    uses_hierarchy: ClassVar[bool] = True
+    value_of: Annotated[Literal["own", "team"], unwritten("team")] = "team"
+    """Whether an agent's reward is its own, or the mean of all agents'."""
+
+
+class MAPPOSettings(MultiAgentPPOSettings):
+    """Multi-agent PPO (Yu et al. 2022): agents are told nothing, critics see all states."""
+
+    kind: Literal["mappo"] = "mappo"
+
+
+class IPPOSettings(MultiAgentPPOSettings):
+    """Independent PPO (de Witt et al. 2020): agents are told nothing, critics see their state."""
 
     kind: Literal["ippo"] = "ippo"
     critic: Annotated[Literal["central", "own"], unwritten("own")] = "own"

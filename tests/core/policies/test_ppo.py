@@ -47,22 +47,24 @@ def sequence(scenario: Any, peer: Any, steps: int) -> None:
         states = transition.states
 
 
-def test_levels_and_messages_by_hand() -> None:
-    tree = Passing(Hierarchy("abcd", TREE), n_actions=3)
-    assert [level.agents.tolist() for level in tree.levels] == [[0], [1, 2], [3]]
+def test_turns_and_messages_by_hand() -> None:
+    tree = Passing(Hierarchy("abcd", TREE), n_actions=3, rows=np.array([0, 0, 1, 0]))
+    assert [t.weights for t in tree.turns] == [0, 0, 1, 0]
+    assert [t.told.tolist() for t in tree.turns] == [[1, 2, 3], [3], [], []]
     assert tree.width == 6  # of a and b; nobody is told by c or d
     told, joint = np.zeros((4, 6)), np.array([2, 0, 1, 1])
-    for level in tree.levels:
-        tree.tell(level, joint, told)
+    for turn in tree.turns:
+        tree.tell(turn, joint, told)
     by_a, by_b = [0, 0, 1], [1, 0, 0]
     assert told.tolist() == [[0] * 6, by_a + [0] * 3, by_a + [0] * 3, by_a + by_b]
 
 
 def test_parents_alone_are_heard() -> None:
-    chain = Passing(Hierarchy("abc", pairwise("abc"), told="parents"), n_actions=2)
-    assert [level.told.tolist() for level in chain.levels] == [[1], [2], []]
-    silent = Passing(Hierarchy("abc", pairwise("abc"), told="none"), n_actions=2)
-    assert (len(silent.levels), silent.width) == (1, 0)
+    rows = np.zeros(3, dtype=int)
+    chain = Passing(Hierarchy("abc", pairwise("abc"), told="parents"), 2, rows)
+    assert [turn.told.tolist() for turn in chain.turns] == [[1], [2], []]
+    silent = Passing(Hierarchy("abc", pairwise("abc"), told="none"), 2, rows)
+    assert ([turn.agents for turn in silent.turns], silent.width) == ([slice(0, 3)], 0)
 
 
 @pytest.mark.parametrize("weights", ["all", "role", "own"])
