@@ -1,22 +1,17 @@
 """Who runs the trials: processes on this machine, or workers of a Dask cluster on many.
 
-A family of siblings with one interface, distinguished by the name of their backend. Whoever runs a
-trial, its bits are the same: each trial has a process to itself, linear algebra uses one thread.
+Whoever runs a trial, its bits are the same: each trial has a process to itself, linear algebra uses
+one thread.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Literal, get_args
 
-from ...core.plugins.messages import closest
 from ..errors import SpecError
 from .arrivals import Workers
 from .worker import cores
-
-Backend = Literal["loky", "dask"]
-"""``loky``: processes of this machine. ``dask``: workers of a Dask cluster."""
 
 
 def check_jobs(jobs: int) -> None:
@@ -26,21 +21,17 @@ def check_jobs(jobs: int) -> None:
 
 
 @contextmanager
-def start_workers(
-    backend: Backend, jobs: int | None, address: str | None, trials: int
-) -> Iterator[Workers]:
+def start_workers(jobs: int | None, address: str | None, trials: int) -> Iterator[Workers]:
     """Start workers, which end with the context, or connect to those of a cluster.
 
     Parameters
     ----------
-    backend
-        Of which kind.
     jobs
         Most trials at a time; None: one for every core, or for every worker at `address`.
     address
-        Of the scheduler of a running Dask cluster; None: workers of this machine are started.
+        Of the scheduler of a running Dask cluster; None: processes of this machine are started.
     trials
-        How many trials there are; no more workers are started.
+        How many trials there are; no more processes are started.
 
     Raises
     ------
@@ -49,15 +40,10 @@ def start_workers(
     """
     if jobs is not None:
         check_jobs(jobs)
-    if backend not in (known := get_args(Backend)):
-        raise SpecError(f"backend = {backend!r}: {closest(backend, known)}")
-    wanted = max(1, min(jobs or cores(), trials))
-    if backend == "loky":
+    if address is None:
         from .loky import LokyWorkers
 
-        if address is not None:
-            raise SpecError(f"--address {address}: is for --backend dask only")
-        yield LokyWorkers(wanted)
+        yield LokyWorkers(max(1, min(jobs or cores(), trials)))
         return
     try:
         from .dask import DaskWorkers
@@ -65,11 +51,7 @@ def start_workers(
         if error.name not in ("dask", "distributed"):
             raise
         raise SpecError(
-            f"--backend dask: {error.name} is not installed; pip install 'nested-agents[dask]'"
+            f"--address {address}: {error.name} is not installed; pip install 'nested-agents[dask]'"
         ) from None
-    if address is None:
-        with DaskWorkers.local(wanted) as workers:
-            yield workers
-    else:
-        with DaskWorkers.at(address, jobs) as workers:
-            yield workers
+    with DaskWorkers.at(address, jobs) as workers:
+        yield workers
