@@ -15,9 +15,9 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
+from nested_agents.core.interface.scenario import EpisodeRecorder
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
-from nested_agents.scenarios.box_pushing.pictures.rendering import AXES, SIDES
-from nested_agents.scenarios.box_pushing.pictures.screen import Screen
+from nested_agents.scenarios.box_pushing.pictures.rendering import AXES, SIDES, picture
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 
@@ -40,10 +40,8 @@ for row, name in zip(grid, BOXES, strict=True):
     for axes, robots in zip(row, ROBOTS, strict=True):
         settings = BoxPushingSettings(box=name, robots=robots, start="hard")
         scenario = BoxPushing(settings)
-        screen = Screen(scenario, "rgb_array")
         scenario.reset(1)
-        screen.begin()
-        axes.imshow(screen.render()[rows, columns])
+        axes.imshow(picture(EpisodeRecorder(scenario).recording(), 0)[rows, columns])
         axes.set_title(f"{name}, {robots} robots", fontsize=9, loc="left", pad=3)
         axes.set_axis_off()
 figure.tight_layout(pad=0.3, h_pad=0.8)

@@ -13,10 +13,11 @@ from ..adaptation.calibration import Calibration
 from ..adaptation.mirror import Mirror
 from ..adaptation.self_model import SelfModel
 from ..decision.exploration import Explorer
+from ..evaluators.best_response import BestResponse
 from ..evaluators.evaluator import NOTHING_GIVEN, DecisionProblem, Deliberation, Evaluator
 from ..interface.acting import Actors
 from ..interface.hierarchy import Hierarchy
-from ..interface.prediction import Prediction
+from ..interface.prediction import NOT_EXPLORING, Prediction
 from ..interface.scenario import EmbodiedScenario, Scenario, Transition, groups_of
 from ..learners import check_prediction
 from ..learners.batch import ReplaySettings
@@ -190,30 +191,16 @@ class Team:
         Without `explore` every agent takes its greatest action and the team's memory stays as it
         is, apart from the random numbers that break ties.
         """
-        n, n_actions = len(self.hierarchy), len(self.action_set)
+        n = len(self.hierarchy)
         self._left = self._states
         if self.evaluator is None:
-            self._last = self.rng.integers(n_actions, size=n)
+            self._last = self.rng.integers(len(self.action_set), size=n)
             return self._last
-        frequencies = self.seen / self.seen.sum(axis=1, keepdims=True)
         theta = self.learner.theta
         weights = [theta[row] for row in self.rows]
-        joint = np.full(n, self.action_set.neutral)
-        for i in self.hierarchy.order:
-            senders, known = self._known(i, joint)
-            deliberation = Deliberation(
-                i, known, prediction, weights, frequencies, self.rng, self._given_by(i), senders,
-                self._states,
-            )  # fmt: skip
-            values = self.evaluator.values(deliberation)
-            if len(values) != n_actions:
-                raise ValueError(f"the evaluator gave {len(values)} values of {n_actions} actions")
-            if explore:
-                joint[i] = self.explorer.choose(i, values, self.rng)
-            else:
-                joint[i] = greatest(values, self.rng)
-            if self.messages.is_absent(i):
-                joint[i] = self.action_set.neutral
+        joint = self._at_once(self.evaluator, prediction, weights, explore)
+        if joint is None:
+            joint = self._in_order(self.evaluator, prediction, weights, explore)
         self.messages.advance(joint)
         self._last = joint
         if explore:
@@ -222,6 +209,45 @@ class Team:
             self.seen[every, joint] += 1.0
             if self.given.size:
                 self.given[every[:, None], joint[:, None], every, joint] += 1.0
+        return joint
+
+    def _at_once(
+        self, evaluator: Evaluator, prediction: Prediction, weights: list[FloatArray], explore: bool
+    ) -> IntArray | None:
+        """Return what all decide by one call of the evaluator, None if it takes one for each."""
+        exploring = getattr(self.explorer, "exploring", None) if explore else NOT_EXPLORING
+        n = len(self.hierarchy)
+        if not isinstance(evaluator, BestResponse) or exploring is None or len(self._hears_all) < n:
+            return None
+        joint = np.full(n, self.action_set.neutral)
+        first = Deliberation(
+            self.hierarchy.order[0], joint, prediction, weights, self.seen, self.rng,
+            present=self._states,
+        )  # fmt: skip
+        return evaluator.decide(first, exploring)
+
+    def _in_order(
+        self, evaluator: Evaluator, prediction: Prediction, weights: list[FloatArray], explore: bool
+    ) -> IntArray:
+        """Return what all decide, one agent after the other."""
+        n, n_actions = len(self.hierarchy), len(self.action_set)
+        frequencies = self.seen / self.seen.sum(axis=1, keepdims=True)
+        joint = np.full(n, self.action_set.neutral)
+        for i in self.hierarchy.order:
+            senders, known = self._known(i, joint)
+            deliberation = Deliberation(
+                i, known, prediction, weights, frequencies, self.rng, self._given_by(i), senders,
+                self._states,
+            )  # fmt: skip
+            values = evaluator.values(deliberation)
+            if len(values) != n_actions:
+                raise ValueError(f"the evaluator gave {len(values)} values of {n_actions} actions")
+            if explore:
+                joint[i] = self.explorer.choose(i, values, self.rng)
+            else:
+                joint[i] = greatest(values, self.rng)
+            if self.messages.is_absent(i):
+                joint[i] = self.action_set.neutral
         return joint
 
     def _known(self, agent: int, joint_action: IntArray) -> tuple[IntArray, IntArray]:

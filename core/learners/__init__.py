@@ -27,6 +27,7 @@ LEARNERS = SettingsRegistry(
         "frozen": f"{__name__}.frozen:FrozenSettings",
         "ppo": f"{PEERS}:PPOSettings",
         "ippo": f"{PEERS}:IPPOSettings",
+        "hierarchy-ppo": f"{PEERS}:HierarchyPPOSettings",
         "mappo": f"{PEERS}:MAPPOSettings",
         "dqn": f"{PEERS}:DQNSettings",
     },

@@ -110,8 +110,7 @@ class Sources:
         ValueError
             If there is no such file, or it is no Python.
         """
-        text = self.text(name)
-        return meaning(text, name) if name.endswith(".py") else _sha256(text)
+        return meaning(self.text(name), name)
 
     def load(self, reference: str) -> Any:
         """Return what ``"file.py:Name"`` names; the file is run once.
@@ -276,13 +275,15 @@ def kept_name(name: str) -> str:
 
 
 def meaning(text: str, name: str) -> str:
-    """Return a short hash of the syntax tree of Python text.
+    """Return a short hash of what a file means: of its syntax tree, if it is Python.
 
     Raises
     ------
     ValueError
-        If it is no Python.
+        If it is called so, and is none.
     """
+    if not name.endswith(".py"):
+        return _sha256(text)
     try:
         tree = ast.dump(ast.parse(text, name))
     except (SyntaxError, ValueError, RecursionError) as error:

@@ -25,14 +25,13 @@ import numpy as np
 from gymnasium.spaces import Box, Discrete, MultiDiscrete
 from pettingzoo import ParallelEnv
 
-from ...core.interface.scenario import Transition
+from ...core.interface.scenario import EpisodeRecorder, Transition
 from ...core.numerics.arrays import FloatArray, IntArray
 from .config import BoxPushingSettings
-from .pictures.screen import Screen
 from .scenario import BoxPushing
 
 ENV_ID = "NestedAgents/BoxPushing-v0"
-RENDER_MODES = ["rgb_array", "human"]
+RENDER_MODES = ["rgb_array"]
 
 SettingsLike = BoxPushingSettings | Mapping[str, Any] | None
 
@@ -82,7 +81,7 @@ class Seat:
 
 
 class Game(ABC):
-    """A scenario with seats, a clock, a stream of seeds and a screen; inherit it beside an API.
+    """A scenario with seats, a clock, a stream of seeds and pictures; inherit it beside an API.
 
     Parameters
     ----------
@@ -91,7 +90,7 @@ class Game(ABC):
     steps
         Most steps of an episode.
     render_mode
-        ``None``, ``"rgb_array"`` or ``"human"``.
+        ``None`` or ``"rgb_array"``, of which `gymnasium.wrappers.HumanRendering` makes a window.
     sensors
         Whether pictures show the rays of the infrared sensors.
     by_wheel
@@ -119,8 +118,8 @@ class Game(ABC):
         if not isinstance(settings, BoxPushingSettings):
             settings = BoxPushingSettings(**(settings or {}))
         self.scenario = BoxPushing(settings)
-        self.steps, self.render_mode = steps, render_mode
-        self.screen = Screen(self.scenario, render_mode, sensors=sensors) if render_mode else None
+        self.steps, self.render_mode, self.sensors = steps, render_mode, sensors
+        self._recorder: EpisodeRecorder | None = None
         self.seats = {
             name: Seat(self.scenario, wheels, by_wheel=by_wheel)
             for name, wheels in self._teams().items()
@@ -144,16 +143,15 @@ class Game(ABC):
         self._episode = int((options or {}).get("episode", self._episode + 1))
         self._step, self.agents = 0, list(self.possible_agents)
         states = self.scenario.reset(int(self._seeds.integers(2**63)), self._episode)
-        if self.screen is not None:
-            self.screen.begin()
+        self._recorder = EpisodeRecorder(self.scenario) if self.render_mode else None
         return states
 
     def advance(self, joint_action: IntArray) -> tuple[Transition, bool]:
         """Return what a joint action ``(n,)`` leads to, and whether the episode is truncated."""
         transition = self.scenario.step(joint_action)
         self._step += 1
-        if self.screen is not None:
-            self.screen.add(transition)
+        if self._recorder is not None:
+            self._recorder.add(transition)
         late = self._step >= self.steps and not transition.terminated
         return transition, transition.truncated or late
 
@@ -166,13 +164,21 @@ class Game(ABC):
         }
 
     def render(self) -> Any:
-        """Return a picture ``(height, width, 3)`` of the present, or show it."""
-        return None if self.screen is None else self.screen.render()
+        """Return a picture ``(height, width, 3)`` of the present; None without a render mode.
 
-    def close(self) -> None:
-        """Close the window, if there is one."""
-        if self.screen is not None:
-            self.screen.close()
+        Raises
+        ------
+        RuntimeError
+            If no episode has begun.
+        """
+        if self.render_mode is None:
+            return None
+        if self._recorder is None:
+            raise RuntimeError("render: no episode has begun, call reset first")
+        from .pictures.rendering import picture
+
+        recording = self._recorder.recording()
+        return picture(recording, len(recording["box_pose"]) - 1, sensors=self.sensors)
 
 
 class WheelsEnv(Game, ParallelEnv):

@@ -33,7 +33,7 @@ from ..results import published
 from ..results.contrasts import contrasts
 from ..results.power import SMALLEST, USUAL_DEVIATION
 from ..results.results import Results, read
-from ..results.selection import Where, chosen, together
+from ..results.selection import chosen, together
 from ..results.verdicts import power_text
 from ..spec.outline import StudyOutline, other_spec, sources_of
 from ..store import durable
@@ -156,8 +156,8 @@ class StudyResults:
         return Comparison(contrasts(self.results, measure, phase, by, reference))
 
     def where(self, choice: str) -> StudyResults:
-        """Return the trials of a choice, such as ``"robots == 8 and seed < 5"``; see `Where`."""
-        part = chosen(self.results, Where(choice), self._settings)
+        """Return the trials of a choice, such as ``"robots == 8 and seed < 5"``; see `chosen`."""
+        part = chosen(self.results, choice, self._settings)
         if not part.conditions:
             raise SpecError(f"where = {choice!r}: no finished trial is so")
         return replace(self, results=part, failed=(), _is_whole=False)

@@ -1,23 +1,25 @@
 """The claims of the paper, each with what is measured and the criterion that decides it.
 
-No verdict is given by hand: measures and criteria stand here. A criterion looks at an estimate with
-its 95 % interval. A claim *holds* if the whole interval meets the criterion, *does not hold* if
-none of it does, and is *not decided* in between, or by fewer than `LEAST_SEEDS`.
+No verdict is given by hand: measures and criteria stand in ``claims.toml``. A criterion looks at an
+estimate with its 95 % interval. A claim *holds* if the whole interval meets the criterion, *does
+not hold* if none of it does, and is *not decided* in between, or by fewer than `LEAST_SEEDS`.
 """
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from math import inf
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from ..presentation.cells import ends
 from ..results.results import NOTHING, Results
-from . import measures as measured
+from . import measures
 from .measures import Measured
 
 Verdict = Literal["holds", "does not hold", "not decided"]
@@ -68,7 +70,7 @@ def within(margin: float) -> Criterion:
 
 @dataclass(frozen=True)
 class Claim:
-    """A claim of the paper."""
+    """A claim of the paper, as it stands in ``claims.toml``."""
 
     name: str
     """For programs."""
@@ -86,123 +88,17 @@ class Claim:
     """What the measure must be."""
 
 
-CLAIMS: tuple[Claim, ...] = (
-    Claim(
-        "learns", "wheels learn over epochs to push the box to the goal", "IX-A, Fig. 5b",
-        "learning-curve", "success in episodes 16-20, less that of the better of frozen and random",
-        measured.learned(), at_least(0.5),
-    ),
-    Claim(
-        "more", "learning achieves more than planning with the reward function",
-        "not claimed: a control", "learning-curve",
-        "success in episodes 16-20, less that of planner",
-        measured.learned(known=(measured.PLANNER,)), at_least(0.05),
-    ),
-    Claim(
-        "sooner", "learning reaches the goal sooner than planning with the reward function",
-        "not claimed: a control", "learning-curve", "evaluation steps, over the planner's",
-        measured.sooner_than_planned, at_most(0.9),
-    ),
-    Claim(
-        "epochs", "the box reaches the goal by epoch 7 to 10", "IX-A, Fig. 6",
-        "learning-curve", "success in episodes 7-10", measured.success(slice(6, 10)), at_least(0.8),
-    ),
-    Claim(
-        "orientation", "it gets there with proper orientation", "IX-A, Fig. 5a",
-        "learning-curve", "success in episodes 16-20, within 15 degrees",
-        measured.success(measured.LAST, "pose", "preset pose"), at_least(0.8),
-    ),
-    Claim(
-        "contact", "robots learn to maintain contact", "IX-A, Fig. 6",
-        "learning-curve", "time in contact, episodes 16-20 less 1-5, less the same of planner",
-        measured.contact_gained, at_least(0.05),
-    ),
-    Claim(
-        "printed", "the printed constants and rule base (5^7) learn it", "IV, V, IX-A",
-        "learning-curve", "as the first line, preset paper", measured.learned("paper"),
-        at_least(0.5),
-    ),
-    Claim(
-        "cost", "2.45e12 operations nested, 1.1e27 as one agent", "VII, Eq. 18-23",
-        "cost", "greatest relative error of the two, by Eq. 18 and 23", measured.cost_error,
-        within(0.01),
-    ),
-    Claim(
-        "complexity", "nesting reduces the complexity of joint-action learners [4]", "X-A",
-        "cost", "joint actions tried by a chain of four, over those of joint-action learners",
-        measured.tried_beside_joint_action_learners, at_most(0.5),
-    ),
-    Claim(
-        "optimum", "agents that observe each other agree on the optimal joint action", "V, X-A",
-        "games", "P(optimal joint action), worst game, nested with observed frequencies",
-        measured.optimal("nested, observed"), at_least(0.8),
-    ),
-    Claim(
-        "maximum", "the same, the best being expected of those below", "V, X-A",
-        "games", "P(optimal joint action), worst game, nested with the maximum",
-        measured.optimal("nested, maximum"), at_least(0.8),
-    ),
-    Claim(
-        "order", "the order of the chain is arbitrary", "X-A",
-        "chain-order", "greatest difference of evaluation success from the first order",
-        measured.order_matters, within(0.15),
-    ),
-    Claim(
-        "considering", "agents gain by considering what those below them may do", "V",
-        "edges", "evaluation success, own value, less that of the same weights considering nobody",
-        measured.lost_without("told only"), at_least(0.1),
-    ),
-    Claim(
-        "telling", "agents gain by being told what those above them have decided", "V",
-        "edges", "the same, less that of agents that are told nothing, take others to maintain",
-        measured.lost_without("considered only"), at_least(0.1),
-    ),
-    Claim(
-        "planning", "the same, if each expects of the others what it would do in their place", "V",
-        "edges", "the same, less that of agents that are told nothing, plan for the others",
-        measured.lost_without("considered only, private plans"), at_least(0.1),
-    ),
-    Claim(
-        "speed", "scales with the number of agents: time", "Abstract, VII",
-        "scaling", "time of a decision over the decision period, most robots, not by enumeration",
-        measured.decision_share, at_most(1.0),
-    ),
-    Claim(
-        "size", "scales with the number of agents: success", "Abstract, XI",
-        "scaling", "evaluation success with most robots over that with fewest",
-        measured.success_by_size, at_least(0.8),
-    ),
-    Claim(
-        "failure", "recovers from a failed wheel by learning", "X-B",
-        "wheel-failure", "success at the end over before, weights adapt, worst fault",
-        measured.recovered("weights"), at_least(0.8),
-    ),
-    Claim(
-        "self-model", "the same, its self-model adapting too", "X-B, extended",
-        "wheel-failure", "success at the end over before, both adapt, worst fault",
-        measured.recovered("both"), at_least(0.8),
-    ),
-    Claim(
-        "shape", "the shape of the box is indifferent", "II-C",
-        "shapes", "evaluation success over that with the square, worst shape",
-        measured.worst_shape(), at_least(0.8),
-    ),
-    Claim(
-        "points", "a robot's pushing points depend on the geometry of the object", "X-B, of [10]",
-        "related", "success over that with the square, worst shape, pushing points as a team",
-        measured.worst_shape("pushing points, team"), at_most(0.8),
-    ),
-    Claim(
-        "wheels", "an agent per wheel does not", "X-B",
-        "related", "success over that with the square, worst shape, nested wheels",
-        measured.worst_shape("nested"), at_least(0.8),
-    ),
-    Claim(
-        "model", "no task model or contact points are needed", "II-B, II-C, XI",
-        "ablation", "evaluation success, box predicted not to move, over the default's",
-        measured.without_model, at_least(0.8),
-    ),
-)  # fmt: skip
+def _claim(*, compute: str, of: Mapping[str, Any] | None = None, **table: Any) -> Claim:
+    """Return the claim of a table: its measure is a function of `measures`, with arguments."""
+    criterion = next(make(table.pop(name)) for name, make in CRITERIA.items() if name in table)
+    return Claim(
+        compute=partial(getattr(measures, compute), **(of or {})), criterion=criterion, **table
+    )
+
+
+CRITERIA = {"at_least": at_least, "at_most": at_most, "within": within}
+_TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+CLAIMS = tuple(_claim(**table) for table in _TABLE["claims"])
 """Every claim that is decided."""
 
 STUDIES_OF_CLAIMS = tuple(dict.fromkeys(claim.study for claim in CLAIMS if claim.study != "cost"))

@@ -1,12 +1,12 @@
 """What is measured of the paper's claims, from the results of a study.
 
-Each function returns an estimate with its 95 % interval over seeds, or None where the results have
-not what it takes.
+Each public function is named by claims of ``claims.toml``; it returns an estimate with its 95 %
+interval over seeds, or None where the results have not what it takes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,9 +20,6 @@ from ..results.sizes import Sizes
 from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
 from ..results.summary import EVALUATED
 from ..store.schema import EVALUATION
-
-Compute = Callable[[Results], "Measured | None"]
-"""Computes what a claim is about from the results of a study."""
 
 CONTACT = "contact_fraction"
 VALUE_OF = "learner.decision.value_of"
@@ -53,8 +50,8 @@ class Measured:
     """What the value is of, if that is part of the result."""
 
 
-def learned(name: str = "", known: tuple[str, ...] = UNREWARDED) -> Compute:
-    """Return what measures success at the end of training, less that of the better control.
+def learned(results: Results, name: str = "", known: Sequence[str] = UNREWARDED) -> Measured | None:
+    """Measure success at the end of training, less that of the better control.
 
     Of the condition of a `name`; without, of that by which claims are judged.
     """
@@ -62,16 +59,13 @@ def learned(name: str = "", known: tuple[str, ...] = UNREWARDED) -> Compute:
     def outcomes(r: Results, condition: str) -> np.ndarray:
         return r.success(condition)[:, LAST]
 
-    def compute(results: Results) -> Measured | None:
-        controls = [c for c in known if results.has(c, "training")]
-        condition = name or learner_of(results)
-        if not results.has(condition, "training") or not controls:
-            return None
-        best = max(controls, key=lambda c: float(outcomes(results, c).mean()))
-        note = f"against {best}"
-        return _compare(results, condition, best, outcomes, difference, "training", note=note)
-
-    return compute
+    controls = [c for c in known if results.has(c, "training")]
+    condition = name or learner_of(results)
+    if not results.has(condition, "training") or not controls:
+        return None
+    best = max(controls, key=lambda c: float(outcomes(results, c).mean()))
+    note = f"against {best}"
+    return _compare(results, condition, best, outcomes, difference, "training", note=note)
 
 
 def learner_of(results: Results) -> str:
@@ -88,17 +82,18 @@ def sooner_than_planned(results: Results) -> Measured | None:
     return _compare(results, learner_of(results), PLANNER, _evaluation_steps, share)
 
 
-def success(episodes: slice, name: str = "", note: str = "") -> Compute:
-    """Return what measures success in some episodes of training, see `learned` for the `name`."""
+def success(
+    results: Results, first: int, last: int | None = None, name: str = "", note: str = ""
+) -> Measured | None:
+    """Measure success in training episodes from a first one to before a last one, by index.
 
-    def compute(results: Results) -> Measured | None:
-        condition = name or learner_of(results)
-        if not results.has(condition, "training"):
-            return None
-        outcomes = results.success(condition)[:, episodes]
-        return Measured(rate(outcomes), len(outcomes), note=note) if outcomes.size else None
-
-    return compute
+    For the `name` see `learned`.
+    """
+    condition = name or learner_of(results)
+    if not results.has(condition, "training"):
+        return None
+    outcomes = results.success(condition)[:, first:last]
+    return Measured(rate(outcomes), len(outcomes), note=note) if outcomes.size else None
 
 
 def contact_gained(results: Results) -> Measured | None:
@@ -138,24 +133,20 @@ def tried_beside_joint_action_learners(results: Results) -> Measured:
     return Measured(Estimate(share, share, share), 0, note=f"{n} agents")
 
 
-def optimal(system: str) -> Compute:
-    """Return what measures how often a system ends in the optimum of its worst game."""
-
-    def compute(results: Results) -> Measured | None:
-        estimates = {
-            ", ".join(str(v) for k, v in columns.items() if k != "name"): rate(
-                results.success(condition, "evaluation")
-            )
-            for condition, columns in results.columns.items()
-            if columns.get("name") == system and results.has(condition, "evaluation")
-        }
-        if not estimates:
-            return None
-        worst = min(estimates, key=lambda game: float(estimates[game].value))
-        seeds = len(results.seeds(results.conditions[0]))
-        return Measured(estimates[worst], seeds, note=worst)
-
-    return compute
+def optimal(results: Results, system: str) -> Measured | None:
+    """Measure how often a system ends in the optimum of its worst game."""
+    estimates = {
+        ", ".join(str(v) for k, v in columns.items() if k != "name"): rate(
+            results.success(condition, "evaluation")
+        )
+        for condition, columns in results.columns.items()
+        if columns.get("name") == system and results.has(condition, "evaluation")
+    }
+    if not estimates:
+        return None
+    worst = min(estimates, key=lambda game: float(estimates[game].value))
+    seeds = len(results.seeds(results.conditions[0]))
+    return Measured(estimates[worst], seeds, note=worst)
 
 
 def order_matters(results: Results) -> Measured | None:
@@ -175,29 +166,25 @@ def order_matters(results: Results) -> Measured | None:
     return Measured(widest, len(first), tests[0].p, f"{1 + len(others)} orders")
 
 
-def lost_without(evaluation: str) -> Compute:
-    """Return what measures evaluation success less that of the same weights under other edges.
+def lost_without(results: Results, evaluation: str) -> Measured | None:
+    """Measure evaluation success less that of the same weights under other edges.
 
     Of the conditions in which every agent seeks its own value, as in the paper, all sizes alike.
     """
-
-    def compute(results: Results) -> Measured | None:
-        other = EVALUATION + evaluation
-        cases = [
-            condition
-            for condition in results.conditions
-            if results.columns[condition].get(VALUE_OF) == "own" and results.has(condition, other)
-        ]
-        if not cases:
-            return None
-        seeds = [results.seeds(condition) for condition in cases]
-        whole, part = (
-            np.hstack(of_shared_seeds(seeds, [results.success(c, phase) for c in cases]))
-            for phase in ("evaluation", other)
-        )
-        return Measured(difference(whole, part), len(whole), note=f"{len(cases)} sizes")
-
-    return compute
+    other = EVALUATION + evaluation
+    cases = [
+        condition
+        for condition in results.conditions
+        if results.columns[condition].get(VALUE_OF) == "own" and results.has(condition, other)
+    ]
+    if not cases:
+        return None
+    seeds = [results.seeds(condition) for condition in cases]
+    whole, part = (
+        np.hstack(of_shared_seeds(seeds, [results.success(c, phase) for c in cases]))
+        for phase in ("evaluation", other)
+    )
+    return Measured(difference(whole, part), len(whole), note=f"{len(cases)} sizes")
 
 
 def _by_size(results: Results) -> tuple[dict[int, list[str]], Sizes]:
@@ -267,34 +254,26 @@ FAULTS = ("4 wheels, seized", "4 wheels, reversed")
 """The faults that count: feedback alone absorbs the milder ones, and two wheels leave no remedy."""
 
 
-def recovered(adapts: str) -> Compute:
-    """Return what measures success at the end relative to before the failure, worst fault."""
-
-    def compute(results: Results) -> Measured | None:
-        courses = [c for c in courses_of(results) if c.fault in FAULTS and c.adapts == adapts]
-        ratios = {c.fault: ratio(c.end, c.before) for c in courses}
-        if not ratios:
-            return None
-        worst = min(ratios, key=lambda fault: float(np.nan_to_num(ratios[fault].value)))
-        return Measured(ratios[worst], len(courses[0].success), note=worst)
-
-    return compute
+def recovered(results: Results, adapts: str) -> Measured | None:
+    """Measure success at the end relative to before the failure, worst fault."""
+    courses = [c for c in courses_of(results) if c.fault in FAULTS and c.adapts == adapts]
+    ratios = {c.fault: ratio(c.end, c.before) for c in courses}
+    if not ratios:
+        return None
+    worst = min(ratios, key=lambda fault: float(np.nan_to_num(ratios[fault].value)))
+    return Measured(ratios[worst], len(courses[0].success), note=worst)
 
 
-def worst_shape(condition: str = "") -> Compute:
-    """Return what measures the success with the worst shape relative to that with the box trained.
+def worst_shape(results: Results, condition: str = "") -> Measured | None:
+    """Measure the success with the worst shape relative to that with the box trained.
 
     Of a condition by its label; without, of that by which claims are judged.
     """
-
-    def compute(results: Results) -> Measured | None:
-        ratios = ratios_of(results, condition or learner_of(results))
-        if not ratios:
-            return None
-        worst = min(ratios, key=lambda d: float(np.nan_to_num(d.estimate.value)))
-        return Measured(worst.estimate, worst.seeds, note=worst.condition)
-
-    return compute
+    ratios = ratios_of(results, condition or learner_of(results))
+    if not ratios:
+        return None
+    worst = min(ratios, key=lambda d: float(np.nan_to_num(d.estimate.value)))
+    return Measured(worst.estimate, worst.seeds, note=worst.condition)
 
 
 def without_model(results: Results) -> Measured | None:

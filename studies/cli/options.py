@@ -133,9 +133,9 @@ as_study = click.option(
 where = click.option(
     "--where",
     metavar="CHOICE",
-    help='Only the trials of a choice: "robots == 8 and seed < 5", "box in [square, circle]".',
+    help="Only the trials of a choice, a query of pandas: \"robots == 8 and box == 'circle'\".",
 )
-"""A part of the trials, see `nested_agents.studies.results.selection.Where`."""
+"""A part of the trials, see `nested_agents.studies.results.selection.chosen`."""
 
 
 def formats(

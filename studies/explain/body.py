@@ -8,7 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core.adaptation.self_model import SelfModel
+from ...core.agents.joint_agents import body_of
 from ...core.numerics.arrays import FloatArray
+from ...core.plugins.deferred import pd
+from .rules import WIDTH
 
 ROWS = ("ahead", "left", "turning")
 """The rows of an effect [m/s, m/s, rad/s], per unit of commanded speed."""
@@ -33,38 +36,18 @@ class Bodies:
         self.deviations = model.deviations
 
 
-def table(bodies: Bodies, actuators: Sequence[str]) -> Iterator[str]:
-    """Yield the effects of every body's actuators, row by row and moment by moment."""
+def table(bodies: Bodies, actuators: Sequence[str]) -> str:
+    """Return the effects of every body's actuators, row by row and moment by moment."""
+    rows = {}
     for r, own in enumerate(by_body(bodies, actuators)):
-        names = [name.rpartition(".")[2].replace("-", "-\n") for name in own]
-        wide, lines = headed([*names, "constant"], 8)
-        for i, line in enumerate(lines):
-            yield ((body_name(own) if i == len(lines) - 1 else "").ljust(16) + line).rstrip()
-        for row, name in enumerate(ROWS):
-            if not any(effects[r][row].any() for effects in bodies.moments.values()):
-                continue  # a joint can but turn
+        names = [*(name.rpartition(".")[2] for name in own), "constant"]
+        for i, row in enumerate(ROWS):
             for moment, effects in bodies.moments.items():
-                values = "".join(f"{v:+.2f}".rjust(wide) for v in effects[r][row])
-                yield f"{name if moment == 'built' else '':<9}{moment:<7}{values}"
-        yield ""
-
-
-def body_name(own: Sequence[str]) -> str:
-    """Return how a body is called: as what the names of its actuators begin with.
-
-    >>> body_name(["robot1.left", "robot1.right"]), body_name(["joint2"])
-    ('robot1', 'joint2')
-    """
-    return own[0].partition(".")[0]
-
-
-def headed(names: Sequence[str], least: int) -> tuple[int, list[str]]:
-    """Return the width of columns and the lines of their heads, which may have several each."""
-    heads = [name.split("\n") for name in names]
-    wide = max([least, *(len(part) + 1 for head in heads for part in head)])
-    depth = max(map(len, heads))
-    padded = [[""] * (depth - len(head)) + head for head in heads]
-    return wide, ["".join(head[i].rjust(wide) for head in padded) for i in range(depth)]
+                rows[body_of(own[0]), row, moment] = pd.Series(effects[r][i], names)
+    frame = pd.DataFrame(rows).T
+    moving = frame.groupby(level=[0, 1]).transform("any").any(axis=1)  # a joint can but turn
+    text: str = frame[moving].to_string(line_width=WIDTH, float_format="{:+.2f}".format)
+    return text
 
 
 def verdicts(bodies: Bodies, actuators: Sequence[str]) -> Iterator[str]:

@@ -1,31 +1,29 @@
-"""A rule base taken apart: what each state variable adds to an agent's f, and what pairs do.
+"""A rule base taken apart: what each state variable adds to an agent's f.
 
 For every way of standing in the membership functions alike, f falls uniquely into a constant,
-functions of one variable, of two, and so on, each of mean zero in each of its variables (the
-analysis of variance, Hoeffding 1948)::
+functions of one variable, each of mean zero, and what several variables do together beyond them
+(the analysis of variance, Hoeffding 1948)::
 
-    f(x) = c + sum_j g_j(x_j) + sum_jk h_jk(x_j, x_k) + the rest
+    f(x) = c + sum_j g_j(x_j) + the rest
 
-A rule base of order 1 is the first two parts, whole. Of one of order d the functions of one
-variable are marginals: the mean over the rules of all other variables. The *share* of a part is its
-share of the variance of f, all rules being equally likely; which rules were ever visited it does
-not know.
+A rule base of order 1 has no rest. Of one of order d the functions of one variable are marginals:
+the mean over the rules of all other variables. The *share* of a part is its share of the variance
+of f, all rules being equally likely; which rules were ever visited it does not know.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
 from math import degrees
 
 import numpy as np
 
 from ...core.interface.spaces import Variable
 from ...core.numerics.arrays import FloatArray
+from ...core.plugins.deferred import pd
 from ...core.rules.kernels.fuzzy import Partition
 from ...core.rules.rule_base import RuleBase
-from .body import headed
 
 WORDS = {
     2: ("low", "high"),
@@ -33,7 +31,8 @@ WORDS = {
     5: ("very low", "low", "medium", "high", "very high"),
 }
 """Of membership functions on a line that have none of their own."""
-Pair = tuple[int, int]
+WIDTH = 80
+"""Of a line [characters]; columns that do not fit side by side follow below."""
 
 
 @dataclass(frozen=True)
@@ -44,8 +43,6 @@ class Parts:
     """Mean of all rules."""
     singles: tuple[FloatArray, ...]
     """``(m_j,)`` consequents of every variable j, of mean zero: g_j at the centres."""
-    pairs: dict[Pair, FloatArray]
-    """``(m_j, m_k)`` consequents of pairs of variables beyond those of either."""
     variance: float
     """Of all rules."""
 
@@ -55,9 +52,8 @@ class Parts:
 
     @property
     def rest(self) -> float:
-        """Share of what three or more variables do together."""
-        drawn = sum(map(self.share, [*self.singles, *self.pairs.values()]))
-        return max(0.0, 1.0 - drawn) if self.variance > 0 else 0.0
+        """Share of what several variables do together."""
+        return max(0.0, 1.0 - sum(map(self.share, self.singles))) if self.variance > 0 else 0.0
 
 
 def take_apart(rules: RuleBase, theta: FloatArray) -> Parts:
@@ -69,8 +65,8 @@ def take_apart(rules: RuleBase, theta: FloatArray) -> Parts:
 
     >>> base = RuleBase([Partition((0.0, 1.0), "triangular")] * 2, [(0, 1)])
     >>> parts = take_apart(base, np.array([0.0, 0.0, 0.0, 4.0]))
-    >>> parts.constant, parts.singles[0].tolist(), parts.pairs[0, 1].tolist()
-    (1.0, [-1.0, 1.0], [[1.0, -1.0], [-1.0, 1.0]])
+    >>> parts.constant, parts.singles[0].tolist(), round(parts.rest, 2)
+    (1.0, [-1.0, 1.0], 0.33)
     """
     sizes = [partition.size for partition in rules.partitions]
     tensors = []
@@ -80,16 +76,11 @@ def take_apart(rules: RuleBase, theta: FloatArray) -> Parts:
         tensors.append((term, weights.reshape([sizes[j] for j in term])))
         begin += size
     singles: list[FloatArray] = [np.zeros(size) for size in sizes]
-    pairs: dict[Pair, FloatArray] = {}
     for term, tensor in tensors:
         for j in term:
             singles[j] += _onto(tensor, term, (j,)) - tensor.mean()
-        for j, k in combinations(term, 2):
-            both = _onto(tensor, term, (j, k))
-            own = both.mean(axis=1, keepdims=True) + both.mean(axis=0, keepdims=True)
-            pairs[j, k] = pairs.get((j, k), 0.0) + both - own + tensor.mean()
     constant = float(sum(tensor.mean() for _, tensor in tensors))
-    return Parts(constant, tuple(singles), pairs, _variance(tensors))
+    return Parts(constant, tuple(singles), _variance(tensors))
 
 
 def _onto(tensor: FloatArray, term: Sequence[int], kept: Sequence[int]) -> FloatArray:
@@ -141,40 +132,32 @@ def place(variable: Variable, value: float) -> str:
 
 def table(
     rules: RuleBase, variables: Sequence[Variable], agents: Sequence[str], parts: Sequence[Parts]
-) -> Iterator[str]:
-    """Yield the rules of some agents in words, a column of consequents for each agent.
+) -> str:
+    """Return the rules of some agents in words, a column of consequents for each agent.
 
-    Variables come in the order of their mean share; of pairs the three that do most.
+    Variables come in the order of their mean share.
     """
-    power = exponent(parts)
-    strongest = sorted(
-        range(len(variables)), key=lambda j: -sum(p.share(p.singles[j]) for p in parts)
-    )
-    heads = [name.replace(".", "\n").replace("-", "-\n") for name in agents]
-    wide, _ = headed(heads, 8)
-    conditions = [
-        [
-            (f"IF {v.name} is {word}", place(v, centre))
-            for word, centre in zip(labels(v, p), p.centres, strict=True)
-        ]
-        for v, p in zip(variables, rules.partitions, strict=True)
-    ]
-    first, second = (max(len(c[i]) for own in conditions for c in own) for i in (0, 1))
-    margin = first + second + 8
-    fit = max(1, (80 - margin) // wide)
-    for begin in range(0, len(agents), fit):
-        block = slice(begin, begin + fit)
-        for line in headed(heads[block], wide)[1]:
-            yield " " * margin + line
-        for j in strongest:
-            shares = [p.share(p.singles[j]) for p in parts[block]]
-            row = "".join(percent(s).rjust(wide) for s in shares)
-            yield f"{variables[j].name}, share of the variance"[: margin - 1].ljust(margin) + row
-            for k, (condition, at) in enumerate(conditions[j]):
-                values = (f"{p.singles[j][k] * 10**power:+.2f}" for p in parts[block])
-                row = "".join(value.rjust(wide) for value in values)
-                yield f"{condition.ljust(first)} {at.rjust(second + 1)}  THEN{row}"
-            yield ""
+    power, lines = exponent(parts), []
+    for j in by_share(parts):
+        variable, partition = variables[j], rules.partitions[j]
+        shares = [percent(p.share(p.singles[j])) for p in parts]
+        lines.append((f"{variable.name}, share of the variance", *shares))
+        words = zip(labels(variable, partition), partition.centres, strict=True)
+        for k, (word, centre) in enumerate(words):
+            consequents = (f"{p.singles[j][k] * 10**power:+.2f}" for p in parts)
+            rule = f"IF {variable.name} is {word}, {place(variable, centre)}:"
+            lines.append((rule, *consequents))
+        lines.append(("", *[""] * len(parts)))
+    names, *columns = zip(*lines, strict=True)
+    heads = pd.MultiIndex.from_tuples([name.rpartition(".")[::2] for name in agents])
+    frame = pd.DataFrame(list(zip(*columns, strict=True)), index=names, columns=heads)
+    return frame.to_string(line_width=WIDTH, sparsify=False)
+
+
+def by_share(parts: Sequence[Parts]) -> list[int]:
+    """Return the variables in the order of their mean share."""
+    shares = np.mean([list(map(p.share, p.singles)) for p in parts], axis=0)
+    return [int(j) for j in np.argsort(-shares, kind="stable")]
 
 
 def percent(share: float) -> str:
@@ -193,13 +176,3 @@ def exponent(parts: Sequence[Parts]) -> int:
     """
     greatest = max((float(np.abs(g).max()) for p in parts for g in p.singles), default=0.0)
     return -int(np.floor(np.log10(greatest))) if greatest > 0 else 0
-
-
-def strongest_pairs(parts: Sequence[Parts], most: int = 3) -> list[Pair]:
-    """Return the pairs of variables of greatest mean share, those of none left out."""
-    shares = {
-        pair: sum(p.share(p.pairs[pair]) for p in parts)
-        for pair in (parts[0].pairs if parts else ())
-    }
-    strongest = sorted(shares, key=lambda pair: -shares[pair])[:most]
-    return [pair for pair in strongest if shares[pair] > 0]

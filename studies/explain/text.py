@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from textwrap import fill
 
-import numpy as np
-
 from . import body as explain_body
 from . import rules as explain_rules
 from .rules import percent
@@ -49,54 +47,33 @@ def _functions(explained: Explanation, agents: int) -> Iterator[str]:
         yield from _wrapped("Every consequent is the same: the agents have learned nothing.")
         yield ""
         return
-    parts, names = explained.parts, [v.name for v in explained.variables]
-    mean = [sum(p.share(p.singles[j]) for p in parts) / len(parts) for j in range(len(names))]
-    order = sorted(range(len(names)), key=lambda j: -mean[j])
-    shares = ", ".join(f"{names[j]} {percent(mean[j])}" for j in order)
-    both = sum(p.share(pair) for p in parts for pair in p.pairs.values()) / len(parts)
-    rest = sum(p.rest for p in parts) / len(parts)
-    yield from _wrapped(f"What f depends on (share of its variance, mean over agents): {shares}.")
-    if explained.rules.terms == tuple((j,) for j in range(len(names))):
-        yield from _wrapped("Each rule has one variable: the functions below are all of f.")
-    else:
-        beyond = f"Pairs of variables beyond that: {percent(both)}."
-        if max(map(len, explained.rules.terms)) > 2:
-            beyond += f" Three and more together: {percent(rest)}, which cannot be drawn."
-        yield from _wrapped(
-            f"{beyond} The functions below are the mean over all rules of the other variables."
-        )
+    parts, variables = explained.parts, explained.variables
+    shares = (
+        f"{variables[j].name} {percent(sum(p.share(p.singles[j]) for p in parts) / len(parts))}"
+        for j in explain_rules.by_share(parts)
+    )
+    rest = percent(sum(p.rest for p in parts) / len(parts))
     power = explain_rules.exponent(parts)
     times = f" times 10^{power}" if power else ""
-    yield from _wrapped(
-        f"Consequents{times}, less their mean over each variable: only differences decide."
-    )
+    whole = "Each rule has one variable: the functions below are all of f."
+    if max(map(len, explained.rules.terms)) > 1:
+        whole = (
+            f"Several variables together do {rest} beyond that. The functions below are the mean "
+            "over all rules of the other variables."
+        )
+    for sentence in (
+        f"What f depends on (share of its variance, mean over agents): {', '.join(shares)}.",
+        whole,
+        f"Consequents{times}, less their mean over each variable: only differences decide.",
+    ):
+        yield from _wrapped(sentence)
     yield ""
     shown = slice(0, agents)
-    yield from explain_rules.table(
-        explained.rules, explained.variables, explained.agents[shown], parts[shown]
-    )
-    for pair in explain_rules.strongest_pairs(parts):
-        yield from _pair(explained, pair)
+    names = explained.agents[shown]
+    yield from _lines(explain_rules.table(explained.rules, variables, names, parts[shown]))
     if agents < len(explained.agents):
         yield f"The rules of {len(explained.agents) - agents} more agents are in the file."
         yield ""
-
-
-def _pair(explained: Explanation, pair: tuple[int, int]) -> Iterator[str]:
-    """Yield the rules in which two variables together add or take most, agents' mean."""
-    mean = np.mean([p.pairs[pair] for p in explained.parts], axis=0)
-    power = explain_rules.exponent(explained.parts)
-    share = sum(p.share(p.pairs[pair]) for p in explained.parts) / len(explained.parts)
-    (one, words), (other, more) = (
-        (v.name, explain_rules.labels(v, explained.rules.partitions[i]))
-        for i, v in ((i, explained.variables[i]) for i in pair)
-    )
-    yield f"{one} and {other} together: {percent(share)} (mean over agents)"
-    for flat in np.abs(mean).ravel().argsort()[::-1][:3]:
-        row, column = divmod(int(flat), len(more))
-        value = mean[row, column] * 10**power
-        yield f"IF {one} is {words[row]} AND {other} is {more[column]} THEN {value:+.2f} more"
-    yield ""
 
 
 def _bodies(explained: Explanation) -> Iterator[str]:
@@ -122,7 +99,12 @@ def _bodies(explained: Explanation) -> Iterator[str]:
         f"{', '.join(moments[m] for m in bodies.moments)}."
     )
     yield ""
-    yield from explain_body.table(bodies, explained.actuators)
+    yield from _lines(explain_body.table(bodies, explained.actuators))
+
+
+def _lines(table: str) -> list[str]:
+    """Return the lines of a table, of which pandas fills the last column with spaces."""
+    return [line.rstrip() for line in table.splitlines()]
 
 
 def _wrapped(sentence: str) -> Sequence[str]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from functools import cache
 from pathlib import Path
 
@@ -10,14 +9,12 @@ import jinja2
 from markupsafe import Markup
 
 from ..catalogue.study import analysed, drawn, load_study
-from ..claims.claims import SPECS, STUDIES_OF_CLAIMS, judge
 from ..presentation.tables import tabulate
 from ..presentation.words import count
 from ..results.contrasts import contrasts
 from ..results.results import read
 from ..results.verdicts import identity_lines
 from ..spec.outline import StudyOutline, sources_of
-from ..spec.spec import Spec
 from ..spec.toml import dumps
 from ..store.schema import RESULTS_VERSION
 from ..store.store import Store
@@ -60,12 +57,6 @@ def page(directory: Path) -> str:
         complete=counts["done"] == len(trials),
         notes=notes,
         table=tabulate(analysis.table),
-        claims=[
-            (finding.claim, finding.result, finding.verdict)
-            for finding in judge({outline.study: results} if _decides(outline) else {})
-            if finding.claim.study == outline.study and finding.measured is not None
-        ],
-        claimed=outline.study in STUDIES_OF_CLAIMS,
         pictures=pictures(figures),
         replays=packed,
         topologies=words.topologies(outline),
@@ -78,13 +69,6 @@ def page(directory: Path) -> str:
         js=_own("page.js"),
         replay_js=Markup(packed.script),
     )
-
-
-def _decides(outline: StudyOutline) -> bool:
-    """Return whether a study is the one that claims of the paper rest on, seeds and all."""
-    name = outline.study.replace("-", "_")
-    own = outline.study in STUDIES_OF_CLAIMS and Spec.load(SPECS / name / f"{name}.toml").table()
-    return bool(json.loads(json.dumps(own)) == outline.table)
 
 
 @cache

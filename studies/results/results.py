@@ -19,7 +19,7 @@ from ...core.plugins.deferred import pd
 from ..store.reading import NamesAndRows
 from ..store.schema import EVALUATION
 from ..store.store import Store
-from .numbers import NUMBERS
+from .numbers import EPISODE_COLUMNS, NUMBERS, TRIAL_COLUMNS
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -30,23 +30,6 @@ SECONDS = "seconds."
 """With what the columns of the seconds of a trial's parts begin."""
 DONE = "done"
 """State of a trial that has finished."""
-EPISODE_COLUMNS = {
-    "condition": ("", "label of the condition"),
-    "seed": ("1", "seed of the trial"),
-    "phase": ("", "training, evaluation, training:STAGE or evaluation:NAME"),
-    "episode": ("1", "number of the episode in its phase, from 0"),
-    "steps": ("1", "decisions until the episode ended"),
-    "return": ("1", "sum of the rewards, not discounted; mean over agents"),
-}
-"""Units and meaning of the columns of episodes that every scenario has."""
-TRIAL_COLUMNS = {
-    "condition": ("", "label of the condition"),
-    "seed": ("1", "seed of the trial"),
-    "state": ("", "done or failed"),
-    "identity": ("", "hash of all that the trial consists of"),
-    "error": ("", "last line of the traceback, if it failed"),
-}
-"""The same of trials."""
 
 
 @dataclass(frozen=True, eq=False)

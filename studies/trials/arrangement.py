@@ -74,10 +74,17 @@ def arrange(settings: ConditionSettings, seed: int) -> Arrangement:
     scenario, hierarchy = settings.arrange(world)
     check_prediction(settings.learner, scenario)
     learner, source = settings.learner, policy_seed(seed)
+    failures = settings.topology.failures
     if isinstance(learner, LearnerSettings):
-        team: Actors = Team(learner, scenario, hierarchy, source, settings.topology.failures)
+        team: Actors = Team(learner, scenario, hierarchy, source, failures)
+    elif learner.uses_hierarchy and failures:
+        raise ValueError(
+            f"topology.failures: messages of learner.kind = {learner.kind!r} cannot fail, "
+            "those of agents with rule bases can"
+        )
     else:
-        team = learner.build(scenario, source)
+        hierarchies = (hierarchy,) if learner.uses_hierarchy else ()
+        team = learner.build(scenario, source, *hierarchies)
     return Arrangement(world, scenario, team)
 
 

@@ -17,8 +17,11 @@ from ..store.reading import Reading
 
 PACKAGE = Path(__file__).parents[2]
 """Where the package is installed."""
-COMPUTING = ("core", "topologies", "scenarios", "studies/trials", "studies/catalogue")
-"""Folders whose modules compute results."""
+COMPUTING = (
+    "core/**/*.py", "topologies/**/*.py", "scenarios/**/*.py", "scenarios/**/*.toml",
+    "studies/trials/**/*.py", "studies/catalogue/**/*.py",
+)  # fmt: skip
+"""Modules that compute results, and what they are given."""
 SILENT = ("checking", "pictures", "environments.py", "figure.py", "drawing.py")
 """Parts of them that do not."""
 GROUPS = "nested_agents."
@@ -31,8 +34,8 @@ Code = dict[str, tuple[str, str]]
 def modules() -> dict[str, str]:
     """Return the text of every module that computes results, by its path in its package."""
     texts = {}
-    for folder in COMPUTING:
-        for path in sorted((PACKAGE / folder).rglob("*.py")):
+    for pattern in COMPUTING:
+        for path in sorted(PACKAGE.glob(pattern)):
             name = path.relative_to(PACKAGE).as_posix()
             if not set(name.split("/")) & set(SILENT):
                 texts[name] = path.read_text(encoding="utf-8")

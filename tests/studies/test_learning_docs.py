@@ -43,7 +43,7 @@ def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixtu
 
 def test_the_planner(capsys: pytest.CaptureFixture[str]) -> None:
     path = str(claims.PUBLISHED / "controls.json")
-    choice = ["--where", "preset == planner", "--columns", "evaluation success"]
+    choice = ["--where", "preset == 'planner'", "--columns", "evaluation success"]
     assert main(["table", path, *choice, "--format", "markdown"]) == 0
     assert capsys.readouterr().out in PAGE.read_text(encoding="utf-8")
 

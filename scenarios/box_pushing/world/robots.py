@@ -5,19 +5,21 @@ counter-clockwise. A wheel is a soft velocity servo on a sticky ground: where it
 it pulls the body with `stiffness` times the difference between its own speed and the body's
 forward speed there, and resists sideways motion with `lateral_stiffness`; both together never
 exceed its traction limit (the friction circle), see `box_pushing.world.wheels`. A further
-robot is one line in `ROBOTS`; a spec may also describe one.
+robot is one table in ``robots.toml``; a spec may also describe one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import tomllib
 from math import radians
+from pathlib import Path
 
 import numpy as np
 
 from ....core.numerics.arrays import FloatArray
 from ....core.plugins.messages import closest
-from .settings import RobotSettings, WheelSettings
+from ....core.plugins.settings import tuples
+from .settings import RobotSettings
 
 E_PUCK_SENSORS = tuple(radians(a) for a in (-17.2, -45.9, -90.0, -151.5, 151.2, 90.0, 45.9, 17.2))
 """Directions of the e-puck's proximity sensors ps0 to ps7 [rad], clockwise from the front right.
@@ -68,52 +70,9 @@ def nominal_effect(robot: RobotSettings) -> FloatArray:
     return np.hstack([compliance(robot) @ drive, constant])
 
 
-_LEFT = 0.053 / 2  # half the axle
-# Two robots that share a box of 0.8 N ground friction slip 3 cm/s; one alone keeps half its speed.
-_TOTAL_STIFFNESS = 13.0
+_TABLES = tuples(tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")))
 
-
-Places = Mapping[str, tuple[float, float]]
-
-
-def _robot(name: str, places: Places, **quantities: float) -> RobotSettings:
-    wheels = tuple(WheelSettings(name=wheel, x=x, y=y) for wheel, (x, y) in places.items())
-    return RobotSettings(name=name, wheels=wheels, **quantities)
-
-
-def _skid_steer(name: str, places: Places) -> RobotSettings:
-    """Return a robot of the e-puck's body and drive, shared by more wheels; not a real one."""
-    stiffness = _TOTAL_STIFFNESS / len(places)
-    # A wheel that turns about its contact grips alike in all directions.
-    return _robot(name, places, stiffness=stiffness, lateral_stiffness=stiffness)
-
-
-ROBOTS: dict[str, RobotSettings] = {
-    str(robot.name): robot
-    for robot in (
-        # Radius, axle, speed, mass and sensors: Mondada et al. 2009, The e-puck, a robot designed
-        # for education in engineering.
-        _robot("e-puck", {"left": (0.0, _LEFT), "right": (0.0, -_LEFT)}),
-        _skid_steer(
-            "three-wheel", {"left": (0.01, _LEFT), "right": (0.01, -_LEFT), "rear": (-0.02, 0.0)}
-        ),
-        _skid_steer(
-            "four-wheel",
-            {
-                "front-left": (0.018, _LEFT), "front-right": (0.018, -_LEFT),
-                "rear-left": (-0.018, _LEFT), "rear-right": (-0.018, -_LEFT),
-            },
-        ),
-        _skid_steer(
-            "six-wheel",
-            {
-                "front-left": (0.022, _LEFT), "front-right": (0.022, -_LEFT),
-                "middle-left": (0.0, _LEFT), "middle-right": (0.0, -_LEFT),
-                "rear-left": (-0.022, _LEFT), "rear-right": (-0.022, -_LEFT),
-            },
-        ),
-    )
-}  # fmt: skip
+ROBOTS = {name: RobotSettings(name=name, **table) for name, table in _TABLES.items()}
 """Robots by the name that specs use."""
 
 

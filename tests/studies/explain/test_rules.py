@@ -7,7 +7,7 @@ from nested_agents.core.interface.spaces import Variable
 from nested_agents.core.rules.kernels.fuzzy import Partition
 from nested_agents.core.rules.rule_base import RuleBase
 from nested_agents.studies.explain import rules as explain_rules
-from nested_agents.studies.explain.rules import labels, strongest_pairs, take_apart
+from nested_agents.studies.explain.rules import labels, take_apart
 
 PARTITIONS = [
     Partition((0.0, 1.0), "triangular"),
@@ -35,16 +35,13 @@ def corners():
     return np.array(list(product(*(p.centres for p in PARTITIONS))))
 
 
-@pytest.mark.parametrize("orders", [(1,), (2,), (1, 2)])
-def test_the_parts_add_up_to_f(orders):
-    rules = base(*orders)
+def test_the_parts_add_up_to_f():
+    rules = base(1)
     theta = theta_for(rules)
     parts = take_apart(rules, theta)
     states = np.random.default_rng(1).uniform(-1, 2, size=(50, 4))
     strengths = [p.strengths(states[:, j]) for j, p in enumerate(PARTITIONS)]
     f = parts.constant + sum(s @ g for s, g in zip(strengths, parts.singles, strict=True))
-    for (j, k), h in parts.pairs.items():
-        f = f + np.einsum("mi,mk,ik->m", strengths[j], strengths[k], h)
     assert np.allclose(f, rules.values(theta, states), atol=1e-12)
     assert parts.rest == pytest.approx(0.0, abs=1e-12)
 
@@ -60,17 +57,7 @@ def test_variance_and_functions_of_one_variable_are_those_of_all_rules(orders):
     for j, single in enumerate(parts.singles):
         others = tuple(i for i in range(4) if i != j)
         assert np.allclose(single, f.mean(axis=others) - f.mean(), atol=1e-12)
-    assert (parts.rest > 0.05) == (max(orders) > 2)
-
-
-def test_strongest_pairs_come_first_and_none_of_nothing():
-    rules = base(2)
-    begin = dict(zip(rules.terms, np.cumsum([0, *rules.sizes]), strict=False))
-    theta = np.zeros(rules.n_rules)
-    theta[begin[1, 2]], theta[begin[0, 3]] = 1.0, 5.0
-    assert strongest_pairs([take_apart(rules, theta)], 3) == [(0, 3), (1, 2)]
-    nothing = take_apart(rules, np.zeros(rules.n_rules))
-    assert (strongest_pairs([nothing]), nothing.rest) == ([], 0.0)
+    assert (parts.rest > 0.05) == (max(orders) > 1)
 
 
 def test_words_for_membership_functions():
@@ -91,23 +78,17 @@ def test_rules_in_words():
     theta[:, 2:5] = [[0.02, 0.0, -0.02], [0.04, 0.0, -0.04]]
     parts = [take_apart(rules, row) for row in theta]
     agents = ["robot1.left", "robot1.front-right"]
-    lines = list(explain_rules.table(rules, VARIABLES, agents, parts))
-    assert [line.split() for line in lines[:3]] == [
-        ["robot1"],
-        ["robot1", "front-"],
-        ["left", "right"],
-    ]
-    assert lines[3].split() == ["gap,", "share", "of", "the", "variance", "100", "%", "100", "%"]
-    assert lines[4].split() == ["IF", "gap", "is", "touching", "0", "m", "THEN", "+2.00", "+4.00"]
-    assert lines[6].split() == ["IF", "gap", "is", "far", "1", "m", "THEN", "-2.00", "-4.00"]
-    assert max(map(len, lines)) <= 80
+    lines = explain_rules.table(rules, VARIABLES, agents, parts).splitlines()
+    assert [line.split() for line in lines[:2]] == [["robot1", "robot1"], ["left", "front-right"]]
+    assert lines[2].split() == ["gap,", "share", "of", "the", "variance", "100", "%", "100", "%"]
+    assert lines[3].split() == ["IF", "gap", "is", "touching,", "0", "m:", "+2.00", "+4.00"]
+    assert lines[5].split() == ["IF", "gap", "is", "far,", "1", "m:", "-2.00", "-4.00"]
 
 
 def test_many_agents_stand_in_blocks():
     rules = base(1)
     parts = [take_apart(rules, theta_for(rules))] * 12
     names = [f"robot{i}.middle-right" for i in range(12)]
-    lines = list(explain_rules.table(rules, VARIABLES, names, parts))
-    assert max(map(len, lines)) <= 80
-    assert sum(line.count("+") + line.count("-0") for line in lines) >= 12 * 6
-    assert all(sum(name.split(".")[0] in line for line in lines) for name in names)
+    table = explain_rules.table(rules, VARIABLES, names, parts)
+    assert max(len(line.rstrip()) for line in table.splitlines()) <= 80
+    assert table.count("robot") == 12

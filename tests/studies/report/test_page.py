@@ -38,21 +38,6 @@ def test_a_finished_study_has_everything(finished):
     assert len(html) < 500_000
 
 
-def test_only_the_study_that_claims_rest_on_has_verdicts(finished, tmp_path, monkeypatch):
-    refers = "This study decides no claim of the paper; the published rows do"
-    assert refers in page(finished)
-    folder = tmp_path / "learning_curve"
-    folder.mkdir()
-    shutil.copy(finished / "study.toml", folder / "learning_curve.toml")
-    monkeypatch.setattr("nested_agents.studies.report.page.SPECS", tmp_path)
-    html = page(finished)
-    claims = html[html.index('<section id="claims"') : html.index('<section id="figures"')]
-    assert "wheels learn over epochs to push the box to the goal<small>IX-A, Fig. 5b" in claims
-    assert claims.count("<strong>not decided</strong>") == claims.count("<strong>") > 0
-    assert "the shape of the box is indifferent" not in claims
-    assert refers not in html
-
-
 def test_equal_results_give_equal_bytes_wherever_they_are(finished, tmp_path):
     copy = shutil.copytree(finished, tmp_path / "elsewhere")
     html = page(finished)
