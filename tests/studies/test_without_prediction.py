@@ -62,9 +62,7 @@ def test_learners_that_need_predictions_are_refused_before_any_trial(
     assert [path.name for path in spec.parent.iterdir() if path.is_dir()] == []
 
 
-def test_the_random_act_without_predictions(
-    spec: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_random_act_without_predictions(spec: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (trial,) = trials_of(Spec.load(spec, ['preset="random"']))
     assert [row.steps for row in run_trial(trial).rows] == [3, 3, 3]
     assert main(["check", str(spec), "--set", 'preset="random"']) == 0
