@@ -77,6 +77,10 @@ TOPOLOGIES = SettingsRegistry(
         "file": f"{__name__}:from_file",
     },
     TopologySettings,
+    moved={
+        "single-agent": "who the agents are has a key of its own: agents = 'team'",
+        "per-robot": "who the agents are has a key of its own: agents = 'body', topology = 'chain'",
+    },
 )
 """Topologies by name."""
 
@@ -108,6 +112,8 @@ def parse(text: str | Mapping[str, Any]) -> TopologySettings:
     try:
         if kind in TOPOLOGIES.built_in:
             return _made(kind, _arguments(kind, argument) if colon else {})
+        if kind in TOPOLOGIES.moved:
+            raise ValueError(TOPOLOGIES.moved[kind])
         if sources.is_file(text):
             return _made("file", {"path": text})
         if sources.is_reference(text) or text in TOPOLOGIES.installed():

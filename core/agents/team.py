@@ -19,6 +19,7 @@ from ..interface.acting import Actors
 from ..interface.hierarchy import Hierarchy
 from ..interface.prediction import NOT_EXPLORING, Prediction
 from ..interface.scenario import EmbodiedScenario, Scenario, Transition, groups_of
+from ..learners import check_prediction
 from ..learners.batch import ReplaySettings
 from ..learners.learner import Learner, LearnerSettings
 from ..numerics.arrays import FloatArray, IntArray
@@ -68,8 +69,8 @@ class Team:
     Raises
     ------
     ValueError
-        If the hierarchy is over other agents than the scenario's, or the settings do not fit its
-        state space.
+        If the hierarchy is over other agents than the scenario's, the settings do not fit its state
+        space, or need a prediction that it has not.
     """
 
     def __init__(
@@ -87,6 +88,7 @@ class Team:
                 f"topology: agents {', '.join(hierarchy.agents)} are not the scenario's "
                 f"{', '.join(scenario.agents)}"
             )
+        check_prediction(settings, scenario)
         self.hierarchy, self.action_set = hierarchy, scenario.action_set
         n, n_actions = len(hierarchy), len(scenario.action_set)
         self.self_model = _self_model_of(scenario, settings)
@@ -165,20 +167,23 @@ class Team:
         self.explorer.begin_episode()
         self.learner.begin_episode()
 
-    def predict(self, scenario: Scenario, states: FloatArray | None = None) -> Prediction:
+    def predict(self, scenario: Scenario, states: FloatArray | None = None) -> Any:
         """Predict from the scenario's present state, by what has been learned of it.
 
-        The agents' `states` ``(n, d)`` are needed by learners and evaluators that ask for them.
+        The agents' `states` ``(n, d)`` are needed by learners and evaluators that ask for them. The
+        prediction is None in a scenario that has none, where the agents act at random.
         """
         if states is not None:
             self._states = states
+        if not hasattr(scenario, "predict"):
+            return None
         if self.self_model is None and self.calibration is None:
             return scenario.predict()
         embodied = cast(EmbodiedScenario, scenario)
         effects = self.self_model.effects if self.self_model else embodied.nominal_effects
         if self.calibration is None:
-            return cast(Prediction, embodied.predict_with(effects))
-        return cast(Prediction, embodied.predict_with(effects, self.calibration.constants))
+            return embodied.predict_with(effects)
+        return embodied.predict_with(effects, self.calibration.constants)
 
     def act(self, prediction: Prediction, *, explore: bool = True) -> IntArray:
         """Decide a joint action ``(n,)``, from the top of the hierarchy down.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Literal, Protocol
+from typing import Annotated, ClassVar, Literal, Protocol
 
 from pydantic import Field
 
@@ -68,6 +68,17 @@ class TeamSettings(PartSettings):
     whoever acts for all by itself are built as they are, see `core.policies`.
     """
 
+    uses_hierarchy: ClassVar[bool] = False
+    """Whether those who act pass actions down a hierarchy, which `build` is then given last."""
+
+    discount: Annotated[float, Field(ge=0, lt=1)] = 0.95
+    """Discount per decision, gamma of Eq. 7."""
+
+    @property
+    def needs_prediction(self) -> bool:
+        """Whether it acts only in scenarios that predict, see `core.interface.scenario`."""
+        return False
+
 
 class LearnerSettings(TeamSettings):
     """What the settings of all learners share.
@@ -76,10 +87,10 @@ class LearnerSettings(TeamSettings):
     base and the row of weights of every agent ``(n,)``; all rows are somebody's.
     """
 
+    uses_hierarchy = True
+
     rule_base: RuleBaseSettings = RuleBaseSettings()
     """Fuzzy rule base of every agent."""
-    discount: Annotated[float, Field(ge=0, lt=1)] = 0.95
-    """Discount per decision, gamma of Eq. 7."""
     weights: Literal["own", "role"] = "own"
     """Whether every agent has consequent weights of its own, or all agents of one role (the left
     wheels, say) share them and pool their experience."""
@@ -91,3 +102,8 @@ class LearnerSettings(TeamSettings):
     """What robots learn of their own wheels."""
     calibration: CalibrationSettings = CalibrationSettings()
     """What the team learns of the constants of its predictor."""
+
+    @property
+    def needs_prediction(self) -> bool:
+        """Whether it acts only in scenarios that predict: unless it acts at random."""
+        return self.decision.rule != "random"

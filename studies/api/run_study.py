@@ -19,7 +19,7 @@ from ..trials.keeping import open_to_run, pending
 from ..trials.trial import trials_of
 from ..workers.runner import Observer, run_trials
 from ..workers.worker import RunTrial
-from ..workers.workers import start_workers
+from ..workers.workers import Backend, start_workers
 
 
 @contextmanager
@@ -28,6 +28,7 @@ def run_study(
     directory: Path,
     *,
     jobs: int | None = None,
+    backend: Backend = "loky",
     address: str | None = None,
     retry_failed: bool = False,
     accept_code: bool = False,
@@ -41,7 +42,7 @@ def run_study(
         The study.
     directory
         Where it is kept; made if it does not exist.
-    jobs, address
+    jobs, backend, address
         Who runs the trials, see `start_workers`.
     retry_failed
         Whether failed trials are run again.
@@ -65,7 +66,7 @@ def run_study(
     observer = observer or Observer()
     measures, trials = examine(spec), trials_of(spec)
     with (
-        start_workers(jobs, address, len(trials)) as workers,
+        start_workers(backend, jobs, address, len(trials)) as workers,
         open_to_run(directory, spec, trials, measures, accept_code=accept_code) as store,
     ):
         if retry_failed:

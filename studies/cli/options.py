@@ -66,11 +66,20 @@ jobs = click.option(
 )
 """Number of worker processes."""
 
+backend = click.option(
+    "--backend",
+    type=click.Choice(["loky", "dask"]),
+    default="loky",
+    help="Who runs the trials: loky, processes of this machine, or dask, workers of a Dask cluster "
+    "(extra nested-agents[dask]). The results are the same.",
+)
+"""Kind of workers, see `nested_agents.studies.workers.workers`."""
+
 address = click.option(
     "--address",
     metavar="tcp://HOST:PORT",
-    help="Of the scheduler of a running Dask cluster, whose workers run the trials, all of them "
-    "unless --jobs says otherwise (extra nested-agents[dask]). The results are the same.",
+    help="Of the scheduler of a running Dask cluster, all of whose workers are used unless --jobs "
+    "says otherwise. If missing, a cluster is started here.",
 )
 """Of a Dask scheduler."""
 

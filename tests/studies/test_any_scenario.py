@@ -247,9 +247,9 @@ class Half:
     def __init__(self, settings):
         whole = LineUp(LineUpSettings())
         self.agents, self.action_set = whole.agents, whole.action_set
-        self.state_space, self.reset, self.step = whole.state_space, whole.reset, whole.step
+        self.state_space, self.reset = whole.state_space, whole.reset
 """)
     (tmp_path / "half.toml").write_text('scenario.kind = "half.py:Half"\n')
     assert main(["run", str(tmp_path / "half.toml"), "--out", str(tmp_path / "out")]) == 2
-    assert "error: scenario.kind: Half lacks predict\n" in capsys.readouterr().err
+    assert "error: scenario.kind: Half lacks step\n" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()

@@ -103,6 +103,10 @@ REFUSED = {
     "nothing.py:f": "topology 'nothing.py:f': nothing.py: No such file or directory",
     "chian": "topology 'chian': did you mean 'chain'? known: chain, coordination-graph, edges,",
     "": "topology '': known: chain,",
+    "single-agent": "topology 'single-agent': who the agents are has a key of its own: "
+    "agents = 'team'",
+    "per-robot": "topology 'per-robot': who the agents are has a key of its own: agents = 'body', "
+    "topology = 'chain'",
 }
 
 

@@ -6,18 +6,21 @@ from pathlib import Path
 
 import click
 
+from ...workers.workers import Backend
 from .. import options
 
 
 @click.command()
 @options.directory
 @options.jobs
+@options.backend
 @options.address
 @options.accept_code
 @options.trust
 def command(
     directory: Path,
     jobs: int | None,
+    backend: Backend,
     address: str | None,
     accept_code: bool,
     trust: bool,
@@ -38,7 +41,7 @@ def command(
     with Store.open(directory) as store:
         spec = spec_of(store)
     study = run(
-        spec, directory, jobs=jobs, address=address, retry_failed=True,
+        spec, directory, jobs=jobs, backend=backend, address=address, retry_failed=True,
         accept_code=accept_code, observer=Terminal(),
     )  # fmt: skip
     return show_results(study)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from ...workers.workers import Backend
 from .. import options
 
 
@@ -20,6 +21,7 @@ from .. import options
     "finishes, so interrupting costs only those that are running.",
 )
 @options.jobs
+@options.backend
 @options.address
 @options.accept_code
 @options.trust
@@ -29,6 +31,7 @@ def command(
     spec: Path,
     out: Path,
     jobs: int | None,
+    backend: Backend,
     address: str | None,
     accept_code: bool,
     trust: bool,
@@ -60,7 +63,7 @@ def command(
             "on by the database"
         ) from None
     study = run(
-        given, out, jobs=jobs, address=address, accept_code=accept_code,
+        given, out, jobs=jobs, backend=backend, address=address, accept_code=accept_code,
         observer=Terminal(),
     )  # fmt: skip
     return show_results(study, figures)
