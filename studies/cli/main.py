@@ -29,6 +29,7 @@ COMMANDS: dict[str, str] = {
     "table": "Print the results of a study: conditions against estimates.",
     "compare": "Compare conditions of one study or several, seed by seed.",
     "results": "Print what every episode of a study measured.",
+    "watch": "Watch a study while it runs: trials, curves, failures.",
     "status": "Tell how far a study is, what failed, and how long is left.",
     "retry": "Run the failed trials of a study again.",
     "export": "Write what a study holds as files for other programs.",
