@@ -25,10 +25,12 @@ PROGRAM = "nested-agents"
 COMMANDS: dict[str, str] = {
     "demo": "Train two e-Pucks to push a box: table, figures and replay.",
     "run": "Run the study of a spec, or continue it.",
+    "tune": "Look for better settings of a spec, on seeds that are not reported.",
     "plan": "Tell what a study will take, and what it can find.",
     "table": "Print the results of a study: conditions against estimates.",
     "compare": "Compare conditions of one study or several, seed by seed.",
     "results": "Print what every episode of a study measured.",
+    "watch": "Watch a study while it runs: trials, curves, failures.",
     "status": "Tell how far a study is, what failed, and how long is left.",
     "retry": "Run the failed trials of a study again.",
     "export": "Write what a study holds as files for other programs.",

@@ -2,6 +2,7 @@
 
 import csv
 import io
+import json
 from contextlib import redirect_stdout
 
 import made_up
@@ -113,12 +114,15 @@ def test_rows_in_every_form(study, monkeypatch):
     ]  # fmt: skip
     assert {row["spread_m"] for row in rows if row["condition"] == "1"} == {""}
     assert {row["level"] for row in rows if row["condition"] == "2"} <= {"0", "1"}
+    items = json.loads(said("results", study, "--format", "json"))
+    assert {item["level"] for item in items if item["condition"] == "1"} == {None}
+    assert all(type(item["level"]) is bool for item in items if item["condition"] == "2")
     lines = said("results", study).splitlines()
     assert any("greatest" in line for line in lines)
     assert max(map(len, lines)) <= 80
     monkeypatch.setenv("COLUMNS", "40")
     narrow = said("results", study).splitlines()
-    assert max(map(len, narrow)) <= 50  # no heading is broken
+    assert max(map(len, narrow)) <= 40
 
 
 def test_frames_hold_what_is_missing_as_missing_in_files_too(study, tmp_path):

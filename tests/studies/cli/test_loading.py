@@ -1,15 +1,19 @@
-"""Results are read without running again: commands, with made-up results."""
+"""Results are read and watched without running again: commands, with made-up results."""
 
 import os
 import shutil
+import sqlite3
 import subprocess
 import sys
+from contextlib import closing
 
 import made_up
 import pytest
 from made_up_commands import run_here
+from rich.console import Console
 
 from nested_agents.studies.cli.main import main
+from nested_agents.studies.cli.watching import curve, frame
 from nested_agents.studies.spec.toml import dumps
 
 
@@ -64,7 +68,50 @@ def test_conditions_are_compared_in_every_form(study, capsys) -> None:
     assert (status, "is named more than once" in errors) == (2, True)
 
 
-READING = ["results", "table", "compare", "status", "export", "report"]
+def test_watching_shows_trials_curves_and_failures(study, capsys, monkeypatch) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    status, printed, _ = said_by(capsys, "watch", study[0], "--once")
+    assert status == 0
+    assert said_by(capsys, "status", study[0])[1].startswith(printed.partition("left ")[0])
+    assert "done     5 of 6 trials" in printed
+    assert "failed: frozen, seed 1: RuntimeError: a wheel came off" in printed
+    assert any(block in printed for block in "▁▂▃▄▅▆▇█")
+    assert max(map(len, printed.splitlines())) <= 80
+    assert said_by(capsys, "watch", study[0], "--every", "0")[0] == 2
+
+
+@pytest.mark.parametrize("what", ["a row altered", "a row deleted", "a recording deleted"])
+def test_watching_says_of_damage_what_status_says_and_draws_none(
+    study, tmp_path, capsys, monkeypatch, what
+) -> None:
+    monkeypatch.setenv("COLUMNS", "400")
+    out = tmp_path / "out"
+    shutil.copytree(study[0], out)
+    if what == "a recording deleted":
+        next((out / "recordings").glob("*.npz")).unlink()
+    else:
+        change = "DELETE FROM" if what == "a row deleted" else "UPDATE"
+        change += " episodes" + " SET steps = steps + 1" * (change == "UPDATE")
+        one = "identity = (SELECT min(identity) FROM episodes) AND phase = 'training'"
+        with closing(sqlite3.connect(out / "results.sqlite")) as connection, connection:
+            connection.execute(f"{change} WHERE {one} AND episode = 0")
+    lines = said_by(capsys, "status", out)[1].splitlines()
+    (warning,) = [line for line in lines if "must run again" in line]
+    status, printed, _ = said_by(capsys, "watch", out)
+    assert status == 0
+    assert warning in printed
+    assert not any(block in printed for block in "▁▂▃▄▅▆▇█")
+    assert not frame(out)[1]
+
+
+def test_watching_ends_when_nothing_is_to_come(study) -> None:
+    shown, is_going_on = frame(study[0])
+    assert not is_going_on
+    assert Console(width=60, record=True).render_lines(shown)
+    assert curve([0.0] * 100) == "▁" * 24
+
+
+READING = ["results", "table", "compare", "status", "watch", "export", "report"]
 
 
 @pytest.mark.parametrize("command", READING)
@@ -74,11 +121,12 @@ def test_a_database_of_another_study_is_noted_by_all_that_read_it(
     monkeypatch.setenv("COLUMNS", "400")
     own = tmp_path / "own"
     shutil.copytree(study[0], own)
-    said_by(capsys, command, own)
-    assert "is not the spec" not in " ".join(said_by(capsys, command, own)[1:])
+    once = ["--once"] if command == "watch" else []
+    said_by(capsys, command, own, *once)
+    assert "is not the spec" not in " ".join(said_by(capsys, command, own, *once)[1:])
     text = (own / "study.toml").read_text()
     (own / "study.toml").write_text(text.replace("steps = 5", "steps = 6"))
-    said = " ".join(" ".join(said_by(capsys, command, own)[1:]).split())
+    said = " ".join(" ".join(said_by(capsys, command, own, *once)[1:]).split())
     assert "study.toml: is not the spec of results.sqlite beside it, whose results these" in said
     assert "steps = 6 here, 5 there" in said
 
@@ -98,7 +146,7 @@ def test_a_copy_of_the_spec_that_means_the_same_is_not_noted(study, tmp_path, ca
 @pytest.mark.parametrize(
     ("command", "encoding"),
     [
-        *[(command, "ascii") for command in ("table", "results", "compare")],
+        *[(command, "ascii") for command in ("table", "watch", "results", "compare")],
         *[("table", encoding) for encoding in ("latin-1", "utf-8")],
     ],
 )
@@ -111,7 +159,7 @@ def test_what_a_terminal_cannot_write_has_a_sign_in_its_place(study, command, en
         assert ("0–" if encoding == "utf-8" else "0-") in done.stdout.decode(encoding)
 
 
-@pytest.mark.parametrize("command", ["table", "results"])
+@pytest.mark.parametrize("command", ["table", "watch", "results"])
 def test_a_reader_that_goes_away_is_told_by_the_status(study, command) -> None:
     reading, writing = os.pipe()
     os.close(reading)

@@ -105,10 +105,11 @@ def test_what_other_code_has_done_is_done(study, monkeypatch, capsys):
 
 def test_a_study_of_another_version_is_refused(study, monkeypatch, capsys):
     monkeypatch.setattr(integrity, "RESULTS_VERSION", 99)
-    assert main(["status", str(study)]) == 2
-    error = capsys.readouterr().err
-    assert "this is version 99; an older nested-agents reads it" in error
-    assert error.count("\n") == 1
+    for command in (["status"], ["watch", "--once"]):
+        assert main([*command, str(study)]) == 2
+        error = capsys.readouterr().err
+        assert "this is version 99; an older nested-agents reads it" in error
+        assert error.count("\n") == 1
 
 
 @pytest.mark.parametrize(
