@@ -18,11 +18,9 @@ from ..interface.acting import Actors
 from ..interface.hierarchy import Hierarchy
 from ..interface.prediction import Prediction
 from ..interface.scenario import EmbodiedScenario, Scenario, Transition, groups_of
-from ..learners.batch import ReplaySettings
 from ..learners.learner import Learner, LearnerSettings
 from ..numerics.arrays import FloatArray, IntArray
 from ..numerics.ties import greatest
-from ..rules.rule_base import RuleBase
 from .messages import MessageFailure, Messages
 from .rows import rows_of
 
@@ -90,11 +88,20 @@ class Team:
         n, n_actions = len(hierarchy), len(scenario.action_set)
         self.self_model = _self_model_of(scenario, settings)
         self.calibration = _calibration_of(scenario, settings)
-        is_mirrored = isinstance(settings, ReplaySettings) and settings.mirrored
-        self.mirror = Mirror.of(scenario) if is_mirrored else None
+        self.mirror = Mirror.of(scenario) if getattr(settings, "mirrored", False) else None
         self.rows = rows_of(scenario, shared=settings.weights == "role")
         rows = self.rows if self.mirror is None else self.mirror.rows(self.rows)
-        rules = RuleBase.build(scenario.state_space, settings.rule_base)
+        self.messages = Messages(hierarchy, failures, n_actions)
+        told = self.messages.told if settings.values_actions else []
+        if settings.values_actions and hierarchy.neighbours:
+            raise ValueError(
+                f"learner.kind = {settings.kind!r}: agents make use of what they are told alone, "
+                "and neighbours tell nothing; set topology.oriented, in which order they decide"
+            )
+        self._senders = [sorted(senders, key=hierarchy.order.index) for senders in told]
+        """Per agent those whose actions are part of its state, in the order of decision."""
+        n_told = max(map(len, self._senders), default=0)
+        self.space, rules = settings.rules_over(scenario.state_space, scenario.action_set, n_told)
         self.learner: Learner = settings.build(rules, rows)
         self._asked = signature(self.learner.observe).parameters.keys() & {"left", "joint_action"}
         self._states: FloatArray = np.zeros((len(hierarchy), scenario.state_space.n_variables))
@@ -115,13 +122,13 @@ class Team:
                 decision.plan,
                 handed_down=hierarchy.told == "ancestors" and not failures,
             )
-            self.evaluator = decision.evaluator.build(problem)
+            own: Any = self.learner
+            self.evaluator = own if settings.values_actions else decision.evaluator.build(problem)
         self.explorer: Explorer = settings.exploration.build(n)
         self.rng = np.random.Generator(np.random.PCG64(seed))
         self.seen: FloatArray = np.ones((n, n_actions))
         conditional = self.evaluator is not None and decision.teammates == "conditional"
         self.given: FloatArray = np.ones((n, n_actions) * 2 if conditional else (0, 0, 0, 0))
-        self.messages = Messages(hierarchy, failures, n_actions)
         self._unseen = decision.unseen
         # Those who are told all that was decided before, and consider all others.
         self._hears_all = {
@@ -186,7 +193,7 @@ class Team:
         is, apart from the random numbers that break ties.
         """
         n, n_actions = len(self.hierarchy), len(self.action_set)
-        self._left = self._states
+        self._left = self._with_told(self._states)
         if self.evaluator is None:
             self._last = self.rng.integers(n_actions, size=n)
             return self._last
@@ -196,9 +203,12 @@ class Team:
         joint = np.full(n, self.action_set.neutral)
         for i in self.hierarchy.order:
             senders, known = self._known(i, joint)
+            if self._senders:
+                told = known[self._senders[i]]
+                self._left[i, self._states.shape[1] :][: len(told)] = told
             deliberation = Deliberation(
                 i, known, prediction, weights, frequencies, self.rng, self._given_by(i), senders,
-                self._states,
+                self._left,
             )  # fmt: skip
             values = self.evaluator.values(deliberation)
             if len(values) != n_actions:
@@ -231,6 +241,14 @@ class Team:
         known = self._last.copy() if self._unseen == "last" else np.full_like(joint_action, neutral)
         known[senders] = actions
         return senders, known
+
+    def _with_told(self, states: FloatArray) -> FloatArray:
+        """Return states with a column for each action that an agent is told: as yet, nobody's."""
+        n_told = max(map(len, self._senders), default=0)
+        if not n_told:
+            return states
+        nobody = np.full((len(states), n_told), float(len(self.action_set)))
+        return np.hstack([states, nobody])
 
     def _given_by(self, agent: int) -> FloatArray:
         """Return how often all took each action ``(A, n, A)`` given each action of an agent."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Literal, Protocol
+from typing import Annotated, ClassVar, Literal, Protocol
 
 from pydantic import Field
 
@@ -11,9 +11,11 @@ from ..adaptation.calibration import CalibrationSettings
 from ..adaptation.self_model import SelfModelSettings
 from ..decision.exploration import EXPLORATIONS, BurstExploration, ExplorationSettings
 from ..decision.settings import Decision
+from ..interface.spaces import ActionSet, StateSpace
 from ..numerics.arrays import FloatArray
 from ..plugins.plugged import Plugged
 from ..plugins.settings import PartSettings
+from ..rules.rule_base import RuleBase
 from ..rules.settings import RuleBaseSettings
 
 
@@ -76,6 +78,10 @@ class LearnerSettings(TeamSettings):
     base and the row of weights of every agent ``(n,)``; all rows are somebody's.
     """
 
+    values_actions: ClassVar[bool] = False
+    """Whether the learner values an agent's own actions in its present state and given what it is
+    told, which takes no prediction: then it is the team's evaluator, too."""
+
     rule_base: RuleBaseSettings = RuleBaseSettings()
     """Fuzzy rule base of every agent."""
     discount: Annotated[float, Field(ge=0, lt=1)] = 0.95
@@ -91,3 +97,17 @@ class LearnerSettings(TeamSettings):
     """What robots learn of their own wheels."""
     calibration: CalibrationSettings = CalibrationSettings()
     """What the team learns of the constants of its predictor."""
+
+    def rules_over(
+        self, space: StateSpace, actions: ActionSet, n_told: int
+    ) -> tuple[StateSpace, RuleBase]:
+        """Return what values are functions of, and the agents' rule base over it.
+
+        Parameters
+        ----------
+        space, actions
+            Those of the scenario.
+        n_told
+            By how many others an agent is told what they decided, at most.
+        """
+        return space, RuleBase.build(space, self.rule_base)
