@@ -29,9 +29,9 @@ MOST_LEVELS = 100
 def read(path: str) -> nx.DiGraph | dict[str, Any]:
     """Read a graph, or a topology as it stands in a spec, from GraphML, JSON or TOML by suffix.
 
-    JSON and TOML hold ``{"edges": [["a", "b"], ...], "alone": [...]}``, or networkx's node-link
-    format; or a table with the key ``kind``, or of nested teams with the key ``members``, perhaps
-    under ``topology``. In GraphML an agent is named by its node's id.
+    JSON and TOML hold ``{"edges": [["a", "b"], ...], "alone": [...]}``; or a table with the key
+    ``kind``, or of nested teams with the key ``members``, perhaps under ``topology``. In GraphML an
+    agent is named by its node's id.
 
     Returns
     -------
@@ -155,17 +155,6 @@ def _check_members(members: Any, level: int = 1) -> None:
 def _graph_of(content: Any) -> nx.DiGraph:
     if not isinstance(content, dict):
         raise ValueError("it must be an object with the key edges")
-    if "nodes" in content:
-        key = "edges" if "edges" in content else "links"
-        for node in _list_of(content, "nodes"):
-            if not isinstance(node, dict) or "id" not in node:
-                raise ValueError(f"nodes: {shown(node)} must be an object with the key id")
-        for edge in _list_of(content, key):
-            if not isinstance(edge, dict) or not {"source", "target"} <= edge.keys():
-                raise ValueError(f"{key}: {shown(edge)} must be an object with source and target")
-            check_legible([edge["source"], edge["target"]])
-        check_legible(node["id"] for node in content["nodes"])
-        return nx.node_link_graph(content, directed=content.get("directed", True), edges=key)
     unknown = set(content) - {"edges", "alone"}
     if unknown or "edges" not in content:
         keys = ", ".join(map(shown, content)) or "none"

@@ -13,11 +13,13 @@ from ..adaptation.calibration import Calibration
 from ..adaptation.mirror import Mirror
 from ..adaptation.self_model import SelfModel
 from ..decision.exploration import Explorer
+from ..evaluators.best_response import BestResponse
 from ..evaluators.evaluator import NOTHING_GIVEN, DecisionProblem, Deliberation, Evaluator
 from ..interface.acting import Actors
 from ..interface.hierarchy import Hierarchy
-from ..interface.prediction import Prediction
+from ..interface.prediction import NOT_EXPLORING, Prediction
 from ..interface.scenario import EmbodiedScenario, Scenario, Transition, groups_of
+from ..learners import check_prediction
 from ..learners.learner import Learner, LearnerSettings
 from ..numerics.arrays import FloatArray, IntArray
 from ..numerics.ties import greatest
@@ -65,8 +67,8 @@ class Team:
     Raises
     ------
     ValueError
-        If the hierarchy is over other agents than the scenario's, or the settings do not fit its
-        state space.
+        If the hierarchy is over other agents than the scenario's, the settings do not fit its state
+        space, or need a prediction that it has not.
     """
 
     def __init__(
@@ -84,6 +86,7 @@ class Team:
                 f"topology: agents {', '.join(hierarchy.agents)} are not the scenario's "
                 f"{', '.join(scenario.agents)}"
             )
+        check_prediction(settings, scenario)
         self.hierarchy, self.action_set = hierarchy, scenario.action_set
         n, n_actions = len(hierarchy), len(scenario.action_set)
         self.self_model = _self_model_of(scenario, settings)
@@ -92,14 +95,8 @@ class Team:
         self.rows = rows_of(scenario, shared=settings.weights == "role")
         rows = self.rows if self.mirror is None else self.mirror.rows(self.rows)
         self.messages = Messages(hierarchy, failures, n_actions)
-        told = self.messages.told if settings.values_actions else []
-        if settings.values_actions and hierarchy.neighbours:
-            raise ValueError(
-                f"learner.kind = {settings.kind!r}: agents make use of what they are told alone, "
-                "and neighbours tell nothing; set topology.oriented, in which order they decide"
-            )
-        self._senders = [sorted(senders, key=hierarchy.order.index) for senders in told]
-        """Per agent those whose actions are part of its state, in the order of decision."""
+        self._values_actions = settings.values_actions
+        self._senders = _senders(settings, self.messages, hierarchy)
         n_told = max(map(len, self._senders), default=0)
         self.space, rules = settings.rules_over(scenario.state_space, scenario.action_set, n_told)
         self.learner: Learner = settings.build(rules, rows)
@@ -123,7 +120,7 @@ class Team:
                 handed_down=hierarchy.told == "ancestors" and not failures,
             )
             own: Any = self.learner
-            self.evaluator = own if settings.values_actions else decision.evaluator.build(problem)
+            self.evaluator = own if self._values_actions else decision.evaluator.build(problem)
         self.explorer: Explorer = settings.exploration.build(n)
         self.rng = np.random.Generator(np.random.PCG64(seed))
         self.seen: FloatArray = np.ones((n, n_actions))
@@ -171,20 +168,23 @@ class Team:
         self.explorer.begin_episode()
         self.learner.begin_episode()
 
-    def predict(self, scenario: Scenario, states: FloatArray | None = None) -> Prediction:
+    def predict(self, scenario: Scenario, states: FloatArray | None = None) -> Any:
         """Predict from the scenario's present state, by what has been learned of it.
 
-        The agents' `states` ``(n, d)`` are needed by learners and evaluators that ask for them.
+        The agents' `states` ``(n, d)`` are needed by learners and evaluators that ask for them. The
+        prediction is None in a scenario that has none, and of agents that value actions.
         """
         if states is not None:
             self._states = states
+        if self._values_actions or not hasattr(scenario, "predict"):
+            return None
         if self.self_model is None and self.calibration is None:
             return scenario.predict()
         embodied = cast(EmbodiedScenario, scenario)
         effects = self.self_model.effects if self.self_model else embodied.nominal_effects
         if self.calibration is None:
-            return cast(Prediction, embodied.predict_with(effects))
-        return cast(Prediction, embodied.predict_with(effects, self.calibration.constants))
+            return embodied.predict_with(effects)
+        return embodied.predict_with(effects, self.calibration.constants)
 
     def act(self, prediction: Prediction, *, explore: bool = True) -> IntArray:
         """Decide a joint action ``(n,)``, from the top of the hierarchy down.
@@ -192,14 +192,47 @@ class Team:
         Without `explore` every agent takes its greatest action and the team's memory stays as it
         is, apart from the random numbers that break ties.
         """
-        n, n_actions = len(self.hierarchy), len(self.action_set)
-        self._left = self._with_told(self._states)
+        n = len(self.hierarchy)
+        self._left = self._with_told()
         if self.evaluator is None:
-            self._last = self.rng.integers(n_actions, size=n)
+            self._last = self.rng.integers(len(self.action_set), size=n)
             return self._last
-        frequencies = self.seen / self.seen.sum(axis=1, keepdims=True)
         theta = self.learner.theta
         weights = [theta[row] for row in self.rows]
+        joint = self._at_once(self.evaluator, prediction, weights, explore)
+        if joint is None:
+            joint = self._in_order(self.evaluator, prediction, weights, explore)
+        self.messages.advance(joint)
+        self._last = joint
+        if explore:
+            self.explorer.advance()
+            every = np.arange(n)
+            self.seen[every, joint] += 1.0
+            if self.given.size:
+                self.given[every[:, None], joint[:, None], every, joint] += 1.0
+        return joint
+
+    def _at_once(
+        self, evaluator: Evaluator, prediction: Prediction, weights: list[FloatArray], explore: bool
+    ) -> IntArray | None:
+        """Return what all decide by one call of the evaluator, None if it takes one for each."""
+        exploring = getattr(self.explorer, "exploring", None) if explore else NOT_EXPLORING
+        n = len(self.hierarchy)
+        if not isinstance(evaluator, BestResponse) or exploring is None or len(self._hears_all) < n:
+            return None
+        joint = np.full(n, self.action_set.neutral)
+        first = Deliberation(
+            self.hierarchy.order[0], joint, prediction, weights, self.seen, self.rng,
+            present=self._states,
+        )  # fmt: skip
+        return evaluator.decide(first, exploring)
+
+    def _in_order(
+        self, evaluator: Evaluator, prediction: Prediction, weights: list[FloatArray], explore: bool
+    ) -> IntArray:
+        """Return what all decide, one agent after the other."""
+        n, n_actions = len(self.hierarchy), len(self.action_set)
+        frequencies = self.seen / self.seen.sum(axis=1, keepdims=True)
         joint = np.full(n, self.action_set.neutral)
         for i in self.hierarchy.order:
             senders, known = self._known(i, joint)
@@ -210,7 +243,7 @@ class Team:
                 i, known, prediction, weights, frequencies, self.rng, self._given_by(i), senders,
                 self._left,
             )  # fmt: skip
-            values = self.evaluator.values(deliberation)
+            values = evaluator.values(deliberation)
             if len(values) != n_actions:
                 raise ValueError(f"the evaluator gave {len(values)} values of {n_actions} actions")
             if explore:
@@ -219,14 +252,6 @@ class Team:
                 joint[i] = greatest(values, self.rng)
             if self.messages.is_absent(i):
                 joint[i] = self.action_set.neutral
-        self.messages.advance(joint)
-        self._last = joint
-        if explore:
-            self.explorer.advance()
-            every = np.arange(n)
-            self.seen[every, joint] += 1.0
-            if self.given.size:
-                self.given[every[:, None], joint[:, None], every, joint] += 1.0
         return joint
 
     def _known(self, agent: int, joint_action: IntArray) -> tuple[IntArray, IntArray]:
@@ -242,13 +267,13 @@ class Team:
         known[senders] = actions
         return senders, known
 
-    def _with_told(self, states: FloatArray) -> FloatArray:
-        """Return states with a column for each action that an agent is told: as yet, nobody's."""
+    def _with_told(self) -> FloatArray:
+        """Return the present states with a column for each action told, as yet that of nobody."""
         n_told = max(map(len, self._senders), default=0)
         if not n_told:
-            return states
-        nobody = np.full((len(states), n_told), float(len(self.action_set)))
-        return np.hstack([states, nobody])
+            return self._states
+        nobody = np.full((len(self._states), n_told), float(len(self.action_set)))
+        return np.hstack([self._states, nobody])
 
     def _given_by(self, agent: int) -> FloatArray:
         """Return how often all took each action ``(A, n, A)`` given each action of an agent."""
@@ -401,6 +426,20 @@ class Team:
         """What adapts beside the learner, by name."""
         parts = {"self_model": self.self_model, "calibration": self.calibration}
         return {name: part for name, part in parts.items() if part is not None}
+
+
+def _senders(
+    settings: LearnerSettings, messages: Messages, hierarchy: Hierarchy
+) -> list[list[int]]:
+    """Return, by agent, whose actions are part of its state, in the order of decision."""
+    if not settings.values_actions:
+        return []
+    if hierarchy.neighbours:
+        raise ValueError(
+            f"learner.kind = {settings.kind!r}: agents use what they are told, and neighbours tell "
+            "nothing; set topology.oriented, in which order they decide"
+        )
+    return [sorted(senders, key=hierarchy.order.index) for senders in messages.told]
 
 
 def _self_model_of(scenario: Scenario, settings: LearnerSettings) -> SelfModel | None:

@@ -13,6 +13,7 @@ from typing import Annotated, Any, ClassVar, Literal, Protocol
 import numpy as np
 from pydantic import Field
 
+from ..interface.prediction import Exploring
 from ..numerics.arrays import FloatArray
 from ..numerics.ties import greatest
 from ..plugins.plugged import SettingsRegistry
@@ -189,6 +190,16 @@ class Bursts:
         s = self.settings
         return min(self._most, max(s.floor, s.rate * s.decay ** max(0.0, self.memory[0])))
 
+    @property
+    def exploring(self) -> Exploring:
+        """The memory, and how likely a burst is to begin and to end.
+
+        Starting with probability p a burst of mean length l makes l p / (1 - p + l p) of all
+        decisions explorative; solved for p at the wanted rate.
+        """
+        length, rate = self.settings.length, self.rate
+        return Exploring(self.memory, rate / (length - rate * (length - 1.0)), 1.0 / length)
+
     def begin_episode(self) -> None:
         """Count the episode and end every burst."""
         self.memory[0] += 1.0
@@ -207,12 +218,10 @@ class Bursts:
         if self.memory[at] > 0:
             self.memory[at] -= 1.0
             return int(self.memory[at + 1])
-        length, rate = self.settings.length, self.rate
-        # Starting with probability p a burst of mean length l makes l p / (1 - p + l p)
-        # of all decisions explorative; solved for p at the wanted rate.
-        if rng.random() < rate / (length - rate * (length - 1.0)):
+        _, chance, stop = self.exploring
+        if rng.random() < chance:
             action = int(rng.integers(len(values)))
-            self.memory[at] = rng.geometric(1.0 / length) - 1
+            self.memory[at] = rng.geometric(stop) - 1
             self.memory[at + 1] = action
             return action
         return greatest(values, rng)

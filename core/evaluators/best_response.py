@@ -23,12 +23,12 @@ The number of joint actions tried grows linearly with the number of bodies.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..interface.hierarchy import Hierarchy
-from ..interface.prediction import Prediction
+from ..interface.prediction import BestResponses, Exploring, Prediction
 from ..numerics.arrays import FloatArray, IntArray
 from ..numerics.ties import greatest
 from .evaluator import Aggregation, DecisionProblem, Deliberation, combinations
@@ -110,6 +110,25 @@ class BestResponse(Aggregation):
         plan[list(free)] = tried[greatest(worths, deliberation.rng)]
         return best
 
+    def decide(self, first: Deliberation, exploring: Exploring) -> IntArray | None:
+        """Return what all agents decide ``(n,)``, who all hear all, by what the `first` one knows.
+
+        None where the prediction has no way to it but to ask every agent in its turn.
+        """
+        prediction: Any = first.prediction
+        by_team = self.problem.rule == "value" and self.problem.value_of == "team"
+        one_plan = {*self._planner} == {first.agent} and self._widest == 1
+        if not (by_team and one_plan and hasattr(prediction, "best_responses")):
+            return None
+        respond: BestResponses | None = prediction.best_responses(self.rules)
+        if respond is None or self.indifferent(first):
+            return None
+        plan = self._started(first, self._free[first.agent])
+        order, weights = np.array(self.hierarchy.order), self._pooled(first).weights[0]
+        tried = int(np.count_nonzero(prediction.alike == np.arange(self.n_actions)))
+        self.count(first.agent, tried + self.n_actions * len(order))
+        return respond(weights, plan, order, exploring, first.rng)
+
     def _plan(self, deliberation: Deliberation) -> IntArray:
         """Return the plan ``(n,)`` as the deciding agent knows it."""
         agent = deliberation.agent
@@ -154,13 +173,19 @@ class BestResponse(Aggregation):
         bodies: dict[int, list[int]] = {}
         for i in free:
             bodies.setdefault(self._group_of[i], []).append(i)
-        if free not in self._starts:
-            self._starts[free] = self._starting(free, list(bodies))
-        tried = _with(deliberation.joint_action, free, self._starts[free])
-        plan = tried[greatest(self.worth(deliberation, tried), rng)].copy()
+        plan = self._started(deliberation, free)
         for members in map(tuple, bodies.values()):
             tried = _with(plan, members, self._distinct(deliberation.prediction, members))
             plan = tried[greatest(self.worth(deliberation, tried), rng)].copy()
+        return plan
+
+    def _started(self, deliberation: Deliberation, free: tuple[int, ...]) -> IntArray:
+        """Return the plan ``(n,)`` that the sweep of best responses starts from."""
+        if free not in self._starts:
+            bodies = list(dict.fromkeys(self._group_of[i] for i in free))
+            self._starts[free] = self._starting(free, bodies)
+        tried = _with(deliberation.joint_action, free, self._starts[free])
+        plan: IntArray = tried[greatest(self.worth(deliberation, tried), deliberation.rng)]
         return plan
 
     def _starting(self, free: tuple[int, ...], bodies: list[int]) -> IntArray:

@@ -9,8 +9,9 @@ digits of one group read as a number are its *robot-action index*.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol, runtime_checkable
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -75,6 +76,10 @@ class Prediction(Protocol):
     ``alike``
         ``(G, L)`` for every robot-action index of every group the first one that comes to the same:
         the evaluator ``best-response`` tries only that.
+    ``best_responses(rules)``
+        `BestResponses` by such rules, or None: what the evaluator ``best-response`` comes to where
+        all agents are bodies of their own that hear all and decide by the value of the team. They
+        are the very same joint actions, with the same draws, but sooner.
     ``blocks(agent)``
         `Blocks` of an agent's next states for all ``A ** n`` joint actions. The evaluator ``exact``
         reads them where few agents are free.
@@ -85,6 +90,24 @@ class Prediction(Protocol):
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
+
+
+class Exploring(NamedTuple):
+    """How agents explore by random actions that are held, as compiled code takes it."""
+
+    memory: FloatArray
+    """``(1 + 2 n,)``, changed: per agent, behind the first, decisions left and the action held."""
+    chance: float
+    """Probability with which an agent begins to hold one; below zero: nobody does."""
+    stop: float
+    """Probability with which it ends."""
+
+
+NOT_EXPLORING = Exploring(np.zeros(0), -1.0, 1.0)
+"""Nobody explores."""
+BestResponses = Callable[[FloatArray, IntArray, IntArray, Exploring, np.random.Generator], IntArray]
+"""Returns the joint action ``(n,)`` by the agents' weights ``(n, n_rules)``, a plan ``(n,)`` to
+start from, the order of decision ``(n,)``, how they explore, and a source of randomness."""
 
 
 def first_alike(keys: IntArray | FloatArray) -> IntArray:

@@ -72,6 +72,8 @@ class FittedQSettings(LearnerSettings):
                     f"decision.{key}: fitted-q predicts nothing and decides by its own value, "
                     "without a plan; leave it out, or take preset = 'fitted-q'"
                 )
+        if self.self_model.enabled or self.calibration.enabled:
+            raise ValueError("self_model and calibration: fitted-q has no predictor to adapt")
         return self
 
     def rules_over(

@@ -70,6 +70,17 @@ class TeamSettings(PartSettings):
     whoever acts for all by itself are built as they are, see `core.policies`.
     """
 
+    uses_hierarchy: ClassVar[bool] = False
+    """Whether those who act pass actions down a hierarchy, which `build` is then given last."""
+
+    discount: Annotated[float, Field(ge=0, lt=1)] = 0.95
+    """Discount per decision, gamma of Eq. 7."""
+
+    @property
+    def needs_prediction(self) -> bool:
+        """Whether it acts only in scenarios that predict, see `core.interface.scenario`."""
+        return False
+
 
 class LearnerSettings(TeamSettings):
     """What the settings of all learners share.
@@ -78,14 +89,14 @@ class LearnerSettings(TeamSettings):
     base and the row of weights of every agent ``(n,)``; all rows are somebody's.
     """
 
+    uses_hierarchy = True
+
     values_actions: ClassVar[bool] = False
     """Whether the learner values an agent's own actions in its present state and given what it is
     told, which takes no prediction: then it is the team's evaluator, too."""
 
     rule_base: RuleBaseSettings = RuleBaseSettings()
     """Fuzzy rule base of every agent."""
-    discount: Annotated[float, Field(ge=0, lt=1)] = 0.95
-    """Discount per decision, gamma of Eq. 7."""
     weights: Literal["own", "role"] = "own"
     """Whether every agent has consequent weights of its own, or all agents of one role (the left
     wheels, say) share them and pool their experience."""
@@ -111,3 +122,8 @@ class LearnerSettings(TeamSettings):
             By how many others an agent is told what they decided, at most.
         """
         return space, RuleBase.build(space, self.rule_base)
+
+    @property
+    def needs_prediction(self) -> bool:
+        """Whether it acts only in scenarios that predict: unless it values actions, or draws them."""
+        return self.decision.rule != "random" and not self.values_actions

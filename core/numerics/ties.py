@@ -6,9 +6,12 @@ import numpy as np
 
 from .arrays import FloatArray
 
+SAME = 1e-12
+"""Values that differ by less, times their size if that is above 1, are equal."""
+
 
 def greatest(values: FloatArray, rng: np.random.Generator) -> int:
-    """Return the index of the greatest value, ties (to 1e-12 of its size) broken at random.
+    """Return the index of the greatest value, ties (see `SAME`) broken at random.
 
     Raises
     ------
@@ -17,7 +20,7 @@ def greatest(values: FloatArray, rng: np.random.Generator) -> int:
     """
     listed = values.tolist()  # four numbers: plain Python is faster
     top = max(listed)
-    least = top - 1e-12 * max(1.0, abs(top))
+    least = top - SAME * max(1.0, abs(top))
     best = [action for action, value in enumerate(listed) if value >= least]
     if not best:
         raise ArithmeticError(f"none of {len(listed)} actions is worth most: not all are numbers")

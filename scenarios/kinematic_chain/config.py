@@ -71,7 +71,7 @@ class KinematicChainSettings(ScenarioSettings):
 
     kind: Literal["kinematic-chain"] = "kinematic-chain"
     factory: ClassVar[str] = f"{__package__}.scenario:KinematicChain"
-    joints: Annotated[int, Field(ge=2, le=64)] = 4
+    joints: Annotated[int, Field(ge=2, le=1024)] = 4
     """Number of joints, an agent each."""
     joint_limit: Annotated[float, Field(gt=0, le=3.141592653589793)] | None = None
     """Greatest angle of every joint but the base, either way [rad]; none: links pass each other."""

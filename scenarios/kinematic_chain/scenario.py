@@ -9,7 +9,7 @@ they turn at the commanded speed, unless they fail or reach their limit.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -17,13 +17,15 @@ from typing import Any
 import numpy as np
 
 from ...core.interface.measures import SUCCESS, Measure
-from ...core.interface.prediction import first_alike
+from ...core.interface.prediction import BestResponses, Exploring, first_alike
 from ...core.interface.scenario import Transition
 from ...core.interface.spaces import ActionSet
 from ...core.numerics.arrays import FloatArray, IntArray
+from ...core.rules.rule_base import RuleBase
 from ..faults.schedule import Failures
 from .config import PERIOD, REACH, KinematicChainSettings
-from .kinematics import postures_of
+from .kinematics import ends_of, postures_of
+from .responses import Options, respond
 from .variables import ChainStates
 from .view import ChainView
 
@@ -35,6 +37,8 @@ LEAST_WAY = 0.25
 """Distance of the tip from the goal at the start, at least [m]."""
 GOAL_RADII = (0.15, 0.95)
 """Least and greatest distance of the goal from the base [m]."""
+SIMPLE = ("bearing", "distance", "approach")
+"""State variables of which `responses` knows how they change."""
 MOST_BEND = 2.5
 """Greatest angle of a joint behind the base at the start [rad]."""
 
@@ -290,6 +294,47 @@ class ChainPrediction:
     def alike(self) -> IntArray:
         """The first action of each joint that comes to the same ``(n, A)``."""
         return first_alike(self.speeds)
+
+    def best_responses(self, rules: RuleBase) -> BestResponses | None:
+        """Return best responses of all joints by what each turn changes, see `responses`.
+
+        None if values are no sums over the default variables.
+        """
+        simple = self.arm.settings.state_space == SIMPLE and rules.compact
+        alone = len(rules.terms) == len(rules.partitions)
+        alone = alone and all(len(term) == 1 for term in rules.terms)
+        return partial(self._respond, rules) if simple and alone else None
+
+    def _respond(
+        self,
+        rules: RuleBase,
+        weights: FloatArray,
+        plan: IntArray,
+        order: IntArray,
+        exploring: Exploring,
+        rng: np.random.Generator,
+    ) -> IntArray:
+        speed, *others = rules.partitions
+        cuts = np.cumsum(rules.sizes)[:-1]
+        of_speed, of_bearing, *common = np.split(weights, cuts, axis=1)
+        distances, approaches = (
+            np.stack([partition.centres, values.sum(axis=0)])
+            for partition, values in zip(others[1:], common, strict=True)
+        )
+        options = Options(
+            self.turns,
+            self.alike,
+            np.einsum("iam,im->ia", speed.strengths(self._fractions), of_speed),
+            others[0].knots,
+            np.tile(of_bearing, 1 + 2 * others[0].copies),
+            distances,
+            approaches,
+        )
+        places = ends_of(self.angles + self.turns[self._joints, plan], self.arm.length)
+        joint: IntArray = respond(
+            places, self.goal, self.before, plan.copy(), order, options, exploring, rng
+        )
+        return joint
 
     def commands(self, joint_action: IntArray) -> FloatArray:
         """Return the joint speeds ``(n,)`` that a joint action ``(n,)`` would command [rad/s]."""

@@ -9,6 +9,7 @@ from html import escape
 
 import numpy as np
 
+from ...core.plugins.deferred import pd
 from ...core.plugins.messages import near
 from ..errors import SpecError
 from ..results.statistics import FEW, Estimate
@@ -65,19 +66,10 @@ class SummaryTable:
     @property
     def html(self) -> str:
         """The table as HTML."""
-        heads = "".join(f"<th>{escape(text)}</th>" for text in ("condition", *self.titles))
-        lines = []
-        for condition, seeds, cells in self.rows:
-            shown = (
-                f"{escape(c.value)}<br><small>{escape(c.interval) or '–'}</small>" if c else ""
-                for c in cells
-            )
-            first = f"<th>{escape(condition)}<br><small>{count(seeds, 'seed')}</small></th>"
-            lines.append(f"<tr>{first}{''.join(f'<td>{cell}</td>' for cell in shown)}</tr>")
-        return (
-            f"<table><thead><tr>{heads}</tr></thead><tbody>{''.join(lines)}</tbody></table>"
-            f"<p><small>{escape(' '.join(self.legend))}</small></p>"
-        )
+        cells = [[c.bracketed(" ") if c else "" for c in row] for *_, row in self.rows]
+        index = [f"{condition}, {count(seeds, 'seed')}" for condition, seeds, _ in self.rows]
+        table = pd.DataFrame(cells, index, self.titles).to_html(border=0)
+        return f"{table}<p><small>{escape(' '.join(self.legend))}</small></p>"
 
     def _repr_html_(self) -> str:
         return self.html

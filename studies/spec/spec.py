@@ -254,7 +254,8 @@ class Spec(Settings):
     def warnings(self) -> tuple[str, ...]:
         """Return what looks wrong and is not refused, a line each: sizes in another unit.
 
-        Also which keys of its learner are left out for controls, see `conditions`.
+        Also which keys are left out: of its learner for controls, see `conditions`, and of its
+        topology for learners that pass nothing down.
         """
         lines: dict[str, None] = {}
         controls = [c for c in self.conditions() if c.settings.learner.kind == "frozen"]
@@ -264,6 +265,7 @@ class Spec(Settings):
             labels = listed((condition.label for condition in controls), 3)
             lines[f"{keys}: left out for {labels}, which learn nothing"] = None
         for condition in self.conditions():
+            lines |= dict.fromkeys(condition.settings.warnings())
             scenarios = [
                 condition.settings.scenario,
                 *(s.scenario for _, s in condition.evaluations),

@@ -2,22 +2,12 @@
 
 from ...core.plugins.registry import Registry
 
-CATALOGUE = "nested_agents.studies.catalogue"
-
+NAMES = (
+    "learning-curve", "chain-order", "ablation", "shapes", "wheel-failure", "scaling",
+    "hierarchies", "edges", "games", "related", "peers",
+)  # fmt: skip
 STUDIES = Registry(
     "study",
-    {
-        "learning-curve": f"{CATALOGUE}.learning_curve",
-        "chain-order": f"{CATALOGUE}.chain_order",
-        "ablation": f"{CATALOGUE}.ablation",
-        "shapes": f"{CATALOGUE}.shapes",
-        "wheel-failure": f"{CATALOGUE}.wheel_failure",
-        "scaling": f"{CATALOGUE}.scaling",
-        "hierarchies": f"{CATALOGUE}.hierarchies",
-        "edges": f"{CATALOGUE}.edges",
-        "games": f"{CATALOGUE}.games",
-        "related": f"{CATALOGUE}.related",
-        "peers": f"{CATALOGUE}.peers",
-    },
+    {name: f"nested_agents.studies.catalogue.{name.replace('-', '_')}" for name in NAMES},
 )
 """Studies by name; what they offer is in `nested_agents.studies.catalogue.study`."""

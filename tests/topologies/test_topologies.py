@@ -1,6 +1,5 @@
 """Builders, spec strings, tables and every refusal."""
 
-import json
 import tomllib
 from pathlib import Path
 
@@ -215,14 +214,13 @@ def test_no_agents_are_refused(text: str) -> None:
 def graph_files(folder: Path) -> dict[str, Path]:
     graph = nx.DiGraph([("a", "b"), ("a", "c")])
     graph.add_node("d")
-    paths = {name: folder / name for name in ("g.graphml", "pairs.json", "links.json")}
+    paths = {name: folder / name for name in ("g.graphml", "pairs.json")}
     nx.write_graphml(graph, paths["g.graphml"])
     paths["pairs.json"].write_text('{"edges": [["a", "b"], ["a", "c"]], "alone": ["d"]}')
-    paths["links.json"].write_text(json.dumps(nx.node_link_data(graph, edges="links")))
     return paths
 
 
-@pytest.mark.parametrize("name", ["g.graphml", "pairs.json", "links.json"])
+@pytest.mark.parametrize("name", ["g.graphml", "pairs.json"])
 def test_graph_files(tmp_path: Path, name: str) -> None:
     path = graph_files(tmp_path)[name]
     assert edges(str(path)) == edges(f"file:{path}") == {"ab", "ac"}

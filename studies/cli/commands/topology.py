@@ -11,7 +11,7 @@ from ....core.agents.joint_agents import Agents
 from ....topologies.view import Form, HierarchyView, kinds, printed, view
 from .. import options
 
-TOPOLOGY = {"kind", "members", "edges", "nodes"}
+TOPOLOGY = {"kind", "members", "edges"}
 """Keys of a file that holds a topology and no more."""
 
 
