@@ -178,7 +178,7 @@ def coordination_graph(
         Field(description="Seed of as many other pairs, drawn at random, in place of these."),
     ] = None,
 ) -> nx.Graph:
-    """Join neighbours on a line, ring, tree or grid or as listed, who decide at once.
+    """Join neighbours in a shape, or as listed, who decide at once.
 
     Raises
     ------

@@ -49,6 +49,8 @@ class Team:
         Owns the consequent weights.
     rows
         ``(n,)`` which row of them each agent has.
+    space, rules
+        What values are functions of, and the rule base that all agents have.
     explorer
         Chooses actions by value.
     evaluator
@@ -98,8 +100,10 @@ class Team:
         self._values_actions = settings.values_actions
         self._senders = _senders(settings, self.messages, hierarchy)
         n_told = max(map(len, self._senders), default=0)
-        self.space, rules = settings.rules_over(scenario.state_space, scenario.action_set, n_told)
-        self.learner: Learner = settings.build(rules, rows)
+        self.space, self.rules = settings.rules_over(
+            scenario.state_space, scenario.action_set, n_told
+        )
+        self.learner: Learner = settings.build(self.rules, rows)
         self._asked = signature(self.learner.observe).parameters.keys() & {"left", "joint_action"}
         self._states: FloatArray = np.zeros((len(hierarchy), scenario.state_space.n_variables))
         self._left: FloatArray = self._states
@@ -107,7 +111,7 @@ class Team:
         decision = settings.decision
         if decision.rule != "random":
             problem = DecisionProblem(
-                rules,
+                self.rules,
                 hierarchy,
                 n_actions,
                 groups_of(scenario),

@@ -18,10 +18,11 @@ one reward and one target for each *joint* step, so that no agent learns from an
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal, Self
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from ..decision.exploration import EXPLORATIONS, BurstExploration, ExplorationSettings
 from ..decision.settings import Decision
@@ -63,23 +64,11 @@ class FittedQSettings(LearnerSettings):
     )
     """How agents explore: without a predictor they begin at random."""
 
-    @model_validator(mode="after")
-    def _decides_by_itself(self) -> Self:
-        known = Decision(rule=self.decision.rule, unseen=self.decision.unseen)
-        for key in Decision.model_fields:
-            if getattr(self.decision, key) != getattr(known, key):
-                raise ValueError(
-                    f"decision.{key}: fitted-q predicts nothing and decides by its own value, "
-                    "without a plan; leave it out, or take preset = 'fitted-q'"
-                )
-        if self.self_model.enabled or self.calibration.enabled:
-            raise ValueError("self_model and calibration: fitted-q has no predictor to adapt")
-        return self
-
     def rules_over(
         self, space: StateSpace, actions: ActionSet, n_told: int
     ) -> tuple[StateSpace, RuleBase]:
         """Return what values are functions of, the own action last, and their rule base."""
+        self._check_decision()
         told = [choice(f"told{k + 1}", (*actions.names, NOBODY)) for k in range(n_told)]
         names = tuple(variable.name for variable in told)
         known = StateSpace(
@@ -94,6 +83,24 @@ class FittedQSettings(LearnerSettings):
             dtype=self.rule_base.precision,
         )
         return StateSpace(space.name, (*known.variables, action)), rules
+
+    def _check_decision(self) -> None:
+        """Refuse what takes a prediction."""
+        taken = Decision(rule=self.decision.rule, unseen=self.decision.unseen)
+        for key, allowed in taken:
+            if (value := getattr(self.decision, key)) != allowed:
+                raise ValueError(
+                    f"learner.decision.{key} = {getattr(value, 'kind', value)!r}: fitted-q "
+                    "predicts nothing and decides by its own value; leave it out, or set preset = "
+                    "'fitted-q'"
+                )
+        if self.decision.rule not in ("value", "random") or self.decision.unseen == "plan":
+            raise ValueError(
+                "learner.decision: fitted-q has neither predicted rewards nor plans, allowed: rule "
+                "= value or random, unseen = maintain or last"
+            )
+        if self.self_model.enabled or self.calibration.enabled:
+            raise ValueError("learner.self_model, calibration: fitted-q has no predictor to adapt")
 
 
 class FittedQ(BatchTD):
@@ -110,8 +117,8 @@ class FittedQ(BatchTD):
         self._n_actions = rules.partitions[-1].size
         self._known = RuleBase(rules.partitions[:-1], [term[:-1] for term in rules.terms])
         k = self._known.n_rules
-        self._gram = np.zeros((len(self.theta), self._n_actions, k, k))
-        self._weights = [np.zeros(0)] * len(self.theta)
+        self._gram: FloatArray = np.zeros((len(self.theta), self._n_actions, k, k))
+        self._weights: list[FloatArray] = [np.zeros(0)] * len(self.theta)
         """By row, with what weight the sums hold each decision."""
 
     def values(self, deliberation: Deliberation) -> FloatArray:
@@ -123,7 +130,7 @@ class FittedQ(BatchTD):
         values: FloatArray = strengths[0] @ weights[active[0]]
         return values
 
-    def observe(
+    def observe(  # type: ignore[override]  # what is asked for by name is given
         self,
         states: FloatArray,
         reward: float | FloatArray,
@@ -136,7 +143,7 @@ class FittedQ(BatchTD):
         return super().observe(np.column_stack([left, joint_action]), reward, terminated)
 
     def _active_of(self, states: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Return the active rules of each decision, with the action that was taken, and strengths."""
+        """Return the active rules of decisions, by the action that was taken, and strengths."""
         active, strengths = self._known.active(states[:, :-1])
         return active * self._n_actions + states[:, -1:].astype(np.int64), strengths
 
@@ -178,10 +185,40 @@ class FittedQ(BatchTD):
         is_running = self._follower[-1] == len(self._states)
         begin, end = len(self._weights[row]), len(known) - is_running * len(self.members[row])
         kept, new = 1.0 - self.settings.forgetting, slice(begin, end)
-        taken, strengths = (part[new] for part in self._active[row])
+        taken, strengths = self._active[row][0][new], self._active[row][1][new]
         self._gram[row] *= kept
         self._weights[row] = np.append(kept * self._weights[row], known[new])
         for action, gram in enumerate(self._gram[row]):
             weights = known[new] * (taken[:, 0] % self._n_actions == action)
             regression.add_gram(gram, taken // self._n_actions, strengths, weights)
         return self._gram[row], np.append(self._weights[row], np.zeros(len(known) - end))
+
+    def arrays(self) -> dict[str, FloatArray]:
+        """Return weights, all experience, and its sums."""
+        held = np.cumsum([len(weights) for weights in self._weights])
+        sums = {"gram": self._gram, "weights": np.concatenate(self._weights), "held": held}
+        return super().arrays() | sums
+
+    def restore(self, arrays: Mapping[str, FloatArray]) -> None:
+        """Continue from `arrays`."""
+        super().restore(arrays)
+        self._gram = arrays["gram"].copy()
+        self._weights = np.split(arrays["weights"], arrays["held"].astype(int)[:-1])
+
+    def continue_from(self, former: Any, rows: IntArray) -> None:
+        """Begin with weights and experience of another team, of which no episode is under way.
+
+        Raises
+        ------
+        ValueError
+            If the agents are told by another number of others; one line.
+        """
+        if former.rules.n_rules != self.rules.n_rules:
+            fewer = len(self.rules.partitions) - len(former.rules.partitions)
+            raise ValueError(
+                f"topology: an agent is told by {abs(fewer)} {'more' if fewer > 0 else 'fewer'} "
+                "others than when it learned what to make of it; allowed: as many"
+            )
+        super().continue_from(former, rows)
+        self._gram = former._gram[rows]
+        self._weights = [former._weights[row].copy() for row in rows]

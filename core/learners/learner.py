@@ -125,5 +125,5 @@ class LearnerSettings(TeamSettings):
 
     @property
     def needs_prediction(self) -> bool:
-        """Whether it acts only in scenarios that predict: unless it values actions, or draws them."""
+        """Whether it acts only in scenarios that predict: unless it values or draws actions."""
         return self.decision.rule != "random" and not self.values_actions

@@ -17,7 +17,8 @@ that those who share weights can act differently only by what they see and are t
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar, Literal, Protocol
+from abc import ABC, abstractmethod
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -49,7 +50,7 @@ class TeamGameSettings(ScenarioSettings):
     kind: Literal["team-game"] = "team-game"
     factory: ClassVar[str] = f"{__name__}:TeamGame"
     game: Literal["polymatrix", "permutation", "landmarks"] = "polymatrix"
-    """Which game."""
+    """Which game is played, see `nested_agents.scenarios.matrix_games.team_games`."""
     players: Annotated[int, Field(ge=2, le=64)] = 8
     """Number of agents."""
     actions: Annotated[int, Field(ge=2, le=26)] = 3
@@ -65,26 +66,34 @@ class TeamGameSettings(ScenarioSettings):
     """What a landmark at a distance of 1, the side of the square, costs."""
 
 
-class Game(Protocol):
-    """What is paid for a joint action, and what it could be at best."""
+class Game(ABC):
+    """What is paid for a joint action, and what it could be at best.
 
-    best: float
+    Parameters
+    ----------
+    seen
+        What the agents see ``(n, d)``.
+    """
+
+    best = 1.0
     """The greatest payoff."""
 
+    def __init__(self, seen: FloatArray) -> None:
+        self.seen = seen
+
+    @abstractmethod
     def payoffs(self, joint_actions: IntArray) -> FloatArray:
         """Return the payoffs ``(m,)`` of joint actions ``(m, n)``."""
 
     def is_optimal(self, joint_action: IntArray) -> bool:
-        """Return whether a joint action ``(n,)`` is as good as any."""
+        """Return whether nothing pays more, but for rounding."""
+        return bool(self.payoffs(joint_action[None])[0] >= self.best - 1e-12)
 
-    def seen(self) -> FloatArray:
-        """Return what the agents see ``(n, d)``."""
-
-    def advance(self, rng: np.random.Generator) -> None:
-        """Go on to the next play."""
+    def advance(self, rng: np.random.Generator) -> None:  # noqa: B027 - most games do not change
+        """Go on to the next play, which is the same game."""
 
 
-class Polymatrix:
+class Polymatrix(Game):
     """A sum of tables, one for each edge of a graph.
 
     Examples
@@ -95,10 +104,11 @@ class Polymatrix:
     """
 
     def __init__(self, edges: list[tuple[int, int]], tables: FloatArray) -> None:
+        n = 1 + int(np.max(edges))
+        super().__init__(np.zeros((n, 1)))
         self._first, self._second = np.array(edges).T
-        self._tables, n = tables, 1 + int(np.max(edges))
+        self._tables = tables
         optimum = Elimination(edges, n, tables.shape[1]).best(list(tables))
-        self._nothing = np.zeros((n, 1))
         self.best = float(self.payoffs(optimum[None])[0])
 
     def payoffs(self, joint_actions: IntArray) -> FloatArray:
@@ -108,43 +118,16 @@ class Polymatrix:
         mean: FloatArray = self._tables[edges, *both].mean(axis=1)
         return mean
 
-    def is_optimal(self, joint_action: IntArray) -> bool:
-        """Return whether nothing pays more, but for rounding."""
-        return bool(self.payoffs(joint_action[None])[0] >= self.best - 1e-12)
 
-    def seen(self) -> FloatArray:
-        """Return that nothing is seen."""
-        return self._nothing
-
-    def advance(self, rng: np.random.Generator) -> None:
-        """Change nothing."""
-
-
-class Permutation:
+class Permutation(Game):
     """A game that pays 1 if no two agents do the same."""
-
-    best = 1.0
-
-    def __init__(self, players: int) -> None:
-        self._nothing = np.zeros((players, 1))
 
     def payoffs(self, joint_actions: IntArray) -> FloatArray:
         """Return 1 or 0."""
-        return (np.diff(np.sort(joint_actions, axis=1), axis=1) > 0).all(axis=1).astype(float)
-
-    def is_optimal(self, joint_action: IntArray) -> bool:
-        """Return whether all do something else."""
-        return len(set(joint_action.tolist())) == len(joint_action)
-
-    def seen(self) -> FloatArray:
-        """Return that nothing is seen."""
-        return self._nothing
-
-    def advance(self, rng: np.random.Generator) -> None:
-        """Change nothing."""
+        return (distinct(joint_actions) == joint_actions.shape[1]).astype(float)
 
 
-class Landmarks(Permutation):
+class Landmarks(Game):
     """A game that pays for landmarks that are taken, and less for far ones.
 
     Two agents at one landmark leave another free, which costs more than any way to it as long as
@@ -152,33 +135,38 @@ class Landmarks(Permutation):
     """
 
     def __init__(self, players: int, cost: float) -> None:
-        self._n, self._cost = players, cost
-        self.advance(np.random.default_rng(0))
+        super().__init__(np.zeros((players, players)))
+        self._cost = cost
 
     def payoffs(self, joint_actions: IntArray) -> FloatArray:
         """Return the share of landmarks that are taken, less the cost of the mean distance."""
-        ordered = np.sort(joint_actions, axis=1)
-        taken = 1 + (np.diff(ordered, axis=1) > 0).sum(axis=1)
-        far = self._distances[np.arange(self._n), joint_actions].mean(axis=1)
-        paid: FloatArray = taken / self._n - self._cost * far
+        n = len(self.seen)
+        far = self.seen[np.arange(n), joint_actions].mean(axis=1)
+        paid: FloatArray = distinct(joint_actions) / n - self._cost * far
         return paid
 
-    @property
-    def best(self) -> float:  # type: ignore[override]
-        """What the assignment of least distance pays."""
-        from scipy.optimize import linear_sum_assignment
-
-        assigned = linear_sum_assignment(self._distances)[1]
-        return float(self.payoffs(assigned[None])[0])
-
-    def seen(self) -> FloatArray:
-        """Return the distance of each agent from every landmark."""
-        return self._distances
+    def is_optimal(self, joint_action: IntArray) -> bool:
+        """Return whether every landmark is taken, by whomever."""
+        return len(set(joint_action.tolist())) == len(joint_action)
 
     def advance(self, rng: np.random.Generator) -> None:
-        """Draw other places."""
-        agents, landmarks = rng.random((2, self._n, 2))
-        self._distances = np.linalg.norm(agents[:, None] - landmarks, axis=2)
+        """Draw other places, and find the assignment of least distance."""
+        from scipy.optimize import linear_sum_assignment
+
+        agents, landmarks = rng.random((2, len(self.seen), 2))
+        self.seen = np.linalg.norm(agents[:, None] - landmarks, axis=2)
+        assigned = linear_sum_assignment(self.seen)[1]
+        self.best = float(self.payoffs(assigned[None])[0])
+
+
+def distinct(joint_actions: IntArray) -> IntArray:
+    """Return how many different actions there are in each joint action, ``(m,)``.
+
+    >>> distinct(np.array([[0, 1, 2], [1, 1, 0]])).tolist()
+    [3, 2]
+    """
+    different: IntArray = 1 + (np.diff(np.sort(joint_actions, axis=1), axis=1) > 0).sum(axis=1)
+    return different
 
 
 class TeamGame:
@@ -206,19 +194,20 @@ class TeamGame:
         k = settings.actions if settings.game == "polymatrix" else n
         names = tuple(f"a{action + 1}" for action in range(k))
         self.action_set = ActionSet(names, (0.0,) * k, (0.0,) * k, neutral=0)
-        seen = (PLAY,)
+        seen: tuple[Variable, ...] = (PLAY,)
         if settings.game == "landmarks":
             seen = tuple(Variable(f"distance{j + 1}", "1", 0.0, 1.0) for j in range(n))
         number = (choice("number", self.agents),) if settings.numbered else ()
         self.state_space = StateSpace(settings.game, (*seen, *number))
         self._numbers = np.arange(float(n))[:, None][:, : len(number)]
-        self.game, self._drawn = self._of_seed(0), 0
+        self._drawn: Any = 0
+        self.game = self._of_seed(0)
         self._rng = np.random.default_rng(0)
 
     def _of_seed(self, seed: Any) -> Game:
         s = self.settings
         if s.game == "permutation":
-            return Permutation(s.players)
+            return Permutation(np.zeros((s.players, 1)))
         if s.game == "landmarks":
             return Landmarks(s.players, s.distance_cost)
         edges = sorted(tuple(sorted(edge)) for edge in shaped(s.shape, s.players).edges)
@@ -244,24 +233,5 @@ class TeamGame:
         self.game.advance(self._rng)
         return Transition(self._states(), payoff, False, False, info)
 
-    def predict(self) -> TeamGamePrediction:
-        """Predict what this play pays; of the next one nothing is known."""
-        return TeamGamePrediction(self.game, self._states())
-
     def _states(self) -> FloatArray:
-        return np.hstack([self.game.seen(), self._numbers])
-
-
-class TeamGamePrediction:
-    """What joint actions are paid now; what is seen stays as it is."""
-
-    def __init__(self, game: Game, states: FloatArray) -> None:
-        self._game, self._states = game, states
-
-    def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
-        """Return the present state of `agent` ``(m, d)`` for joint actions ``(m, n)``."""
-        return np.tile(self._states[agent], (len(joint_actions), 1))
-
-    def rewards(self, joint_actions: IntArray) -> FloatArray:
-        """Return the payoffs ``(m,)`` of joint actions ``(m, n)``; for planners."""
-        return self._game.payoffs(joint_actions)
+        return np.hstack([self.game.seen, self._numbers])
