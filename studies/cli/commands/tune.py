@@ -1,0 +1,72 @@
+"""``nested-agents tune``: look for better settings of a spec."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from ...workers.workers import Backend
+from .. import options
+
+
+@click.command()
+@click.argument("spec", type=options.PATH, metavar="SPEC.toml")
+@click.option(
+    "--out",
+    type=options.PATH,
+    metavar="DIR",
+    required=True,
+    help="Where to keep the study of all configurations, best.toml and configurations.csv.",
+)
+@click.option(
+    "--trials",
+    type=int,
+    metavar="N",
+    default=20,
+    help="Configurations to try, the spec's own among them.",
+)
+@click.option(
+    "--seeds", type=int, metavar="N", default=16, help="On which the last ones are compared."
+)
+@click.option(
+    "--first-seed", type=int, metavar="N", default=10_000, help="Of these seeds; at least 10000."
+)
+@click.option("--draw", type=int, metavar="N", default=0, help="Seed of the draw.")
+@options.jobs
+@options.backend
+@options.address
+@options.accept_code
+@options.changes
+def command(
+    spec: Path,
+    out: Path,
+    trials: int,
+    seeds: int,
+    first_seed: int,
+    draw: int,
+    jobs: int | None,
+    backend: Backend,
+    address: str | None,
+    accept_code: bool,
+    changes: tuple[str, ...],
+) -> int:
+    """Look for better settings of a spec, on seeds that no report uses; again, it continues.
+
+    SPEC.toml has one condition, and may have a table [tune] with lists of values by key. All
+    configurations are tried on two seeds, the better half on four, and so on.
+    """
+    from ...api.tuning import BEST_FILE, TABLE_FILE, tune
+    from ...spec.spec import Spec
+    from ..display import print_table
+
+    given = Spec.load(spec, changes, study=out)
+    tuning = tune(
+        given, out, trials=trials, seeds=seeds, first_seed=first_seed, draw=draw, jobs=jobs,
+        backend=backend, address=address, accept_code=accept_code,
+    )  # fmt: skip
+    print_table(tuning.study.table(tuning.columns))
+    print("", *tuning.lines, "", sep="\n")
+    print(f"spec    {out / BEST_FILE}")
+    print(f"table   {out / TABLE_FILE}")
+    return 0
