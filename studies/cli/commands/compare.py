@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -38,15 +39,12 @@ from .. import options
 @options.trust
 def command(
     sources: tuple[Path, ...],
-    by: str | None,
-    measure: str,
-    phase: str | None,
-    reference: str | None,
     statistics: bool,
     plot: Path | None,
     where: str | None,
     form: str,
     trust: bool,
+    **compared: Any,
 ) -> int:
     """Compare conditions of one study or several: effect, interval, p raw and adjusted, power.
 
@@ -58,7 +56,7 @@ def command(
     from ..loading import load_results
 
     results = load_results(sources, None, where, is_trusted=trust)
-    comparison = results.compare(by, measure, phase=phase, reference=reference)
+    comparison = results.compare(**compared)
     if plot is not None:
         from ...presentation.figures import write
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
-from ...workers.workers import Backend
 from .. import options
 
 
@@ -33,24 +33,9 @@ from .. import options
     "--first-seed", type=int, metavar="N", default=10_000, help="Of these seeds; at least 10000."
 )
 @click.option("--draw", type=int, metavar="N", default=0, help="Seed of the draw.")
-@options.jobs
-@options.backend
-@options.address
-@options.accept_code
+@options.running
 @options.changes
-def command(
-    spec: Path,
-    out: Path,
-    trials: int,
-    seeds: int,
-    first_seed: int,
-    draw: int,
-    jobs: int | None,
-    backend: Backend,
-    address: str | None,
-    accept_code: bool,
-    changes: tuple[str, ...],
-) -> int:
+def command(spec: Path, out: Path, changes: tuple[str, ...], **tuned: Any) -> int:
     """Look for better settings of a spec, on seeds that no report uses; again, it continues.
 
     SPEC.toml has one condition, and may have a table [tune] with lists of values by key. All
@@ -60,11 +45,7 @@ def command(
     from ...spec.spec import Spec
     from ..display import print_table
 
-    given = Spec.load(spec, changes, study=out)
-    tuning = tune(
-        given, out, trials=trials, seeds=seeds, first_seed=first_seed, draw=draw, jobs=jobs,
-        backend=backend, address=address, accept_code=accept_code,
-    )  # fmt: skip
+    tuning = tune(Spec.load(spec, changes, study=out), out, **tuned)
     print_table(tuning.study.table(tuning.columns))
     print("", *tuning.lines, "", sep="\n")
     print(f"spec    {out / BEST_FILE}")
