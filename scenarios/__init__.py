@@ -24,6 +24,8 @@ SCENARIOS = SettingsRegistry(
         "matrix-game": f"{__name__}.matrix_games.scenario:MatrixGameSettings",
         "kinematic-chain": f"{__name__}.kinematic_chain.config:KinematicChainSettings",
         "line-up": f"{__name__}.line_up:LineUpSettings",
+        "gymnasium": f"{__name__}.adapters.settings:GymnasiumSettings",
+        "pettingzoo": f"{__name__}.adapters.settings:PettingZooSettings",
     },
     ScenarioSettings,
 )
