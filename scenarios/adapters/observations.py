@@ -45,8 +45,8 @@ def numbers_of(player: str, space: Any) -> Numbers:
                 "environments have another id or option whose observations are states"
             )
     if isinstance(space, Discrete):
-        low = float(space.start)
-        return Numbers(("o0",), np.array([low]), np.array([low + float(space.n) - 1.0]))
+        first, last = float(space.start), float(space.start + space.n - 1)
+        return Numbers(("o0",), np.array([first]), np.array([last]))
     parts = list(space.values()) if isinstance(space, Dict) else [space]
     if not all(isinstance(part, Box | Discrete | MultiDiscrete | MultiBinary) for part in parts):
         raise ValueError(f"observations{of}: {space}, allowed: a fixed number of numbers")
