@@ -79,6 +79,7 @@ _PLACES = {
     "run": ("studies.api.study", "run"),
     "run_trial": ("studies.trials.session", "run_trial"),
     "seeds_for": ("studies.results.power", "seeds_for"),
+    "tune": ("studies.api.tuning", "tune"),
     "state_variable": ("scenarios.state_variables", "state_variable"),
 }
 

@@ -20,11 +20,9 @@ from ..interface.hierarchy import Hierarchy
 from ..interface.prediction import NOT_EXPLORING, Prediction
 from ..interface.scenario import EmbodiedScenario, Scenario, Transition, groups_of
 from ..learners import check_prediction
-from ..learners.batch import ReplaySettings
 from ..learners.learner import Learner, LearnerSettings
 from ..numerics.arrays import FloatArray, IntArray
 from ..numerics.ties import greatest
-from ..rules.rule_base import RuleBase
 from .messages import MessageFailure, Messages
 from .rows import rows_of
 
@@ -51,6 +49,8 @@ class Team:
         Owns the consequent weights.
     rows
         ``(n,)`` which row of them each agent has.
+    space, rules
+        What values are functions of, and the rule base that all agents have.
     explorer
         Chooses actions by value.
     evaluator
@@ -93,12 +93,17 @@ class Team:
         n, n_actions = len(hierarchy), len(scenario.action_set)
         self.self_model = _self_model_of(scenario, settings)
         self.calibration = _calibration_of(scenario, settings)
-        is_mirrored = isinstance(settings, ReplaySettings) and settings.mirrored
-        self.mirror = Mirror.of(scenario) if is_mirrored else None
+        self.mirror = Mirror.of(scenario) if getattr(settings, "mirrored", False) else None
         self.rows = rows_of(scenario, shared=settings.weights == "role")
         rows = self.rows if self.mirror is None else self.mirror.rows(self.rows)
-        rules = RuleBase.build(scenario.state_space, settings.rule_base)
-        self.learner: Learner = settings.build(rules, rows)
+        self.messages = Messages(hierarchy, failures, n_actions)
+        self._values_actions = settings.values_actions
+        self._senders = _senders(settings, self.messages, hierarchy)
+        n_told = max(map(len, self._senders), default=0)
+        self.space, self.rules = settings.rules_over(
+            scenario.state_space, scenario.action_set, n_told
+        )
+        self.learner: Learner = settings.build(self.rules, rows)
         self._asked = signature(self.learner.observe).parameters.keys() & {"left", "joint_action"}
         self._states: FloatArray = np.zeros((len(hierarchy), scenario.state_space.n_variables))
         self._left: FloatArray = self._states
@@ -106,7 +111,7 @@ class Team:
         decision = settings.decision
         if decision.rule != "random":
             problem = DecisionProblem(
-                rules,
+                self.rules,
                 hierarchy,
                 n_actions,
                 groups_of(scenario),
@@ -118,13 +123,13 @@ class Team:
                 decision.plan,
                 handed_down=hierarchy.told == "ancestors" and not failures,
             )
-            self.evaluator = decision.evaluator.build(problem)
+            own: Any = self.learner
+            self.evaluator = own if self._values_actions else decision.evaluator.build(problem)
         self.explorer: Explorer = settings.exploration.build(n)
         self.rng = np.random.Generator(np.random.PCG64(seed))
         self.seen: FloatArray = np.ones((n, n_actions))
         conditional = self.evaluator is not None and decision.teammates == "conditional"
         self.given: FloatArray = np.ones((n, n_actions) * 2 if conditional else (0, 0, 0, 0))
-        self.messages = Messages(hierarchy, failures, n_actions)
         self._unseen, self._discount = decision.unseen, settings.discount
         # Those who are told all that was decided before, and consider all others.
         self._hears_all = {
@@ -171,11 +176,11 @@ class Team:
         """Predict from the scenario's present state, by what has been learned of it.
 
         The agents' `states` ``(n, d)`` are needed by learners and evaluators that ask for them. The
-        prediction is None in a scenario that has none, where the agents act at random.
+        prediction is None in a scenario that has none, and of agents that value actions.
         """
         if states is not None:
             self._states = states
-        if not hasattr(scenario, "predict"):
+        if self._values_actions or not hasattr(scenario, "predict"):
             return None
         if self.self_model is None and self.calibration is None:
             return scenario.predict()
@@ -192,7 +197,7 @@ class Team:
         is, apart from the random numbers that break ties.
         """
         n = len(self.hierarchy)
-        self._left = self._states
+        self._left = self._with_told()
         if self.evaluator is None:
             self._last = self.rng.integers(len(self.action_set), size=n)
             return self._last
@@ -235,9 +240,12 @@ class Team:
         joint = np.full(n, self.action_set.neutral)
         for i in self.hierarchy.order:
             senders, known = self._known(i, joint)
+            if self._senders:
+                told = known[self._senders[i]]
+                self._left[i, self._states.shape[1] :][: len(told)] = told
             deliberation = Deliberation(
                 i, known, prediction, weights, frequencies, self.rng, self._given_by(i), senders,
-                self._states,
+                self._left,
             )  # fmt: skip
             values = evaluator.values(deliberation)
             if len(values) != n_actions:
@@ -262,6 +270,14 @@ class Team:
         known = self._last.copy() if self._unseen == "last" else np.full_like(joint_action, neutral)
         known[senders] = actions
         return senders, known
+
+    def _with_told(self) -> FloatArray:
+        """Return the present states with a column for each action told, as yet that of nobody."""
+        n_told = max(map(len, self._senders), default=0)
+        if not n_told:
+            return self._states
+        nobody = np.full((len(self._states), n_told), float(len(self.action_set)))
+        return np.hstack([self._states, nobody])
 
     def _given_by(self, agent: int) -> FloatArray:
         """Return how often all took each action ``(A, n, A)`` given each action of an agent."""
@@ -416,6 +432,20 @@ class Team:
         """What adapts beside the learner, by name."""
         parts = {"self_model": self.self_model, "calibration": self.calibration}
         return {name: part for name, part in parts.items() if part is not None}
+
+
+def _senders(
+    settings: LearnerSettings, messages: Messages, hierarchy: Hierarchy
+) -> list[list[int]]:
+    """Return, by agent, whose actions are part of its state, in the order of decision."""
+    if not settings.values_actions:
+        return []
+    if hierarchy.neighbours:
+        raise ValueError(
+            f"learner.kind = {settings.kind!r}: agents use what they are told, and neighbours tell "
+            "nothing; set topology.oriented, in which order they decide"
+        )
+    return [sorted(senders, key=hierarchy.order.index) for senders in messages.told]
 
 
 def _self_model_of(scenario: Scenario, settings: LearnerSettings) -> SelfModel | None:

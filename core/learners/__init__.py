@@ -24,6 +24,7 @@ LEARNERS = SettingsRegistry(
         "sparse-cooperative": f"{__name__}.sparse_cooperative:SparseCooperativeSettings",
         "q-learning": f"{__name__}.q_learning:QLearningSettings",
         "vdn": f"{__name__}.vdn:ValueDecompositionSettings",
+        "fitted-q": f"{__name__}.fitted_q:FittedQSettings",
         "frozen": f"{__name__}.frozen:FrozenSettings",
         "ppo": f"{PEERS}:PPOSettings",
         "ippo": f"{PEERS}:IPPOSettings",

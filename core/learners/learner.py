@@ -11,9 +11,11 @@ from ..adaptation.calibration import CalibrationSettings
 from ..adaptation.self_model import SelfModelSettings
 from ..decision.exploration import EXPLORATIONS, BurstExploration, ExplorationSettings
 from ..decision.settings import Decision
+from ..interface.spaces import ActionSet, StateSpace
 from ..numerics.arrays import FloatArray
 from ..plugins.plugged import Plugged
 from ..plugins.settings import PartSettings
+from ..rules.rule_base import RuleBase
 from ..rules.settings import RuleBaseSettings
 
 
@@ -89,6 +91,10 @@ class LearnerSettings(TeamSettings):
 
     uses_hierarchy = True
 
+    values_actions: ClassVar[bool] = False
+    """Whether the learner values an agent's own actions in its present state and given what it is
+    told, which takes no prediction: then it is the team's evaluator, too."""
+
     rule_base: RuleBaseSettings = RuleBaseSettings()
     """Fuzzy rule base of every agent."""
     weights: Literal["own", "role"] = "own"
@@ -103,7 +109,21 @@ class LearnerSettings(TeamSettings):
     calibration: CalibrationSettings = CalibrationSettings()
     """What the team learns of the constants of its predictor."""
 
+    def rules_over(
+        self, space: StateSpace, actions: ActionSet, n_told: int
+    ) -> tuple[StateSpace, RuleBase]:
+        """Return what values are functions of, and the agents' rule base over it.
+
+        Parameters
+        ----------
+        space, actions
+            Those of the scenario.
+        n_told
+            By how many others an agent is told what they decided, at most.
+        """
+        return space, RuleBase.build(space, self.rule_base)
+
     @property
     def needs_prediction(self) -> bool:
-        """Whether it acts only in scenarios that predict: unless it acts at random."""
-        return self.decision.rule != "random"
+        """Whether it acts only in scenarios that predict: unless it values or draws actions."""
+        return self.decision.rule != "random" and not self.values_actions

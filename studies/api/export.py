@@ -1,10 +1,9 @@
-"""Results as files: tidy tables as CSV or Parquet, or one small JSON file."""
+"""Results as files: tidy tables as CSV, or one small JSON file."""
 
 from __future__ import annotations
 
 import io
 from collections.abc import Callable
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -20,7 +19,7 @@ from ..store.store import Store
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-Form = Literal["csv", "parquet", "json"]
+Form = Literal["csv", "json"]
 
 
 def export(store: Store, folder: Path, form: Form, *, overwrite: bool = False) -> list[Path]:
@@ -47,7 +46,7 @@ def export(store: Store, folder: Path, form: Form, *, overwrite: bool = False) -
     Raises
     ------
     SpecError
-        If a file is in the way, the extra ``parquet`` is not installed, or the database is damaged.
+        If a file is in the way, or the database is damaged.
     """
     writers = _writers(store, form)
     paths = {name: folder / f"{name}.{form}" for name in writers}
@@ -71,14 +70,9 @@ def _writers(store: Store, form: Form) -> dict[str, Callable[[Path], None]]:
         outline = StudyOutline.kept(store)
         kept = published_part(outline.study, results)
         return {"results": lambda path: published.write(path, outline, kept)}
-    if form == "parquet" and not find_spec("pyarrow"):
-        raise SpecError(
-            "--format parquet: pyarrow is not installed; pip install 'nested-agents[parquet]'"
-        )
-    write = _write_csv if form == "csv" else _write_parquet
     return {
-        "episodes": lambda path: write(results.episodes, path),
-        "trials": lambda path: write(results.trials, path),
+        "episodes": lambda path: _write_csv(results.episodes, path),
+        "trials": lambda path: _write_csv(results.trials, path),
     }
 
 
@@ -88,11 +82,3 @@ def _write_csv(frame: DataFrame, path: Path) -> None:
         text = io.TextIOWrapper(file, encoding="utf-8", newline="", write_through=True)
         write_frame(text, frame)
         text.detach()
-
-
-def _write_parquet(frame: DataFrame, path: Path) -> None:
-    """Write a frame as Parquet; a column of numbers and texts is one of texts."""
-    mixed = [n for n in frame if frame[n].dtype == object]
-    texts = {n: frame[n].map(str, na_action="ignore") for n in mixed}
-    with replacing(path) as file:
-        frame.assign(**texts).to_parquet(file, index=False)

@@ -8,7 +8,7 @@ begins so, and is no number, gets an apostrophe in front. Numbers stay numbers.
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, TextIO
 
 if TYPE_CHECKING:
@@ -27,8 +27,13 @@ def write_csv(file: TextIO, names: Sequence[str], rows: Iterable[Sequence[Any]])
 
 def write_frame(file: TextIO, frame: DataFrame) -> None:
     """Write a frame with a header; truth values are 0 and 1, what is missing is an empty cell."""
+    write_csv(file, list(frame.columns), rows_of(frame))
+
+
+def rows_of(frame: DataFrame) -> Iterator[tuple[Any, ...]]:
+    """Yield the rows of a frame as values of Python's own types; None is what is missing."""
     values: Any = frame.astype(object).where(frame.notna(), None)
-    write_csv(file, list(frame.columns), values.itertuples(index=False, name=None))
+    yield from values.itertuples(index=False, name=None)
 
 
 def harmless(value: Any) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -31,14 +32,7 @@ from .. import options
 @options.form
 @options.trust
 def command(
-    sources: tuple[Path, ...],
-    by: str | None,
-    measure: str,
-    phase: str | None,
-    reference: str | None,
-    where: str | None,
-    form: str,
-    trust: bool,
+    sources: tuple[Path, ...], where: str | None, form: str, trust: bool, **compared: Any
 ) -> int:
     """Compare conditions of one study or several: effect, interval, p raw and adjusted, power.
 
@@ -49,7 +43,7 @@ def command(
     from ..loading import load_results
 
     results = load_results(sources, None, where, is_trusted=trust)
-    comparison = results.compare(by, measure, phase=phase, reference=reference)
+    comparison = results.compare(**compared)
     if form == "table":
         print_table(comparison.table)
         print("", *comparison.verdicts, sep="\n")

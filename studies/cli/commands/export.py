@@ -17,10 +17,8 @@ if TYPE_CHECKING:
 @options.directory
 @options.formats(
     "csv",
-    "parquet",
     "json",
-    text="Of the files; parquet needs the extra nested-agents[parquet]. Distances and returns are "
-    "left out of json.",
+    text="Of the files; distances and returns are left out of json.",
 )
 @click.option(
     "--out",

@@ -1,4 +1,7 @@
+import io
+
 import numpy as np
+import pandas as pd
 import pytest
 from made_up_results import Arrays
 
@@ -7,6 +10,7 @@ from nested_agents.scenarios.box_pushing.scenario import MEASURES
 from nested_agents.studies.catalogue.learning_curve import analyse, draw, metrics_of
 from nested_agents.studies.presentation.cells import Cell
 from nested_agents.studies.presentation.figures import save
+from nested_agents.studies.presentation.row_formats import write_rows
 from nested_agents.studies.results.statistics import Estimate
 from nested_agents.studies.results.summary import two_figures
 
@@ -85,6 +89,14 @@ def test_the_interval_of_a_cell():
     assert Cell.of(Estimate(*map(np.asarray, (0.5, 0.25, 1.0)))).interval == ".25–1.0"
     assert Cell.of(Estimate(*map(np.asarray, (-0.6, -0.72, -0.53)))).interval == "-.72 to -.53"
     assert two_figures(float("nan")) == "?"
+
+
+@pytest.mark.parametrize("form", ["table", "csv", "json"])
+def test_no_rows_can_be_written(form):
+    expected = {"table": "", "csv": "condition,phase,seed\n", "json": "[]\n"}
+    file = io.StringIO()
+    write_rows(pd.DataFrame(columns=["condition", "phase", "seed"]), [], form, file)
+    assert file.getvalue() == expected[form]
 
 
 @pytest.mark.parametrize("further", range(6))

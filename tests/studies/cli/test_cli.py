@@ -1,5 +1,6 @@
 import csv
 import io
+import json
 import os
 import re
 import shlex
@@ -101,10 +102,14 @@ def test_results_in_every_form(study, capsys):
         "condition", "preset", "seed", "phase", "episode", "steps", "success", "stopped_at_goal",
         "final_distance_m", "final_orientation_rad", "contact_fraction", "return",
     ]  # fmt: skip
+    objects = json.loads(results(directory, "json", capsys=capsys))
+    assert len(objects) == len(rows)
+    for row, item in zip(rows, objects, strict=True):
+        assert float(row["return"]) == item["return"]
+        assert bool(int(row["success"])) is item["success"]
     table = results(directory, "table", "--phase", "evaluation", capsys=capsys)
     lines = table.splitlines()
-    blocks = table.count("seed episode") // 2  # columns that do not fit follow below
-    assert sum(line[:1] in ("0", "1", "2") for line in lines) == 2 * 3 * 2 * blocks
+    assert len([line for line in lines if line.split()[:1] in (["0"], ["1"], ["2"])]) == 2 * 3 * 2
     assert [line for line in lines if "evaluation" in line] == [
         "default, evaluation", "frozen, evaluation",
     ]  # fmt: skip
@@ -144,7 +149,7 @@ def test_interrupted_and_continued_is_as_if_never_interrupted(
     assert len(again) <= (1 if how == signal.SIGKILL else 0)
     for phase in ("training", "evaluation"):
         whole, resumed = (
-            results(d, "csv", "--phase", phase, capsys=capsys) for d in (study[0], tmp_path)
+            results(d, "json", "--phase", phase, capsys=capsys) for d in (study[0], tmp_path)
         )
         assert whole == resumed
     for name in now:
@@ -243,7 +248,7 @@ BAD = {
     "run {spec} --out": "'--out' requires an argument; see nested-agents run --help",
     "demo --out --print-spec": "error: --out --print-spec: is an option; a value must come first",
     "results nowhere": "nowhere: holds no study",
-    "results nowhere --format xml": "'--format': 'xml' is not one of 'table', 'csv'",
+    "results nowhere --format xml": "'--format': 'xml' is not one of 'table', 'csv', 'json'",
     "status nowhere": "nowhere: holds no study",
     "retry nowhere": "nowhere: holds no study",
     "presets papr": "did you mean 'paper'",
