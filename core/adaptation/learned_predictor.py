@@ -73,6 +73,110 @@ class LearnedPredictor:
         mirrored = known if settings.mirrored is None else settings.mirrored
         self.mirror = Mirror.of(scenario) if mirrored else None
         self.bodies = Bodies(scenario, settings.products, settings.memberships)
+        kinds = list(dict.fromkeys(roles))
+        self.kinds = np.array([kinds.index(role) for role in roles])
+        """``(n,)`` agents of one kind have own variables that change alike."""
+        own = [Partition.of(variable) for variable in space.own]
+        self.own_rules = RuleBase(own, [(j,) for j in range(len(own))]) if own else None
+        low, high = np.array([(v.low, v.high) for v in space.variables]).T
+        self.periods = np.where([v.periodic for v in space.variables], high - low, 0.0)
+        self.limits = np.maximum(np.abs(low), np.abs(high))[: space.n_own]
+        self.grains = GRAIN * (high - low)[: space.n_own]
+        self._pending: list[tuple[FloatArray, IntArray, FloatArray]] = []
+        self._tabulate()
+        (b, w), v = self.bodies.members.shape, len(self.bodies.common)
+        k, rules = w * (space.n_own or self.n_actions + 1), self.bodies.rules.n_rules
+        if k * rules * min(b, 2) > MOST_FEATURES:
+            raise ValueError(
+                f"learner.predictor: {k * rules * min(b, 2)} features to regress on, allowed "
+                f"{MOST_FEATURES}; lower products or memberships"
+            )
+        r = self.own_rules.n_rules if self.own_rules else 0
+        of_own, f = (len(kinds), self.n_actions, r), k * rules
+        self.memory: dict[str, FloatArray] = {
+            "own_gram": np.zeros((*of_own, r)),
+            "own_moment": np.zeros((*of_own, space.n_own)),
+            "own_weights": np.zeros((*of_own, space.n_own)),
+            "gram": np.zeros((3, f, f)),
+            "moment": np.zeros((2, f, 2 * v)),
+            "squares": np.zeros(2 * v),
+            "weights": np.zeros((k, rules, 2 * v)),
+            "keep": np.ones(v),
+            "seen": np.where(self.periods > 0.0, [low, high], [[np.inf], [-np.inf]]),
+        }
+        """Sums over all experience and what follows from them: all that is remembered."""
+
+    def _tabulate(self) -> None:
+        """Write out the actions of a group, and of all agents if they are few."""
+        a, n = self.n_actions, len(self.kinds)
+        sizes = {len(group) for group in self.groups}
+        self.group_of = np.repeat(np.arange(len(self.groups)), [len(g) for g in self.groups])
+        self.digits = self.joint = np.zeros((0, 0), dtype=np.int64)
+        """``(A ** w, w)`` if groups are of equal size; ``(A ** n, n)`` if agents are few, too."""
+        if len(sizes) == 1:
+            (w,) = sizes
+            self.digits = np.indices((a,) * w).reshape(w, -1).T
+            if a**n <= MOST_TABULATED:
+                self.joint = np.indices((a,) * n).reshape(n, -1).T
+                self.divisors = a ** np.arange(n - w, -1, -w)
+                self.local = np.arange(a**n)[:, None] // self.divisors % a**w
+
+    def predict(self, states: FloatArray) -> LearnedPrediction:
+        """Predict from states ``(n, d)``."""
+        return (TabulatedPrediction if len(self.joint) else LearnedPrediction)(self, states)
+
+    def observe(self, before: FloatArray, joint_action: IntArray, after: FloatArray) -> None:
+        """Take in what a joint action ``(n,)`` made of states ``(n, d)``."""
+        self._pending.append((before.copy(), joint_action.copy(), after.copy()))
+        if len(self._pending) == INTERVAL:
+            self.end_episode()
+
+    def end_episode(self) -> None:
+        """Regress on all experience."""
+        if not self._pending:
+            return
+        before, joint, after = map(np.array, zip(*self._pending, strict=True))
+        self._pending = []
+        if self.own_rules is not None:
+            self._regress_own(before, joint, after)
+        if self.mirror is not None:
+            signs, partners = self.mirror.signs, self.mirror.partners
+            before = np.concatenate([before, signs * before[:, partners]])
+            after = np.concatenate([after, signs * after[:, partners]])
+        seen, every = self.memory["seen"], np.concatenate([before, after])
+        seen[0] = np.minimum(seen[0], every.min(axis=(0, 1)))
+        seen[1] = np.maximum(seen[1], every.max(axis=(0, 1)))
+        self._regress(before, joint, after)
+
+    def _regress_own(self, before: FloatArray, joint: IntArray, after: FloatArray) -> None:
+        m, own = self.memory, self.space.n_own
+        assert self.own_rules is not None
+        phi = self.own_rules.features(before[..., :own].reshape(-1, own))
+        change = self._apart(after, before)[..., :own].reshape(-1, own)
+        at = np.tile(self.kinds, len(before)), joint.ravel()
+        np.add.at(m["own_gram"], at, phi[:, :, None] * phi[:, None])
+        np.add.at(m["own_moment"], at, phi[:, :, None] * change[:, None])
+        gram = m["own_gram"] + STEADY * np.eye(phi.shape[1])
+        m["own_weights"] = np.linalg.solve(gram, m["own_moment"])
+
+    def _regress(self, before: FloatArray, joint: IntArray, after: FloatArray) -> None:
+        bodies, m = self.bodies, self.memory
+        b, v = bodies.agents.shape
+        change = self._apart(after, before)[:, bodies.agents, bodies.columns]
+        present = before[:, bodies.agents, bodies.columns]
+        phi = bodies.rules.features(present.reshape(-1, v)).reshape(len(before), b, 1, -1)
+        features = self.drivers(after[..., : self.space.n_own], joint)[..., None] * phi
+        features = features.reshape(len(before), b, -1)
+        targets = np.concatenate([change, after[:, bodies.agents, bodies.columns]], axis=2)
+        each, together = features.reshape(len(before) * b, -1), features.sum(axis=1)
+        common = np.tile(bodies.common, 2)
+        summed = np.where(common, targets[:, 0], targets.sum(axis=1))
+        of_all = together.T @ together
+        m["gram"] += np.stack([each.T @ each, of_all, (b - 2) * of_all])
+        m["moment"] += np.stack([each.T @ targets.reshape(-1, 2 * v), together.T @ summed])
+        m["squares"] += np.where(
+            common, (targets[:, 0] ** 2).sum(axis=0), (targets**2).sum(axis=(0, 1))
+        )
         own, others, explained = self._solved(common)
         left = m["squares"] - explained
         is_angle = self.periods[bodies.columns[0]] > 0.0

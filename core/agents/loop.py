@@ -78,6 +78,7 @@ def control_loop(
     first_episode: int = 0,
     first_world: int | None = None,
     learn: bool = True,
+    explore: bool | None = None,
 ) -> Iterator[StepRecord]:
     """Run episodes and yield every step.
 
@@ -94,7 +95,9 @@ def control_loop(
     first_world
         Number of its world, see `world_seed`; None: the same.
     learn
-        Whether the team explores and learns, or is evaluated greedily.
+        Whether the team learns, or is evaluated.
+    explore
+        Whether it explores; None: if it learns.
 
     Raises
     ------
@@ -103,6 +106,7 @@ def control_loop(
         cannot be learned from, see `StateSpace.checked`.
     """
     first_world = first_episode if first_world is None else first_world
+    explore = learn if explore is None else explore
     space, agents = scenario.state_space, scenario.agents
     for k in range(episodes):
         episode = first_episode + k
@@ -116,7 +120,7 @@ def control_loop(
         team.check(prediction)
         for step in range(steps):
             begin = perf_counter()
-            joint_action = team.act(prediction, explore=learn)
+            joint_action = team.act(prediction, explore=explore)
             decided = perf_counter()
             transition = scenario.step(joint_action)
             last = transition.terminated or transition.truncated or step == steps - 1

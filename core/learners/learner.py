@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Literal, Protocol
+from typing import Annotated, ClassVar, Literal, Protocol
 
 from pydantic import Field
 
@@ -12,9 +12,11 @@ from ..adaptation.predictors import GivenPredictor, Predictor
 from ..adaptation.self_model import SelfModelSettings
 from ..decision.exploration import EXPLORATIONS, BurstExploration, ExplorationSettings
 from ..decision.settings import Decision
+from ..interface.spaces import ActionSet, StateSpace
 from ..numerics.arrays import FloatArray
 from ..plugins.plugged import Plugged
 from ..plugins.settings import PartSettings, unwritten
+from ..rules.rule_base import RuleBase
 from ..rules.settings import RuleBaseSettings
 
 
@@ -69,6 +71,17 @@ class TeamSettings(PartSettings):
     whoever acts for all by itself are built as they are, see `core.policies`.
     """
 
+    uses_hierarchy: ClassVar[bool] = False
+    """Whether those who act pass actions down a hierarchy, which `build` is then given last."""
+
+    discount: Annotated[float, Field(ge=0, lt=1)] = 0.95
+    """Discount per decision, gamma of Eq. 7."""
+
+    @property
+    def needs_prediction(self) -> bool:
+        """Whether it acts only in scenarios that predict, see `core.interface.scenario`."""
+        return False
+
 
 class LearnerSettings(TeamSettings):
     """What the settings of all learners share.
@@ -77,10 +90,14 @@ class LearnerSettings(TeamSettings):
     base and the row of weights of every agent ``(n,)``; all rows are somebody's.
     """
 
+    uses_hierarchy = True
+
+    values_actions: ClassVar[bool] = False
+    """Whether the learner values an agent's own actions in its present state and given what it is
+    told, which takes no prediction: then it is the team's evaluator, too."""
+
     rule_base: RuleBaseSettings = RuleBaseSettings()
     """Fuzzy rule base of every agent."""
-    discount: Annotated[float, Field(ge=0, lt=1)] = 0.95
-    """Discount per decision, gamma of Eq. 7."""
     weights: Literal["own", "role"] = "own"
     """Whether every agent has consequent weights of its own, or all agents of one role (the left
     wheels, say) share them and pool their experience."""
@@ -94,3 +111,26 @@ class LearnerSettings(TeamSettings):
     """What the team learns of the constants of its predictor."""
     predictor: Annotated[Predictor, unwritten(GivenPredictor())] = GivenPredictor()
     """What predicts: the scenario, nothing but persistence, or what has been learned."""
+
+    def rules_over(
+        self, space: StateSpace, actions: ActionSet, n_told: int
+    ) -> tuple[StateSpace, RuleBase]:
+        """Return what values are functions of, and the agents' rule base over it.
+
+        Parameters
+        ----------
+        space, actions
+            Those of the scenario.
+        n_told
+            By how many others an agent is told what they decided, at most.
+        """
+        return space, RuleBase.build(space, self.rule_base)
+
+    @property
+    def needs_prediction(self) -> bool:
+        """Whether it acts only in scenarios that predict: unless it values or draws actions.
+
+        Nor does it if it has another predictor than the given one.
+        """
+        decides_by_it = self.decision.rule != "random" and not self.values_actions
+        return decides_by_it and isinstance(self.predictor, GivenPredictor)

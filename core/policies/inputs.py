@@ -23,6 +23,8 @@ class Inputs:
     ----------
     scenario
         Whose states.
+    numbered
+        Whether the inputs of an agent say which one it is.
 
     Attributes
     ----------
@@ -37,7 +39,7 @@ class Inputs:
     (4, 4)
     """
 
-    def __init__(self, scenario: Scenario) -> None:
+    def __init__(self, scenario: Scenario, *, numbered: bool = True) -> None:
         space = scenario.state_space
         self._low = np.array([v.low for v in space.variables])
         self._span = np.array([v.high - v.low for v in space.variables])
@@ -46,10 +48,10 @@ class Inputs:
         self._columns = np.append(np.arange(space.n_variables), np.flatnonzero(self._periodic))
         self._groups, self._n_own = groups_of(scenario), space.n_own
         n = len(scenario.agents)
-        self._names = np.eye(n)
+        self._names = np.eye(n) if numbered else np.zeros((n, 0))
         of_own = int((self._columns < space.n_own).sum())
         of_shared = len(self._columns) - of_own
-        self.n_own = len(self._columns) + n
+        self.n_own = len(self._columns) + self._names.shape[1]
         self.n_joint = n * of_own + len(self._groups) * of_shared
 
     def each(self, states: FloatArray) -> FloatArray:

@@ -1,10 +1,13 @@
-"""PPO of stable-baselines3, decision by decision: centralised, independent, with a central critic.
+"""PPO of stable-baselines3, decision by decision: of agents in a hierarchy, and of one for all.
 
 The policy, its rollout buffer and its update are stable-baselines3's; here is what its own loop
 does in between. Actions are drawn by adding Gumbel noise to the logarithms of probabilities.
-Several agents with shared weights are to it as many environments side by side. A time limit is no
-end: the last reward of an episode that did not terminate is added the discounted value of the state
-that it broke off in (Pardo et al. 2018).
+Several agents with shared weights are to it as many environments side by side. In a hierarchy
+agents decide level by level, and see the actions that they are told as one-hots; these are kept
+with a decision, so that an update passes over all agents at once. A step is that of all agents: it
+has one value and one advantage for each, whoever decided first. A time limit is no end: the last
+reward of an episode that did not terminate is added the discounted value of the state that it broke
+off in (Pardo et al. 2018).
 """
 
 from __future__ import annotations
@@ -17,17 +20,175 @@ from gymnasium.spaces import Discrete, MultiDiscrete
 from scipy.special import logsumexp
 from stable_baselines3 import PPO
 
-from ..interface.scenario import Scenario, Transition
+from ..interface.hierarchy import Hierarchy
+from ..interface.scenario import Scenario, Transition, roles_of
 from ..numerics.arrays import FloatArray, IntArray
-from .central_critic import CentralCriticPolicy
 from .inputs import Inputs, RewardScale
 from .networks import Layers, drawing_from, prepare, weights_of
+from .passing import Passing
 from .peer import Peer, Seen
-from .settings import PolicyGradientSettings
+from .settings import MultiAgentPPOSettings, PolicyGradientSettings
+from .split_policy import SplitPolicy
 
 
-class IndependentPPO(Peer):
-    """One policy for every agent, which sees its own state alone; all share the weights.
+class ActorCritic:
+    """Policy and critic with their buffer and update, for agents that share these weights.
+
+    Parameters
+    ----------
+    settings
+        Of PPO.
+    agents
+        Which agents they are: rows of what is seen, of actions and of rewards.
+    actions
+        Space of what one of them does.
+    widths
+        How many inputs, in this order, the actor sees, both see, and the critic sees.
+    rng
+        Source of everything random in it.
+    """
+
+    def __init__(
+        self,
+        settings: PolicyGradientSettings,
+        agents: IntArray,
+        actions: Any,
+        widths: tuple[int, int, int],
+        rng: np.random.Generator,
+    ) -> None:
+        of_actor, of_both, of_critic = widths
+        split = {"actor": of_actor + of_both, "critic": of_both + of_critic}
+        is_split = of_actor > 0 or of_critic > 0
+        policy: Any = SplitPolicy if is_split else "MlpPolicy"
+        options = {"net_arch": list(settings.hidden)} | (split if is_split else {})
+        model = PPO(
+            policy, None, learning_rate=settings.learning_rate,
+            n_steps=settings.rollout, batch_size=settings.batch_size, n_epochs=settings.epochs,
+            gamma=settings.discount, gae_lambda=settings.gae_lambda, clip_range=settings.clip,
+            ent_coef=settings.entropy, policy_kwargs=options,
+            device="cpu", _init_setup_model=False,
+        )  # fmt: skip
+        prepare(model, sum(widths), actions, len(agents), rng)
+        model.policy.set_training_mode(False)
+        hidden = model.policy.mlp_extractor
+        self.model, self.agents, self._rng = model, agents, rng
+        self.actor = Layers([hidden.policy_net, model.policy.action_net], np.tanh)
+        self.critic = Layers([hidden.value_net, model.policy.value_net], np.tanh)
+        self._of_actor, self._discount = of_actor, settings.discount
+        self._rewards = RewardScale(settings.discount, len(agents))
+        self._starts: FloatArray = np.ones(len(agents))
+
+    def learn(
+        self, seen: FloatArray, actions: IntArray, logs: FloatArray, reward: FloatArray
+    ) -> None:
+        """Keep a step of all agents; if the buffer was full before it, update the policy first."""
+        seen = seen[self.agents]
+        values = torch.as_tensor(self._values(seen))
+        if self.model.rollout_buffer.full:
+            self._update(values, done=False)
+        self.model.rollout_buffer.add(
+            seen, actions[self.agents], self._rewards.scaled(reward[self.agents]), self._starts,
+            values, torch.as_tensor(logs[self.agents]),
+        )  # fmt: skip
+        self._starts = np.zeros(len(seen))
+
+    def end_episode(self, seen: FloatArray, *, terminated: bool) -> None:
+        """Bootstrap from where the episode broke off; update the policy if the buffer is full."""
+        buffer, values = self.model.rollout_buffer, self._values(seen[self.agents])
+        if not terminated:
+            buffer.rewards[buffer.pos - 1] += self._discount * values
+        self._starts = np.ones(len(values))
+        self._rewards.end_episode()
+        if buffer.full:
+            self._update(torch.as_tensor(values), done=True)
+
+    def _values(self, seen: FloatArray) -> FloatArray:
+        return self.critic(seen[:, self._of_actor :]).ravel()
+
+    def _update(self, values: torch.Tensor, *, done: bool) -> None:
+        buffer = self.model.rollout_buffer
+        ends = np.full(len(self._starts), done)
+        buffer.compute_returns_and_advantage(last_values=values, dones=ends)
+        with drawing_from(self._rng):
+            self.model.train()
+        buffer.reset()
+
+
+class PolicyGradient(Peer):
+    """What central and decentral forms of PPO share: acting by noisy logits, keeping, updating.
+
+    Parameters
+    ----------
+    scenario
+        Where they act.
+    seed
+        Source of everything random in them.
+    value_of
+        Whether the reward of a step is that of each agent, or its mean for all.
+
+    Attributes
+    ----------
+    parts
+        By name, policies that share no weights.
+    """
+
+    is_sampled = True
+
+    def __init__(self, scenario: Scenario, seed: np.random.SeedSequence, value_of: str) -> None:
+        super().__init__(seed)
+        self.shape = len(scenario.agents), len(scenario.action_set)
+        self.value_of = value_of
+        self.parts: dict[str, ActorCritic] = {}
+
+    def act(self, prediction: Seen, *, explore: bool = True) -> IntArray:
+        """Return a joint action ``(n,)``: drawn from the policies, or the most probable."""
+        noise = self.rng.gumbel(size=self.shape) if explore else np.zeros(self.shape)
+        seen, logits, joint = self.decide(prediction.present, noise)
+        if explore:
+            self._decided = prediction.present, seen, logits, joint
+        return joint
+
+    def learn(self, transition: Transition) -> None:
+        """Keep the step, and update the policies whose buffers were full."""
+        states, seen, logits, joint = self._decided
+        chosen = logits[np.arange(len(joint)), joint] - logsumexp(logits, axis=1)
+        actions, logs = joint.reshape(len(seen), -1), chosen.reshape(len(seen), -1).sum(axis=1)
+        reward = np.asarray(transition.reward, dtype=float)
+        reward = np.broadcast_to(reward.mean() if self.value_of == "team" else reward, len(seen))
+        seen = self.with_critics(seen, states)
+        for part in self.parts.values():
+            part.learn(seen, actions, logs, reward)
+        self._last = transition
+
+    def end_episode(self) -> None:
+        """Bootstrap, and update the policies whose buffers are full."""
+        states = self._last.states
+        seen = self.with_critics(self.of_actors(states), states)
+        for part in self.parts.values():
+            part.end_episode(seen, terminated=self._last.terminated)
+
+    def arrays(self) -> dict[str, FloatArray]:
+        """Return the weights of policies and critics."""
+        weights = {name: weights_of(part.model.policy) for name, part in self.parts.items()}
+        return {f"{name}.{key}": w for name, own in weights.items() for key, w in own.items()}
+
+    def of_actors(self, states: FloatArray) -> FloatArray:
+        """Return the inputs of actors ``(rows, k)`` before anything is decided."""
+        raise NotImplementedError
+
+    def with_critics(self, seen: FloatArray, states: FloatArray) -> FloatArray:
+        """Return inputs of actors ``(rows, k)``, and after them what critics see beside."""
+        return seen
+
+    def decide(
+        self, states: FloatArray, noise: FloatArray
+    ) -> tuple[FloatArray, FloatArray, IntArray]:
+        """Return the inputs of actors, logits ``(n, A)``, and the greatest with noise ``(n,)``."""
+        raise NotImplementedError
+
+
+class CentralPPO(PolicyGradient):
+    """One policy that sees all states and acts for all agents.
 
     Parameters
     ----------
@@ -39,115 +200,100 @@ class IndependentPPO(Peer):
         Source of everything random in it.
     """
 
-    policy: Any = "MlpPolicy"
-
     def __init__(
         self, settings: PolicyGradientSettings, scenario: Scenario, seed: np.random.SeedSequence
     ) -> None:
-        super().__init__(seed)
-        self.inputs, self._n = Inputs(scenario), len(scenario.agents)
-        n_envs, n_inputs, actions, options = self._shape(len(scenario.action_set))
-        model = PPO(
-            self.policy, None, learning_rate=settings.learning_rate,
-            n_steps=settings.rollout, batch_size=settings.batch_size, n_epochs=settings.epochs,
-            gamma=settings.discount, gae_lambda=settings.gae_lambda, clip_range=settings.clip,
-            ent_coef=settings.entropy, policy_kwargs={"net_arch": list(settings.hidden)} | options,
-            device="cpu", _init_setup_model=False,
-        )  # fmt: skip
-        prepare(model, n_inputs, actions, n_envs, self.rng)
-        self._model, self._discount = model, settings.discount
-        model.policy.set_training_mode(False)
-        hidden = model.policy.mlp_extractor
-        self._actor = Layers([hidden.policy_net, model.policy.action_net], np.tanh)
-        self._critic = Layers([hidden.value_net, model.policy.value_net], np.tanh)
-        self._n_actions = len(scenario.action_set)
-        self._rewards = RewardScale(settings.discount, n_envs)
-        self._starts: FloatArray = np.ones(n_envs)
+        super().__init__(scenario, seed, "team")
+        self.inputs = Inputs(scenario)
+        n, n_actions = self.shape
+        actions = Discrete(n_actions) if n == 1 else MultiDiscrete([n_actions] * n)
+        widths = 0, self.inputs.n_joint, 0
+        self.parts = {"all": ActorCritic(settings, np.arange(1), actions, widths, self.rng)}
 
-    def _shape(self, n_actions: int) -> tuple[int, int, Any, dict[str, Any]]:
-        """Return how many act side by side, on how many inputs each, the actions, and options."""
-        return self._n, self.inputs.n_own, Discrete(n_actions), {}
+    def of_actors(self, states: FloatArray) -> FloatArray:
+        """Return all states, once."""
+        return self.inputs.joint(states)[None].astype(np.float32)
 
-    def _seen(self, states: FloatArray) -> FloatArray:
-        """Return the inputs ``(n_envs, n_inputs)``."""
-        return self.inputs.each(states)
-
-    def act(self, prediction: Seen, *, explore: bool = True) -> IntArray:
-        """Return a joint action ``(n,)``: drawn from the policy, or the most probable."""
-        seen = self._seen(prediction.present).astype(np.float32)
-        logits = self._actor(seen).reshape(self._n, self._n_actions)
-        if not explore:
-            return logits.argmax(axis=1)
-        actions = (logits + self.rng.gumbel(size=logits.shape)).argmax(axis=1)
-        logs = logits[np.arange(self._n), actions] - logsumexp(logits, axis=1)
-        self._decided = seen, actions, logs.reshape(len(seen), -1).sum(axis=1)
-        return actions
-
-    def learn(self, transition: Transition) -> None:
-        """Keep the step; if the buffer was full before it, update the policy first."""
-        seen, actions, logs = self._decided
-        values = torch.as_tensor(self._critic(seen).ravel())
-        if self._model.rollout_buffer.full:
-            self._update(values, done=False)
-        rewards = self._rewards.scaled(self._share(transition.reward))
-        self._model.rollout_buffer.add(
-            seen, actions.reshape(len(seen), -1), rewards, self._starts, values,
-            torch.as_tensor(logs),
-        )  # fmt: skip
-        self._starts = np.zeros(len(seen))
-        self._last = transition
-
-    def end_episode(self) -> None:
-        """Bootstrap from where the episode broke off; update the policy if the buffer is full."""
-        buffer, last = self._model.rollout_buffer, self._last
-        values = self._critic(self._seen(last.states).astype(np.float32)).ravel()
-        if not last.terminated:
-            buffer.rewards[buffer.pos - 1] += self._discount * values
-        self._starts = np.ones(len(values))
-        self._rewards.end_episode()
-        if buffer.full:
-            self._update(torch.as_tensor(values), done=True)
-
-    def _update(self, values: torch.Tensor, *, done: bool) -> None:
-        buffer = self._model.rollout_buffer
-        ends = np.full(len(self._starts), done)
-        buffer.compute_returns_and_advantage(last_values=values, dones=ends)
-        with drawing_from(self.rng):
-            self._model.train()
-        buffer.reset()
-
-    def _share(self, reward: float | FloatArray) -> FloatArray:
-        """Return the reward of everybody who acts side by side."""
-        return np.broadcast_to(np.asarray(reward, dtype=float), (self._n,)).copy()
-
-    def arrays(self) -> dict[str, FloatArray]:
-        """Return the weights of policy and critic."""
-        return weights_of(self._model.policy)
+    def decide(
+        self, states: FloatArray, noise: FloatArray
+    ) -> tuple[FloatArray, FloatArray, IntArray]:
+        """Decide for all at once."""
+        seen = self.of_actors(states)
+        logits = self.parts["all"].actor(seen).reshape(self.shape)
+        return seen, logits, (logits + noise).argmax(axis=1)
 
 
-class CentralPPO(IndependentPPO):
-    """One policy that sees all states and acts for all agents."""
+class HierarchyPPO(PolicyGradient):
+    """One policy for every agent, on its own state and the actions that it is told.
 
-    def _shape(self, n_actions: int) -> tuple[int, int, Any, dict[str, Any]]:
-        actions = Discrete(n_actions) if self._n == 1 else MultiDiscrete([n_actions] * self._n)
-        return 1, self.inputs.n_joint, actions, {}
+    Parameters
+    ----------
+    settings
+        Of PPO, whose weights are whose, and what the critic sees.
+    scenario
+        Where they act.
+    seed
+        Source of everything random in them.
+    hierarchy
+        Who is told by whom; None: nobody is.
 
-    def _seen(self, states: FloatArray) -> FloatArray:
-        return self.inputs.joint(states)[None]
+    Raises
+    ------
+    ValueError
+        If some agents are neighbours; one line.
+    """
 
-    def _share(self, reward: float | FloatArray) -> FloatArray:
-        return np.array([np.mean(reward)])
+    def __init__(
+        self,
+        settings: MultiAgentPPOSettings,
+        scenario: Scenario,
+        seed: np.random.SeedSequence,
+        hierarchy: Hierarchy | None = None,
+    ) -> None:
+        super().__init__(scenario, seed, settings.value_of)
+        n, n_actions = self.shape
+        hierarchy = hierarchy or Hierarchy(scenario.agents, [])
+        if hierarchy.neighbours:
+            raise ValueError(
+                f"learner.kind = {settings.kind!r}: neighbours decide at the same time and tell "
+                "each other nothing, use a topology without them"
+            )
+        self.inputs = Inputs(scenario, numbered=settings.numbered)
+        owners = {"all": ("all",) * n, "role": roles_of(scenario), "own": scenario.agents}
+        names, rows = np.unique(owners[settings.weights], return_inverse=True)
+        self.passing = Passing(hierarchy, n_actions, rows)
+        self._n_joint = self.inputs.n_joint if settings.critic == "central" else 0
+        widths = self.passing.width, self.inputs.n_own, self._n_joint
+        self.parts = {
+            str(name): ActorCritic(
+                settings, np.flatnonzero(rows == row), Discrete(n_actions), widths, self.rng
+            )
+            for row, name in enumerate(names)
+        }
+        self._actors = [part.actor for part in self.parts.values()]
 
+    def of_actors(self, states: FloatArray) -> FloatArray:
+        """Return what nobody has been told yet, and each agent's own state."""
+        own = self.inputs.each(states).astype(np.float32)
+        return np.hstack([np.zeros((len(own), self.passing.width), dtype=np.float32), own])
 
-class CentralCriticPPO(IndependentPPO):
-    """One policy for every agent, with a critic that sees all states beside the agent's own."""
+    def with_critics(self, seen: FloatArray, states: FloatArray) -> FloatArray:
+        """Return them with all states beside, if critics see these."""
+        if not self._n_joint:
+            return seen
+        return np.hstack(
+            [seen, np.tile(self.inputs.joint(states), (len(seen), 1))], dtype=np.float32
+        )
 
-    policy = CentralCriticPolicy
-
-    def _shape(self, n_actions: int) -> tuple[int, int, Any, dict[str, Any]]:
-        own = self.inputs.n_own
-        return self._n, own + self.inputs.n_joint, Discrete(n_actions), {"own": own}
-
-    def _seen(self, states: FloatArray) -> FloatArray:
-        joint = np.tile(self.inputs.joint(states), (self._n, 1))
-        return np.hstack([self.inputs.each(states), joint])
+    def decide(
+        self, states: FloatArray, noise: FloatArray
+    ) -> tuple[FloatArray, FloatArray, IntArray]:
+        """Decide from the top down; what is decided is written into what others see."""
+        seen = self.of_actors(states)
+        logits, joint = np.empty(self.shape, dtype=np.float32), np.empty(len(seen), dtype=np.int64)
+        for turn in self.passing.turns:
+            agents = turn.agents
+            logits[agents] = own = self._actors[turn.weights](seen[agents])
+            joint[agents] = (own + noise[agents]).argmax(axis=1)
+            self.passing.tell(turn, joint, seen)
+        return seen, logits, joint

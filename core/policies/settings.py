@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field
 
 from ..learners.learner import TeamSettings
-from ..plugins.settings import Fraction, NonNegative, Positive
+from ..plugins.settings import Fraction, NonNegative, Positive, unwritten
 
 Count = Annotated[int, Field(ge=1)]
 Width = Annotated[int, Field(ge=1, le=4096)]
@@ -77,18 +77,42 @@ class PPOSettings(PolicyGradientSettings):
     factory: ClassVar[str] = f"{__package__}.ppo:CentralPPO"
 
 
-class IPPOSettings(PolicyGradientSettings):
-    """Independent PPO (de Witt et al. 2020): every agent acts by its state, all share weights."""
+class MultiAgentPPOSettings(PolicyGradientSettings):
+    """What the settings of PPO with a policy for every agent share."""
 
-    kind: Literal["ippo"] = "ippo"
-    factory: ClassVar[str] = f"{__package__}.ppo:IndependentPPO"
+    factory: ClassVar[str] = f"{__package__}.ppo:HierarchyPPO"
+    weights: Annotated[Literal["all", "role", "own"], unwritten("all")] = "all"
+    """Whether all agents share the weights of one policy and one critic, those of a role do, or
+    every agent has its own."""
+    numbered: Annotated[bool, unwritten(True)] = True
+    """Whether an agent's inputs say which one it is."""
+    critic: Annotated[Literal["central", "own"], unwritten("central")] = "central"
+    """Whether critics see all states beside the agent's own, or that alone."""
+    value_of: Annotated[Literal["own", "team"], unwritten("own")] = "own"
+    """Whether an agent's reward is its own, or the mean of all agents'."""
 
 
-class MAPPOSettings(PolicyGradientSettings):
-    """Multi-agent PPO (Yu et al. 2022): as independent PPO, but the critic sees all states."""
+class HierarchyPPOSettings(MultiAgentPPOSettings):
+    """PPO of agents in a hierarchy: each acts by its own state and the actions that it is told."""
+
+    kind: Literal["hierarchy-ppo"] = "hierarchy-ppo"
+    uses_hierarchy: ClassVar[bool] = True
+    value_of: Annotated[Literal["own", "team"], unwritten("team")] = "team"
+    """Whether an agent's reward is its own, or the mean of all agents'."""
+
+
+class MAPPOSettings(MultiAgentPPOSettings):
+    """Multi-agent PPO (Yu et al. 2022): agents are told nothing, critics see all states."""
 
     kind: Literal["mappo"] = "mappo"
-    factory: ClassVar[str] = f"{__package__}.ppo:CentralCriticPPO"
+
+
+class IPPOSettings(MultiAgentPPOSettings):
+    """Independent PPO (de Witt et al. 2020): agents are told nothing, critics see their state."""
+
+    kind: Literal["ippo"] = "ippo"
+    critic: Annotated[Literal["central", "own"], unwritten("own")] = "own"
+    """Whether critics see all states beside the agent's own, or that alone."""
 
 
 class DQNSettings(NetworkSettings):

@@ -70,11 +70,8 @@ def predicted_steps(
     steps, paid = [], 0.0
     states = np.array(scenario.reset(world_seed(seed, episode), episode))
     for action in joint_actions:
-        prediction = scenario.predict()
-        rewards = getattr(prediction, "rewards", None)
-        foretold = [prediction.states(i, action[None])[0] for i in range(len(action))]
         before = _with_reward(states, paid)
-        predicted = _with_reward(foretold, np.nan if rewards is None else rewards(action[None])[0])
+        predicted = _predicted(scenario, action, before)
         for joint in [action, *[np.full_like(action, scenario.action_set.neutral)] * (ahead - 1)]:
             transition = scenario.step(joint)
             states, paid = np.array(transition.states), float(np.mean(transition.reward))
@@ -84,6 +81,16 @@ def predicted_steps(
         if transition.terminated or transition.truncated:
             break
     return np.array(steps)
+
+
+def _predicted(scenario: Scenario, joint_action: IntArray, before: FloatArray) -> FloatArray:
+    """Return states and reward after a joint action, NaN where they are not predicted."""
+    if not hasattr(scenario, "predict"):
+        return np.full_like(before, np.nan)
+    prediction, action = scenario.predict(), joint_action[None]
+    states = [prediction.states(i, action)[0] for i in range(len(joint_action))]
+    rewards = getattr(prediction, "rewards", None)
+    return _with_reward(states, np.nan if rewards is None else rewards(action)[0])
 
 
 def _with_reward(states: FloatArray | list[FloatArray], reward: float) -> FloatArray:

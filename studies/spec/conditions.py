@@ -61,6 +61,17 @@ class ConditionSettings(Settings):
         """Return whether topology and learner are those of `other`."""
         return (self.topology, self.learner) == (other.topology, other.learner)
 
+    def warnings(self) -> tuple[str, ...]:
+        """Return what of its topology says nothing to its learner, a line each."""
+        learner, topology = f"learner.kind = {self.learner.kind!r}", self.topology
+        if isinstance(self.learner, LearnerSettings):
+            return ()
+        if not self.learner.uses_hierarchy:
+            ignored = topology != parse("chain")
+            return (f"topology: left out, {learner} passes no actions down",) if ignored else ()
+        ignored = topology.considers != "descendants"
+        return (f"topology.considers: left out, {learner} considers nobody",) if ignored else ()
+
     def canonical(self) -> str:
         """Return the JSON text that equal settings share, whatever wrote them."""
         return json.dumps(

@@ -18,7 +18,7 @@ from ...core.agents.team import Team, of_fuzzy_agents
 from ...core.interface.acting import Actors
 from ...core.interface.measures import Measure, measures_of
 from ...core.interface.scenario import Scenario, lacking
-from ...core.learners import LearnerSettings, TeamSettings
+from ...core.learners import LearnerSettings, TeamSettings, check_prediction
 from ...core.numerics.arrays import IntArray
 from ...core.plugins.sources import format_error
 from ..errors import SpecError
@@ -72,11 +72,19 @@ def arrange(settings: ConditionSettings, seed: int) -> Arrangement:
     if problem := lacking(world):
         raise ValueError(f"scenario.kind: {problem}")
     scenario, hierarchy = settings.arrange(world)
+    check_prediction(settings.learner, scenario)
     learner, source = settings.learner, policy_seed(seed)
+    failures = settings.topology.failures
     if isinstance(learner, LearnerSettings):
-        team: Actors = Team(learner, scenario, hierarchy, source, settings.topology.failures)
+        team: Actors = Team(learner, scenario, hierarchy, source, failures)
+    elif learner.uses_hierarchy and failures:
+        raise ValueError(
+            f"topology.failures: messages of learner.kind = {learner.kind!r} cannot fail, "
+            "those of agents with rule bases can"
+        )
     else:
-        team = learner.build(scenario, source)
+        hierarchies = (hierarchy,) if learner.uses_hierarchy else ()
+        team = learner.build(scenario, source, *hierarchies)
     return Arrangement(world, scenario, team)
 
 

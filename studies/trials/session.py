@@ -25,6 +25,9 @@ EVALUATION_WORLDS = 10**6
 CURRICULUM_WORLDS = 2 * 10**6
 """The same of the first episode of a curriculum."""
 
+SAMPLED = f"{EVALUATION}sampled actions"
+"""Phase of the evaluation by actions drawn from a policy, not by the most probable ones."""
+
 Observer = Callable[[StepRecord], None]
 """Is shown every step of some episodes, as it is done."""
 
@@ -138,11 +141,15 @@ class Session:
         """Evaluate in each of the trial's `evaluations`, whatever the others are.
 
         The same agents are the same team; others take over what it has learned. The steps of each
-        are shown to the observer of its name, if there is one.
+        are shown to the observer of its name, if there is one. A team whose policy is one of
+        probabilities, which says so by ``is_sampled``, is evaluated by sampled actions as well.
         """
         self._go_through_curriculum()
         trial, rng = self.trial, self.team.rng.bit_generator
         state = rng.state
+        if getattr(self.team, "is_sampled", False):
+            self._evaluate(self._own, SAMPLED, None, explore=True)
+            rng.state = state
         for name, there in transfer(self._own, trial.settings, trial.evaluations, trial.seed):
             self._note_measures(there)
             self._evaluate(there, f"{EVALUATION}{name}", (observers or {}).get(name))
@@ -171,7 +178,9 @@ class Session:
                 pass
             done += stage.episodes
 
-    def _evaluate(self, there: Arrangement, phase: str, observe: Observer | None) -> None:
+    def _evaluate(
+        self, there: Arrangement, phase: str, observe: Observer | None, *, explore: bool = False
+    ) -> None:
         episodes = self.trial.evaluation
         most = self.trial.evaluation_steps or self.trial.steps
         if observe is None and self._at_once(
@@ -181,7 +190,7 @@ class Session:
         steps = control_loop(
             there.scenario, there.team, episodes=episodes,
             steps=most, seed=self.trial.seed, first_episode=EVALUATION_WORLDS,
-            learn=False,
+            learn=False, explore=explore,
         )  # fmt: skip
         measures = measures_of(there.world)
         for _ in self._measured(steps, phase, measures, observe, EVALUATION_WORLDS):

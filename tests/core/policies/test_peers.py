@@ -142,7 +142,7 @@ def test_arrays_act_as_the_networks_do(kind: str) -> None:
     session = Session(trials_of(spec_of(kind))[0])
     session.train(2)  # the networks have been updated by now
     peer: Any = session.team
-    policy = peer._model.policy
+    policy = peer._model.policy if kind == "dqn" else peer.parts["all"].model.policy
     n_inputs = policy.observation_space.shape[0]
     seen = np.random.default_rng(0).standard_normal((5, n_inputs)).astype(np.float32)
     with torch.no_grad():
@@ -150,16 +150,16 @@ def test_arrays_act_as_the_networks_do(kind: str) -> None:
             pairs = [(peer._q(seen), policy.q_net(torch.as_tensor(seen)))]
         else:
             features = policy.mlp_extractor(torch.as_tensor(seen))
-            pairs = [(peer._actor(seen), policy.action_net(features[0]))]
-            pairs += [(peer._critic(seen), policy.value_net(features[1]))]
+            pairs = [(peer.parts["all"].actor(seen), policy.action_net(features[0]))]
+            pairs += [(peer.parts["all"].critic(seen), policy.value_net(features[1]))]
     for ours, theirs in pairs:
         assert ours == pytest.approx(theirs.numpy(), abs=1e-5)
 
 
 def test_dqn_needs_one_agent() -> None:
     pytest.importorskip("stable_baselines3", reason="extra [peers]")
-    with pytest.raises(SpecError, match=r"dqn': acts for one agent, there are 2; use topology"):
-        check(spec_of("dqn", topology="chain"))
+    with pytest.raises(SpecError, match=r"dqn': acts for one agent, there are 2; use agents"):
+        check(spec_of("dqn", agents="actuator"))
 
 
 def test_what_needs_rule_bases_says_so() -> None:
