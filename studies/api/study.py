@@ -38,6 +38,7 @@ from ..results.verdicts import power_text
 from ..spec.outline import StudyOutline, other_spec, sources_of
 from ..store import durable
 from ..store.store import Store
+from ..workers.workers import Backend
 from . import replay
 from .comparison import Comparison
 
@@ -296,6 +297,7 @@ def run(
     out: Place,
     *,
     jobs: int | None = None,
+    backend: Backend = "loky",
     address: str | None = None,
     retry_failed: bool = False,
     accept_code: bool = False,
@@ -311,7 +313,7 @@ def run(
     out
         Where the study is kept; made if it does not exist. Every trial is kept the moment it
         finishes.
-    jobs, address, retry_failed, accept_code
+    jobs, backend, address, retry_failed, accept_code
         As those of `nested_agents.studies.api.run_study.run_study`.
     progress
         Whether to show how it goes.
@@ -336,7 +338,7 @@ def run(
     spec = Spec.read(spec, study=out)
     listener = observer or (Terminal() if progress else Observer())
     with run_study(
-        spec, out, jobs=jobs, address=address, retry_failed=retry_failed,
+        spec, out, jobs=jobs, backend=backend, address=address, retry_failed=retry_failed,
         accept_code=accept_code, observer=listener,
     ) as store:  # fmt: skip
         study = _of(store)
@@ -353,7 +355,8 @@ def load(*places: Place) -> StudyResults:
     Parameters
     ----------
     *places
-        Directories of studies; or a single file that ``export --format json`` has written.
+        Directories of studies; or single files that ``export --format json`` has written, or of the
+        form of marl-eval, as those of BenchMARL are.
         Conditions of several studies whose labels are equal get the name of their directory; the
         first study says how all of them are analysed.
 

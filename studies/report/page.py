@@ -50,17 +50,17 @@ def page(directory: Path) -> str:
     if len(results.conditions) > 1 and [*notes] == identity_lines(results.identical):
         notes = contrasts(results).notes  # what `compare` says of it, this included
     return _template().render(
-        study=outline.study,
-        extent=words.extent(outline),
+        outline=outline,
         compared=", ".join(next(iter(outline.columns.values()))),
-        standing=words.standing(len(trials), counts["done"], counts["failed"]),
-        complete=counts["done"] == len(trials),
+        trials=len(trials),
+        left=len(trials) - counts["done"] - counts["failed"],
+        **counts,
         notes=notes,
         table=tabulate(analysis.table),
         pictures=pictures(figures),
         replays=packed,
         topologies=words.topologies(outline),
-        failed=failed,
+        failures=failed,
         seeds=words.runs(outline.seeds),
         spec=dumps(outline.table),
         versions=words.versions(),

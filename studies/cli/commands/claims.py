@@ -62,25 +62,21 @@ def command(out: Path | None, quick: bool, jobs: int | None, form: Format) -> in
 
 def _run(out: Path, *, quick: bool, jobs: int | None) -> dict[str, Published]:
     """Run the studies of the claims, or what is left of them; return the results by study."""
-    from ...api.run_study import run_study
+    from ...api.study import run
     from ...claims import claims
     from ...errors import SpecError
     from ...presentation.progress import Terminal
     from ...results import published
-    from ...results.results import read
-    from ...spec.outline import StudyOutline
-    from ...spec.spec import Spec
 
     results = {}
     for study in claims.STUDIES_OF_CLAIMS:
         name = study.replace("-", "_")
         folder = claims.QUICK if quick else claims.SPECS / name
-        spec = Spec.load(folder / f"{name}.toml")
-        with run_study(spec, out / study, jobs=jobs, observer=Terminal()) as store:
-            if failed := store.failed():
-                raise SpecError(
-                    f"{out / study}: {len(failed)} trials failed: nested-agents status "
-                    f"{out / study}"
-                )
-            results[study] = published.loads(published.dumps(StudyOutline.kept(store), read(store)))
+        ran = run(folder / f"{name}.toml", out / study, jobs=jobs, observer=Terminal())
+        if ran.failed:
+            raise SpecError(
+                f"{out / study}: {len(ran.failed)} trials failed: nested-agents status "
+                f"{out / study}"
+            )
+        results[study] = published.loads(published.dumps(ran.outline, ran.results))
     return results

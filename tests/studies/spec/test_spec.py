@@ -505,6 +505,9 @@ def test_an_agent_for_every_actuator_is_no_part_of_an_identity() -> None:
         ({"agents": "wheel"}, "agents = 'wheel': must be 'actuator', 'body' or 'team'"),
         ({"overrides": [{"name": "a", "agents": 3}]}, "overrides[0].agents = 3: must be"),
         ({"sweep": {"agents": ["bodies"]}}, "agents = 'bodies': must be"),
+        ({"topology": "per-robot"}, "a key of its own: agents = 'body', topology = 'chain'"),
+        ({"topology": {"kind": "single-agent"}}, "a key of its own: agents = 'team'"),
+        ({"sweep": {"topology": ["chain", "per-robot"]}}, "a key of its own: agents = 'body'"),
     ],
 )
 def test_who_the_agents_are_is_refused_in_one_line(table, message: str) -> None:
