@@ -40,7 +40,7 @@ MEASURES = (
         "optimal_plays", "optimal plays", source="optimal", gathering="mean", better="higher",
         least=0.0, greatest=1.0,
     ),
-    Measure("payoff", "payoff over the best", gathering="mean", better="higher", greatest=1.0),
+    Measure("share_of_best", "payoff over the best", gathering="mean", better="higher", greatest=1.0),
 )  # fmt: skip
 """Success is that the last play of an episode was optimal."""
 
@@ -232,7 +232,7 @@ class TeamGame:
         payoff = float(self.game.payoffs(joint_action[None])[0])
         info = {
             "optimal": float(self.game.is_optimal(joint_action)),
-            "payoff": payoff / self.game.best,
+            "share_of_best": payoff / self.game.best,
         }
         self.game.advance(self._rng)
         return Transition(self._states(), payoff, False, False, info)
