@@ -25,6 +25,8 @@ SCENARIOS = SettingsRegistry(
         "team-game": f"{__name__}.matrix_games.team_games:TeamGameSettings",
         "kinematic-chain": f"{__name__}.kinematic_chain.config:KinematicChainSettings",
         "line-up": f"{__name__}.line_up:LineUpSettings",
+        "gymnasium": f"{__name__}.adapters.settings:GymnasiumSettings",
+        "pettingzoo": f"{__name__}.adapters.settings:PettingZooSettings",
     },
     ScenarioSettings,
 )

@@ -130,7 +130,7 @@ class Team:
         self.seen: FloatArray = np.ones((n, n_actions))
         conditional = self.evaluator is not None and decision.teammates == "conditional"
         self.given: FloatArray = np.ones((n, n_actions) * 2 if conditional else (0, 0, 0, 0))
-        self._unseen = decision.unseen
+        self._unseen, self._discount = decision.unseen, settings.discount
         # Those who are told all that was decided before, and consider all others.
         self._hears_all = {
             i
@@ -313,6 +313,8 @@ class Team:
     def learn(self, transition: Transition) -> None:
         """Take in what a step led to."""
         states, reward, left, taken = transition.states, transition.reward, self._left, self._last
+        if transition.terminated and not transition.absorbing:
+            reward = reward * (1.0 - self._discount)  # which learners have entered again for ever
         if self.mirror is not None:
             states, reward = self.mirror.states(states), self.mirror.reward(reward)
             left, taken = self.mirror.states(left), np.tile(taken, 2)

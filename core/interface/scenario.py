@@ -33,6 +33,9 @@ class Transition:
     """``(M, 3)`` mean twist of every group's body in its own frame [m/s, m/s, rad/s], where bodies
     measure it; ``(K + M, 3)`` where they also measure what they move, its twists standing first,
     and nothing else than these bodies moved it."""
+    absorbing: bool = True
+    """Whether a terminal state is as if entered again for ever, as where a box stands at its goal;
+    if not, its reward is received once, as in Gymnasium."""
 
 
 @runtime_checkable

@@ -1,4 +1,4 @@
-"""Results as files: tidy tables as CSV, or one small JSON file."""
+"""Results as files: tidy tables as CSV, or one JSON file."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Literal
 from ..catalogue.study import published_part
 from ..errors import SpecError
 from ..presentation.csv_text import write_frame
-from ..results import published
+from ..results import marl_eval, published
 from ..results.results import read
 from ..spec.outline import StudyOutline
-from ..store.durable import replacing
+from ..store import durable
 from ..store.store import Store
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-Form = Literal["csv", "json"]
+Form = Literal["csv", "json", "marl-eval"]
 
 
 def export(store: Store, folder: Path, form: Form, *, overwrite: bool = False) -> list[Path]:
@@ -34,7 +34,8 @@ def export(store: Store, folder: Path, form: Form, *, overwrite: bool = False) -
         exist.
     form
         Of the files, and their suffix; JSON is the form of
-        `nested_agents.studies.results.published`.
+        `nested_agents.studies.results.published`, marl-eval, ``marl-eval.json``, that of
+        `nested_agents.studies.results.marl_eval`.
     overwrite
         Whether files of these names may be replaced.
 
@@ -49,7 +50,8 @@ def export(store: Store, folder: Path, form: Form, *, overwrite: bool = False) -
         If a file is in the way, or the database is damaged.
     """
     writers = _writers(store, form)
-    paths = {name: folder / f"{name}.{form}" for name in writers}
+    suffix = "json" if form == "marl-eval" else form
+    paths = {name: folder / f"{name}.{suffix}" for name in writers}
     for path in paths.values():
         if path.exists() and not overwrite:
             raise SpecError(f"{path}: exists; --overwrite replaces it, --out writes elsewhere")
@@ -70,6 +72,10 @@ def _writers(store: Store, form: Form) -> dict[str, Callable[[Path], None]]:
         outline = StudyOutline.kept(store)
         kept = published_part(outline.study, results)
         return {"results": lambda path: published.write(path, outline, kept)}
+    if form == "marl-eval":
+        kinds = {c: own["scenario"]["kind"] for c, own in store.settings().items()}
+        text = marl_eval.dumps(results, kinds, StudyOutline.kept(store).study)
+        return {"marl-eval": lambda path: durable.write(path, text.encode())}
     return {
         "episodes": lambda path: _write_csv(results.episodes, path),
         "trials": lambda path: _write_csv(results.trials, path),
@@ -78,7 +84,7 @@ def _writers(store: Store, form: Form) -> dict[str, Callable[[Path], None]]:
 
 def _write_csv(frame: DataFrame, path: Path) -> None:
     """Write a frame as CSV: truth values as 0 and 1, texts as they may stand in a spreadsheet."""
-    with replacing(path) as file:
+    with durable.replacing(path) as file:
         text = io.TextIOWrapper(file, encoding="utf-8", newline="", write_through=True)
         write_frame(text, frame)
         text.detach()

@@ -355,7 +355,8 @@ def load(*places: Place) -> StudyResults:
     Parameters
     ----------
     *places
-        Directories of studies; or a single file that ``export --format json`` has written.
+        Directories of studies; or single files that ``export --format json`` has written, or of the
+        form of marl-eval, as those of BenchMARL are.
         Conditions of several studies whose labels are equal get the name of their directory; the
         first study says how all of them are analysed.
 

@@ -19,15 +19,15 @@ def print_wrapped(text: str, first: str = "", indent: int = 4) -> None:
     print(fill(text, width, initial_indent=first, subsequent_indent=" " * indent))
 
 
-def print_table(table: SummaryTable) -> None:
-    """Print estimates by condition, each over its 95 % interval."""
+def print_table(table: SummaryTable, legend: Sequence[str] | None = None) -> None:
+    """Print estimates by condition, each over its 95 % interval, and its legend or another one."""
     from rich.console import Console
 
     from ..presentation.terminal_tables import print_rows
 
     if table.rows:
         print_rows(table.titles, table.rows, Console())
-    print(*table.legend, sep="\n")
+    print(*(table.legend if legend is None else legend), sep="\n")
 
 
 def print_study(study: StudyResults, columns: Sequence[str] = ()) -> None:

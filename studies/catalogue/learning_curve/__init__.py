@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Literal
 from ....core.interface.measures import SUCCESS, Measure
 from ...errors import SpecError
 from ...results.analysis import Analysis, Figures
-from ...results.contrasts import STEPS
+from ...results.contrasts import EPISODES, STEPS
 from ...results.results import Array, Results
 from ...results.statistics import Estimate, bootstrap, rate, rates
 from ...results.summary import EVALUATED, Summary, evaluated
@@ -101,10 +101,11 @@ class Followed:
 def analyse(results: Results) -> Analysis:
     """Estimate the table and what the curves need; seeds are the unit of sampling."""
     conditions, table = results.of_phase("training"), []
+    measures = results.measures or EPISODES[1:]  # foreign ones may have the return alone
     for condition in conditions:
         estimates: dict[str, Estimate] = {}
-        episodes = results.success(condition).shape[1]
-        for metric in metrics_of(results.measures, episodes):
+        episodes = results.values(condition, measures[0].name).shape[1]
+        for metric in metrics_of(measures, episodes):
             phase = "evaluation" if metric.block == "evaluation" else "training"
             name = metric.measure.name
             if results.has(condition, phase, name):  # published results keep a part
@@ -114,7 +115,7 @@ def analyse(results: Results) -> Analysis:
                 estimates |= evaluated(results, condition)
         table.append(Summary(condition, len(results.seeds(condition)), estimates))
     followed = []
-    for m in results.measures:
+    for m in measures:
         own = [c for c in conditions if results.has(c, "training", m.name)]
         if own and (m.name == SUCCESS.name or not m.is_rate):
             followed.append(Followed(m, {c: results.values(c, m.name) for c in own}))

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 @options.formats(
     "csv",
     "json",
+    "marl-eval",
     text="Of the files; distances and returns are left out of json.",
 )
 @click.option(

@@ -35,12 +35,7 @@ from .. import options
 @click.option("--draw", type=int, metavar="N", default=0, help="Seed of the draw.")
 @options.running
 @options.changes
-def command(
-    spec: Path,
-    out: Path,
-    changes: tuple[str, ...],
-    **search: Any,
-) -> int:
+def command(spec: Path, out: Path, changes: tuple[str, ...], **tuned: Any) -> int:
     """Look for better settings of a spec, on seeds that no report uses; again, it continues.
 
     SPEC.toml has one condition, and may have a table [tune] with lists of values by key. All
@@ -50,7 +45,7 @@ def command(
     from ...spec.spec import Spec
     from ..display import print_table
 
-    tuning = tune(Spec.load(spec, changes, study=out), out, **search)
+    tuning = tune(Spec.load(spec, changes, study=out), out, **tuned)
     print_table(tuning.study.table(tuning.columns))
     print("", *tuning.lines, "", sep="\n")
     print(f"spec    {out / BEST_FILE}")
