@@ -40,7 +40,9 @@ MEASURES = (
         "optimal_plays", "optimal plays", source="optimal", gathering="mean", better="higher",
         least=0.0, greatest=1.0,
     ),
-    Measure("share_of_best", "payoff over the best", gathering="mean", better="higher", greatest=1.0),
+    Measure(
+        "share_of_best", "payoff over the best", gathering="mean", better="higher", greatest=1.0
+    ),
 )  # fmt: skip
 """Success is that the last play of an episode was optimal."""
 
