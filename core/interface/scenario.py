@@ -58,7 +58,8 @@ class Scenario(Protocol):
         if an agent has none: experience can be mirrored, see `core.adaptation.mirror`.
     ``horizon``
         Decisions that its predictions look ahead, while nobody changes what it does after the
-        first; 1 without. By that a check judges how far they are off.
+        first; 1 without. By that a check judges how far they are off. Then all are neutral; where
+        it ``repeats``, all do the same again.
     ``with_exact_prediction()``
         The same scenario with a predictor that makes no errors but those of rounding; itself, if it
         has one already. Then it can be checked that sensing and predicting mean the same.
