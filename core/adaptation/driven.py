@@ -32,7 +32,7 @@ class Bodies:
     scenario
         Whose bodies they are.
     products
-        Which pairs of variables have rules, too.
+        Pairs of which variables rules are over, see `LearnedPredictorSettings`.
     memberships
         Membership functions per variable; none: the state space's own centres.
 
@@ -50,7 +50,7 @@ class Bodies:
         The rule base over the variables of a body: single ones, and pairs of one group's.
     """
 
-    def __init__(self, scenario: Scenario, products: str, memberships: int | None) -> None:
+    def __init__(self, scenario: Scenario, *, products: str, memberships: int | None) -> None:
         space, groups, roles = scenario.state_space, groups_of(scenario), roles_of(scenario)
         common = {j for j, v in enumerate(space.variables) if v.name in space.common}
         columns = range(space.n_own, space.n_variables)
@@ -71,9 +71,9 @@ class Bodies:
         self.common = np.array([len(owned) > 1 and j in common for _, j in first])
         terms: list[tuple[int, ...]] = [(v,) for v in range(len(first))]
         if products != "none":
-            is_all = products == "all" or len(groups) == 1
+            every = products == "all" or len(groups) == 1
             pairs = combinations(
-                [v for v, (_, j) in enumerate(first) if is_all or j not in common], 2
+                (v for v, (_, j) in enumerate(first) if every or j not in common), 2
             )
             terms += [(v, u) for v, u in pairs if first[v][0] == first[u][0]]
         parts = [Partition.of(space.variables[j], count=memberships) for _, j in first]

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
 from ..interface.prediction import Blocks, first_alike
 from ..numerics.arrays import FloatArray, IntArray
-
-if TYPE_CHECKING:
-    from .learned_predictor import LearnedPredictor
 
 
 class LearnedPrediction:
@@ -20,7 +17,7 @@ class LearnedPrediction:
     Parameters
     ----------
     predictor
-        What has been learned.
+        What has been learned, a `LearnedPredictor`.
     present
         ``(n, d)`` the states of all agents.
 
@@ -30,7 +27,7 @@ class LearnedPrediction:
         ``(G, L)`` the first robot-action index that comes to the same, of groups of equal size.
     """
 
-    def __init__(self, predictor: LearnedPredictor, present: FloatArray) -> None:
+    def __init__(self, predictor: Any, present: FloatArray) -> None:
         self._predictor, self._present = predictor, present
         self._reached = predictor.reached(present)
         self._last: tuple[bytes, tuple[FloatArray, FloatArray]] | None = None

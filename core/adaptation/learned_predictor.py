@@ -72,7 +72,7 @@ class LearnedPredictor:
             raise ValueError("learner.predictor.mirrored: without own variables there is no mirror")
         mirrored = known if settings.mirrored is None else settings.mirrored
         self.mirror = Mirror.of(scenario) if mirrored else None
-        self.bodies = Bodies(scenario, settings.products, settings.memberships)
+        self.bodies = Bodies(scenario, products=settings.products, memberships=settings.memberships)
         kinds = list(dict.fromkeys(roles))
         self.kinds = np.array([kinds.index(role) for role in roles])
         """``(n,)`` agents of one kind have own variables that change alike."""
@@ -89,7 +89,7 @@ class LearnedPredictor:
         if k * rules * min(b, 2) > MOST_FEATURES:
             raise ValueError(
                 f"learner.predictor: {k * rules * min(b, 2)} features to regress on, allowed "
-                f"{MOST_FEATURES}; lower products or memberships"
+                f"{MOST_FEATURES}; take fewer products or memberships"
             )
         r = self.own_rules.n_rules if self.own_rules else 0
         of_own, f = (len(kinds), self.n_actions, r), k * rules

@@ -36,8 +36,8 @@ class LearnedPredictorSettings(PartSettings):
     ridge: Positive = 10.0
     """Weight of the squared weights against the squared errors."""
     products: Literal["none", "private", "all"] = "private"
-    """What an agent moves depends on the variables of its body one by one, and besides on no pairs
-    of them, on pairs of those that other bodies do not share, or on all pairs."""
+    """Pairs of which variables of a body say, beside each alone, what an agent moves: of none, of
+    those that are its own to the body, or of the ``common`` ones, too."""
     memberships: Annotated[int, Field(ge=2, le=15)] | None = None
     """Membership functions per variable, spread evenly; none: the state space's own centres."""
     mirrored: bool | None = None

@@ -184,11 +184,9 @@ class Team:
         """
         if states is not None:
             self._states = states
-        if self._values_actions:
-            return None
         if self.predictor is not None:
             return self.predictor.predict(self._states)
-        if not hasattr(scenario, "predict"):
+        if self._values_actions or not hasattr(scenario, "predict"):
             return None
         if self.self_model is None and self.calibration is None:
             return scenario.predict()
@@ -487,17 +485,14 @@ def _predictor_of(
 ) -> LearnedPredictor | Persistence | None:
     if isinstance(settings.predictor, GivenPredictor):
         return None
+    named = f"learner.predictor.kind = {settings.predictor.kind!r}"
     if settings.values_actions:
-        raise ValueError(
-            f"learner.predictor.kind = {settings.predictor.kind!r}: {settings.kind} values actions "
-            "and predicts nothing; use 'given'"
-        )
+        raise ValueError(f"{named}: learner.kind = {settings.kind!r} decides without a prediction")
     for name in ("self_model", "calibration"):
         if getattr(settings, name).enabled:
             raise ValueError(
-                f"learner.{name}.enabled: revises what the scenario predicts, and "
-                f"learner.predictor.kind = {settings.predictor.kind!r} predicts in its place; use "
-                "'given'"
+                f"learner.{name}.enabled: revises what the scenario predicts, and {named} predicts "
+                "in its place; use 'given'"
             )
     predictor: LearnedPredictor | Persistence = settings.predictor.build(scenario)
     return predictor

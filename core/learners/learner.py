@@ -128,9 +128,6 @@ class LearnerSettings(TeamSettings):
 
     @property
     def needs_prediction(self) -> bool:
-        """Whether it acts only in scenarios that predict: unless it values or draws actions.
-
-        Nor does it if it has another predictor than the given one.
-        """
-        decides_by_it = self.decision.rule != "random" and not self.values_actions
-        return decides_by_it and isinstance(self.predictor, GivenPredictor)
+        """Whether it acts only in scenarios that predict: unless it has a predictor of its own."""
+        is_given = isinstance(self.predictor, GivenPredictor)
+        return is_given and self.decision.rule != "random" and not self.values_actions
