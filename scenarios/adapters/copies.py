@@ -42,48 +42,31 @@ class PickledCopies:
 
     def __init__(self, simulator: Simulator) -> None:
         self._layers = list(_layers(simulator))
+        self._kept: dict[int, Any] = {id(layer): layer for layer in self._layers}
         file = BytesIO()
-        pickler = _Pickler(file, self._layers)
+        pickler: Any = pickle.Pickler(file, pickle.HIGHEST_PROTOCOL)
+        pickler.persistent_id = self._identity
         # Attribute by attribute: many environments (EzPickle) would be made anew.
         pickler.dump([vars(layer) for layer in self._layers])
-        self._saved, self._shared = file.getvalue(), pickler.shared
+        self._saved = file.getvalue()
+
+    def _identity(self, value: Any) -> int | None:
+        """Return the identity of what copies have in common, and of the layers themselves."""
+        if id(value) not in self._kept:
+            if not _is_shared(value):
+                return None
+            self._kept[id(value)] = value
+        return id(value)
 
     @contextmanager
     def lane(self) -> Iterator[Simulator]:
         """Return a copy."""
         made = {id(layer): object.__new__(type(layer)) for layer in self._layers}
-        unpickler = _Unpickler(BytesIO(self._saved), {**self._shared, **made})
+        unpickler: Any = pickle.Unpickler(BytesIO(self._saved))
+        unpickler.persistent_load = {**self._kept, **made}.__getitem__
         for layer, attributes in zip(made.values(), unpickler.load(), strict=True):
             vars(layer).update(attributes)
         yield made[id(self._layers[0])]
-
-
-class _Pickler(pickle.Pickler):
-    """Leaves out what copies share, and the layers themselves."""
-
-    def __init__(self, file: BytesIO, layers: list[Any]) -> None:
-        super().__init__(file, protocol=pickle.HIGHEST_PROTOCOL)
-        self.shared: dict[int, Any] = {id(layer): layer for layer in layers}
-
-    def persistent_id(self, value: Any) -> int | None:
-        """Return the identity of what is left out."""
-        if id(value) not in self.shared:
-            if not _is_shared(value):
-                return None
-            self.shared[id(value)] = value
-        return id(value)
-
-
-class _Unpickler(pickle.Unpickler):
-    """Puts in what was left out."""
-
-    def __init__(self, file: BytesIO, shared: Mapping[int, Any]) -> None:
-        super().__init__(file)
-        self._shared = shared
-
-    def persistent_load(self, key: int) -> Any:
-        """Return what has the identity `key`."""
-        return self._shared[key]
 
 
 class SavedMujoco:
@@ -97,10 +80,11 @@ class SavedMujoco:
 
     def __init__(self, simulator: Simulator) -> None:
         mujoco: Any = import_module("mujoco")
-        self._simulator, self._env = simulator, _unwrapped(simulator)
+        env: Any = simulator.env.unwrapped
+        self._simulator, self._env = simulator, env
         self._attributes = [(layer, dict(vars(layer))) for layer in _layers(simulator)]
-        self._copy, self._saved = mujoco.mj_copyData, mujoco.MjData(self._env.model)
-        self._copy(self._saved, self._env.model, self._env.data)
+        self._copy, self._saved = mujoco.mj_copyData, mujoco.MjData(env.model)
+        self._copy(self._saved, env.model, env.data)
 
     @contextmanager
     def lane(self) -> Iterator[Simulator]:
@@ -111,10 +95,6 @@ class SavedMujoco:
             self._copy(self._env.data, self._env.model, self._saved)
             for layer, values in self._attributes:
                 vars(layer).update(values)
-
-
-def _unwrapped(simulator: Simulator) -> Any:
-    return simulator.env.unwrapped
 
 
 def fault_of_copies(simulator: Simulator, actions: Mapping[str, Any]) -> str:
