@@ -105,15 +105,13 @@ def test_there_is_a_panel_for_every_number(further, tmp_path):
     measures = (SUCCESS, *numbers, Measure("calm", "calm", is_rate=True))
     training = {"only": {m.name: np.ones((2, 3)) for m in measures}}
     analysis = analyse(Arrays(training, {}, measures=measures).frames())
-    assert [followed.measure.name for followed in analysis.cases] == [
+    assert [m.name for m, _ in analysis.cases] == [
         "success",
         *(m.name for m in numbers),
     ]
     figure = draw(analysis)["learning-curves"]
     shown = [axes for axes in figure.axes if axes.get_visible()]
-    assert [axes.get_title(loc="left") for axes in shown] == [
-        followed.measure.heading for followed in analysis.cases
-    ]
+    assert [axes.get_title(loc="left") for axes in shown] == [m.heading for m, _ in analysis.cases]
     assert sum(bool(axes.get_xlabel()) for axes in shown) == min(2, len(shown))
 
 
