@@ -50,6 +50,9 @@ class Scenario(Protocol):
         `needs_prediction`.
     ``measure()``
         See `RecordedScenario`; asked for alone where a scenario is checked.
+    ``interactions``
+        Pairs of agents, by index, whose actions matter to each other: what a topology with ``shape
+        = "scenario"`` joins.
     ``partners()``
         For every agent the one in whose place it stands in the mirror, or a ValueError of one line
         if an agent has none: experience can be mirrored, see `core.adaptation.mirror`.
