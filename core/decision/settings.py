@@ -23,7 +23,8 @@ class Decision(Settings):
     they were seen to do when this agent did the same as it considers now (``conditional``)."""
     value_of: ValueOf = "own"
     """Whose value decides: the agent's own; the mean of its own and those of the agents below it;
-    or the mean of all agents'."""
+    or the mean of all agents'. ``own`` where each state tells what its agent's action is worth,
+    ``team`` where what helps one may hinder others."""
     unseen: Annotated[Unseen, unwritten("maintain")] = "maintain"
     """What agents are expected to do that this one neither considers nor hears of: to maintain, to
     do again what they did last, or to keep to the plan that ``best-response`` makes for them."""

@@ -22,6 +22,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ...core.interface.measures import SUCCESS
 from ...core.plugins.messages import closest
 from ...core.plugins.sources import Sources
 from ..catalogue.study import analysed, drawn, load_study
@@ -110,6 +111,23 @@ class StudyResults:
     def notes(self) -> tuple[str, ...]:
         """What the study says of its results, verdicts and their power, line by line."""
         return tuple(getattr(self.analysis, "notes", ()))
+
+    @property
+    def unlearned(self) -> tuple[str, ...]:
+        """Conditions that learn, and succeed in evaluation no more often than frozen weights do.
+
+        Known where there is a frozen condition in the same scenario.
+        """
+        of_frozen, others = dict[str, float](), list[tuple[str, str, float]]()
+        for c in self.conditions:
+            own = self._settings.get(c)
+            if own and self.results.has(c, "evaluation", SUCCESS.name):
+                scenario, rate = repr(own["scenario"]), self.results.success(c, "evaluation").mean()
+                if own["learner"]["kind"] != "frozen":
+                    others.append((c, scenario, rate))
+                elif own["learner"]["decision"]["rule"] == "value":
+                    of_frozen[scenario] = rate
+        return tuple(c for c, scenario, rate in others if rate <= of_frozen.get(scenario, -1.0))
 
     @property
     def power(self) -> tuple[str, ...]:
