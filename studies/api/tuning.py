@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from ...core.interface.measures import SUCCESS
 from ...core.interface.scenario import roles_of
 from ...core.plugins.deferred import pd
 from ..errors import SpecError, show
@@ -165,9 +164,8 @@ def tune(
             observer=observer, chosen=list(planned.values()),
         ) as store:  # fmt: skip
             results = read(store)
-        reached = range(first_seed, first_seed + n_seeds)
-        names.sort(key=lambda name: _score(results, name, reached), reverse=True)
-    table = _table(results, points)
+        table = _table(results, points, range(first_seed, first_seed + n_seeds))
+        names = [name for name in table["name"] if name in names]
     best = points[table["name"].iloc[0]]
     tuned = _laid(spec, best)
     durable.write(out / BEST_FILE, dumps(tuned.table()).encode())
@@ -289,34 +287,19 @@ def _study(spec: Spec, points: Mapping[str, Point], seeds: Iterable[int]) -> Spe
     return Spec.of({**base, "overrides": overrides}, spec.sources)
 
 
-def _score(results: Results, name: str, seeds: Sequence[int]) -> tuple[float, float]:
-    """Return means over seeds: of evaluation success, if it is measured, and of the return.
+def _table(results: Results, points: Mapping[str, Point], seeds: Iterable[int]) -> Any:
+    """Return the data frame of all configurations: those of most of the seeds first, then by score.
 
-    What has failed on one of them comes after all others.
+    The score is the mean evaluation success, 0 where it is not measured, then the return.
     """
-    own = np.isin(results.seeds(name), seeds)
-    if own.sum() < len(seeds):
-        return -np.inf, -np.inf
-    success, return_ = (
-        float(results.values(name, measure, "evaluation")[own].mean())
-        if results.has(name, "evaluation", measure)
-        else 0.0
-        for measure in (SUCCESS.name, "return")
-    )
-    return success, return_
-
-
-def _table(results: Results, points: Mapping[str, Point]) -> Any:
-    """Return the data frame of all configurations: those of most seeds first, then by score."""
-    lines = []
-    for name, point in points.items():
-        own = results.seeds(name)
-        success, return_ = _score(results, name, own) if own else (np.nan, np.nan)
-        lines.append(
-            {"name": name, "seeds": len(own), "success": success, "return": return_, **point}
-        )
-    order = ["seeds", "success", "return"]
-    return pd.DataFrame(lines, dtype=object).sort_values(order, ascending=False, ignore_index=True)
+    episodes = results.episodes[results.episodes["phase"] == "evaluation"]
+    by_name = episodes[episodes["seed"].isin(seeds)].groupby("condition")
+    means = by_name[["success", "return"]].mean().astype(float).fillna({"success": 0.0})
+    means.insert(0, "seeds", by_name["seed"].nunique())
+    lines = pd.DataFrame({"name": list(points)}).join(means, on="name").fillna({"seeds": 0})
+    values = pd.DataFrame(list(points.values()), dtype=object)
+    table = lines.astype({"seeds": int}).join(values).astype(object)
+    return table.sort_values(list(means), ascending=False, ignore_index=True)
 
 
 class _Rungs(Terminal):

@@ -61,6 +61,9 @@ def _is_further(argument: str, option: click.Option) -> bool:
 directory = click.argument("directory", type=PATH, metavar="DIR")
 """An existing study."""
 
+sources = click.argument("sources", type=PATH, metavar="DIR...|FILE.json", nargs=-1, required=True)
+"""Existing studies, or a file of results."""
+
 jobs = click.option(
     "--jobs", type=int, metavar="N", help="Trials at a time; by default one for every core."
 )

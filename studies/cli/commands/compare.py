@@ -11,7 +11,7 @@ from .. import options
 
 
 @click.command()
-@click.argument("sources", type=options.PATH, metavar="DIR...|FILE.json", nargs=-1, required=True)
+@options.sources
 @click.option(
     "--by",
     metavar="KEY",
@@ -55,7 +55,7 @@ def command(
     from ..display import print_table
     from ..loading import load_results
 
-    results = load_results(sources, None, where, is_trusted=trust)
+    results = load_results(sources, where=where, trust=trust)
     comparison = results.compare(**compared)
     if plot is not None:
         from ...presentation.figures import write
