@@ -16,7 +16,8 @@ class Decision(Settings):
 
     rule: Literal["value", "reward", "reward-and-value", "random"] = "value"
     """Decide by f of the predicted state, by its predicted reward, by reward + discount f, or at
-    random. f of an after-state contains its reward already: the sum weighs the reward twice."""
+    random. f of an after-state contains its reward already: the sum weighs the reward twice, which
+    helps where rewards lead part of the way."""
     teammates: Teammates = "best-response"
     """What the agents below are expected to do: the best for this agent, anything with equal
     probability, what they were seen to do so far (the paper's "stochastically observing"), or what

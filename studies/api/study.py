@@ -114,20 +114,21 @@ class StudyResults:
 
     @property
     def unlearned(self) -> tuple[str, ...]:
-        """Conditions that learn, and succeed in evaluation no more often than frozen weights do.
+        """Conditions that learn, but have neither more success nor return than frozen weights.
 
-        Known where there is a frozen condition in the same scenario.
+        In evaluation; known where there is a frozen condition in the same scenario.
         """
-        of_frozen, others = dict[str, float](), list[tuple[str, str, float]]()
-        for c in self.conditions:
-            own = self._settings.get(c)
-            if own and self.results.has(c, "evaluation", SUCCESS.name):
-                scenario, rate = repr(own["scenario"]), self.results.success(c, "evaluation").mean()
-                if own["learner"]["kind"] != "frozen":
-                    others.append((c, scenario, rate))
-                elif own["learner"]["decision"]["rule"] == "value":
-                    of_frozen[scenario] = rate
-        return tuple(c for c, scenario, rate in others if rate <= of_frozen.get(scenario, -1.0))
+        evaluations = self.results.episodes.query("phase == 'evaluation'")
+        columns = ["condition", SUCCESS.name, "return"]
+        means = evaluations.reindex(columns=columns).groupby("condition").mean()
+        frozen, others = dict[str, Any](), list[tuple[str, str]]()
+        for c in means.index.intersection(list(self._settings), sort=False):
+            learner, scenario = (self._settings[c][name] for name in ("learner", "scenario"))
+            if learner["kind"] != "frozen":
+                others.append((c, repr(scenario)))
+            elif learner["decision"]["rule"] == "value":
+                frozen[repr(scenario)] = means.loc[c]
+        return tuple(c for c, s in others if s in frozen and (means.loc[c] <= frozen[s]).all())
 
     @property
     def power(self) -> tuple[str, ...]:
