@@ -163,10 +163,11 @@ def coordination_graph(
     bodies: Bodies = (),
     *,
     shape: Annotated[
-        Shape,
+        Shape | Literal["scenario"],
         Field(
             description="In agent order; on a ring the last is a neighbour of the first, in a tree "
-            "everybody of two later ones, in a grid of those in rows and columns."
+            "everybody of two later ones, in a grid of those in rows and columns. Or those whose "
+            "actions matter to each other, as the scenario has it."
         ),
     ] = "line",
     edges: Annotated[
@@ -191,6 +192,8 @@ def coordination_graph(
     [('a', 'b'), ('a', 'c'), ('b', 'c')]
     """
     if edges is None:
+        if shape == "scenario":
+            raise ValueError("shape = 'scenario': the scenario has no interactions of its agents")
         graph = nx.relabel_nodes(shapes.shaped(shape, len(agents)), dict(enumerate(agents)))
     else:
         pairs = [(min(a, b), max(a, b)) for a, b in edges]

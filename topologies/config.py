@@ -170,6 +170,7 @@ def build(
     settings: TopologySettings | str | Mapping[str, Any],
     agents: Sequence[str],
     bodies: Sequence[Sequence[int]] | None = None,
+    interactions: Sequence[tuple[int, int]] | None = None,
 ) -> Hierarchy:
     """Build the hierarchy of `settings` over named agents.
 
@@ -181,6 +182,9 @@ def build(
         Distinct names, in agent order.
     bodies
         Agent indices, from 0, by body (robot), each once; none: every agent is a body of its own.
+    interactions
+        Pairs of agents, by index, whose actions matter to each other: what ``shape = "scenario"``
+        of a coordination graph joins.
 
     Raises
     ------
@@ -202,6 +206,9 @@ def build(
         if not agents:
             raise ValueError("no agents")
         named = [(a,) for a in agents] if bodies is None else _named(agents, bodies)
+        if interactions is not None and getattr(settings, "shape", "") == "scenario":
+            pairs = tuple((agents[a], agents[b]) for a, b in interactions)
+            settings = settings.model_copy(update={"edges": pairs})
         if settings.kind in TOPOLOGIES.built_in:
             graph = settings.build(agents, named)
         else:
@@ -295,7 +302,7 @@ def _order(text: str) -> dict[str, Any]:
 
 def _neighbours(text: str) -> dict[str, Any]:
     """Read a shape, or pairs of names as ``a-b,b-c``."""
-    if text in get_args(Shape):
+    if text in ("scenario", *get_args(Shape)):
         return {"shape": text}
     pairs = _split(text, "-")
     for pair in pairs:
@@ -325,7 +332,7 @@ ARGUMENTS: dict[str, tuple[str, str | Callable[[str], dict[str, Any]]]] = {
     "tree": ("BRANCHING", "branching"),
     "star": ("LEADER", "leader"),
     "teams": ("star", "link"),
-    "coordination-graph": ("line|ring|tree|grid|A-B,B-C,...", _neighbours),
+    "coordination-graph": ("line|ring|tree|grid|scenario|A-B,B-C,...", _neighbours),
     "edges": ("A>B,B>C,D", _edges),
     "random": ("SEED", "seed"),
     "file": ("PATH.graphml|PATH.json|PATH.toml", "path"),

@@ -149,6 +149,7 @@ class JointAgents:
         self.scenario, self.blocks, self.whole = scenario, blocks, whole
         self.agents, self.roles, self.state_space = agents, roles, state_space
         self.measures = measures_of(scenario)
+        self.horizon = getattr(scenario, "horizon", 1)
         self.groups = tuple((i,) for i in range(len(agents)))
         single, space = scenario.action_set, scenario.state_space
         # Row c holds the actions of a block's agents of index c.

@@ -10,7 +10,9 @@ from typing import Any, cast
 import numpy as np
 
 from ..adaptation.calibration import Calibration
+from ..adaptation.learned_predictor import LearnedPredictor
 from ..adaptation.mirror import Mirror
+from ..adaptation.predictors import GivenPredictor, Persistence
 from ..adaptation.self_model import SelfModel
 from ..decision.exploration import Explorer
 from ..evaluators.best_response import BestResponse
@@ -59,6 +61,8 @@ class Team:
         What the wheels do, as learned; none: prediction takes every robot as nominal.
     calibration
         The predictor's constants, as learned; none: as the scenario believes them to be.
+    predictor
+        What predicts in place of the scenario; none: the scenario does.
     mirror
         Doubles what is learned from; none: it is what the agents met.
     seen
@@ -93,6 +97,7 @@ class Team:
         n, n_actions = len(hierarchy), len(scenario.action_set)
         self.self_model = _self_model_of(scenario, settings)
         self.calibration = _calibration_of(scenario, settings)
+        self.predictor = _predictor_of(scenario, settings)
         self.mirror = Mirror.of(scenario) if getattr(settings, "mirrored", False) else None
         self.rows = rows_of(scenario, shared=settings.weights == "role")
         rows = self.rows if self.mirror is None else self.mirror.rows(self.rows)
@@ -153,8 +158,7 @@ class Team:
             return
         if not hasattr(prediction, "rewards"):
             raise ValueError(
-                f"learner.decision.rule = {problem.rule!r}: the scenario predicts no rewards, "
-                "use value"
+                f"learner.decision.rule = {problem.rule!r}: no rewards are predicted, use value"
             )
         if getattr(self.evaluator, "continues", False) and not hasattr(prediction, "after"):
             raise ValueError(
@@ -180,6 +184,8 @@ class Team:
         """
         if states is not None:
             self._states = states
+        if self.predictor is not None:
+            return self.predictor.predict(self._states)
         if self._values_actions or not hasattr(scenario, "predict"):
             return None
         if self.self_model is None and self.calibration is None:
@@ -292,6 +298,8 @@ class Team:
         What contact is predicted to take from the motion is given back to the self-model: a robot
         that moves a load is slow, not broken. The constants are held against how the load moved.
         """
+        if isinstance(self.predictor, LearnedPredictor):
+            self.predictor.observe(self._states, joint_action, transition.states)
         if self.calibration is not None:
             self._calibrate(prediction, joint_action, transition)
         if self.self_model is None or transition.twists is None:
@@ -325,6 +333,8 @@ class Team:
     def end_episode(self) -> None:
         """Learn what is learned after an episode."""
         self._count(self.learner.end_episode())
+        if isinstance(self.predictor, LearnedPredictor):
+            self.predictor.end_episode()
 
     def _count(self, updates: int) -> None:
         if self.evaluator is not None:
@@ -430,8 +440,11 @@ class Team:
     @property
     def _adapting(self) -> dict[str, Any]:
         """What adapts beside the learner, by name."""
-        parts = {"self_model": self.self_model, "calibration": self.calibration}
-        return {name: part for name, part in parts.items() if part is not None}
+        parts = {
+            "self_model": self.self_model, "calibration": self.calibration,
+            "predictor": self.predictor,
+        }  # fmt: skip
+        return {name: part for name, part in parts.items() if hasattr(part, "arrays")}
 
 
 def _senders(
@@ -465,6 +478,24 @@ def _calibration_of(scenario: Scenario, settings: LearnerSettings) -> Calibratio
             "learner.calibration.enabled: the scenario's predictor has no constants to calibrate"
         )
     return Calibration(settings.calibration, len(constants), cast(Any, scenario).levers)
+
+
+def _predictor_of(
+    scenario: Scenario, settings: LearnerSettings
+) -> LearnedPredictor | Persistence | None:
+    if isinstance(settings.predictor, GivenPredictor):
+        return None
+    named = f"learner.predictor.kind = {settings.predictor.kind!r}"
+    if settings.values_actions:
+        raise ValueError(f"{named}: learner.kind = {settings.kind!r} decides without a prediction")
+    for name in ("self_model", "calibration"):
+        if getattr(settings, name).enabled:
+            raise ValueError(
+                f"learner.{name}.enabled: revises what the scenario predicts, and {named} predicts "
+                "in its place; use 'given'"
+            )
+    predictor: LearnedPredictor | Persistence = settings.predictor.build(scenario)
+    return predictor
 
 
 def of_fuzzy_agents(team: Actors) -> Team:

@@ -50,12 +50,16 @@ class Scenario(Protocol):
         `needs_prediction`.
     ``measure()``
         See `RecordedScenario`; asked for alone where a scenario is checked.
+    ``interactions``
+        Pairs of agents, by index, whose actions matter to each other: what a topology with ``shape
+        = "scenario"`` joins.
     ``partners()``
         For every agent the one in whose place it stands in the mirror, or a ValueError of one line
         if an agent has none: experience can be mirrored, see `core.adaptation.mirror`.
     ``horizon``
         Decisions that its predictions look ahead, while nobody changes what it does after the
-        first; 1 without. By that a check judges how far they are off.
+        first; 1 without. By that a check judges how far they are off. Then all are neutral; where
+        it ``repeats``, all do the same again.
     ``with_exact_prediction()``
         The same scenario with a predictor that makes no errors but those of rounding; itself, if it
         has one already. Then it can be checked that sensing and predicting mean the same.

@@ -53,7 +53,7 @@ def check_prediction(settings: TeamSettings, scenario: Scenario) -> None:
     raise ValueError(
         f"learner.kind = {settings.kind!r}: decides by predicted states, and the scenario "
         f"{type(scenario).__name__} has no method predict; without it do {', '.join(others)}, and "
-        "any with learner.decision.rule = 'random'"
+        "any with learner.predictor.kind = 'learned' or learner.decision.rule = 'random'"
     )
 
 

@@ -8,13 +8,14 @@ from typing import Annotated, ClassVar, Literal, Protocol
 from pydantic import Field
 
 from ..adaptation.calibration import CalibrationSettings
+from ..adaptation.predictors import GivenPredictor, Predictor
 from ..adaptation.self_model import SelfModelSettings
 from ..decision.exploration import EXPLORATIONS, BurstExploration, ExplorationSettings
 from ..decision.settings import Decision
 from ..interface.spaces import ActionSet, StateSpace
 from ..numerics.arrays import FloatArray
 from ..plugins.plugged import Plugged
-from ..plugins.settings import PartSettings
+from ..plugins.settings import PartSettings, unwritten
 from ..rules.rule_base import RuleBase
 from ..rules.settings import RuleBaseSettings
 
@@ -109,6 +110,8 @@ class LearnerSettings(TeamSettings):
     """What robots learn of their own wheels."""
     calibration: CalibrationSettings = CalibrationSettings()
     """What the team learns of the constants of its predictor."""
+    predictor: Annotated[Predictor, unwritten(GivenPredictor())] = GivenPredictor()
+    """What predicts: the scenario, nothing but persistence, or what has been learned."""
 
     def rules_over(
         self, space: StateSpace, actions: ActionSet, n_told: int
@@ -126,5 +129,6 @@ class LearnerSettings(TeamSettings):
 
     @property
     def needs_prediction(self) -> bool:
-        """Whether it acts only in scenarios that predict: unless it values or draws actions."""
-        return self.decision.rule != "random" and not self.values_actions
+        """Whether it acts only in scenarios that predict: unless it has a predictor of its own."""
+        is_given = isinstance(self.predictor, GivenPredictor)
+        return is_given and self.decision.rule != "random" and not self.values_actions

@@ -78,6 +78,7 @@ class AdaptedWorld:
 
     measures = MEASURES
     recorded = ("joint_action",)
+    repeats = True
 
     def __init__(self, settings: AdaptedSettings, make: Make) -> None:
         survey = surveyed(settings, make)
@@ -113,9 +114,9 @@ class AdaptedWorld:
         played = self.play(self._simulator, joint_action)
         self._last = np.array(joint_action)
         self._states = self.states_of(played.observations)
-        reward = self.reward(played)
-        self._return += float(np.mean(list(played.rewards.values())))
-        info = {**self.measure(), "env_reward": float(np.mean(list(played.rewards.values())))}
+        mean = float(np.mean(list(played.rewards.values())))
+        self._return += mean
+        info, reward = {**self.measure(), "env_reward": mean}, self.reward(played)
         return Transition(
             self._states, reward, played.terminated, played.truncated, info, absorbing=False
         )
@@ -279,21 +280,21 @@ def _bodies(
     return tuple(names), chosen
 
 
-def _met(simulator: Simulator, actuators: Actuators, flat: Any) -> tuple[FloatArray, FloatArray]:
-    """Return the least and greatest numbers that players observe in random episodes."""
+def _met(simulator: Simulator, actuators: Actuators, numbers_of: Any) -> FloatArray:
+    """Return the least and greatest numbers ``(2, k)`` of what is observed in random episodes."""
     rng = np.random.default_rng(0)
     numbers = []
     for episode in range(EPISODES):
-        numbers.append(flat(simulator.reset(episode)))
+        numbers.append(numbers_of(simulator.reset(episode)))
         action = rng.integers(len(actuators.action_set), size=len(actuators.names))
         for _ in range(STEPS):
             drawn = rng.integers(len(actuators.action_set), size=len(action))
             action = np.where(rng.random(len(action)) < HELD, action, drawn)
             played = simulator.step(actuators.commands(action))
-            numbers.append(flat(played.observations))
+            numbers.append(numbers_of(played.observations))
             if played.terminated or played.truncated:
                 break
-    return np.min(numbers, axis=(0, 1)), np.max(numbers, axis=(0, 1))
+    return np.array([np.min(numbers, axis=(0, 1)), np.max(numbers, axis=(0, 1))])
 
 
 def gymnasium_world(settings: GymnasiumSettings) -> AdaptedWorld:

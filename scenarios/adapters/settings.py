@@ -20,12 +20,10 @@ class FrozenTable(dict[str, Any]):
         return hash(json.dumps(self, sort_keys=True, default=repr))
 
 
-Entry = int | str
-"""A number of an observation: its index, or its name in an observation that is a table."""
-Entries = Entry | Annotated[tuple[Entry, ...], Field(min_length=1)]
-"""One for all bodies, or one for each body."""
 Range = Annotated[tuple[float, float], AfterValidator(lambda ends: _ordered(ends))]
 Index = Annotated[int, Field(ge=0)]
+Entries = Index | Annotated[tuple[Index, ...], Field(min_length=1)]
+"""Which number of an observation, counted from 0: one for all bodies, or one for each body."""
 
 
 def _ordered(ends: tuple[float, float]) -> tuple[float, float]:

@@ -65,14 +65,17 @@ def predicted_steps(
     joint_actions
         ``(steps, n)``; the episode may end earlier.
     ahead
-        Decisions that predictions look ahead; after each joint action all are neutral for the rest.
+        Decisions that predictions look ahead; after each joint action all are neutral for the rest,
+        or do the same again in a scenario that ``repeats``.
     """
     steps, paid = [], 0.0
+    repeats = getattr(scenario, "repeats", False)
+    neutral: IntArray = np.full(len(scenario.agents), scenario.action_set.neutral)
     states = np.array(scenario.reset(world_seed(seed, episode), episode))
     for action in joint_actions:
         before = _with_reward(states, paid)
         predicted = _predicted(scenario, action, before)
-        for joint in [action, *[np.full_like(action, scenario.action_set.neutral)] * (ahead - 1)]:
+        for joint in [action, *[action if repeats else neutral] * (ahead - 1)]:
             transition = scenario.step(joint)
             states, paid = np.array(transition.states), float(np.mean(transition.reward))
             if transition.terminated or transition.truncated:

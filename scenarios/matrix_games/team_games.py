@@ -29,6 +29,7 @@ from ...core.interface.measures import SUCCESS, Measure
 from ...core.interface.scenario import Transition
 from ...core.interface.spaces import ActionSet, StateSpace, Variable, choice
 from ...core.numerics.arrays import FloatArray, IntArray
+from ...core.plugins.deferred import nx
 from ...core.plugins.settings import NonNegative, ScenarioSettings
 
 PLAY = Variable("play", "1", 0.0, 1.0, centres=(0.0, 1.0))
@@ -39,7 +40,9 @@ MEASURES = (
         "optimal_plays", "optimal plays", source="optimal", gathering="mean", better="higher",
         least=0.0, greatest=1.0,
     ),
-    Measure("payoff", "payoff over the best", gathering="mean", better="higher", greatest=1.0),
+    Measure(
+        "share_of_best", "payoff over the best", gathering="mean", better="higher", greatest=1.0
+    ),
 )  # fmt: skip
 """Success is that the last play of an episode was optimal."""
 
@@ -199,6 +202,9 @@ class TeamGame:
             seen = tuple(Variable(f"distance{j + 1}", "1", 0.0, 1.0) for j in range(n))
         number = (choice("number", self.agents),) if settings.numbered else ()
         self.state_space = StateSpace(settings.game, (*seen, *number))
+        edges = shaped(settings.shape, n) if settings.game == "polymatrix" else nx.complete_graph(n)
+        self.interactions = sorted(tuple(sorted(edge)) for edge in edges.edges)
+        """Pairs of agents whose actions matter to each other."""
         self._numbers = np.arange(float(n))[:, None][:, : len(number)]
         self._drawn: Any = 0
         self.game = self._of_seed(0)
@@ -210,7 +216,7 @@ class TeamGame:
             return Permutation(np.zeros((s.players, 1)))
         if s.game == "landmarks":
             return Landmarks(s.players, s.distance_cost)
-        edges = sorted(tuple(sorted(edge)) for edge in shaped(s.shape, s.players).edges)
+        edges = self.interactions
         rng = np.random.default_rng(seed if s.seed is None else s.seed)
         return Polymatrix(edges, rng.random((len(edges), s.actions, s.actions)))
 
@@ -228,7 +234,7 @@ class TeamGame:
         payoff = float(self.game.payoffs(joint_action[None])[0])
         info = {
             "optimal": float(self.game.is_optimal(joint_action)),
-            "payoff": payoff / self.game.best,
+            "share_of_best": payoff / self.game.best,
         }
         self.game.advance(self._rng)
         return Transition(self._states(), payoff, False, False, info)

@@ -202,7 +202,6 @@ def _arrangements(condition: Condition) -> Iterator[Arrangement]:
     evaluations = transfer(own, settings, condition.evaluations, 0)
     for there in (own, *(a for _, a in stages), *(a for _, a in evaluations)):
         if isinstance(learner, LearnerSettings) and learner.decision.rule != "value":
-            there.scenario.reset(0)
-            team = of_fuzzy_agents(there.team)
-            team.check(team.predict(there.scenario))
+            team, states = of_fuzzy_agents(there.team), there.scenario.reset(0)
+            team.check(team.predict(there.scenario, states))
         yield there

@@ -255,8 +255,8 @@ IMAGE = Box(0, 255, (8, 8, 3), np.uint8)
         (lambda: from_gymnasium(Odd(done=Discrete(1))), "actions: agents have 1 each"),
         (lambda: from_gymnasium(Odd(done=Box(-np.inf, 1.0, (2,)))), "wrap it in RescaleAction"),
         (lambda: from_gymnasium(Carts(), variables={"a": 2}), r"give scenario\.ranges\.a"),
-        (lambda: from_gymnasium(Carts(), variables={"a": 9}), "'a' is 9 of an observation"),
-        (lambda: from_gymnasium(Carts(), variables={"a": (1, 1, 1)}), "3 places of 2 bodies"),
+        (lambda: from_gymnasium(Carts(), variables={"a": 9}), "'a' = 9: must be a numb"),
+        (lambda: from_gymnasium(Carts(), variables={"a": (1, 1, 1)}), "one for each of 2"),
         (lambda: from_gymnasium(Carts(), ranges={"b": (0.0, 1.0)}), r"ranges\.b: no state variab"),
         (lambda: from_gymnasium(Carts(), ranges={"o0": (1.0, 0.0)}), "the lower end first"),
         (lambda: from_gymnasium(Carts(), success={"b": (0.0, 1.0)}), r"success\.b: no state vari"),
@@ -274,7 +274,7 @@ def test_what_cannot_be_adapted_is_refused_in_one_line(make: Any, message: str) 
 
 def test_tables_and_discrete_observations() -> None:
     table = Dict({"goal": Box(-1.0, 1.0, (2,)), "odds": MultiDiscrete([2, 3])})
-    world = from_gymnasium(Odd(table), variables={"x": "goal0", "y": 1})
+    world = from_gymnasium(Odd(table), variables={"x": 0, "y": 1})
     assert [v.name for v in world.state_space.variables] == ["x", "y"]
     (variable,) = from_gymnasium(Odd(Discrete(3))).state_space.variables
     assert variable.centres == (0.0, 1.0, 2.0)

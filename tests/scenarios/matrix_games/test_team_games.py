@@ -22,10 +22,10 @@ def test_the_best_payoff_of_a_polymatrix_game_is_that_of_enumeration(shape: str)
     payoffs = game.game.payoffs(every)
     assert game.game.best == payoffs.max()
     best = game.step(every[payoffs.argmax()])
-    assert (best.info["optimal"], best.info["payoff"]) == (1.0, 1.0)
+    assert (best.info["optimal"], best.info["share_of_best"]) == (1.0, 1.0)
     worst = game.step(every[payoffs.argmin()])
     assert worst.info["optimal"] == 0.0
-    assert worst.info["payoff"] == pytest.approx(payoffs.min() / payoffs.max())
+    assert worst.info["share_of_best"] == pytest.approx(payoffs.min() / payoffs.max())
 
 
 def test_a_polymatrix_game_is_a_trials_own_unless_it_has_a_seed() -> None:
