@@ -88,11 +88,12 @@ MODULES = {
     )),
     "studies": ("What is measured, compared and drawn.", (
         "api.study", "api.teams", "api.planning", "api.costs", "api.comparison", "api.recovery",
-        "api.run_study",
+        "api.run_study", "api.tuning",
         "errors", "spec.spec", "spec.keys", "spec.presets", "trials.trial",
         "trials.arrangement", "trials.session",
         "store.store", "results.results", "results.analysis", "results.statistics",
-        "results.comparison", "results.power", "results.summary", "catalogue.study", "cost.cost",
+        "results.comparison", "results.aggregates", "results.marl_eval",
+        "results.power", "results.summary", "catalogue.study", "cost.cost",
         "claims.claims",
     )),
 }  # fmt: skip
