@@ -192,6 +192,12 @@ def test_what_takes_a_prediction_is_refused(keys: dict, message: str) -> None:
         FittedQSettings(**keys).rules_over(SPACE, TWO, 0)
 
 
+def test_messages_have_no_mirror_image() -> None:
+    with pytest.raises(ValueError, match=r"learner\.mirrored = true: messages have no mirror"):
+        FittedQSettings(mirrored=True).rules_over(SPACE, TWO, 1)
+    FittedQSettings(mirrored=True).rules_over(SPACE, TWO, 0)
+
+
 def test_neighbours_are_refused_as_they_tell_nothing() -> None:
     names = ("agent1", "agent2", "agent3")
     with pytest.raises(ValueError, match=r"set topology\.oriented"):
