@@ -14,6 +14,7 @@ from nested_agents.core.learners.fitted_q import FittedQ, FittedQSettings
 from nested_agents.core.rules.rule_base import RuleBase
 from nested_agents.core.rules.settings import RuleBaseSettings
 from nested_agents.scenarios.matrix_games.team_games import TeamGameSettings
+from nested_agents.studies.spec.spec import Spec
 
 SPACE = StateSpace("gap", (Variable("gap", "m", 0.0, 1.0, centres=(0.0, 0.5, 1.0)),))
 TWO = ActionSet(("left", "right"), (0.0, 0.0), (0.0, 0.0), neutral=0)
@@ -212,3 +213,10 @@ def test_a_team_goes_on_with_all_it_has_learned_unless_others_tell_it_something(
     assert (later.learner.theta == 1.0).all()
     with pytest.raises(ValueError, match="told by 1 fewer others than when it learned"):
         team(chain(told="parents")).continue_from(former, np.arange(3))
+
+
+def test_a_topology_that_says_whom_agents_consider_is_remarked_on() -> None:
+    silent = {"kind": "chain", "considers": "none"}
+    spec = Spec(preset="fitted-q", scenario={"kind": "line-up"}, topology=silent)
+    told = "topology.considers: left out, learner.kind = 'fitted-q' considers nobody"
+    assert any(told in line for c in spec.conditions() for line in c.settings.warnings())
