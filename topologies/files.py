@@ -10,20 +10,16 @@ from __future__ import annotations
 import json
 import tomllib
 import traceback
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Iterator
 from inspect import iscoroutine
 from itertools import islice
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 from ..core.plugins import plugged, sources
 from ..core.plugins.deferred import nx
 from .builders import Bodies, Names, independent
-from .checks import check_legible, shown, with_edges
-
-MOST_LEVELS = 100
-"""Of nested teams."""
+from .checks import check_legible, with_edges
 
 
 def read(path: str) -> nx.DiGraph | dict[str, Any]:
@@ -49,8 +45,7 @@ def read(path: str) -> nx.DiGraph | dict[str, Any]:
     text = sources.active().text(path)
     try:
         if suffix == ".graphml":
-            _check_graphml(text)
-            graph = nx.parse_graphml(text)
+            graph = nx.parse_graphml(text, node_type=_name)
             check_legible(graph)
             return graph
         as_toml = suffix == ".toml"
@@ -133,34 +128,23 @@ def _table_of(content: Any) -> dict[str, Any]:
         raise ValueError("it must be a table with one of the keys edges, members and kind")
     if content.get("kind") == "file":
         raise ValueError("kind = 'file': a file cannot name another one")
-    if "members" in content:
-        _check_members(content["members"])
-    edges = content.get("edges")
-    for names in (content.get("alone"), *(edges if isinstance(edges, list) else ())):
-        check_legible(names if isinstance(names, list) else ())
+    check_legible(_names([content.get(key) for key in ("members", "edges", "alone")]))
     return content
 
 
-def _check_members(members: Any, level: int = 1) -> None:
-    """Refuse nested teams that are not lists of lists of names, or deeper than `MOST_LEVELS`."""
-    if level > MOST_LEVELS:
-        raise ValueError(f"members: are nested more than {MOST_LEVELS} levels deep")
-    if not isinstance(members, list) or not members:
-        raise ValueError(f"members = {shown(members)}: must be a list of names and of such lists")
-    for member in members:
-        if not isinstance(member, str):
-            _check_members(member, level + 1)
-    check_legible(member for member in members if isinstance(member, str))
+def _names(content: Any) -> Iterator[str]:
+    """Yield the texts in lists, at any depth."""
+    if isinstance(content, str):
+        yield content
+    for part in content if isinstance(content, list) else ():
+        yield from _names(part)
 
 
-def _check_graphml(text: str) -> None:
-    """Refuse nodes and edges without what names agents; networkx would call these None."""
-    needed = {"node": ("id",), "edge": ("source", "target")}
-    for element in ElementTree.fromstring(text).iter():
-        kind = element.tag.rpartition("}")[2]
-        for attribute in needed.get(kind, ()):
-            if element.get(attribute) is None:
-                raise ValueError(f"{kind} {dict(element.attrib)}: has no {attribute}")
+def _name(text: str | None) -> str:
+    """Return what GraphML calls an agent; networkx would call it None if there is nothing."""
+    if text is None:
+        raise ValueError("a node has no id, or an edge no source or target")
+    return text
 
 
 def _no_name(constant: str) -> Any:

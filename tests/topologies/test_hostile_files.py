@@ -97,9 +97,9 @@ def test_nested_teams_of_many_levels_are_made_or_told(levels, tmp_path, monkeypa
     monkeypatch.chdir(tmp_path)
     members = "".join(f'["a{i}", ' for i in range(levels)) + '["b"]' + "]" * levels
     (tmp_path / "deep.json").write_text(f'{{"members": {members}}}')
-    assert main(["topology", "show", "deep.json"]) == (2 if levels > 99 else 0)
+    assert main(["topology", "show", "deep.json"]) == (2 if levels > 100 else 0)
     error = capsys.readouterr().err
-    assert levels < 100 or re.fullmatch(r"nested-agents: error: [ -~]{1,1300}\n", error), error
+    assert levels <= 100 or re.fullmatch(r"nested-agents: error: [ -~]{1,1300}\n", error), error
 
 
 def test_names_in_arguments_are_checked_too(capsys: pytest.CaptureFixture[str]) -> None:
