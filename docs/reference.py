@@ -72,6 +72,7 @@ MODULES = {
     "scenarios": ("Where agents act.", (
         "box_pushing.config", "box_pushing.world.settings", "box_pushing.prediction.settings",
         "box_pushing.scenario", "box_pushing.environments", "adapters.passing_down",
+        "adapters.adapted", "adapters.settings",
         "box_pushing.world.reward", "box_pushing.world.starts", "box_pushing.states.view",
         "box_pushing.states.variables", "box_pushing.states.state_spaces",
         "box_pushing.prediction.predictors", "box_pushing.world.boxes",
@@ -86,11 +87,12 @@ MODULES = {
     )),
     "studies": ("What is measured, compared and drawn.", (
         "api.study", "api.teams", "api.planning", "api.costs", "api.comparison", "api.recovery",
-        "api.run_study",
+        "api.run_study", "api.tuning",
         "errors", "spec.spec", "spec.keys", "spec.presets", "trials.trial",
         "trials.arrangement", "trials.session",
         "store.store", "results.results", "results.analysis", "results.statistics",
-        "results.comparison", "results.power", "results.summary", "catalogue.study", "cost.cost",
+        "results.comparison", "results.aggregates", "results.marl_eval",
+        "results.power", "results.summary", "catalogue.study", "cost.cost",
         "claims.claims",
     )),
 }  # fmt: skip
@@ -197,8 +199,10 @@ def columns() -> Iterator[str]:
         yield from table(headings, ((code(n) if "*" not in n else n, u, m) for n, u, m in rows))
     yield "## Measures of the scenarios\n"
     yield "A scenario declares its own measures ([](../extending.md#a-scenario)). These are those"
-    yield "of the built-in scenarios.\n"
+    yield "of the built-in scenarios; those of environments of others depend on these.\n"
     for kind in SCENARIOS.built_in:
+        if any(field.is_required() for field in SCENARIOS.model(kind).model_fields.values()):
+            continue
         yield f"### `{kind}`\n"
         yield from table(
             ("column", "heading", "unit", "of the steps of an episode", "better", "bounds"),

@@ -74,6 +74,9 @@ class TopologySettings(Settings):
         raise ValueError("has no kind, and makes no hierarchy")
 
 
+IMPLIED = {"members": "teams", "edges": "edges"}
+"""Kinds of tables that have none, by a key that they have."""
+
 TOPOLOGIES = SettingsRegistry(
     "topology",
     {
@@ -102,7 +105,7 @@ def parse(text: str | Mapping[str, Any]) -> TopologySettings:
 
     Besides ``"kind"`` and ``"kind:argument"``, a file of a graph or of such a table, a
     ``file.py:function`` and the name of an installed package's topology stand for themselves. A
-    table without a kind that has `members` is one of teams.
+    table without a kind that has `members` is one of teams, one that has `edges` of these.
 
     Raises
     ------
@@ -145,7 +148,8 @@ def parse(text: str | Mapping[str, Any]) -> TopologySettings:
 
 def _of_table(table: Mapping[str, Any]) -> TopologySettings:
     """Return the settings of a table."""
-    kind = table.get("kind", "teams" if "members" in table else None)
+    implied = next((k for key, k in IMPLIED.items() if key in table), None)
+    kind = table.get("kind", implied)
     if not isinstance(kind, str):
         raise ValueError(f"topology.kind = {kind!r}: {closest(kind, TOPOLOGIES.names())}")
     try:

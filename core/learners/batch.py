@@ -32,7 +32,8 @@ class ReplaySettings(LearnerSettings):
     """What learners share that regress on all experience, after every episode and during it."""
 
     ridge: Positive = 10.0
-    """Weight of the squared consequents against squared errors of rewards scaled by 100."""
+    """Weight of the squared consequents against squared errors of rewards scaled by 100: larger, if
+    values are jagged; smaller, if they are flat."""
     regression_iterations: Annotated[int, Field(ge=1, le=10_000)] = 30
     """Regressions on freshly discounted targets each time."""
     target_averaging_rate: Annotated[float, Field(gt=0, le=1)] = 0.5

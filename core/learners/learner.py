@@ -75,7 +75,8 @@ class TeamSettings(PartSettings):
     """Whether those who act pass actions down a hierarchy, which `build` is then given last."""
 
     discount: Annotated[float, Field(ge=0, lt=1)] = 0.95
-    """Discount per decision, gamma of Eq. 7."""
+    """Discount per decision, gamma of Eq. 7: low where actions pay at once, high where they pay
+    late."""
 
     @property
     def needs_prediction(self) -> bool:
@@ -100,7 +101,7 @@ class LearnerSettings(TeamSettings):
     """Fuzzy rule base of every agent."""
     weights: Literal["own", "role"] = "own"
     """Whether every agent has consequent weights of its own, or all agents of one role (the left
-    wheels, say) share them and pool their experience."""
+    wheels, say) share them and pool their experience; alike where a scenario has no roles."""
     exploration: Annotated[ExplorationSettings, Plugged(EXPLORATIONS)] = BurstExploration()
     """How agents explore."""
     decision: Decision = Decision()

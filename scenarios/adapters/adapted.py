@@ -95,7 +95,6 @@ class AdaptedWorld:
         self._last: IntArray = np.full(len(self.agents), self.action_set.neutral)
         self._states: FloatArray = np.zeros((len(self.agents), self.state_space.n_variables))
         if settings.predictor == "copy":
-            self.copies = copies_of(self._simulator)
             self.predict = self._predict
             self.with_exact_prediction = self._with_exact_prediction
         if "rgb_array" in (self._simulator.env.metadata or {}).get("render_modes", ()):
@@ -154,18 +153,7 @@ class AdaptedWorld:
 
     def _predict(self) -> CopiedPrediction:
         """Predict from the present state."""
-        return CopiedPrediction(self)
-
-    def ahead(self, joint_action: IntArray) -> tuple[FloatArray, float]:
-        """Return the states ``(n, d)`` that a joint action leads to, and the mean reward."""
-        paid = 0.0
-        with self.copies.lane() as lane:
-            for _ in range(self.horizon):
-                played = self.play(lane, joint_action)
-                paid += float(np.mean(list(played.rewards.values())))
-                if played.terminated or played.truncated:
-                    break
-        return self.states_of(played.observations), paid / self.horizon
+        return CopiedPrediction(self, self._simulator)
 
     def _with_exact_prediction(self) -> AdaptedWorld:
         """Return the same world, which predicts one decision ahead."""
@@ -204,12 +192,13 @@ class CopiedPrediction:
 
     Parameters
     ----------
-    world
-        The scenario, in its present state.
+    world, simulator
+        The scenario, and its simulator in its present state.
     """
 
-    def __init__(self, world: AdaptedWorld) -> None:
-        self._world = world
+    def __init__(self, world: AdaptedWorld, simulator: Simulator) -> None:
+        self._world, self._simulator = world, simulator
+        self._copies: Any = None
         self._played: dict[bytes, tuple[FloatArray, float]] = {}
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
@@ -221,9 +210,19 @@ class CopiedPrediction:
         return np.array([self._ahead(joint)[1] for joint in joint_actions])
 
     def _ahead(self, joint_action: IntArray) -> tuple[FloatArray, float]:
+        """Return the states ``(n, d)`` that a joint action leads to, and the mean reward."""
         key = np.ascontiguousarray(joint_action, dtype=np.int64).tobytes()
-        if key not in self._played:
-            self._played[key] = self._world.ahead(joint_action)
+        if key in self._played:
+            return self._played[key]
+        self._copies, paid = self._copies or copies_of(self._simulator), 0.0
+        with self._copies.lane() as lane:
+            for _ in range(self._world.horizon):
+                played = self._world.play(lane, joint_action)
+                paid += float(np.mean(list(played.rewards.values())))
+                if played.terminated or played.truncated:
+                    break
+        states = self._world.states_of(played.observations)
+        self._played[key] = states, paid / self._world.horizon
         return self._played[key]
 
 

@@ -1,8 +1,8 @@
 """Copies of a simulator, which are stepped to predict what joint actions lead to.
 
 A simulator of MuJoCo is saved by its ``MjData``, played and brought back: what its environment
-makes of that, observations and rewards, is its own. Others are copied as Python objects, without
-spaces and windows. Either way a copy has the random numbers of the original, too.
+makes of that, observations and rewards, is its own. Others are saved as Python objects, without
+spaces and windows, and made anew of that. Either way a copy has the random numbers of the original.
 """
 
 from __future__ import annotations
@@ -10,8 +10,9 @@ from __future__ import annotations
 import pickle
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from copy import deepcopy
 from importlib import import_module
+from io import BytesIO
+from types import FunctionType, ModuleType
 from typing import Any
 
 import gymnasium
@@ -23,15 +24,15 @@ SHARED = ("pygame", "glfw", "OpenGL", "moderngl")
 """Packages whose objects a simulator draws with; copies have them in common."""
 
 
-def copies_of(simulator: Simulator) -> DeepCopies | SavedMujoco:
-    """Return what copies a simulator: its ``lane`` is one that is where the original is now."""
+def copies_of(simulator: Simulator) -> PickledCopies | SavedMujoco:
+    """Return what makes copies of a simulator as it is now, by ``lane``, until its next step."""
     data = getattr(simulator.env.unwrapped, "data", None)
     is_mujoco = type(data).__module__.partition(".")[0] == "mujoco"
-    return SavedMujoco(simulator) if is_mujoco else DeepCopies(simulator)
+    return SavedMujoco(simulator) if is_mujoco else PickledCopies(simulator)
 
 
-class DeepCopies:
-    """Copies as Python objects.
+class PickledCopies:
+    """Copies of Python objects.
 
     Parameters
     ----------
@@ -40,20 +41,32 @@ class DeepCopies:
     """
 
     def __init__(self, simulator: Simulator) -> None:
-        self._simulator = simulator
+        self._layers = list(_layers(simulator))
+        self._kept: dict[int, Any] = {id(layer): layer for layer in self._layers}
+        file = BytesIO()
+        pickler: Any = pickle.Pickler(file, pickle.HIGHEST_PROTOCOL)
+        pickler.persistent_id = self._identity
+        # Attribute by attribute: many environments (EzPickle) would be made anew.
+        pickler.dump([vars(layer) for layer in self._layers])
+        self._saved = file.getvalue()
+
+    def _identity(self, value: Any) -> int | None:
+        """Return the identity of what copies have in common, and of the layers themselves."""
+        if id(value) not in self._kept:
+            if not _is_shared(value):
+                return None
+            self._kept[id(value)] = value
+        return id(value)
 
     @contextmanager
     def lane(self) -> Iterator[Simulator]:
         """Return a copy."""
-        layers = list(_layers(self._simulator))
-        fixed = (v for layer in layers for v in vars(layer).values() if _is_shared(v))
-        memo: dict[int, Any] = {id(value): value for value in fixed}
-        # Attribute by attribute: many environments (EzPickle) would be made anew.
-        copies = [object.__new__(type(layer)) for layer in layers]
-        memo |= {id(layer): made for layer, made in zip(layers, copies, strict=True)}
-        for layer, made in zip(layers, copies, strict=True):
-            vars(made).update(deepcopy(vars(layer), memo))
-        yield copies[0]
+        made = {id(layer): object.__new__(type(layer)) for layer in self._layers}
+        unpickler: Any = pickle.Unpickler(BytesIO(self._saved))
+        unpickler.persistent_load = {**self._kept, **made}.__getitem__
+        for layer, attributes in zip(made.values(), unpickler.load(), strict=True):
+            vars(layer).update(attributes)
+        yield made[id(self._layers[0])]
 
 
 class SavedMujoco:
@@ -67,22 +80,20 @@ class SavedMujoco:
 
     def __init__(self, simulator: Simulator) -> None:
         mujoco: Any = import_module("mujoco")
-        self._simulator = simulator
-        self._copy = mujoco.mj_copyData
         env: Any = simulator.env.unwrapped
-        self._saved = mujoco.MjData(env.model)
+        self._simulator, self._env = simulator, env
+        self._attributes = [(layer, dict(vars(layer))) for layer in _layers(simulator)]
+        self._copy, self._saved = mujoco.mj_copyData, mujoco.MjData(env.model)
+        self._copy(self._saved, env.model, env.data)
 
     @contextmanager
     def lane(self) -> Iterator[Simulator]:
         """Return the simulator, which is where it was when the context ends."""
-        env: Any = self._simulator.env.unwrapped
-        attributes = [(layer, dict(vars(layer))) for layer in _layers(self._simulator)]
-        self._copy(self._saved, env.model, env.data)
         try:
             yield self._simulator
         finally:
-            self._copy(env.data, env.model, self._saved)
-            for layer, values in attributes:
+            self._copy(self._env.data, self._env.model, self._saved)
+            for layer, values in self._attributes:
                 vars(layer).update(values)
 
 
@@ -94,8 +105,9 @@ def fault_of_copies(simulator: Simulator, actions: Mapping[str, Any]) -> str:
     simulator.reset(0)
     for _ in range(2):
         simulator.step(actions)
-    copies, played = copies_of(simulator), []
+    played = []
     try:
+        copies = copies_of(simulator)
         for _ in range(2):
             with copies.lane() as lane:
                 played.append(pickle.dumps([lane.step(actions) for _ in range(2)]))
@@ -116,7 +128,5 @@ def _layers(simulator: Simulator) -> Iterator[Any]:
 
 def _is_shared(value: Any) -> bool:
     """Return whether no step changes a part of an environment."""
-    if isinstance(value, dict):
-        return bool(value) and all(isinstance(part, gymnasium.Space) for part in value.values())
-    is_fixed = isinstance(value, gymnasium.Space | gymnasium.envs.registration.EnvSpec)
-    return is_fixed or type(value).__module__.partition(".")[0] in SHARED
+    fixed = gymnasium.Space, gymnasium.envs.registration.EnvSpec, FunctionType, ModuleType
+    return isinstance(value, fixed) or type(value).__module__.partition(".")[0] in SHARED

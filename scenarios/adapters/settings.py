@@ -6,6 +6,7 @@ Reading them needs no simulator; it is imported when a world is built.
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import AfterValidator, Field
@@ -86,6 +87,11 @@ class AdaptedSettings(ScenarioSettings):
         """Return that nothing is a success, if it is so."""
         nothing = "scenario.success: nothing is said to be one, compare total_reward"
         return () if self.success else (nothing,)
+
+    def scenario_defaults(self, preset: str) -> Mapping[str, Any]:
+        """Return that few joint actions are tried, where each is played by a copy."""
+        is_slow = self.predictor == "copy" and preset in ("default", "own-value", "frozen")
+        return {"learner": {"decision": {"evaluator": "best-response"}}} if is_slow else {}
 
 
 class GymnasiumSettings(AdaptedSettings):

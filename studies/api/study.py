@@ -22,6 +22,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ...core.interface.measures import SUCCESS
 from ...core.plugins.messages import closest
 from ...core.plugins.sources import Sources
 from ..catalogue.study import analysed, drawn, load_study
@@ -110,6 +111,24 @@ class StudyResults:
     def notes(self) -> tuple[str, ...]:
         """What the study says of its results, verdicts and their power, line by line."""
         return tuple(getattr(self.analysis, "notes", ()))
+
+    @property
+    def unlearned(self) -> tuple[str, ...]:
+        """Conditions that learn, but have neither more success nor return than frozen weights.
+
+        In evaluation; known where there is a frozen condition in the same scenario.
+        """
+        evaluations = self.results.episodes.query("phase == 'evaluation'")
+        columns = ["condition", SUCCESS.name, "return"]
+        means = evaluations.reindex(columns=columns).groupby("condition").mean()
+        frozen, others = dict[str, Any](), list[tuple[str, str]]()
+        for c in means.index.intersection(list(self._settings), sort=False):
+            learner, scenario = (self._settings[c][name] for name in ("learner", "scenario"))
+            if learner["kind"] != "frozen":
+                others.append((c, repr(scenario)))
+            elif learner["decision"]["rule"] == "value":
+                frozen[repr(scenario)] = means.loc[c]
+        return tuple(c for c, s in others if s in frozen and (means.loc[c] <= frozen[s]).all())
 
     @property
     def power(self) -> tuple[str, ...]:

@@ -93,7 +93,7 @@ class Tuning:
         lines = [f"Best of {len(self.configurations)} configurations: {name}"]
         lines += [f"  {key} = {show(value)}" for key, value in self.changes.items()]
         if success == 0.0:
-            lines.append("None of them reaches the goal in evaluation.")
+            lines.append("None of them reaches the goal in evaluation: they are ranked by return.")
         return [
             *lines,
             "Its success on these seeds is flattered, as it was chosen by it.",

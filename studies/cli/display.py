@@ -59,6 +59,7 @@ def show_results(
     int
         1 if any trial failed, else 0.
     """
+    from ...topologies.checks import listed
     from ..presentation import figures  # Matplotlib takes its time, for which no trial has to wait
     from ..presentation.progress import say
     from ..presentation.words import count
@@ -72,6 +73,13 @@ def show_results(
     print("", *(f"figure  {path}" for path in drawn), sep="\n")
     for path in replays:
         print(f"replay  {path}")
+    if study.unlearned:
+        names = listed(study.unlearned, 3)
+        print_wrapped(
+            f"{names}: no better than frozen weights in evaluation. What to try, and in which "
+            "order: docs/not_learned.md; nested-agents tune tries it for you.",
+            "hint    ", 8,
+        )  # fmt: skip
     print(f"rows    nested-agents results {directory} --format csv")
     print(f"report  nested-agents report {directory}")
     if study.failed:

@@ -50,17 +50,17 @@ def page(directory: Path) -> str:
     if len(results.conditions) > 1 and [*notes] == identity_lines(results.identical):
         notes = contrasts(results).notes  # what `compare` says of it, this included
     return _template().render(
-        outline=outline,
+        study=outline.study,
+        extent=words.extent(outline),
         compared=", ".join(next(iter(outline.columns.values()))),
-        trials=len(trials),
-        left=len(trials) - counts["done"] - counts["failed"],
-        **counts,
+        standing=words.standing(len(trials), counts["done"], counts["failed"]),
+        complete=counts["done"] == len(trials),
         notes=notes,
         table=tabulate(analysis.table),
         pictures=pictures(figures),
         replays=packed,
         topologies=words.topologies(outline),
-        failures=failed,
+        failed=failed,
         seeds=words.runs(outline.seeds),
         spec=dumps(outline.table),
         versions=words.versions(),

@@ -1,4 +1,4 @@
-"""What a report says of a study and of what it was made with, where its template does not."""
+"""What a report says in sentences: how far the study is, and what it was made with."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..errors import show
+from ..presentation.words import count
 from ..spec.outline import StudyOutline
 from ..workers.worker import installed
 
@@ -42,6 +43,23 @@ def runs(values: Iterable[int]) -> str:
     return ", ".join(parts)
 
 
+def extent(outline: StudyOutline) -> str:
+    """Return what a study consists of."""
+    after = ""
+    if outline.evaluation:
+        longest = outline.table.get("evaluation_steps")
+        after = f", {count(outline.evaluation, 'evaluation episode')} after them"
+        after += f" of up to {count(longest, 'step')}" if longest else ""
+        others = len(outline.table.get("evaluations", ()))
+        each = "another scenario" if others == 1 else f"each of {others} other scenarios"
+        after += f" and as many in {each}" if others else ""
+    return (
+        f"{count(len(outline.columns), 'condition')} × {count(len(outline.seeds), 'seed')}, each "
+        f"{outline.lengths.replace('episode', 'training episode')} of up to "
+        f"{count(outline.steps, 'step')}{after}"
+    )
+
+
 def topologies(outline: StudyOutline) -> dict[str, str]:
     """Return the topologies that a spec names, as it writes them, failures included, by where."""
     own = {o["name"]: o for o in outline.table.get("overrides", ())}
@@ -49,6 +67,17 @@ def topologies(outline: StudyOutline) -> dict[str, str]:
     return {
         name: show(t["topology"], width=None) for name, t in tables.items() if t.get("topology")
     }
+
+
+def standing(total: int, done: int, failed: int) -> str:
+    """Return how far a study is."""
+    if done == total:
+        return f"All {count(total, 'trial')} are done." if total > 1 else "Its one trial is done."
+    left = total - done - failed
+    parts = [f"{done} of {count(total, 'trial')} {'is' if done == 1 else 'are'} done"]
+    parts += [f"{failed} failed"] * bool(failed) + [f"{left} left"] * bool(left)
+    what = "What follows is of those done." if done else "There is nothing to show yet."
+    return f"{'Unfinished' if left else 'With failures'}: {', '.join(parts)}. {what}"
 
 
 def versions() -> list[tuple[str, str]]:

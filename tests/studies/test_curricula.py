@@ -9,7 +9,7 @@ import pytest
 from nested_agents.studies.catalogue.study import load_study
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.presentation.tables import tabulate
-from nested_agents.studies.report.page import page
+from nested_agents.studies.report import words
 from nested_agents.studies.results.results import read
 from nested_agents.studies.spec.outline import StudyOutline
 from nested_agents.studies.spec.spec import Spec
@@ -98,9 +98,9 @@ def test_the_lengths_of_several_curricula_are_told():
     )
 
 
-def test_reports_tell_the_extent(study):
-    header = page(study).partition("</header>")[0]
-    assert (
-        "<p>1 condition × 2 seeds, each 2 + 1 + 3 training episodes of up to 4 steps, "
-        "2 evaluation episodes after them and as many in each of 2 other scenarios</p>"
-    ) in " ".join(header.split())
+def test_extent(study):
+    with Store.open(study) as store:
+        assert words.extent(StudyOutline.kept(store)) == (
+            "1 condition × 2 seeds, each 2 + 1 + 3 training episodes of up to 4 steps, "
+            "2 evaluation episodes after them and as many in each of 2 other scenarios"
+        )

@@ -1,8 +1,23 @@
 import Box2D
+import pytest
 
 from nested_agents.studies.report import words
 from nested_agents.studies.spec.outline import StudyOutline
 from nested_agents.studies.spec.spec import Spec
+
+
+@pytest.mark.parametrize(
+    ("counts", "said"),
+    [
+        ((1, 1, 0), "Its one trial is done."),
+        ((8, 8, 0), "All 8 trials are done."),
+        ((8, 5, 1), "Unfinished: 5 of 8 trials are done, 1 failed, 2 left. What follows is"),
+        ((8, 7, 1), "With failures: 7 of 8 trials are done, 1 failed. What follows is of"),
+        ((8, 0, 0), "Unfinished: 0 of 8 trials are done, 8 left. There is nothing to show yet."),
+    ],
+)
+def test_standing(counts, said):
+    assert words.standing(*counts).startswith(said)
 
 
 def test_topologies_are_named_as_the_spec_writes_them():
