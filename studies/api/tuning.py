@@ -8,6 +8,7 @@ on four, and so on: seeds are spent on what may be best. All meet the same world
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -145,7 +146,7 @@ def tune(
     """
     spec, out = Spec.read(spec, study=Path(out)), Path(out)
     _check(spec, trials, seeds, first_seed)
-    points = {GIVEN: {}, **_sampled(spec, trials, draw)}
+    points = _sampled(spec, trials, draw)
     study = _study(spec, points, range(first_seed, first_seed + seeds))
     everything, planned = trials_of(study), dict[str, Trial]()
     observer = _Rungs() if progress else Observer()
@@ -195,10 +196,8 @@ def _check(spec: Spec, trials: int, seeds: int, first_seed: int) -> None:
     ):  # fmt: skip
         if value < least:
             raise SpecError(f"--{name} {value}: must be at least {least}")
-    if len(spec.conditions()) != 1:
-        raise SpecError(
-            f"sweep, overrides: {len(spec.conditions())} conditions; tune takes a spec of one"
-        )
+    if spec.sweep or spec.overrides:
+        raise SpecError("sweep, overrides: must be absent, tune takes a spec of one condition")
     if spec.evaluation < 1:
         raise SpecError("evaluation = 0: tune compares evaluation success, needs 1 or more")
     if shared := sorted(set(spec.seeds) & set(range(first_seed, first_seed + seeds))):
@@ -207,12 +206,23 @@ def _check(spec: Spec, trials: int, seeds: int, first_seed: int) -> None:
         )
 
 
+def _over(table: TomlTable, point: Point) -> TomlTable:
+    """Return a table with values laid over it."""
+    for key, value in point.items():
+        table = overlay(table, nested(key, value))
+    return table
+
+
 def _laid(spec: Spec, point: Point) -> Spec:
     """Return a spec with values laid over it, and nothing left to tune."""
     table = {key: value for key, value in spec.table().items() if key != "tune"}
-    for key, value in point.items():
-        table = overlay(table, nested(key, value))
-    return Spec.of(table, spec.sources)
+    return Spec.of(_over(table, point), spec.sources)
+
+
+def _built(spec: Spec) -> str:
+    """Return what the only condition of a spec consists of, if it can be built."""
+    check(spec)
+    return spec.conditions()[0].settings.canonical()
 
 
 def _space(spec: Spec) -> dict[str, Sequence[Any]]:
@@ -225,65 +235,43 @@ def _space(spec: Spec) -> dict[str, Sequence[Any]]:
     with spec.sources.active():
         scenario = spec.conditions()[0].settings.scenario.build()
     has_roles = len({*roles_of(scenario)}) < len(scenario.agents)
-    possible = {
-        key: [value for value in values if _problem(spec, {key: value}) is None]
-        for key, values in USUAL.items()
-        if key != "learner.weights" or has_roles
-    }
-    return {key: values for key, values in possible.items() if values}
-
-
-def _problem(spec: Spec, point: Point) -> str | None:
-    """Return why a configuration cannot be built; None if it can."""
-    try:
-        check(_laid(spec, point))
-    except SpecError as error:
-        return str(error)
-    return None
+    possible = dict[str, Sequence[Any]]()
+    for key, values in USUAL.items():
+        for value in values if has_roles or key != "learner.weights" else ():
+            with suppress(SpecError):
+                _built(_laid(spec, {key: value}))
+                possible[key] = [*possible.get(key, ()), value]
+    return possible
 
 
 def _sampled(spec: Spec, trials: int, draw: int) -> dict[str, Point]:
-    """Return distinct configurations that can be built, by name, besides the spec's own."""
-    space, rng = _space(spec), np.random.default_rng(draw)
-    seen, tried, problem = {_content(spec)}, set[str](), "all are the spec's own"
-    points: dict[str, Point] = {}
+    """Return distinct configurations that can be built, by name; the spec's own is the first."""
+    space, rng, problem = _space(spec), np.random.default_rng(draw), "all are the spec's own"
+    points, tried = {_built(spec): dict[str, Any]()}, set[str]()
     for _ in range(DRAWS * trials):
         point = {key: values[int(rng.integers(len(values)))] for key, values in space.items()}
-        if len(points) == trials - 1 or repr(point) in tried:
-            continue
-        tried.add(repr(point))
-        if (reason := _problem(spec, point)) is not None:
-            problem = reason
-        elif (content := _content(_laid(spec, point))) not in seen:
-            seen.add(content)
-            points[f"c{len(points) + 1:02}"] = point
-    if not points:
+        if len(points) < trials and repr(point) not in tried:
+            tried.add(repr(point))
+            try:
+                points.setdefault(_built(_laid(spec, point)), point)
+            except SpecError as error:
+                problem = str(error)
+    if len(points) == 1:
         raise SpecError(f"tune: there is nothing to try: {problem}")
-    return points
-
-
-def _content(spec: Spec) -> str:
-    return spec.conditions()[0].settings.canonical()
+    return {f"c{i:02}" if i else GIVEN: point for i, point in enumerate(points.values())}
 
 
 def _study(spec: Spec, points: Mapping[str, Point], seeds: Iterable[int]) -> Spec:
     """Return the study of all configurations and of the controls that the scenario allows."""
-    base = spec.table()
-    for key in ("tune", "overrides", "sweep", "evaluations", "keep_teams"):
-        base.pop(key, None)
-    overrides: list[TomlTable] = []
-    for name, point in points.items():
-        override: TomlTable = {"name": name}
-        for key, value in point.items():
-            override = overlay(override, nested(key, value))
-        overrides.append(override)
+    left_out = ("tune", "evaluations", "keep_teams")
+    base = {key: value for key, value in spec.table().items() if key not in left_out}
     base |= {"study": "learning-curve", "seeds": list(seeds)}
+    overrides = [_over({"name": name}, point) for name, point in points.items()]
     for name, table in CONTROLS.items():
-        try:
-            check(Spec.of({**base, "overrides": [{"name": name, **table}]}, spec.sources))
-        except SpecError:  # no rewards are predicted
-            continue
-        overrides.append({"name": name, **table})
+        control = {"name": name, **table}
+        with suppress(SpecError):  # if no rewards are predicted
+            check(Spec.of({**base, "overrides": [control]}, spec.sources))
+            overrides.append(control)
     return Spec.of({**base, "overrides": overrides}, spec.sources)
 
 

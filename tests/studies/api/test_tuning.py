@@ -76,7 +76,7 @@ def test_what_was_interrupted_goes_on_and_runs_nothing_twice(tuned, tmp_path, mo
 def test_the_same_draw_gives_the_same_configurations() -> None:
     spec = na.Spec.of({key: value for key, value in SPEC.items() if key != "tune"})
     first, again, other = (tuning._sampled(spec, 5, draw) for draw in (0, 0, 1))
-    assert list(first) == ["c01", "c02", "c03", "c04"]
+    assert list(first) == ["given", "c01", "c02", "c03", "c04"]
     assert first == again != other
     keys = set(first["c01"])
     assert "learner.decision.value_of" in keys
@@ -94,7 +94,7 @@ def test_the_same_draw_gives_the_same_configurations() -> None:
         (["--set", "tune.'learner.rigde'=[1]"], "learner.rigde = 1: unknown key"),
         (["--set", "tune.'rigde'=[1]"], "tune.rigde: unknown key"),
         (["--set", "tune.'learner.ridge'=[10.0]"], "tune: there is nothing to try: all are"),
-        (["--set", "sweep.'learner.ridge'=[1.0, 2.0]"], "sweep, overrides: 2 conditions"),
+        (["--set", "sweep.'learner.ridge'=[1.0, 2.0]"], "sweep, overrides: must be absent"),
     ],
 )
 def test_what_cannot_be_tuned_is_refused_in_a_line(changes, message, tmp_path, capsys) -> None:
