@@ -41,8 +41,8 @@ def spec_of(seeds: int) -> Spec:
 LONGEST = 1.5
 """Most seconds to a kill from the moment that trials are handed out or that another one is kept."""
 
-WORKER = b"popen_loky_posix"
-"""What the command line of a worker holds."""
+WORKERS = {"loky": b"popen_loky_posix", "dask": b"multiprocessing.spawn"}
+"""What the command line of a worker holds, by backend."""
 
 
 @dataclass
@@ -65,12 +65,12 @@ class Tally:
     """Studies that did not end with the bytes of the undisturbed one."""
 
 
-def disturb(kills: int, seed: int, seeds: int, folder: Path) -> Tally:
+def disturb(backend: str, kills: int, seed: int, seeds: int, folder: Path) -> Tally:
     """Kill `kills` processes of studies of `seeds` in `folder`, and return what happened."""
     rng = random.Random(seed)
     spec = folder / "spec.toml"
     spec.write_text(dumps(spec_of(seeds).table()))
-    assert _begin(["run", spec, "--out", folder / "whole"]).wait() == 0
+    assert _begin(["run", spec, "--out", folder / "whole"], "loky").wait() == 0
     expected = _digest(folder / "whole")
     tally = Tally()
     while tally.kills.total() < kills:
@@ -79,14 +79,14 @@ def disturb(kills: int, seed: int, seeds: int, folder: Path) -> Tally:
         command, status = ["run", spec, "--out", directory], -1
         while status != 0:
             tally.runs += 1
-            process = _begin(command)
+            process = _begin(command, backend)
             while process.poll() is None and tally.kills.total() < kills:
                 _await(process, directory, another=rng.random() < 0.8)
                 with contextlib.suppress(subprocess.TimeoutExpired):
                     process.wait(rng.uniform(0.0, LONGEST))
                 before = _kept(directory)
                 victim = rng.choice(["process", "worker"])
-                if _kill(process, victim, rng):
+                if _kill(process, victim, backend, rng):
                     tally.kills[victim] += 1
                     after = _kept(directory)
                     tally.kept += len(before)
@@ -107,10 +107,10 @@ def disturb(kills: int, seed: int, seeds: int, folder: Path) -> Tally:
     return tally
 
 
-def _begin(command: list[object]) -> subprocess.Popen[bytes]:
+def _begin(command: list[object], backend: str) -> subprocess.Popen[bytes]:
     line = [sys.executable, "-m", "nested_agents", *map(str, command)]
     return subprocess.Popen(
-        [*line, "--jobs", "2"],
+        [*line, "--jobs", "2", "--backend", backend],
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )  # fmt: skip
 
@@ -129,7 +129,7 @@ def _await(process: subprocess.Popen[bytes], directory: Path, *, another: bool) 
         time.sleep(0.02)
 
 
-def _kill(process: subprocess.Popen[bytes], victim: str, rng: random.Random) -> bool:
+def _kill(process: subprocess.Popen[bytes], victim: str, backend: str, rng: random.Random) -> bool:
     """Kill the process or one of its workers; tell whether there was one."""
     if process.poll() is not None:
         return False
@@ -137,7 +137,7 @@ def _kill(process: subprocess.Popen[bytes], victim: str, rng: random.Random) -> 
         process.kill()
         process.wait()
         return True
-    workers = [pid for pid in _children(process.pid) if WORKER in _line(pid)]
+    workers = [pid for pid in _children(process.pid) if WORKERS[backend] in _line(pid)]
     if not workers:
         return False
     try:
@@ -196,13 +196,14 @@ def main() -> int:
     """Kill, compare, print what happened; 1 if anything was lost."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.crashes", description=__doc__)
     parser.add_argument("--kills", type=int, default=100, metavar="N")
+    parser.add_argument("--backend", choices=sorted(WORKERS), default="loky")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--seeds", type=int, default=20, metavar="N", help="of the study")
     options = parser.parse_args()
     begin = time.monotonic()
     with tempfile.TemporaryDirectory() as folder:
-        tally = disturb(options.kills, options.seed, options.seeds, Path(folder))
-    print(f"seed            {options.seed}")
+        tally = disturb(options.backend, options.kills, options.seed, options.seeds, Path(folder))
+    print(f"backend         {options.backend}, seed {options.seed}")
     print(f"killed          {tally.kills['process']} processes, {tally.kills['worker']} workers")
     print(f"studies         {tally.studies}, the command begun {tally.runs} times")
     print(f"kept at a kill  {tally.kept / tally.kills.total():.1f} trials on average")

@@ -13,6 +13,7 @@ import click
 import nested_agents
 from nested_agents.core.interface.measures import Measure
 from nested_agents.scenarios import SCENARIOS
+from nested_agents.scenarios.adapters.adapted import AdaptedWorld
 from nested_agents.scenarios.box_pushing.states.variables import STATE_VARIABLES
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
@@ -72,6 +73,7 @@ MODULES = {
     "scenarios": ("Where agents act.", (
         "box_pushing.config", "box_pushing.world.settings", "box_pushing.prediction.settings",
         "box_pushing.scenario", "box_pushing.environments", "adapters.passing_down",
+        "adapters.adapted", "adapters.settings",
         "box_pushing.world.reward", "box_pushing.world.starts", "box_pushing.states.view",
         "box_pushing.states.variables", "box_pushing.states.state_spaces",
         "box_pushing.prediction.predictors", "box_pushing.world.boxes",
@@ -86,11 +88,12 @@ MODULES = {
     )),
     "studies": ("What is measured, compared and drawn.", (
         "api.study", "api.teams", "api.planning", "api.costs", "api.comparison", "api.recovery",
-        "api.run_study",
+        "api.run_study", "api.tuning",
         "errors", "spec.spec", "spec.keys", "spec.presets", "trials.trial",
         "trials.arrangement", "trials.session",
         "store.store", "results.results", "results.analysis", "results.statistics",
-        "results.comparison", "results.power", "results.summary", "catalogue.study", "cost.cost",
+        "results.comparison", "results.aggregates", "results.marl_eval",
+        "results.power", "results.summary", "catalogue.study", "cost.cost",
         "claims.claims",
     )),
 }  # fmt: skip
@@ -198,14 +201,16 @@ def columns() -> Iterator[str]:
     yield "## Measures of the scenarios\n"
     yield "A scenario declares its own measures ([](../extending.md#a-scenario)). These are those"
     yield "of the built-in scenarios.\n"
+    adapted = "gymnasium", "pettingzoo"  # alike, and built only of an environment
     for kind in SCENARIOS.built_in:
         yield f"### `{kind}`\n"
+        declared = AdaptedWorld if kind in adapted else SCENARIOS.parsed(kind).build()
         yield from table(
             ("column", "heading", "unit", "of the steps of an episode", "better", "bounds"),
             (
                 (code(m.name), m.title, m.unit, "yes (1) or no (0)" if m.is_rate else m.gathering,
                  m.better or "", bounds(m))
-                for m in SCENARIOS.parsed(kind).build().measures
+                for m in declared.measures
             ),
         )  # fmt: skip
 

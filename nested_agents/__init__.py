@@ -66,6 +66,8 @@ _PLACES = {
     "cost_table": ("studies.api.costs", "cost_table"),
     "control_loop": ("core.agents.loop", "control_loop"),
     "detectable": ("studies.results.power", "detectable"),
+    "from_gymnasium": ("scenarios.adapters.adapted", "from_gymnasium"),
+    "from_pettingzoo": ("scenarios.adapters.adapted", "from_pettingzoo"),
     "greatest": ("core.numerics.ties", "greatest"),
     "load": ("studies.api.study", "load"),
     "parse_topology": ("topologies", "parse"),
@@ -77,6 +79,7 @@ _PLACES = {
     "run": ("studies.api.study", "run"),
     "run_trial": ("studies.trials.session", "run_trial"),
     "seeds_for": ("studies.results.power", "seeds_for"),
+    "tune": ("studies.api.tuning", "tune"),
     "state_variable": ("scenarios.state_variables", "state_variable"),
 }
 

@@ -12,7 +12,9 @@ from nested_agents.studies.cli.main import main
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "extending.md"
 SECTIONS = dict(
-    re.findall(r"^## An? ([a-z ]+)\n(.*?)(?=^## |\Z)", PAGE.read_text(), re.MULTILINE | re.DOTALL)
+    re.findall(
+        r"^## (?:An?|Around) ([\w ]+)\n(.*?)(?=^## |\Z)", PAGE.read_text(), re.MULTILINE | re.DOTALL
+    )
 )
 MOST_LINES = 30
 
@@ -25,7 +27,7 @@ def block(section: str, language: str) -> str:
 def test_all_kinds_have_an_example() -> None:
     assert set(SECTIONS) == {
         "topology", "scenario", "state variable", "learner", "learner that acts by itself",
-        "evaluator", "exploration", "study",
+        "evaluator", "exploration", "study", "an environment of Gymnasium or PettingZoo",
     }  # fmt: skip
 
 

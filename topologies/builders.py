@@ -17,9 +17,11 @@ import numpy as np
 from pydantic import Field
 from typing_extensions import TypeAliasType
 
+from ..core.coordination import shapes
+from ..core.coordination.shapes import Shape
 from ..core.interface.hierarchy import Hierarchy
 from ..core.plugins.deferred import nx
-from ..core.plugins.settings import Fraction
+from ..core.plugins.settings import Fraction, unwritten
 from .checks import check_names, with_edges
 
 Names: TypeAlias = Sequence[str]
@@ -161,14 +163,23 @@ def coordination_graph(
     bodies: Bodies = (),
     *,
     shape: Annotated[
-        Literal["line", "ring"],
-        Field(description="In agent order; on a ring the last is a neighbour of the first."),
+        Shape | Literal["scenario"],
+        Field(
+            description="In agent order; on a ring the last is a neighbour of the first, in a tree "
+            "everybody of two later ones, in a grid of those in rows and columns. Or those whose "
+            "actions matter to each other, as the scenario has it."
+        ),
     ] = "line",
     edges: Annotated[
         Pairs | None, Field(description="Pairs of neighbours in place of a shape.")
     ] = None,
+    others: Annotated[
+        Annotated[int, Field(ge=0)] | None,
+        unwritten(None),
+        Field(description="Seed of as many other pairs, drawn at random, in place of these."),
+    ] = None,
 ) -> nx.Graph:
-    """Join neighbours on a line, on a ring or as listed, who decide at once.
+    """Join neighbours in a shape, or as listed, who decide at once.
 
     Raises
     ------
@@ -181,13 +192,15 @@ def coordination_graph(
     [('a', 'b'), ('a', 'c'), ('b', 'c')]
     """
     if edges is None:
-        is_ring = shape == "ring" and len(agents) > 2
-        return nx.cycle_graph(agents) if is_ring else nx.path_graph(agents)
-    pairs = [(min(a, b), max(a, b)) for a, b in edges]
-    Hierarchy(agents, [], pairs)  # raises and names what is wrong
-    graph = nx.empty_graph(agents)
-    graph.add_edges_from(pairs)
-    return graph
+        if shape == "scenario":
+            raise ValueError("shape = 'scenario': the scenario has no interactions of its agents")
+        graph = nx.relabel_nodes(shapes.shaped(shape, len(agents)), dict(enumerate(agents)))
+    else:
+        pairs = [(min(a, b), max(a, b)) for a, b in edges]
+        Hierarchy(agents, [], pairs)  # raises and names what is wrong
+        graph = nx.empty_graph(agents)
+        graph.add_edges_from(pairs)
+    return graph if others is None else shapes.others(graph, others)
 
 
 def from_edges(

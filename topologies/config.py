@@ -8,11 +8,12 @@ follow ``kind:`` is in `ARGUMENTS`.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
 from ..core.agents.messages import AbsentAgents, AnyMessageFailure
+from ..core.coordination.shapes import Shape, oriented
 from ..core.interface.hierarchy import Considers, Hierarchy, Told
 from ..core.plugins import sources
 from ..core.plugins.deferred import nx
@@ -37,6 +38,15 @@ class TopologySettings(Settings):
     considers: Annotated[Considers, unwritten("descendants")] = "descendants"
     """Whose actions an agent tries beside its own: those of all below it, of its direct
     subordinates, or of nobody; or a list of bodies, as above, in which those below it are."""
+    oriented: Annotated[Literal["listed", "reversed"] | tuple[str, ...] | None, unwritten(None)] = (
+        None
+    )
+    """In which order those decide who are joined by undirected edges: in the agents' own, in its
+    reverse, or as listed by name; each is above those of its neighbours that come later. None: they
+    decide at once."""
+    fill_in: Annotated[bool, unwritten(False)] = False
+    """Whether those who are above one agent are joined, too, from the last one that decides to the
+    first: then the best that an agent can do depends on nobody else who has decided."""
     failures: Annotated[tuple[AnyMessageFailure, ...], unwritten(())] = ()
     """What fails of the messages down the hierarchy, from when to when."""
 
@@ -46,6 +56,8 @@ class TopologySettings(Settings):
             raise ValueError(
                 "told = 'none': there are no messages to fail, failures must be absent"
             )
+        if self.fill_in and self.oriented is None:
+            raise ValueError("fill_in = true: needs oriented, in which order agents decide")
         return self
 
     def __repr_args__(self) -> Iterable[tuple[str | None, Any]]:
@@ -62,6 +74,9 @@ class TopologySettings(Settings):
         raise ValueError("has no kind, and makes no hierarchy")
 
 
+IMPLIED = {"members": "teams", "edges": "edges"}
+"""Kinds of tables that have none, by a key that they have."""
+
 TOPOLOGIES = SettingsRegistry(
     "topology",
     {
@@ -77,6 +92,10 @@ TOPOLOGIES = SettingsRegistry(
         "file": f"{__name__}:from_file",
     },
     TopologySettings,
+    moved={
+        "single-agent": "who the agents are has a key of its own: agents = 'team'",
+        "per-robot": "who the agents are has a key of its own: agents = 'body', topology = 'chain'",
+    },
 )
 """Topologies by name."""
 
@@ -86,7 +105,7 @@ def parse(text: str | Mapping[str, Any]) -> TopologySettings:
 
     Besides ``"kind"`` and ``"kind:argument"``, a file of a graph or of such a table, a
     ``file.py:function`` and the name of an installed package's topology stand for themselves. A
-    table without a kind that has `members` is one of teams.
+    table without a kind that has `members` is one of teams, one that has `edges` of these.
 
     Raises
     ------
@@ -108,6 +127,8 @@ def parse(text: str | Mapping[str, Any]) -> TopologySettings:
     try:
         if kind in TOPOLOGIES.built_in:
             return _made(kind, _arguments(kind, argument) if colon else {})
+        if kind in TOPOLOGIES.moved:
+            raise ValueError(TOPOLOGIES.moved[kind])
         if sources.is_file(text):
             return _made("file", {"path": text})
         if sources.is_reference(text) or text in TOPOLOGIES.installed():
@@ -127,7 +148,8 @@ def parse(text: str | Mapping[str, Any]) -> TopologySettings:
 
 def _of_table(table: Mapping[str, Any]) -> TopologySettings:
     """Return the settings of a table."""
-    kind = table.get("kind", "teams" if "members" in table else None)
+    implied = next((k for key, k in IMPLIED.items() if key in table), None)
+    kind = table.get("kind", implied)
     if not isinstance(kind, str):
         raise ValueError(f"topology.kind = {kind!r}: {closest(kind, TOPOLOGIES.names())}")
     try:
@@ -152,6 +174,7 @@ def build(
     settings: TopologySettings | str | Mapping[str, Any],
     agents: Sequence[str],
     bodies: Sequence[Sequence[int]] | None = None,
+    interactions: Sequence[tuple[int, int]] | None = None,
 ) -> Hierarchy:
     """Build the hierarchy of `settings` over named agents.
 
@@ -163,6 +186,9 @@ def build(
         Distinct names, in agent order.
     bodies
         Agent indices, from 0, by body (robot), each once; none: every agent is a body of its own.
+    interactions
+        Pairs of agents, by index, whose actions matter to each other: what ``shape = "scenario"``
+        of a coordination graph joins.
 
     Raises
     ------
@@ -184,11 +210,15 @@ def build(
         if not agents:
             raise ValueError("no agents")
         named = [(a,) for a in agents] if bodies is None else _named(agents, bodies)
+        if interactions is not None and getattr(settings, "shape", "") == "scenario":
+            pairs = tuple((agents[a], agents[b]) for a, b in interactions)
+            settings = settings.model_copy(update={"edges": pairs})
         if settings.kind in TOPOLOGIES.built_in:
             graph = settings.build(agents, named)
         else:
             graph = files.call(settings.build, title.rpartition(":")[2], agents, named)
             graph = from_networkx(graph, agents, neighbours=True)
+        graph = _directed(graph, settings, agents)
         edges, neighbours = (graph.edges, ()) if graph.is_directed() else ((), graph.edges)
         return Hierarchy(agents, edges, neighbours, settings.told, settings.considers, named)
     except ValueError as error:
@@ -208,7 +238,25 @@ def from_file(
     content = read(path)
     if isinstance(content, TopologySettings):
         return content.build(agents, bodies)
-    return from_networkx(content, agents)
+    return from_networkx(content, agents, neighbours=True)
+
+
+def _directed(graph: nx.Graph, settings: TopologySettings, agents: Names) -> nx.Graph:
+    """Return a graph with its undirected edges oriented, if the settings say how."""
+    order = settings.oriented
+    if order is None:
+        if settings.kind == "file" and not graph.is_directed():
+            raise ValueError(
+                "the graph is undirected: who is above whom? set topology.oriented = 'listed', or "
+                "all names in the order of decision"
+            )
+        return graph
+    if graph.is_directed():
+        raise ValueError(f"oriented = {shown(order)}: the edges are directed already, leave it out")
+    names = {"listed": tuple(agents), "reversed": tuple(reversed(agents))}
+    listed = names[order] if isinstance(order, str) else order
+    check_names(listed, agents, "oriented")
+    return oriented(graph, listed, fill_in=settings.fill_in)
 
 
 def read(path: str) -> nx.DiGraph | TopologySettings:
@@ -228,7 +276,7 @@ def read(path: str) -> nx.DiGraph | TopologySettings:
         raise ValueError(f"{path}: is nested too deeply") from None
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
-    for key in ("told", "considers", "failures"):
+    for key in ("told", "considers", "oriented", "fill_in", "failures"):
         if key in settings.model_fields_set:
             raise ValueError(f"{path}: {key} must stand in the [topology] table of the spec")
     return settings
@@ -258,12 +306,14 @@ def _order(text: str) -> dict[str, Any]:
 
 def _neighbours(text: str) -> dict[str, Any]:
     """Read a shape, or pairs of names as ``a-b,b-c``."""
-    if text in ("line", "ring"):
+    if text in ("scenario", *get_args(Shape)):
         return {"shape": text}
     pairs = _split(text, "-")
     for pair in pairs:
         if len(pair) != 2 or not all(pair):
-            raise ValueError(f"must be line, ring, or pairs a-b, received {'-'.join(pair)!r}")
+            raise ValueError(
+                f"must be {', '.join(get_args(Shape))}, or pairs a-b, received {'-'.join(pair)!r}"
+            )
     return {"edges": pairs}
 
 
@@ -286,7 +336,7 @@ ARGUMENTS: dict[str, tuple[str, str | Callable[[str], dict[str, Any]]]] = {
     "tree": ("BRANCHING", "branching"),
     "star": ("LEADER", "leader"),
     "teams": ("star", "link"),
-    "coordination-graph": ("line|ring|A-B,B-C,...", _neighbours),
+    "coordination-graph": ("line|ring|tree|grid|scenario|A-B,B-C,...", _neighbours),
     "edges": ("A>B,B>C,D", _edges),
     "random": ("SEED", "seed"),
     "file": ("PATH.graphml|PATH.json|PATH.toml", "path"),

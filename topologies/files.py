@@ -10,28 +10,24 @@ from __future__ import annotations
 import json
 import tomllib
 import traceback
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Iterator
 from inspect import iscoroutine
 from itertools import islice
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 from ..core.plugins import plugged, sources
 from ..core.plugins.deferred import nx
 from .builders import Bodies, Names, independent
-from .checks import check_legible, shown, with_edges
-
-MOST_LEVELS = 100
-"""Of nested teams."""
+from .checks import check_legible, with_edges
 
 
 def read(path: str) -> nx.DiGraph | dict[str, Any]:
     """Read a graph, or a topology as it stands in a spec, from GraphML, JSON or TOML by suffix.
 
-    JSON and TOML hold ``{"edges": [["a", "b"], ...], "alone": [...]}``; or a table with the key
-    ``kind``, or of nested teams with the key ``members``, perhaps under ``topology``. In GraphML an
-    agent is named by its node's id.
+    JSON and TOML hold a table, perhaps under ``topology``: of edges, ``{"edges": [["a", "b"], ...],
+    "alone": [...]}``, of nested teams, ``{"members": [...]}``, or with the key ``kind``. In GraphML
+    an agent is named by its node's id.
 
     Returns
     -------
@@ -49,15 +45,13 @@ def read(path: str) -> nx.DiGraph | dict[str, Any]:
     text = sources.active().text(path)
     try:
         if suffix == ".graphml":
-            _check_graphml(text)
-            graph = nx.parse_graphml(text)
-        else:
-            as_toml = suffix == ".toml"
-            content = tomllib.loads(text) if as_toml else json.loads(text, parse_constant=_no_name)
-            if (table := _table_of(content)) is not None:
-                return table
-            graph = _graph_of(content)
-        check_legible(graph)
+            graph = nx.parse_graphml(text, node_type=_name)
+            check_legible(graph)
+            return graph
+        as_toml = suffix == ".toml"
+        return _table_of(
+            tomllib.loads(text) if as_toml else json.loads(text, parse_constant=_no_name)
+        )
     except RecursionError:
         raise ValueError(f"{path} holds no graph: it is nested too deeply") from None
     except (
@@ -65,7 +59,6 @@ def read(path: str) -> nx.DiGraph | dict[str, Any]:
     ) as error:  # fmt: skip
         reason = " ".join(str(error).split()) or type(error).__name__
         raise ValueError(f"{path} holds no graph: {reason}") from None
-    return graph
 
 
 def call(build: Callable[..., Any], name: str, agents: Names, bodies: Bodies) -> nx.Graph:
@@ -127,63 +120,31 @@ def _pairs(result: Any, most: int) -> list[tuple[str, str]] | None:
     return [(str(superior), str(subordinate)) for superior, subordinate in pairs]
 
 
-def _table_of(content: Any) -> dict[str, Any] | None:
-    """Return the topology's table that a file holds; None if it must be a graph."""
+def _table_of(content: Any) -> dict[str, Any]:
+    """Return the topology's table that a file holds."""
     if isinstance(content, dict) and isinstance(content.get("topology"), dict):
         content = content["topology"]
-    if not isinstance(content, dict) or not {"kind", "members"} & content.keys():
-        return None
+    if not isinstance(content, dict) or not {"kind", "members", "edges"} & content.keys():
+        raise ValueError("it must be a table with one of the keys edges, members and kind")
     if content.get("kind") == "file":
         raise ValueError("kind = 'file': a file cannot name another one")
-    if "members" in content:
-        _check_members(content["members"])
+    check_legible(_names([content.get(key) for key in ("members", "edges", "alone")]))
     return content
 
 
-def _check_members(members: Any, level: int = 1) -> None:
-    """Refuse nested teams that are not lists of lists of names, or deeper than `MOST_LEVELS`."""
-    if level > MOST_LEVELS:
-        raise ValueError(f"members: are nested more than {MOST_LEVELS} levels deep")
-    if not isinstance(members, list) or not members:
-        raise ValueError(f"members = {shown(members)}: must be a list of names and of such lists")
-    for member in members:
-        if not isinstance(member, str):
-            _check_members(member, level + 1)
-    check_legible(member for member in members if isinstance(member, str))
+def _names(content: Any) -> Iterator[str]:
+    """Yield the texts in lists, at any depth."""
+    if isinstance(content, str):
+        yield content
+    for part in content if isinstance(content, list) else ():
+        yield from _names(part)
 
 
-def _graph_of(content: Any) -> nx.DiGraph:
-    if not isinstance(content, dict):
-        raise ValueError("it must be an object with the key edges")
-    unknown = set(content) - {"edges", "alone"}
-    if unknown or "edges" not in content:
-        keys = ", ".join(map(shown, content)) or "none"
-        raise ValueError(f"its keys must be edges and alone, not {keys}")
-    edges = _list_of(content, "edges")
-    for edge in edges:
-        if not isinstance(edge, list) or len(edge) != 2:
-            raise ValueError(f"edges: {shown(edge)} must be a pair [superior, subordinate]")
-        check_legible(edge)
-    alone = _list_of(content, "alone") if "alone" in content else []
-    check_legible(alone)
-    return with_edges(independent(alone), edges)
-
-
-def _check_graphml(text: str) -> None:
-    """Refuse nodes and edges without what names agents; networkx would call these None."""
-    needed = {"node": ("id",), "edge": ("source", "target")}
-    for element in ElementTree.fromstring(text).iter():
-        kind = element.tag.rpartition("}")[2]
-        for attribute in needed.get(kind, ()):
-            if element.get(attribute) is None:
-                raise ValueError(f"{kind} {dict(element.attrib)}: has no {attribute}")
-
-
-def _list_of(content: dict[str, Any], key: str) -> list[Any]:
-    value = content.get(key)
-    if not isinstance(value, list):
-        raise ValueError(f"{key} = {shown(value)}: must be a list")
-    return value
+def _name(text: str | None) -> str:
+    """Return what GraphML calls an agent; networkx would call it None if there is nothing."""
+    if text is None:
+        raise ValueError("a node has no id, or an edge no source or target")
+    return text
 
 
 def _no_name(constant: str) -> Any:

@@ -149,6 +149,7 @@ class JointAgents:
         self.scenario, self.blocks, self.whole = scenario, blocks, whole
         self.agents, self.roles, self.state_space = agents, roles, state_space
         self.measures = measures_of(scenario)
+        self.horizon = getattr(scenario, "horizon", 1)
         self.groups = tuple((i,) for i in range(len(agents)))
         single, space = scenario.action_set, scenario.state_space
         # Row c holds the actions of a block's agents of index c.
@@ -159,6 +160,8 @@ class JointAgents:
         zeros = (0.0,) * len(names)
         self.action_set = ActionSet(names, zeros, zeros, neutral)
         self._n_each = space.n_variables if whole else space.n_own
+        if hasattr(scenario, "predict"):
+            self.predict = self._predict
         if not whole and isinstance(scenario, EmbodiedScenario):
             for name in OF_BODIES:
                 if hasattr(scenario, name):
@@ -175,9 +178,9 @@ class JointAgents:
         reward = joint_reward(transition.reward, self.blocks)
         return replace(transition, states=self._states(transition.states), reward=reward)
 
-    def predict(self) -> JointPrediction:
+    def _predict(self) -> JointPrediction:
         """Predict from the present state."""
-        return JointPrediction(self.scenario.predict(), self)
+        return JointPrediction(cast(Any, self.scenario).predict(), self)
 
     def _predict_with(self, *beliefs: Any) -> JointPrediction:
         """Predict from the present state, believing in effects, and in constants if given."""

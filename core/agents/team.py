@@ -10,7 +10,9 @@ from typing import Any, cast
 import numpy as np
 
 from ..adaptation.calibration import Calibration
+from ..adaptation.learned_predictor import LearnedPredictor
 from ..adaptation.mirror import Mirror
+from ..adaptation.predictors import GivenPredictor, Persistence
 from ..adaptation.self_model import SelfModel
 from ..decision.exploration import Explorer
 from ..evaluators.best_response import BestResponse
@@ -19,11 +21,10 @@ from ..interface.acting import Actors
 from ..interface.hierarchy import Hierarchy
 from ..interface.prediction import NOT_EXPLORING, Prediction
 from ..interface.scenario import EmbodiedScenario, Scenario, Transition, groups_of
-from ..learners.batch import ReplaySettings
+from ..learners import check_prediction
 from ..learners.learner import Learner, LearnerSettings
 from ..numerics.arrays import FloatArray, IntArray
 from ..numerics.ties import greatest
-from ..rules.rule_base import RuleBase
 from .messages import MessageFailure, Messages
 from .rows import rows_of
 
@@ -50,6 +51,8 @@ class Team:
         Owns the consequent weights.
     rows
         ``(n,)`` which row of them each agent has.
+    space, rules
+        What values are functions of, and the rule base that all agents have.
     explorer
         Chooses actions by value.
     evaluator
@@ -58,6 +61,8 @@ class Team:
         What the wheels do, as learned; none: prediction takes every robot as nominal.
     calibration
         The predictor's constants, as learned; none: as the scenario believes them to be.
+    predictor
+        What predicts in place of the scenario; none: the scenario does.
     mirror
         Doubles what is learned from; none: it is what the agents met.
     seen
@@ -68,8 +73,8 @@ class Team:
     Raises
     ------
     ValueError
-        If the hierarchy is over other agents than the scenario's, or the settings do not fit its
-        state space.
+        If the hierarchy is over other agents than the scenario's, the settings do not fit its state
+        space, or need a prediction that it has not.
     """
 
     def __init__(
@@ -87,16 +92,23 @@ class Team:
                 f"topology: agents {', '.join(hierarchy.agents)} are not the scenario's "
                 f"{', '.join(scenario.agents)}"
             )
+        check_prediction(settings, scenario)
         self.hierarchy, self.action_set = hierarchy, scenario.action_set
         n, n_actions = len(hierarchy), len(scenario.action_set)
         self.self_model = _self_model_of(scenario, settings)
         self.calibration = _calibration_of(scenario, settings)
-        is_mirrored = isinstance(settings, ReplaySettings) and settings.mirrored
-        self.mirror = Mirror.of(scenario) if is_mirrored else None
+        self.predictor = _predictor_of(scenario, settings)
+        self.mirror = Mirror.of(scenario) if getattr(settings, "mirrored", False) else None
         self.rows = rows_of(scenario, shared=settings.weights == "role")
         rows = self.rows if self.mirror is None else self.mirror.rows(self.rows)
-        rules = RuleBase.build(scenario.state_space, settings.rule_base)
-        self.learner: Learner = settings.build(rules, rows)
+        self.messages = Messages(hierarchy, failures, n_actions)
+        self._values_actions = settings.values_actions
+        self._senders = _senders(settings, self.messages, hierarchy)
+        n_told = max(map(len, self._senders), default=0)
+        self.space, self.rules = settings.rules_over(
+            scenario.state_space, scenario.action_set, n_told
+        )
+        self.learner: Learner = settings.build(self.rules, rows)
         self._asked = signature(self.learner.observe).parameters.keys() & {"left", "joint_action"}
         self._states: FloatArray = np.zeros((len(hierarchy), scenario.state_space.n_variables))
         self._left: FloatArray = self._states
@@ -104,7 +116,7 @@ class Team:
         decision = settings.decision
         if decision.rule != "random":
             problem = DecisionProblem(
-                rules,
+                self.rules,
                 hierarchy,
                 n_actions,
                 groups_of(scenario),
@@ -116,14 +128,14 @@ class Team:
                 decision.plan,
                 handed_down=hierarchy.told == "ancestors" and not failures,
             )
-            self.evaluator = decision.evaluator.build(problem)
+            own: Any = self.learner
+            self.evaluator = own if self._values_actions else decision.evaluator.build(problem)
         self.explorer: Explorer = settings.exploration.build(n)
         self.rng = np.random.Generator(np.random.PCG64(seed))
         self.seen: FloatArray = np.ones((n, n_actions))
         conditional = self.evaluator is not None and decision.teammates == "conditional"
         self.given: FloatArray = np.ones((n, n_actions) * 2 if conditional else (0, 0, 0, 0))
-        self.messages = Messages(hierarchy, failures, n_actions)
-        self._unseen = decision.unseen
+        self._unseen, self._discount = decision.unseen, settings.discount
         # Those who are told all that was decided before, and consider all others.
         self._hears_all = {
             i
@@ -146,8 +158,7 @@ class Team:
             return
         if not hasattr(prediction, "rewards"):
             raise ValueError(
-                f"learner.decision.rule = {problem.rule!r}: the scenario predicts no rewards, "
-                "use value"
+                f"learner.decision.rule = {problem.rule!r}: no rewards are predicted, use value"
             )
         if getattr(self.evaluator, "continues", False) and not hasattr(prediction, "after"):
             raise ValueError(
@@ -165,20 +176,25 @@ class Team:
         self.explorer.begin_episode()
         self.learner.begin_episode()
 
-    def predict(self, scenario: Scenario, states: FloatArray | None = None) -> Prediction:
+    def predict(self, scenario: Scenario, states: FloatArray | None = None) -> Any:
         """Predict from the scenario's present state, by what has been learned of it.
 
-        The agents' `states` ``(n, d)`` are needed by learners and evaluators that ask for them.
+        The agents' `states` ``(n, d)`` are needed by learners and evaluators that ask for them. The
+        prediction is None in a scenario that has none, and of agents that value actions.
         """
         if states is not None:
             self._states = states
+        if self.predictor is not None:
+            return self.predictor.predict(self._states)
+        if self._values_actions or not hasattr(scenario, "predict"):
+            return None
         if self.self_model is None and self.calibration is None:
             return scenario.predict()
         embodied = cast(EmbodiedScenario, scenario)
         effects = self.self_model.effects if self.self_model else embodied.nominal_effects
         if self.calibration is None:
-            return cast(Prediction, embodied.predict_with(effects))
-        return cast(Prediction, embodied.predict_with(effects, self.calibration.constants))
+            return embodied.predict_with(effects)
+        return embodied.predict_with(effects, self.calibration.constants)
 
     def act(self, prediction: Prediction, *, explore: bool = True) -> IntArray:
         """Decide a joint action ``(n,)``, from the top of the hierarchy down.
@@ -187,7 +203,7 @@ class Team:
         is, apart from the random numbers that break ties.
         """
         n = len(self.hierarchy)
-        self._left = self._states
+        self._left = self._with_told()
         if self.evaluator is None:
             self._last = self.rng.integers(len(self.action_set), size=n)
             return self._last
@@ -230,9 +246,12 @@ class Team:
         joint = np.full(n, self.action_set.neutral)
         for i in self.hierarchy.order:
             senders, known = self._known(i, joint)
+            if self._senders:
+                told = known[self._senders[i]]
+                self._left[i, self._states.shape[1] :][: len(told)] = told
             deliberation = Deliberation(
                 i, known, prediction, weights, frequencies, self.rng, self._given_by(i), senders,
-                self._states,
+                self._left,
             )  # fmt: skip
             values = evaluator.values(deliberation)
             if len(values) != n_actions:
@@ -258,6 +277,14 @@ class Team:
         known[senders] = actions
         return senders, known
 
+    def _with_told(self) -> FloatArray:
+        """Return the present states with a column for each action told, as yet that of nobody."""
+        n_told = max(map(len, self._senders), default=0)
+        if not n_told:
+            return self._states
+        nobody = np.full((len(self._states), n_told), float(len(self.action_set)))
+        return np.hstack([self._states, nobody])
+
     def _given_by(self, agent: int) -> FloatArray:
         """Return how often all took each action ``(A, n, A)`` given each action of an agent."""
         if not self.given.size:
@@ -271,6 +298,8 @@ class Team:
         What contact is predicted to take from the motion is given back to the self-model: a robot
         that moves a load is slow, not broken. The constants are held against how the load moved.
         """
+        if isinstance(self.predictor, LearnedPredictor):
+            self.predictor.observe(self._states, joint_action, transition.states)
         if self.calibration is not None:
             self._calibrate(prediction, joint_action, transition)
         if self.self_model is None or transition.twists is None:
@@ -292,6 +321,8 @@ class Team:
     def learn(self, transition: Transition) -> None:
         """Take in what a step led to."""
         states, reward, left, taken = transition.states, transition.reward, self._left, self._last
+        if transition.terminated and not transition.absorbing:
+            reward = reward * (1.0 - self._discount)  # which learners have entered again for ever
         if self.mirror is not None:
             states, reward = self.mirror.states(states), self.mirror.reward(reward)
             left, taken = self.mirror.states(left), np.tile(taken, 2)
@@ -302,6 +333,8 @@ class Team:
     def end_episode(self) -> None:
         """Learn what is learned after an episode."""
         self._count(self.learner.end_episode())
+        if isinstance(self.predictor, LearnedPredictor):
+            self.predictor.end_episode()
 
     def _count(self, updates: int) -> None:
         if self.evaluator is not None:
@@ -407,8 +440,25 @@ class Team:
     @property
     def _adapting(self) -> dict[str, Any]:
         """What adapts beside the learner, by name."""
-        parts = {"self_model": self.self_model, "calibration": self.calibration}
-        return {name: part for name, part in parts.items() if part is not None}
+        parts = {
+            "self_model": self.self_model, "calibration": self.calibration,
+            "predictor": self.predictor,
+        }  # fmt: skip
+        return {name: part for name, part in parts.items() if hasattr(part, "arrays")}
+
+
+def _senders(
+    settings: LearnerSettings, messages: Messages, hierarchy: Hierarchy
+) -> list[list[int]]:
+    """Return, by agent, whose actions are part of its state, in the order of decision."""
+    if not settings.values_actions:
+        return []
+    if hierarchy.neighbours:
+        raise ValueError(
+            f"learner.kind = {settings.kind!r}: agents use what they are told, and neighbours tell "
+            "nothing; set topology.oriented, in which order they decide"
+        )
+    return [sorted(senders, key=hierarchy.order.index) for senders in messages.told]
 
 
 def _self_model_of(scenario: Scenario, settings: LearnerSettings) -> SelfModel | None:
@@ -428,6 +478,24 @@ def _calibration_of(scenario: Scenario, settings: LearnerSettings) -> Calibratio
             "learner.calibration.enabled: the scenario's predictor has no constants to calibrate"
         )
     return Calibration(settings.calibration, len(constants), cast(Any, scenario).levers)
+
+
+def _predictor_of(
+    scenario: Scenario, settings: LearnerSettings
+) -> LearnedPredictor | Persistence | None:
+    if isinstance(settings.predictor, GivenPredictor):
+        return None
+    named = f"learner.predictor.kind = {settings.predictor.kind!r}"
+    if settings.values_actions:
+        raise ValueError(f"{named}: learner.kind = {settings.kind!r} decides without a prediction")
+    for name in ("self_model", "calibration"):
+        if getattr(settings, name).enabled:
+            raise ValueError(
+                f"learner.{name}.enabled: revises what the scenario predicts, and {named} predicts "
+                "in its place; use 'given'"
+            )
+    predictor: LearnedPredictor | Persistence = settings.predictor.build(scenario)
+    return predictor
 
 
 def of_fuzzy_agents(team: Actors) -> Team:

@@ -62,7 +62,8 @@ class Deliberation(NamedTuple):
     told: IntArray = NOBODY
     """``(k,)`` the agents of whose actions it was told."""
     present: FloatArray = NO_STATES
-    """``(n, d)`` the states that all agents are in."""
+    """``(n, d)`` the states that all agents are in; where the learner values actions, with the
+    actions that they are told."""
 
     @property
     def own_weights(self) -> FloatArray:

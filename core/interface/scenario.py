@@ -12,7 +12,6 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from ..numerics.arrays import FloatArray, IntArray
-from .prediction import Prediction
 from .spaces import ActionSet, StateSpace
 
 
@@ -34,6 +33,9 @@ class Transition:
     """``(M, 3)`` mean twist of every group's body in its own frame [m/s, m/s, rad/s], where bodies
     measure it; ``(K + M, 3)`` where they also measure what they move, its twists standing first,
     and nothing else than these bodies moved it."""
+    absorbing: bool = True
+    """Whether a terminal state is as if entered again for ever, as where a box stands at its goal;
+    if not, its reward is received once, as in Gymnasium."""
 
 
 @runtime_checkable
@@ -43,14 +45,21 @@ class Scenario(Protocol):
     What else it may have is asked for by `groups_of`, `roles_of` and `measures_of`, which know what
     holds without; by `RecordedScenario` and `EmbodiedScenario`; and by name:
 
+    ``predict()``
+        The `Prediction` from the present state: what learners decide by whose settings say
+        `needs_prediction`.
     ``measure()``
         See `RecordedScenario`; asked for alone where a scenario is checked.
+    ``interactions``
+        Pairs of agents, by index, whose actions matter to each other: what a topology with ``shape
+        = "scenario"`` joins.
     ``partners()``
         For every agent the one in whose place it stands in the mirror, or a ValueError of one line
         if an agent has none: experience can be mirrored, see `core.adaptation.mirror`.
     ``horizon``
         Decisions that its predictions look ahead, while nobody changes what it does after the
-        first; 1 without. By that a check judges how far they are off.
+        first; 1 without. By that a check judges how far they are off. Then all are neutral; where
+        it ``repeats``, all do the same again.
     ``with_exact_prediction()``
         The same scenario with a predictor that makes no errors but those of rounding; itself, if it
         has one already. Then it can be checked that sensing and predicting mean the same.
@@ -78,9 +87,6 @@ class Scenario(Protocol):
 
     def step(self, joint_action: IntArray) -> Transition:
         """Carry out a joint action ``(n,)`` for one decision period."""
-
-    def predict(self) -> Prediction:
-        """Predict from the present state."""
 
 
 @runtime_checkable
@@ -169,7 +175,7 @@ class EmbodiedScenario(Scenario, Protocol):
 
 def lacking(scenario: object) -> str:
     """Return what of `Scenario` an object has not, in words; nothing if it has all."""
-    members = ("agents", "state_space", "action_set", "reset", "step", "predict")
+    members = ("agents", "state_space", "action_set", "reset", "step")
     missing = ", ".join(name for name in members if not hasattr(scenario, name))
     return f"{type(scenario).__name__} lacks {missing}" if missing else ""
 

@@ -6,6 +6,9 @@ and is not learned from. A terminal state counts as entered again for ever: its 
 R(s) / (1 - discount). Siblings differ where their mathematics differs.
 """
 
+from typing import cast
+
+from ..interface.scenario import Scenario
 from ..plugins.plugged import SettingsRegistry
 from .learner import LearnerSettings, TeamSettings
 
@@ -21,6 +24,7 @@ LEARNERS = SettingsRegistry(
         "sparse-cooperative": f"{__name__}.sparse_cooperative:SparseCooperativeSettings",
         "q-learning": f"{__name__}.q_learning:QLearningSettings",
         "vdn": f"{__name__}.vdn:ValueDecompositionSettings",
+        "fitted-q": f"{__name__}.fitted_q:FittedQSettings",
         "frozen": f"{__name__}.frozen:FrozenSettings",
         "ppo": f"{PEERS}:PPOSettings",
         "ippo": f"{PEERS}:IPPOSettings",
@@ -33,4 +37,24 @@ LEARNERS = SettingsRegistry(
 )
 """Learners by name."""
 
-__all__ = ["LEARNERS", "LearnerSettings", "TeamSettings"]
+
+def check_prediction(settings: TeamSettings, scenario: Scenario) -> None:
+    """Refuse a learner that needs a prediction in a scenario that has none.
+
+    Raises
+    ------
+    ValueError
+        If it is so; one line, which names the learners that need none.
+    """
+    if not settings.needs_prediction or hasattr(scenario, "predict"):
+        return
+    every = {kind: cast(TeamSettings, LEARNERS.model(kind)()) for kind in LEARNERS.built_in}
+    others = [kind for kind, other in every.items() if not other.needs_prediction]
+    raise ValueError(
+        f"learner.kind = {settings.kind!r}: decides by predicted states, and the scenario "
+        f"{type(scenario).__name__} has no method predict; without it do {', '.join(others)}, and "
+        "any with learner.predictor.kind = 'learned' or learner.decision.rule = 'random'"
+    )
+
+
+__all__ = ["LEARNERS", "LearnerSettings", "TeamSettings", "check_prediction"]

@@ -10,7 +10,7 @@ Agents that share weights share the regression: the experience of all of them is
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, ClassVar, Literal, NamedTuple
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -32,7 +32,8 @@ class ReplaySettings(LearnerSettings):
     """What learners share that regress on all experience, after every episode and during it."""
 
     ridge: Positive = 10.0
-    """Weight of the squared consequents against squared errors of rewards scaled by 100."""
+    """Weight of the squared consequents against squared errors of rewards scaled by 100: larger, if
+    values are jagged; smaller, if they are flat."""
     regression_iterations: Annotated[int, Field(ge=1, le=10_000)] = 30
     """Regressions on freshly discounted targets each time."""
     target_averaging_rate: Annotated[float, Field(gt=0, le=1)] = 0.5
@@ -73,7 +74,7 @@ class BatchTD:
         If the rule base is too large for its normal equations to be solved densely.
     """
 
-    def __init__(self, settings: BatchTDSettings, rules: RuleBase, rows: IntArray) -> None:
+    def __init__(self, settings: Any, rules: RuleBase, rows: IntArray) -> None:
         if rules.n_rules > MOST_RULES:
             raise ValueError(
                 f"learner.kind: batch learners solve for all rules at once: {rules.n_rules} rules, "
@@ -148,13 +149,16 @@ class BatchTD:
         if self._regressed == len(self._states):
             return
         rows = range(len(self.theta))
-        active = [self.rules.active(self.states_of(row, self._regressed)) for row in rows]
+        active = [self._active_of(self.states_of(row, self._regressed)) for row in rows]
         if self._active:
             active = [
                 (np.concatenate([old[0], new[0]]), np.concatenate([old[1], new[1]]))
                 for old, new in zip(self._active, active, strict=True)
             ]
         self._active, self._regressed = active, len(self._states)
+
+    def _active_of(self, states: FloatArray) -> tuple[IntArray, FloatArray]:
+        return self.rules.active(states)
 
     def _outcomes(self, row: int) -> tuple[FloatArray, IntArray]:
         """Return rewards and followers of all after-states of a row, the earlier ones first.

@@ -8,12 +8,15 @@ from typing import Annotated, ClassVar, Literal, Protocol
 from pydantic import Field
 
 from ..adaptation.calibration import CalibrationSettings
+from ..adaptation.predictors import GivenPredictor, Predictor
 from ..adaptation.self_model import SelfModelSettings
 from ..decision.exploration import EXPLORATIONS, BurstExploration, ExplorationSettings
 from ..decision.settings import Decision
+from ..interface.spaces import ActionSet, StateSpace
 from ..numerics.arrays import FloatArray
 from ..plugins.plugged import Plugged
-from ..plugins.settings import PartSettings
+from ..plugins.settings import PartSettings, unwritten
+from ..rules.rule_base import RuleBase
 from ..rules.settings import RuleBaseSettings
 
 
@@ -72,7 +75,13 @@ class TeamSettings(PartSettings):
     """Whether those who act pass actions down a hierarchy, which `build` is then given last."""
 
     discount: Annotated[float, Field(ge=0, lt=1)] = 0.95
-    """Discount per decision, gamma of Eq. 7."""
+    """Discount per decision, gamma of Eq. 7: low where actions pay at once, high where they pay
+    late."""
+
+    @property
+    def needs_prediction(self) -> bool:
+        """Whether it acts only in scenarios that predict, see `core.interface.scenario`."""
+        return False
 
 
 class LearnerSettings(TeamSettings):
@@ -84,11 +93,15 @@ class LearnerSettings(TeamSettings):
 
     uses_hierarchy = True
 
+    values_actions: ClassVar[bool] = False
+    """Whether the learner values an agent's own actions in its present state and given what it is
+    told, which takes no prediction: then it is the team's evaluator, too."""
+
     rule_base: RuleBaseSettings = RuleBaseSettings()
     """Fuzzy rule base of every agent."""
     weights: Literal["own", "role"] = "own"
     """Whether every agent has consequent weights of its own, or all agents of one role (the left
-    wheels, say) share them and pool their experience."""
+    wheels, say) share them and pool their experience; alike where a scenario has no roles."""
     exploration: Annotated[ExplorationSettings, Plugged(EXPLORATIONS)] = BurstExploration()
     """How agents explore."""
     decision: Decision = Decision()
@@ -97,3 +110,25 @@ class LearnerSettings(TeamSettings):
     """What robots learn of their own wheels."""
     calibration: CalibrationSettings = CalibrationSettings()
     """What the team learns of the constants of its predictor."""
+    predictor: Annotated[Predictor, unwritten(GivenPredictor())] = GivenPredictor()
+    """What predicts: the scenario, nothing but persistence, or what has been learned."""
+
+    def rules_over(
+        self, space: StateSpace, actions: ActionSet, n_told: int
+    ) -> tuple[StateSpace, RuleBase]:
+        """Return what values are functions of, and the agents' rule base over it.
+
+        Parameters
+        ----------
+        space, actions
+            Those of the scenario.
+        n_told
+            By how many others an agent is told what they decided, at most.
+        """
+        return space, RuleBase.build(space, self.rule_base)
+
+    @property
+    def needs_prediction(self) -> bool:
+        """Whether it acts only in scenarios that predict: unless it has a predictor of its own."""
+        is_given = isinstance(self.predictor, GivenPredictor)
+        return is_given and self.decision.rule != "random" and not self.values_actions

@@ -24,7 +24,7 @@ class SettingsRegistry(Registry):
 
     Parameters
     ----------
-    kind, built_in
+    kind, built_in, moved
         As of `Registry`.
     base
         What the settings of things of the kind inherit.
@@ -52,8 +52,9 @@ class SettingsRegistry(Registry):
         built_in: Mapping[str, str],
         base: type[Settings],
         root: type[Settings] | None = None,
+        moved: Mapping[str, str] | None = None,
     ) -> None:
-        super().__init__(kind, built_in)
+        super().__init__(kind, built_in, moved)
         self.base, self.root = base, root or base
         self._adapted: dict[tuple[str, int], tuple[Any, type[Settings]]] = {}
 

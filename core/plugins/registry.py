@@ -32,6 +32,8 @@ class Registry:
         What they are called in messages, and in the name of the entry-point group.
     built_in
         By name where each is, as ``"package.module:Name"``; imported when it is asked for.
+    moved
+        By names of earlier versions, what is written in their place.
 
     Examples
     --------
@@ -40,9 +42,12 @@ class Registry:
     (3.141592653589793, ['pi'])
     """
 
-    def __init__(self, kind: str, built_in: Mapping[str, str]) -> None:
+    def __init__(
+        self, kind: str, built_in: Mapping[str, str], moved: Mapping[str, str] | None = None
+    ) -> None:
         self.kind = kind
         self.built_in = dict(built_in)
+        self.moved = moved or {}
 
     @property
     def group(self) -> str:
@@ -89,6 +94,8 @@ class Registry:
         place = self.built_in.get(name) or self.installed().get(name)
         if place is None and ":" in name and "." in name.partition(":")[0]:
             place = name
+        if place is None and name in self.moved:
+            raise ValueError(self.moved[name])
         if place is None:
             raise ValueError(f"{closest(name, self.names())}, or one of your own as file.py:NAME")
         try:

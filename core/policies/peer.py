@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, cast
 
 import numpy as np
 
@@ -21,7 +22,8 @@ class Seen:
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of `agent` as the scenario predicts them."""
-        return self.scenario.predict().states(agent, joint_actions)
+        predicted: FloatArray = cast(Any, self.scenario).predict().states(agent, joint_actions)
+        return predicted
 
 
 class Peer:

@@ -132,7 +132,12 @@ class RuleBase:
                 )
             terms.append(tuple(sorted(names.index(name) for name in product)))
         partitions = [
-            Partition.of(v, settings.membership, settings.memberships, settings.steepness)
+            Partition.of(
+                v,
+                settings.membership,
+                None if v.name in space.actions else settings.memberships,
+                settings.steepness,
+            )
             for v in space.variables
         ]
         common = [names.index(name) for name in space.common]

@@ -20,7 +20,7 @@ class RuleBaseSettings(Settings):
     """Sigmoid slope times the distance of neighbouring centres (c_j of Eq. 6, dimensionless)."""
     order: Annotated[int, Field(ge=1, le=12)] | Literal["full"] = 1
     """Variables per rule: 1 sums one-variable rule bases, d or ``full`` is the paper's product of
-    all variables."""
+    all variables. 2 where what one variable is worth depends on another; it takes more episodes."""
     products: tuple[tuple[str, ...], ...] = ()
     """Further products of variables by name, summed to those of `order`."""
     precision: Literal["float64", "float32"] = "float64"

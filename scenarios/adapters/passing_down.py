@@ -5,6 +5,12 @@ they decide from the top down, and each is passed the actions decided above (Sec
 a turn-based environment of the same world, of any parallel environment with flat Box observations
 and discrete actions: agents take turns in hierarchy order, each observes its state and the actions
 it was passed, and the world goes on when the last has acted.
+
+Turns are not steps. A learner that takes every turn for a step of one process learns little of the
+agents above: their turns bring no reward and leave the world as it is, so that a TD error of one
+step is 0, and with traces credit falls by (discount * trace decay) ** turns. Let one transition of
+an agent span a joint step: from its turn to its next turn, with the reward that `last` then gives,
+which is all that came between.
 """
 
 from __future__ import annotations

@@ -94,7 +94,8 @@ class BoxPushingSettings(BoxTaskSettings):
     reward: RewardSettings = RewardSettings()
     """The constants of the reward, and whose contact it asks for."""
     prediction_horizon: Periods = 24
-    """Control periods that predictions look ahead, the decision being held for all of them."""
+    """Control periods that predictions look ahead, the decision being held for all of them: so far
+    that what agents do shows."""
 
     @field_validator("state_space", mode="before")
     @classmethod

@@ -248,7 +248,11 @@ def _only_looks(of: Examination) -> str | None:
 
 def _predicts(of: Examination) -> str | None:
     """Check that predictions have their shapes, are finite, and that their tables agree."""
-    scenario, rng = of.factory(), np.random.default_rng(of.seeds[0])
+    scenario: Any = of.factory()
+    rng = np.random.default_rng(of.seeds[0])
+    if not hasattr(scenario, "predict"):
+        of.unchecked["predictions"] = "the scenario has no method predict"
+        return None
     opening(scenario, of.seeds[0], of.episodes[0])
     actions = of.actions(scenario, of.seeds[0])
     for action in actions[:STEPS]:

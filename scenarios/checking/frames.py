@@ -142,7 +142,10 @@ def _contrast(one: Any, other: Any) -> str:
 
 
 def look_ahead(scenario: Scenario) -> None:
-    """Ask for predictions and measurements."""
+    """Ask for predictions, of a scenario that predicts, and measurements."""
+    measured(scenario)
+    if not hasattr(scenario, "predict"):
+        return
     prediction = scenario.predict()
     some = np.zeros((2, len(scenario.agents)), dtype=np.int64)
     some[1] = len(scenario.action_set) - 1

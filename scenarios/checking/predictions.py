@@ -27,7 +27,7 @@ CLOSE = 1e-9
 
 
 def fault_of_prediction(
-    scenario: Scenario, joint_actions: IntArray, rng: np.random.Generator
+    scenario: Any, joint_actions: IntArray, rng: np.random.Generator
 ) -> str | None:
     """Return what is wrong with what a scenario predicts from its present state, or None.
 

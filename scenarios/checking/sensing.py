@@ -65,17 +65,17 @@ def predicted_steps(
     joint_actions
         ``(steps, n)``; the episode may end earlier.
     ahead
-        Decisions that predictions look ahead; after each joint action all are neutral for the rest.
+        Decisions that predictions look ahead; after each joint action all are neutral for the rest,
+        or do the same again in a scenario that ``repeats``.
     """
     steps, paid = [], 0.0
+    repeats = getattr(scenario, "repeats", False)
+    neutral: IntArray = np.full(len(scenario.agents), scenario.action_set.neutral)
     states = np.array(scenario.reset(world_seed(seed, episode), episode))
     for action in joint_actions:
-        prediction = scenario.predict()
-        rewards = getattr(prediction, "rewards", None)
-        foretold = [prediction.states(i, action[None])[0] for i in range(len(action))]
         before = _with_reward(states, paid)
-        predicted = _with_reward(foretold, np.nan if rewards is None else rewards(action[None])[0])
-        for joint in [action, *[np.full_like(action, scenario.action_set.neutral)] * (ahead - 1)]:
+        predicted = _predicted(scenario, action, before)
+        for joint in [action, *[action if repeats else neutral] * (ahead - 1)]:
             transition = scenario.step(joint)
             states, paid = np.array(transition.states), float(np.mean(transition.reward))
             if transition.terminated or transition.truncated:
@@ -84,6 +84,16 @@ def predicted_steps(
         if transition.terminated or transition.truncated:
             break
     return np.array(steps)
+
+
+def _predicted(scenario: Scenario, joint_action: IntArray, before: FloatArray) -> FloatArray:
+    """Return states and reward after a joint action, NaN where they are not predicted."""
+    if not hasattr(scenario, "predict"):
+        return np.full_like(before, np.nan)
+    prediction, action = scenario.predict(), joint_action[None]
+    states = [prediction.states(i, action)[0] for i in range(len(joint_action))]
+    rewards = getattr(prediction, "rewards", None)
+    return _with_reward(states, np.nan if rewards is None else rewards(action)[0])
 
 
 def _with_reward(states: FloatArray | list[FloatArray], reward: float) -> FloatArray:

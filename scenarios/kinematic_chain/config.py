@@ -109,6 +109,8 @@ class KinematicChainSettings(ScenarioSettings):
         The ridge weighs against the squared errors of all joints that share weights, so that it
         grows with their number.
         """
+        if preset == "fitted-q":
+            return {"learner": {"discount": DISCOUNT}}
         sharing = {"default": self.joints, "own-value": 1}
         if preset not in sharing:
             return {}

@@ -46,6 +46,8 @@ def parts_of(game: Any, team: Team, *, learn: bool) -> Parts | None:
         return None
     if team.messages.fail or team.evaluator.problem.unseen != "maintain":
         return None
+    if team.predictor is not None:
+        return None
     learning = _learning(team.learner) if learn else STILL
     exploring = _exploring(team.explorer) if learn else NO_EXPLORATION
     if learning is None or exploring is None:

@@ -5,10 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from html import escape
+from typing import TYPE_CHECKING
 
+from ..presentation.profiles import draw
 from ..presentation.tables import SummaryTable, tabulate
+from ..results.aggregates import Aggregates, aggregate
 from ..results.comparison import Difference
 from ..results.contrasts import Contrasts
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -32,6 +38,26 @@ class Comparison:
     def verdicts(self) -> tuple[str, ...]:
         """What was found, and what could have been detected, line by line."""
         return self.contrasts.notes
+
+    @cached_property
+    def statistics(self) -> Aggregates:
+        """Interquartile means, probabilities of improvement and performance profiles.
+
+        Raises
+        ------
+        SpecError
+            If no two conditions have two seeds each.
+        """
+        return aggregate(self.contrasts)
+
+    @cached_property
+    def aggregated(self) -> SummaryTable:
+        """The table of `statistics`, in all forms."""
+        return tabulate(self.statistics.table)
+
+    def figure(self) -> Figure:
+        """Return performance profiles, and the interquartile mean by episode of training."""
+        return draw(self.statistics)
 
     def __str__(self) -> str:
         return "\n".join([str(self.table), "", *self.verdicts])

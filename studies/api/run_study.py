@@ -5,7 +5,7 @@ Nothing is printed here: who wants to see how it goes passes an `Observer`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 
@@ -16,10 +16,10 @@ from ..spec.spec import Spec
 from ..store.store import Store
 from ..trials.arrangement import check
 from ..trials.keeping import open_to_run, pending
-from ..trials.trial import trials_of
+from ..trials.trial import Trial, trials_of
 from ..workers.runner import Observer, run_trials
 from ..workers.worker import RunTrial
-from ..workers.workers import start_workers
+from ..workers.workers import Backend, start_workers
 
 
 @contextmanager
@@ -28,10 +28,12 @@ def run_study(
     directory: Path,
     *,
     jobs: int | None = None,
+    backend: Backend = "loky",
     address: str | None = None,
     retry_failed: bool = False,
     accept_code: bool = False,
     observer: Observer | None = None,
+    chosen: Sequence[Trial] = (),
 ) -> Iterator[Store]:
     """Run what is left of a study; then its store is open for as long as the context lasts.
 
@@ -41,7 +43,7 @@ def run_study(
         The study.
     directory
         Where it is kept; made if it does not exist.
-    jobs, address
+    jobs, backend, address
         Who runs the trials, see `start_workers`.
     retry_failed
         Whether failed trials are run again.
@@ -49,6 +51,8 @@ def run_study(
         Whether to go on with a study although the installed code has changed.
     observer
         Who is notified of progress; None: nobody.
+    chosen
+        Those of its trials that are run; none named: all.
 
     Yields
     ------
@@ -63,9 +67,9 @@ def run_study(
         If it is interrupted. What has finished is kept; the same call continues.
     """
     observer = observer or Observer()
-    measures, trials = examine(spec), trials_of(spec)
+    measures, trials = examine(spec), chosen or trials_of(spec)
     with (
-        start_workers(jobs, address, len(trials)) as workers,
+        start_workers(backend, jobs, address, len(trials)) as workers,
         open_to_run(directory, spec, trials, measures, accept_code=accept_code) as store,
     ):
         if retry_failed:

@@ -22,6 +22,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ...core.interface.measures import SUCCESS
 from ...core.plugins.messages import closest
 from ...core.plugins.sources import Sources
 from ..catalogue.study import analysed, drawn, load_study
@@ -38,6 +39,7 @@ from ..results.verdicts import power_text
 from ..spec.outline import StudyOutline, other_spec, sources_of
 from ..store import durable
 from ..store.store import Store
+from ..workers.workers import Backend
 from . import replay
 from .comparison import Comparison
 
@@ -109,6 +111,24 @@ class StudyResults:
     def notes(self) -> tuple[str, ...]:
         """What the study says of its results, verdicts and their power, line by line."""
         return tuple(getattr(self.analysis, "notes", ()))
+
+    @property
+    def unlearned(self) -> tuple[str, ...]:
+        """Conditions that learn, but have neither more success nor return than frozen weights.
+
+        In evaluation; known where there is a frozen condition in the same scenario.
+        """
+        evaluations = self.results.episodes.query("phase == 'evaluation'")
+        columns = ["condition", SUCCESS.name, "return"]
+        means = evaluations.reindex(columns=columns).groupby("condition").mean()
+        frozen, others = dict[str, Any](), list[tuple[str, str]]()
+        for c in means.index.intersection(list(self._settings), sort=False):
+            learner, scenario = (self._settings[c][name] for name in ("learner", "scenario"))
+            if learner["kind"] != "frozen":
+                others.append((c, repr(scenario)))
+            elif learner["decision"]["rule"] == "value":
+                frozen[repr(scenario)] = means.loc[c]
+        return tuple(c for c, s in others if s in frozen and (means.loc[c] <= frozen[s]).all())
 
     @property
     def power(self) -> tuple[str, ...]:
@@ -296,6 +316,7 @@ def run(
     out: Place,
     *,
     jobs: int | None = None,
+    backend: Backend = "loky",
     address: str | None = None,
     retry_failed: bool = False,
     accept_code: bool = False,
@@ -311,7 +332,7 @@ def run(
     out
         Where the study is kept; made if it does not exist. Every trial is kept the moment it
         finishes.
-    jobs, address, retry_failed, accept_code
+    jobs, backend, address, retry_failed, accept_code
         As those of `nested_agents.studies.api.run_study.run_study`.
     progress
         Whether to show how it goes.
@@ -336,7 +357,7 @@ def run(
     spec = Spec.read(spec, study=out)
     listener = observer or (Terminal() if progress else Observer())
     with run_study(
-        spec, out, jobs=jobs, address=address, retry_failed=retry_failed,
+        spec, out, jobs=jobs, backend=backend, address=address, retry_failed=retry_failed,
         accept_code=accept_code, observer=listener,
     ) as store:  # fmt: skip
         study = _of(store)
@@ -353,7 +374,8 @@ def load(*places: Place) -> StudyResults:
     Parameters
     ----------
     *places
-        Directories of studies; or a single file that ``export --format json`` has written.
+        Directories of studies; or single files that ``export --format json`` has written, or of the
+        form of marl-eval, as those of BenchMARL are.
         Conditions of several studies whose labels are equal get the name of their directory; the
         first study says how all of them are analysed.
 

@@ -87,7 +87,7 @@ def reevaluate(
     trials = [t for t in trials_of(spec) if (t.condition, t.seed) in identities]
     with (
         TemporaryDirectory() as folder,
-        start_workers(jobs, None, len(trials)) as workers,
+        start_workers("loky", jobs, None, len(trials)) as workers,
         open_to_run(Path(folder), spec, trials, measures) as store,
     ):
         evaluate = partial(_evaluate, directory, identities)

@@ -1,4 +1,4 @@
-"""The claims of the paper, each with what is measured and the criterion that decides it.
+"""The claims of papers, each with what is measured and the criterion that decides it.
 
 No verdict is given by hand: measures and criteria stand in ``claims.toml``. A criterion looks at an
 estimate with its 95 % interval. A claim *holds* if the whole interval meets the criterion, *does
@@ -70,7 +70,7 @@ def within(margin: float) -> Criterion:
 
 @dataclass(frozen=True)
 class Claim:
-    """A claim of the paper, as it stands in ``claims.toml``."""
+    """A claim of a paper, as it stands in ``claims.toml``."""
 
     name: str
     """For programs."""
@@ -98,11 +98,17 @@ def _claim(*, compute: str, of: Mapping[str, Any] | None = None, **table: Any) -
 
 CRITERIA = {"at_least": at_least, "at_most": at_most, "within": within}
 _TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
-CLAIMS = tuple(_claim(**table) for table in _TABLE["claims"])
-"""Every claim that is decided."""
+PAPERS = {paper: tuple(_claim(**table) for table in tables) for paper, tables in _TABLE.items()}
+"""Every claim that is decided, by the paper that makes it."""
+OWN = "nested-agents"
+"""The paper that all this is of."""
 
-STUDIES_OF_CLAIMS = tuple(dict.fromkeys(claim.study for claim in CLAIMS if claim.study != "cost"))
-"""The studies that have to be run; costs are computed."""
+
+def studies_of(paper: str = OWN) -> tuple[str, ...]:
+    """Return the studies that have to be run for a paper's claims; costs are computed."""
+    return tuple(dict.fromkeys(claim.study for claim in PAPERS[paper] if claim.study != "cost"))
+
+
 SPECS = Path(__file__).parents[1] / "catalogue"
 """Where their specs are: one folder for each study."""
 PUBLISHED = Path(__file__).parent / "published"
@@ -135,10 +141,10 @@ class Finding:
         return text + (f", {self.measured.note}" if self.measured.note else "")
 
 
-def judge(results: Mapping[str, Results]) -> tuple[Finding, ...]:
-    """Decide every claim by the results of its study, by name."""
+def judge(results: Mapping[str, Results], paper: str = OWN) -> tuple[Finding, ...]:
+    """Decide every claim of a paper by the results of its study, by name."""
     findings = []
-    for claim in CLAIMS:
+    for claim in PAPERS[paper]:
         measurement = claim.compute(results.get(claim.study, NOTHING()))
         if measurement is None or not np.isfinite(measurement.estimate.value):
             findings.append(Finding(claim, None, "not decided"))

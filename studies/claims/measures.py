@@ -14,7 +14,14 @@ import numpy as np
 from ...core.agents.cost import Problem
 from ..catalogue.shapes import ratios_of
 from ..catalogue.wheel_failure import courses_of
-from ..results.comparison import aligned, difference, of_shared_seeds, order_tests, ratio
+from ..results.comparison import (
+    aligned,
+    difference,
+    of_shared_seeds,
+    order_tests,
+    paired_difference,
+    ratio,
+)
 from ..results.results import Results
 from ..results.sizes import Sizes
 from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
@@ -147,6 +154,28 @@ def optimal(results: Results, system: str) -> Measured | None:
     worst = min(estimates, key=lambda game: float(estimates[game].value))
     seeds = len(results.seeds(results.conditions[0]))
     return Measured(estimates[worst], seeds, note=worst)
+
+
+def gained_by_edges(results: Results, edges: str, less: str) -> Measured | None:
+    """Measure success with some edges, less that with others, seed by seed, the mean of all games.
+
+    Conditions of the study `fit` are known by the name of their edges and by what else they are.
+    """
+    by_game: dict[tuple[object, ...], dict[str, str]] = {}
+    for condition, columns in results.columns.items():
+        if results.has(condition, "evaluation"):
+            game = tuple(value for key, value in columns.items() if key != "name")
+            by_game.setdefault(game, {})[str(columns.get("name"))] = condition
+    pairs = [(of[edges], of[less]) for of in by_game.values() if {edges, less} <= of.keys()]
+    if not pairs:
+        return None
+    every = [condition for pair in pairs for condition in pair]
+    success_of = of_shared_seeds(
+        [results.seeds(condition) for condition in every],
+        [results.success(condition, "evaluation").mean(axis=1) for condition in every],
+    )
+    own, other = np.mean(success_of[::2], axis=0), np.mean(success_of[1::2], axis=0)
+    return Measured(paired_difference(own, other, of_rates=True), len(own)) if len(own) else None
 
 
 def order_matters(results: Results) -> Measured | None:

@@ -19,15 +19,15 @@ def print_wrapped(text: str, first: str = "", indent: int = 4) -> None:
     print(fill(text, width, initial_indent=first, subsequent_indent=" " * indent))
 
 
-def print_table(table: SummaryTable) -> None:
-    """Print estimates by condition, each over its 95 % interval."""
+def print_table(table: SummaryTable, legend: Sequence[str] | None = None) -> None:
+    """Print estimates by condition, each over its 95 % interval, and its legend or another one."""
     from rich.console import Console
 
     from ..presentation.terminal_tables import print_rows
 
     if table.rows:
         print_rows(table.titles, table.rows, Console())
-    print(*table.legend, sep="\n")
+    print(*(table.legend if legend is None else legend), sep="\n")
 
 
 def print_study(study: StudyResults, columns: Sequence[str] = ()) -> None:
@@ -59,6 +59,7 @@ def show_results(
     int
         1 if any trial failed, else 0.
     """
+    from ...topologies.checks import listed
     from ..presentation import figures  # Matplotlib takes its time, for which no trial has to wait
     from ..presentation.progress import say
     from ..presentation.words import count
@@ -72,6 +73,13 @@ def show_results(
     print("", *(f"figure  {path}" for path in drawn), sep="\n")
     for path in replays:
         print(f"replay  {path}")
+    if study.unlearned:
+        names = listed(study.unlearned, 3)
+        print_wrapped(
+            f"{names}: no better than frozen weights in evaluation. What to try, and in which "
+            "order: docs/not_learned.md; nested-agents tune tries it for you.",
+            "hint    ", 8,
+        )  # fmt: skip
     print(f"rows    nested-agents results {directory} --format csv")
     print(f"report  nested-agents report {directory}")
     if study.failed:

@@ -7,7 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ...core.plugins import trust
+from ...core.plugins.trust import is_trusted
+from ...core.plugins.trust import trust as trust_text
 from ..presentation.progress import say
 from ..spec.outline import other_spec
 from ..store.store import Store
@@ -26,12 +27,12 @@ def opened(directory: Path) -> Iterator[Store]:
 
 
 def load_results(
-    sources: Sequence[Path], study: str | None, where: str | None, *, is_trusted: bool
+    sources: Sequence[Path], *, study: str | None = None, where: str | None = None, trust: bool
 ) -> StudyResults:
     """Return the results at some places, as a study analyses them, or a choice of the trials."""
     from ..api.study import load
 
-    if is_trusted:
+    if trust:
         for source in sources:
             if source.is_dir():
                 trust_files(source)
@@ -47,6 +48,6 @@ def trust_files(directory: Path) -> None:
     with Store.open(directory) as store:
         texts = store.sources()
     for name, text in texts.items():
-        if name.endswith(".py") and not trust.is_trusted(text):
+        if name.endswith(".py") and not is_trusted(text):
             say(f"{name}, which came with {directory}, is trusted from now on")
-            trust.trust(text)
+            trust_text(text)

@@ -25,6 +25,7 @@ PROGRAM = "nested-agents"
 COMMANDS: dict[str, str] = {
     "demo": "Train two e-Pucks to push a box: table, figures and replay.",
     "run": "Run the study of a spec, or continue it.",
+    "tune": "Look for better settings of a spec, on seeds of their own.",
     "plan": "Tell what a study will take, and what it can find.",
     "table": "Print the results of a study: conditions against estimates.",
     "compare": "Compare conditions of one study or several, seed by seed.",

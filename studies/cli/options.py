@@ -61,25 +61,38 @@ def _is_further(argument: str, option: click.Option) -> bool:
 directory = click.argument("directory", type=PATH, metavar="DIR")
 """An existing study."""
 
+sources = click.argument("sources", type=PATH, metavar="DIR...|FILE.json", nargs=-1, required=True)
+"""Existing studies, or a file of results."""
+
 jobs = click.option(
     "--jobs", type=int, metavar="N", help="Trials at a time; by default one for every core."
 )
 """Number of worker processes."""
 
-address = click.option(
+_backend = click.option(
+    "--backend",
+    type=click.Choice(["loky", "dask"]),
+    default="loky",
+    help="Who runs the trials: loky, processes of this machine, or dask, workers of a Dask cluster "
+    "(extra nested-agents[dask]). The results are the same.",
+)
+_address = click.option(
     "--address",
     metavar="tcp://HOST:PORT",
-    help="Of the scheduler of a running Dask cluster, whose workers run the trials, all of them "
-    "unless --jobs says otherwise (extra nested-agents[dask]). The results are the same.",
+    help="Of the scheduler of a running Dask cluster, all of whose workers are used unless --jobs "
+    "says otherwise. If missing, a cluster is started here.",
 )
-"""Of a Dask scheduler."""
-
-accept_code = click.option(
+_accept_code = click.option(
     "--accept-code",
     is_flag=True,
     help="Go on with a study although the installed code that computes it has changed since.",
 )
-"""Whether results of two versions of the code may stand side by side."""
+
+
+def running(command: Callable[..., int]) -> Callable[..., int]:
+    """Add the options of who runs trials, as `nested_agents.studies.api.study.run` takes them."""
+    return jobs(_backend(_address(_accept_code(command))))
+
 
 trust = click.option(
     "--trust",

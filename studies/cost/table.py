@@ -13,9 +13,10 @@ from contextlib import contextmanager
 from fractions import Fraction
 from typing import Any, Literal
 
+from ...core.plugins.deferred import pd
 from ...topologies.view import aligned, readable
 from ..presentation.csv_text import write_csv
-from ..presentation.tables import escaped, tabular
+from ..presentation.tables import in_latex
 from .cost import PAPER, RULES, CostRow
 
 Form = Literal["table", "json", "csv", "latex"]
@@ -148,14 +149,16 @@ def _amount(value: float, digits: int = 3) -> str:
 
 
 def _tabular(cells: Sequence[Sequence[str]]) -> str:
-    lines = [list(map(_latex_cell, line)) for line in cells]
-    return tabular("{booktabs}", f"{{rl{'r' * (len(cells[0]) - 2)}}}", lines)
+    head, *lines = cells
+    rows = [(n, topology, *map(_latex_cell, numbers)) for n, topology, *numbers in lines]
+    frame = pd.DataFrame(rows, columns=head)
+    return in_latex(frame, "topology", f"rl{'r' * (len(head) - 2)}").rstrip()
 
 
 def _latex_cell(text: str) -> str:
     """Return a cell for LaTeX, numbers as they are printed."""
-    if not text[0].isdigit():
-        return "--" if text == "-" else escaped(text).replace(">", "$>$")
+    if text == "-":
+        return "--"
     mantissa, e, power = text.partition("e")
     if e:
         return rf"${mantissa}\times 10^{{{int(power)}}}$"

@@ -14,13 +14,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 from rich.console import Console
 from rich.progress import track
 
 from ...core.agents.team import Team, of_fuzzy_agents
 from ...core.interface.scenario import Scenario
 from ...core.interface.spaces import Variable
-from ...core.learners import LearnerSettings
 from ...core.rules.rule_base import RuleBase
 from ..errors import SpecError
 from ..store.durable import TEAM
@@ -30,6 +30,7 @@ from ..trials.session import Session
 from ..trials.trial import Trial
 from . import rules as explain_rules
 from .body import Bodies
+from .predictor import errors_of
 from .rules import Parts
 
 
@@ -54,6 +55,8 @@ class Explanation:
     why there is none."""
     bodies: Bodies | None
     """What bodies believed their actuators to do; none: they have no self-model."""
+    errors: pd.DataFrame | None
+    """By how much predictions are wrong, see `errors_of`; none: the team has not learned them."""
 
 
 def explain(store: Store, trial: Trial) -> Explanation:
@@ -67,28 +70,28 @@ def explain(store: Store, trial: Trial) -> Explanation:
     """
     with trial.sources.active():
         team, scenario, bodies = _trained(store, trial)
-        learner = trial.settings.learner
-        assert isinstance(learner, LearnerSettings), "of fuzzy agents, see _trained"
-        rules = RuleBase.build(scenario.state_space, learner.rule_base)
-        taken = [explain_rules.take_apart(rules, theta) for theta in team.learner.theta]
+        taken = [explain_rules.take_apart(team.rules, theta) for theta in team.learner.theta]
         return Explanation(
             trial=trial,
             agents=scenario.agents,
             actuators=trial.settings.scenario.build().agents,
-            rules=rules,
-            variables=scenario.state_space.variables,
+            rules=team.rules,
+            variables=team.space.variables,
             parts=tuple(taken[row] for row in team.rows),
-            policy=_policy(team, scenario),
+            policy=_policy(trial, team, scenario),
             bodies=bodies,
+            errors=errors_of(team, scenario, trial.seed),
         )
 
 
-def _policy(team: Team, scenario: Any) -> Any:
+def _policy(trial: Trial, team: Team, scenario: Any) -> Any:
     """Return what a scenario shows of what a team does, or why it does not."""
     if not hasattr(scenario, "show_policy"):
         return "the scenario has no method show_policy for agents such as these"
     if team.evaluator is None:
         return "actions are drawn at random"
+    if not trial.settings.learner.needs_prediction:
+        return "the agents value their actions where they are, and predict nothing elsewhere"
     try:
         return scenario.show_policy(team)
     except ValueError as error:

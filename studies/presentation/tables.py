@@ -6,6 +6,7 @@ import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,11 +20,9 @@ from .csv_text import write_csv
 from .terminal_tables import text_of
 from .words import count
 
-LATEX = {
-    "\\": r"\textbackslash{}", "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_",
-    "{": r"\{", "}": r"\}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
-}  # fmt: skip
-"""What LaTeX reads otherwise, and how it is written instead."""
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
 MATHS_SPACE = r"\;"
 NOTHING = "no trial has finished"
 
@@ -38,8 +37,6 @@ class SummaryTable:
     """Its lines."""
     csv: str
     """The whole table as CSV."""
-    latex: str
-    """The whole table in LaTeX."""
     markdown: str
     """The whole table in Markdown. Printed, it is as on a terminal of 80 columns; a notebook shows
     it as HTML."""
@@ -71,6 +68,17 @@ class SummaryTable:
         table = pd.DataFrame(cells, index, self.titles).to_html(border=0)
         return f"{table}<p><small>{escape(' '.join(self.legend))}</small></p>"
 
+    @property
+    def latex(self) -> str:
+        """The whole table in LaTeX."""
+        rows = [
+            (name, seeds, *(f"${c.bracketed(MATHS_SPACE)}$" if c else "--" for c in cells))
+            for name, seeds, cells in self.rows
+        ]
+        frame = pd.DataFrame(rows, columns=["condition", "seeds", *self.titles])
+        note = "; 95 % intervals in brackets"
+        return in_latex(frame, "condition", f"lr{'r' * len(self.titles)}", note)
+
     def _repr_html_(self) -> str:
         return self.html
 
@@ -101,8 +109,7 @@ def tabulate(lines: Sequence[Summary], columns: Sequence[str] = ()) -> SummaryTa
         (s.condition, s.seeds, tuple(_cell(s.estimates.get(title)) for title in titles))
         for s in lines
     )
-    texts = _csv(lines, titles), _latex(titles, rows), _markdown(titles, rows)
-    return SummaryTable(titles, rows, *texts)
+    return SummaryTable(titles, rows, _csv(lines, titles), _markdown(titles, rows))
 
 
 def _cell(estimate: Estimate | None) -> Cell | None:
@@ -132,44 +139,27 @@ def _markdown(titles: Sequence[str], rows: Sequence[Row]) -> str:
     return "".join(f"| {' | '.join(line)} |\n" for line in escaped)
 
 
-def _latex(titles: Sequence[str], rows: Sequence[Row]) -> str:
-    lines = [["condition", "seeds", *map(escaped, titles)]]
-    for condition, seeds, cells in rows:
-        # After a line's end LaTeX would take a leading bracket for an option.
-        name = "{}" * condition.startswith(("[", "*")) + escaped(condition)
-        numbers = (f"${c.bracketed(MATHS_SPACE)}$" if c else "--" for c in cells)
-        lines.append([name, str(seeds), *numbers])
-    note = "{booktabs}; 95 % intervals in brackets"
-    return tabular(note, f"{{lr{'r' * len(titles)}}}", lines) + "\n"
-
-
-def tabular(needs: str, columns: str, rows: Sequence[Sequence[str]]) -> str:
-    """Return rows of LaTeX as a table; the first one is its head.
+def in_latex(frame: DataFrame, names: str, columns: str, note: str = "") -> str:
+    """Return a frame of LaTeX as a table of booktabs, a line after the other.
 
     Parameters
     ----------
-    needs
-        The packages in braces, and what a comment above the table says besides.
+    frame
+        Cells by heading.
+    names
+        The column whose texts, as those of headings, are no LaTeX yet.
     columns
         Arguments of ``tabular``: how columns are aligned.
-    rows
-        Cells, line by line.
+    note
+        What a comment above the table says besides the package that it needs.
     """
-    head, *lines = (" & ".join(row) + r" \\" for row in rows)
-    return "\n".join(
-        [
-            rf"% needs \usepackage{needs}",
-            rf"\begin{{tabular}}{columns}",
-            r"\toprule",
-            head,
-            r"\midrule",
-            *lines,
-            r"\bottomrule",
-            r"\end{tabular}",
-        ]
+    style = frame.style.hide(axis="index").format_index(escape="latex", axis=1)
+    text = style.format(_protected, escape="latex", subset=names).to_latex(
+        column_format=columns, hrules=True
     )
+    return f"% needs \\usepackage{{booktabs}}{note}\n{text}"
 
 
-def escaped(text: str) -> str:
-    """Return text as LaTeX needs it."""
-    return "".join(LATEX.get(character, character) for character in text)
+def _protected(text: str) -> str:
+    """Return escaped text that is no option of the line before, and whose > any font shows."""
+    return "{}" * text.startswith(("[", "*")) + text.replace(">", "$>$")

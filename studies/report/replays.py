@@ -3,17 +3,21 @@
 A scenario whose settings name a `player` has its recordings played on a canvas. The player is a
 module with ``scene_of(recording)``, which raises ValueError if it cannot play it, with
 ``pack(recording, scene)``, and the path ``SCRIPT`` of what draws a packed episode in its scene.
-Other scenarios draw theirs as `films`.
+Any other that draws its episodes, one's own included, has them drawn as animations, one for each
+condition.
 """
 
 from __future__ import annotations
 
+import base64
+import tempfile
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 from ...core.plugins.deferred import located
 from ...scenarios import SCENARIOS
@@ -21,10 +25,20 @@ from ..errors import SpecError
 from ..presentation.words import count
 from ..store.durable import NotRecordedError, Recording
 from ..store.store import Planned, Store
-from .films import Film, films
+from ..trials.keeping import spec_of
+from ..trials.trial import Trial, trials_of
 
 MOST_BYTES = 1_500_000
 """Of all packed episodes together."""
+
+
+class Film(NamedTuple):
+    """The last training episode of a trial, drawn by its scenario."""
+
+    condition: str
+    seed: int
+    data: str
+    """A GIF in base64."""
 
 
 @dataclass(frozen=True)
@@ -98,14 +112,43 @@ def replays(store: Store, trials: Iterable[Planned], most_bytes: int = MOST_BYTE
             episodes.append(episode)
             scripts.add(player.SCRIPT.read_text(encoding="utf-8"))
             size += len(episode["data"])
-    drawn = films(store, others, most_bytes - size)
-    filmed = {film.condition for film in drawn}
+    films: list[Film] = []
+    # Of a study that the canvas plays nothing is asked for, and no file of its is run.
+    readable = _trials(store) if others else {}
+    first: dict[str, Planned] = {}
     for trial in others:
-        if trial.condition not in filmed:
-            missing["Not shown, as the scenario cannot draw it, or there is no room"][
-                trial.condition
-            ] += 1
-    return Replays(scenes, episodes, "".join(scripts), drawn, missing)
+        first.setdefault(trial.condition, trial)
+    for trial in first.values():
+        gif = _drawn(store, readable[trial.identity]) if trial.identity in readable else ""
+        if 0 < len(gif) <= most_bytes - size:
+            films.append(Film(trial.condition, trial.seed, gif))
+            size += len(gif)
+    filmed = {film.condition for film in films}
+    missing["Not shown, as the scenario cannot draw it, or there is no room"] += Counter(
+        trial.condition for trial in others if trial.condition not in filmed
+    )
+    kept_back = {reason: trials for reason, trials in missing.items() if trials}
+    return Replays(scenes, episodes, "".join(scripts), films, kept_back)
+
+
+def _trials(store: Store) -> Mapping[str, Trial]:
+    """Return the trials of a study by identity; none if this version cannot read its spec."""
+    try:
+        return {trial.identity: trial for trial in trials_of(spec_of(store))}
+    except SpecError:
+        return {}
+
+
+def _drawn(store: Store, trial: Trial) -> str:
+    """Return the GIF of a trial's last episode in base64; nothing if its scenario cannot draw."""
+    scenario: Any = trial.world()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "episode.gif"
+        try:
+            scenario.animate(store.recording(trial.identity, "last"), path)
+        except Exception:  # a drawing may be anybody's, and the page is worth more than it
+            return ""
+        return base64.b64encode(path.read_bytes()).decode("ascii")
 
 
 def _scene_of(recording: Recording) -> tuple[Any, dict[str, Any]]:

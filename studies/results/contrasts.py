@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -35,6 +35,10 @@ class Group:
     """Of the others from it."""
     table: tuple[Summary, ...]
     """A line for each, the reference first."""
+    values: Mapping[str, Array] = field(default_factory=dict)
+    """By the name of each, the means of its seeds ``(n_seeds,)``."""
+    training: Mapping[str, Array] = field(default_factory=dict)
+    """Values of each episode of training ``(n_seeds, n_episodes)``, if it is measured there."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +131,13 @@ def contrasts(
     for setting, members in groups:
         own = tuple(compared[c] for _, c in members if c in compared)
         lines = _lines(results, shown_as, phase, setting, members, values, own)
-        made.append(Group(setting, members[0][0], own, lines))
+        trained = {
+            name: results.values(c, shown_as.name)
+            for name, c in members
+            if phase and results.has(c, "training", shown_as.name)
+        }
+        means = {name: values[c] for name, c in members}
+        made.append(Group(setting, members[0][0], own, lines, means, trained))
     return Contrasts(shown_as, phase, tuple(made), results.identical)
 
 

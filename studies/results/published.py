@@ -16,9 +16,9 @@ import numpy as np
 
 from ..errors import SpecError
 from ..spec.outline import StudyOutline
-from ..store import durable
 from ..store.schema import RESULTS_VERSION, measures_from, tables
 from ..store.schema import SECONDS as PARTS
+from . import marl_eval
 from .results import SECONDS, Results, from_arrays
 
 DECIMALS = 3
@@ -70,8 +70,12 @@ class Published(NamedTuple):
 
 
 def loads(text: str) -> Published:
-    """Return what `dumps` has written."""
+    """Return what `dumps` has written, or results of the form of `marl_eval`."""
     content = json.loads(text)
+    if "results_version" not in content:
+        results = marl_eval.read(content)
+        outline = StudyOutline.noted(marl_eval.spec_of(results), results.columns)
+        return Published(outline, results, RESULTS_VERSION)
     measures = measures_from(content["measures"])
     rates = {measure.name for measure in measures if measure.is_rate}
     phases = {
@@ -99,11 +103,6 @@ def loads(text: str) -> Published:
     return Published(
         StudyOutline.noted(content["spec"], columns), results, int(content["results_version"])
     )
-
-
-def write(path: Path, outline: StudyOutline, results: Results) -> None:
-    """Write the same to a file, which is there whole or not at all."""
-    durable.write(path, dumps(outline, results).encode())
 
 
 def read(folder: Path, studies: Iterable[str]) -> dict[str, Published]:

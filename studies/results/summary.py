@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...core.interface.measures import SUCCESS
 from .results import Results
 from .statistics import Estimate, rate
 
@@ -32,7 +33,7 @@ def evaluated(results: Results, condition: str) -> dict[str, Estimate]:
 
     Those of `[evaluations]` are called ``success, NAME``.
     """
-    if not results.has(condition, "evaluation"):
+    if not results.has(condition, "evaluation", SUCCESS.name):
         return {}
     others = results.other_evaluations(condition).items()
     phases = {EVALUATED: "evaluation", **{f"success, {name}": phase for name, phase in others}}

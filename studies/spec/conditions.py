@@ -55,7 +55,8 @@ class ConditionSettings(Settings):
             If agents or topology do not fit the world; one line that names the culprit.
         """
         scenario = join_agents(world, self.agents)
-        return scenario, build(self.topology, scenario.agents, groups_of(scenario))
+        own: Sequence[tuple[int, int]] | None = getattr(scenario, "interactions", None)
+        return scenario, build(self.topology, scenario.agents, groups_of(scenario), own)
 
     def acts_as(self, other: ConditionSettings) -> bool:
         """Return whether topology and learner are those of `other`."""

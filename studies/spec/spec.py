@@ -5,7 +5,8 @@
 ``[scenario]``, ``[topology]``, ``[learner]``, laid over the preset. What is compared:
 ``[[overrides]]``, further tables by name, and ``[sweep]``, lists of values by dotted key; the
 conditions are their combinations. ``[[curriculum]]`` are stages of training before that of the
-conditions, ``[evaluations]`` further scenarios and hierarchies for the trained teams.
+conditions, ``[evaluations]`` further scenarios and hierarchies for the trained teams. ``[tune]``
+are the values that `nested_agents.studies.api.tuning` tries.
 """
 
 from __future__ import annotations
@@ -86,6 +87,8 @@ class Spec(Settings):
     """Laid over the preset's learner."""
     sweep: Mapping[str, tuple[Any, ...]] = Field(default_factory=dict)
     """Lists of values by dotted key; the conditions are all their combinations."""
+    tune: Mapping[str, tuple[Any, ...]] = Field(default_factory=dict)
+    """Lists of values by dotted key that `nested-agents tune` draws from; nothing else reads it."""
     overrides: tuple[Override, ...] = ()
     """Tables by name, each laid over those above and crossed with the sweep."""
     curriculum: Curriculum = ()
@@ -308,9 +311,10 @@ def _read(table: Mapping[str, Any], where: str) -> TomlTable:
     for name in SECTIONS:
         if name in table:
             table[name] = section(f"{where}{name}", table[name])
-    if isinstance(table.get("sweep"), Mapping):
-        reach = below({} if where else table)
-        table["sweep"] = dict(_sweep(table["sweep"], f"{where}sweep", reach))
+    reach = below({} if where else table)
+    for name in ("sweep", "tune"):
+        if isinstance(table.get(name), Mapping):
+            table[name] = dict(_sweep(table[name], f"{where}{name}", reach))
     return table
 
 

@@ -4,7 +4,7 @@ from ...core.plugins.registry import Registry
 
 NAMES = (
     "learning-curve", "chain-order", "ablation", "shapes", "wheel-failure", "scaling",
-    "hierarchies", "edges", "games", "related", "peers",
+    "hierarchies", "edges", "fit", "games", "related", "peers",
 )  # fmt: skip
 STUDIES = Registry(
     "study",

@@ -18,7 +18,7 @@ from ...core.agents.team import Team, of_fuzzy_agents
 from ...core.interface.acting import Actors
 from ...core.interface.measures import Measure, measures_of
 from ...core.interface.scenario import Scenario, lacking
-from ...core.learners import LearnerSettings, TeamSettings
+from ...core.learners import LearnerSettings, TeamSettings, check_prediction
 from ...core.numerics.arrays import IntArray
 from ...core.plugins.sources import format_error, place
 from ..errors import SpecError
@@ -72,6 +72,7 @@ def arrange(settings: ConditionSettings, seed: int) -> Arrangement:
     if problem := lacking(world):
         raise ValueError(f"scenario.kind: {problem}")
     scenario, hierarchy = settings.arrange(world)
+    check_prediction(settings.learner, scenario)
     learner, source = settings.learner, policy_seed(seed)
     failures = settings.topology.failures
     if isinstance(learner, LearnerSettings):
@@ -203,6 +204,6 @@ def _arrangements(condition: Condition) -> Iterator[Arrangement]:
     evaluations = transfer(own, settings, condition.evaluations, 0)
     for there in (own, *(a for _, a in stages), *(a for _, a in evaluations)):
         if isinstance(learner, LearnerSettings) and learner.decision.rule != "value":
-            there.scenario.reset(0)
-            of_fuzzy_agents(there.team).check(there.scenario.predict())
+            team, states = of_fuzzy_agents(there.team), there.scenario.reset(0)
+            team.check(team.predict(there.scenario, states))
         yield there

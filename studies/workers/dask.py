@@ -1,8 +1,8 @@
-"""Workers of a Dask cluster, whose scheduler has an address.
+"""Workers of a Dask cluster: one started here, or one whose scheduler has an address.
 
 A cluster has an idea of its own of what to do when a worker dies: it hands the trial to another
-one, and gives up after some deaths (`allowed-failures` in its configuration). Only then is the
-trial lost. Workers may join and leave at any time.
+one, and gives up after some deaths (`allowed-failures` in its configuration; none in a cluster
+started here). Only then is the trial lost. Workers may join and leave at any time.
 """
 
 from __future__ import annotations
@@ -13,13 +13,14 @@ import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 
-from distributed import CancelledError, Client, Future, KilledWorker
+from distributed import CancelledError, Client, Future, KilledWorker, LocalCluster
 from distributed.comm.core import CommClosedError
 
 from ..errors import SpecError
 from ..trials.trial import Trial
 from .arrivals import Workers
-from .worker import Outcome, RunTrial, UnlikeWorkerError, attempt_alike, versions
+from .interrupts import ignore_interrupts
+from .worker import ONE_THREAD, Outcome, RunTrial, UnlikeWorkerError, attempt_alike, versions
 
 CONNECT = 10.0
 """How long to try to reach a scheduler [s]."""
@@ -29,7 +30,7 @@ PATIENCE = 60.0
 
 
 class DaskWorkers(Workers):
-    """Workers of a Dask cluster; see `Workers`. Use `DaskWorkers.at`.
+    """Workers of a Dask cluster; see `Workers`. Use `DaskWorkers.local` or `DaskWorkers.at`.
 
     Parameters
     ----------
@@ -37,14 +38,31 @@ class DaskWorkers(Workers):
         Connected to the cluster.
     most
         Most trials at a time; None: one for every worker.
-    address
-        Of its scheduler.
+    name
+        What to call the cluster in messages.
     """
 
-    def __init__(self, client: Client, most: int | None, address: str) -> None:
-        self._client, self._most = client, most
-        self._name = f"the Dask cluster at {address}"
+    def __init__(self, client: Client, most: int | None, name: str) -> None:
+        self._client, self._most, self._name = client, most, name
         self._alone_since: float | None = None  # when there was no worker any more
+
+    @classmethod
+    @contextmanager
+    def local(cls, jobs: int) -> Iterator[DaskWorkers]:
+        """Start a cluster of `jobs` workers on this machine; it ends with the context."""
+        with _quiet():
+            with ignore_interrupts():
+                cluster = LocalCluster(
+                    n_workers=jobs,
+                    threads_per_worker=1,
+                    env=ONE_THREAD,
+                    memory_limit=0,
+                    dashboard_address=None,
+                    silence_logs=logging.CRITICAL,
+                    scheduler_kwargs={"allowed_failures": 0},
+                )
+            with cluster, Client(cluster) as client:
+                yield cls(client, jobs, "the local Dask cluster")
 
     @classmethod
     @contextmanager
@@ -63,7 +81,7 @@ class DaskWorkers(Workers):
                 why = " ".join(str(error).split()) or "no scheduler answers"
                 raise SpecError(f"--address {address}: {why}") from None
             with client:
-                yield cls(client, jobs, address)
+                yield cls(client, jobs, f"the Dask cluster at {address}")
 
     @property
     def processes(self) -> int:

@@ -1,17 +1,22 @@
 """Who runs the trials: processes on this machine, or workers of a Dask cluster on many.
 
-Whoever runs a trial, its bits are the same: each trial has a process to itself, linear algebra uses
-one thread.
+A family of siblings with one interface, distinguished by the name of their backend. Whoever runs a
+trial, its bits are the same: each trial has a process to itself, linear algebra uses one thread.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Literal, get_args
 
+from ...core.plugins.messages import closest
 from ..errors import SpecError
 from .arrivals import Workers
 from .worker import cores
+
+Backend = Literal["loky", "dask"]
+"""``loky``: processes of this machine. ``dask``: workers of a Dask cluster."""
 
 
 def check_jobs(jobs: int) -> None:
@@ -21,17 +26,21 @@ def check_jobs(jobs: int) -> None:
 
 
 @contextmanager
-def start_workers(jobs: int | None, address: str | None, trials: int) -> Iterator[Workers]:
+def start_workers(
+    backend: Backend, jobs: int | None, address: str | None, trials: int
+) -> Iterator[Workers]:
     """Start workers, which end with the context, or connect to those of a cluster.
 
     Parameters
     ----------
+    backend
+        Of which kind.
     jobs
         Most trials at a time; None: one for every core, or for every worker at `address`.
     address
-        Of the scheduler of a running Dask cluster; None: processes of this machine are started.
+        Of the scheduler of a running Dask cluster; None: workers of this machine are started.
     trials
-        How many trials there are; no more processes are started.
+        How many trials there are; no more workers are started.
 
     Raises
     ------
@@ -40,10 +49,15 @@ def start_workers(jobs: int | None, address: str | None, trials: int) -> Iterato
     """
     if jobs is not None:
         check_jobs(jobs)
-    if address is None:
+    if backend not in (known := get_args(Backend)):
+        raise SpecError(f"backend = {backend!r}: {closest(backend, known)}")
+    wanted = max(1, min(jobs or cores(), trials))
+    if backend == "loky":
         from .loky import LokyWorkers
 
-        yield LokyWorkers(max(1, min(jobs or cores(), trials)))
+        if address is not None:
+            raise SpecError(f"--address {address}: is for --backend dask only")
+        yield LokyWorkers(wanted)
         return
     try:
         from .dask import DaskWorkers
@@ -51,7 +65,11 @@ def start_workers(jobs: int | None, address: str | None, trials: int) -> Iterato
         if error.name not in ("dask", "distributed"):
             raise
         raise SpecError(
-            f"--address {address}: {error.name} is not installed; pip install 'nested-agents[dask]'"
+            f"--backend dask: {error.name} is not installed; pip install 'nested-agents[dask]'"
         ) from None
-    with DaskWorkers.at(address, jobs) as workers:
-        yield workers
+    if address is None:
+        with DaskWorkers.local(wanted) as workers:
+            yield workers
+    else:
+        with DaskWorkers.at(address, jobs) as workers:
+            yield workers

@@ -17,11 +17,14 @@ def run(*arguments: str) -> str:
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
-def test_killed_studies_end_with_the_bytes_of_undisturbed_ones() -> None:
+@pytest.mark.parametrize(("backend", "kills"), [("loky", 3), ("dask", 1)])
+def test_killed_studies_end_with_the_bytes_of_undisturbed_ones(backend: str, kills: int) -> None:
     said = run(
         "benchmarks.crashes",
+        "--backend",
+        backend,
         "--kills",
-        "3",
+        str(kills),
         "--seed",
         "3",
         "--seeds",
@@ -29,7 +32,7 @@ def test_killed_studies_end_with_the_bytes_of_undisturbed_ones() -> None:
     )
     killed = re.search(r"killed +(\d+) processes, (\d+) workers", said)
     assert killed is not None
-    assert sum(map(int, killed.groups())) == 3
+    assert sum(map(int, killed.groups())) == kills
     assert re.search(r"lost +0 trials", said)
     assert re.search(r"unequal +0 studies", said)
 

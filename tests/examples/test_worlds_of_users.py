@@ -11,10 +11,8 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
-from distributed import LocalCluster
 
 from nested_agents.studies.cli.main import main
-from nested_agents.studies.workers.worker import ONE_THREAD
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 pytestmark = pytest.mark.slow
@@ -79,6 +77,5 @@ def test_a_world_from_a_file(
     assert measure.replace("final_", "").partition("_")[0] in page
 
     (tmp_path / "moved.py").rename(tmp_path / f"{name}.py")
-    with LocalCluster(1, threads_per_worker=1, env=ONE_THREAD, dashboard_address=None) as cluster:
-        assert main([*run, "cluster", "--address", cluster.scheduler_address]) == 0
+    assert main([*run, "cluster", "--backend", "dask"]) == 0
     assert rows(tmp_path / "cluster") == rows(tmp_path / "whole")

@@ -31,7 +31,7 @@ def test_a_scenario_of_ones_own(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """What the tutorial has one write is checked by the command and learns as it prints."""
-    scenario, training = re.findall(r"```python\n(.*?)```", TUTORIAL, re.DOTALL)
+    scenario, training, _ = re.findall(r"```python\n(.*?)```", TUTORIAL, re.DOTALL)
     (printed,) = re.findall(r"```text\n(before training: \d+ of .*?)```", TUTORIAL, re.DOTALL)
     (tmp_path / "tank.py").write_text(scenario)
     monkeypatch.chdir(tmp_path)

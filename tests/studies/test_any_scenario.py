@@ -7,8 +7,10 @@ from contextlib import redirect_stdout
 
 import made_up
 import numpy as np
+import pandas as pd
 import pytest
 
+import nested_agents as na
 from nested_agents.core.interface.measures import SUCCESS, Measure
 from nested_agents.core.interface.scenario import groups_of
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
@@ -123,18 +125,11 @@ def test_rows_in_every_form(study, monkeypatch):
     assert max(map(len, narrow)) <= 40
 
 
-def test_files_hold_what_is_missing_as_missing(study, tmp_path):
+def test_frames_hold_what_is_missing_as_missing_in_files_too(study, tmp_path):
     pytest.importorskip("pyarrow")
-    from pyarrow import parquet
-
-    said("export", study, "--out", tmp_path, "--format", "parquet")
-    table = parquet.read_table(tmp_path / "episodes.parquet")
-    assert str(table.schema.field("level").type) == "bool"
-    by_condition = dict(
-        zip(table["condition"].to_pylist(), table["level"].to_pylist(), strict=True)
-    )
-    assert by_condition["1"] is None
-    assert by_condition["2"] is not None
+    na.load(study).episodes.to_parquet(tmp_path / "episodes.parquet")
+    levels = pd.read_parquet(tmp_path / "episodes.parquet").groupby("condition")["level"]
+    assert levels.count().tolist() == [0, levels.size()["2"]]
 
 
 def test_the_learning_curve_and_its_publication(study):
@@ -251,9 +246,9 @@ class Half:
     def __init__(self, settings):
         whole = LineUp(LineUpSettings())
         self.agents, self.action_set = whole.agents, whole.action_set
-        self.state_space, self.reset, self.step = whole.state_space, whole.reset, whole.step
+        self.state_space, self.reset = whole.state_space, whole.reset
 """)
     (tmp_path / "half.toml").write_text('scenario.kind = "half.py:Half"\n')
     assert main(["run", str(tmp_path / "half.toml"), "--out", str(tmp_path / "out")]) == 2
-    assert "error: scenario.kind: Half lacks predict\n" in capsys.readouterr().err
+    assert "error: scenario.kind: Half lacks step\n" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()

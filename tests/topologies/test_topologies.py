@@ -103,6 +103,10 @@ REFUSED = {
     "nothing.py:f": "topology 'nothing.py:f': nothing.py: No such file or directory",
     "chian": "topology 'chian': did you mean 'chain'? known: chain, coordination-graph, edges,",
     "": "topology '': known: chain,",
+    "single-agent": "topology 'single-agent': who the agents are has a key of its own: "
+    "agents = 'team'",
+    "per-robot": "topology 'per-robot': who the agents are has a key of its own: agents = 'body', "
+    "topology = 'chain'",
 }
 
 
@@ -226,10 +230,10 @@ def test_graph_files(tmp_path: Path, name: str) -> None:
     ("name", "content", "message"),
     [
         ("x.json", "{", "holds no graph: Expecting"),
-        ("x.json", "[]", "holds no graph: it must be an object"),
-        ("x.json", '{"edges": [], "names": []}', "holds no graph: its keys must be"),
+        ("x.json", "[]", "holds no graph: it must be a table"),
+        ("x.json", '{"edges": [], "names": []}', "names = .*: unknown key; known: alone, "),
         ("x.json", '{"edges": [["a", "b"], ["a", "b"]]}', "edge a -> b is given more than once"),
-        ("x.json", '{"edges": [["a"]]}', "holds no graph: edges: .* must be a pair"),
+        ("x.json", '{"edges": [["a"]]}', "edges.0.: missing"),
         ("x.graphml", "nothing", "holds no graph: syntax error"),
         ("x.csv", "a,b", "suffix must be .graphml, .json or .toml"),
     ],
@@ -242,3 +246,52 @@ def test_a_file_without_a_graph_is_refused(
     with pytest.raises(ValueError, match=message) as refusal:
         build(parse(f"file:{path}"), AGENTS)
     assert "\n" not in str(refusal.value)
+
+
+RING = {"kind": "coordination-graph", "shape": "ring", "oriented": "listed"}
+
+
+def test_undirected_edges_are_oriented_in_a_given_order() -> None:
+    ring = (*AGENTS, "e")
+    cycle = build(RING, ring)
+    assert cycle.edges == ((0, 1), (0, 4), (1, 2), (2, 3), (3, 4))
+    assert (cycle.neighbours, cycle.order) == ((), (0, 1, 2, 3, 4))
+    assert build({**RING, "oriented": "reversed"}, ring).edges == (
+        (1, 0), (2, 1), (3, 2), (4, 0), (4, 3),
+    )  # fmt: skip
+    assert build({**RING, "oriented": ["c", "a", "b", "d", "e"]}, ring).edges == (
+        (0, 1), (0, 4), (2, 1), (2, 3), (3, 4),
+    )  # fmt: skip
+    filled = build({**RING, "fill_in": True, "told": "parents"}, ring)
+    assert filled.edges == ((0, 1), (0, 2), (0, 3), (0, 4), (1, 2), (2, 3), (3, 4))
+    assert filled.above(4) == (0, 3)
+
+
+def test_other_edges_take_the_place_of_the_graphs() -> None:
+    wrong = build({**RING, "others": 3}, tuple("abcdef"))
+    right = build(RING, tuple("abcdef"))
+    assert len(wrong.edges) == len(right.edges) == 6
+    assert not set(wrong.edges) & set(right.edges)
+
+
+@pytest.mark.parametrize(
+    ("settings", "problem"),
+    [
+        ({"kind": "chain", "oriented": "listed"}, "the edges are directed already, leave it out"),
+        ({**RING, "oriented": ["a", "b"]}, "agent 'c' is missing from oriented"),
+        ({**RING, "oriented": ["a", "b", "c", "x"]}, "unknown agent 'x' in oriented"),
+        ({"kind": "coordination-graph", "fill_in": True}, "fill_in = true: needs oriented"),
+    ],
+)
+def test_an_orientation_that_does_not_fit_is_refused(settings: dict, problem: str) -> None:
+    with pytest.raises(ValueError, match=problem):
+        build(settings, AGENTS)
+
+
+def test_an_undirected_file_needs_an_orientation(tmp_path: Path) -> None:
+    path = tmp_path / "line.graphml"
+    nx.write_graphml(nx.path_graph(AGENTS), path)
+    with pytest.raises(ValueError, match=r"who is above whom\? set topology\.oriented = 'listed'"):
+        build(f"file:{path}", AGENTS)
+    reversed_line = build({"kind": "file", "path": str(path), "oriented": "reversed"}, AGENTS)
+    assert reversed_line.edges == ((1, 0), (2, 1), (3, 2))

@@ -155,7 +155,7 @@ def policy_of(
         If the predictor needs a world that has really come to be as it predicts from.
     """
     if type(prediction) is not BoxPrediction:
-        raise ValueError("its predictions play the world itself, and cannot begin anywhere")
+        raise ValueError("its predictions are of one place only, and cannot begin anywhere")
     goal = prediction.situation.goal
     at = np.array([goal[0] - AHEAD, goal[1], goal[2]])
     poses = _behind(at, box, robots, start)

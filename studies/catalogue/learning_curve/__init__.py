@@ -7,13 +7,12 @@ from luck, one that has the reward function tells it from what the predictor alo
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from ....core.interface.measures import SUCCESS, Measure
 from ...errors import SpecError
 from ...results.analysis import Analysis, Figures
-from ...results.contrasts import STEPS
+from ...results.contrasts import EPISODES, STEPS
 from ...results.results import Array, Results
 from ...results.statistics import Estimate, bootstrap, rate, rates
 from ...results.summary import EVALUATED, Summary, evaluated
@@ -26,6 +25,8 @@ if TYPE_CHECKING:
 
 BLOCK = 5
 """Episodes at each end of training that the table averages over."""
+BLOCKS = {"first": slice(BLOCK), "last": slice(-BLOCK, None), "evaluation": slice(None)}
+"""The episodes that the table averages over, of training or of evaluation, by name."""
 COLUMNS = 2
 """Panels of the figure that stand beside each other."""
 
@@ -42,23 +43,8 @@ def check(spec: Spec) -> None:
                 )
 
 
-@dataclass(frozen=True)
-class Metric:
-    """A column of the table."""
-
-    title: str
-    """Its heading."""
-    measure: Measure
-    """Which measurement."""
-    block: Literal["first", "last", "evaluation"]
-    """Which episodes: the first or the last `BLOCK` of training, or those of the evaluation."""
-
-    def estimate(self, values: Array) -> Estimate:
-        """Return the mean over the block of values ``(n_seeds, n_episodes)``."""
-        if self.block != "evaluation":
-            values = values[:, :BLOCK] if self.block == "first" else values[:, -BLOCK:]
-        m = self.measure
-        return rate(values) if m.is_rate else bootstrap(values.mean(axis=1), bounds=m.bounds)
+Metric = tuple[str, Measure, str]
+"""Heading of a column of the table, which measurement it is, and of which of `BLOCKS`."""
 
 
 def metrics_of(measures: Sequence[Measure], episodes: int) -> tuple[Metric, ...]:
@@ -69,55 +55,47 @@ def metrics_of(measures: Sequence[Measure], episodes: int) -> tuple[Metric, ...]
     no longer than a block, its begin is its end.
     """
     others = [m for m in measures if m.name != SUCCESS.name]
-    begin = [Metric(f"success first {BLOCK}", SUCCESS, "first")]
     return (
-        *(begin if episodes > BLOCK else ()),
-        Metric(f"success last {BLOCK}", SUCCESS, "last"),
-        Metric(EVALUATED, SUCCESS, "evaluation"),
-        *(Metric(f"{m.title}, evaluation", m, "evaluation") for m in others if m.is_rate),
-        Metric("evaluation steps", STEPS, "evaluation"),
-        *(Metric(m.heading, m, "last") for m in others if not m.is_rate),
+        *[(f"success first {BLOCK}", SUCCESS, "first")] * (episodes > BLOCK),
+        (f"success last {BLOCK}", SUCCESS, "last"),
+        (EVALUATED, SUCCESS, "evaluation"),
+        *((f"{m.title}, evaluation", m, "evaluation") for m in others if m.is_rate),
+        ("evaluation steps", STEPS, "evaluation"),
+        *((m.heading, m, "last") for m in others if not m.is_rate),
     )
 
 
-@dataclass(frozen=True)
-class Followed:
-    """A measure that is followed from episode to episode: success, or one that is no rate."""
+def curves_of(measure: Measure, training: Mapping[str, Array]) -> dict[str, Estimate]:
+    """Return estimates ``(n_episodes,)`` over seeds by condition; of thousands they take seconds.
 
-    measure: Measure
-    """Which."""
-    training: Mapping[str, Array]
-    """By condition, what was measured ``(n_seeds, n_episodes)``."""
-
-    @property
-    def curves(self) -> dict[str, Estimate]:
-        """Estimates ``(n_episodes,)`` over seeds; of thousands of seeds they take seconds."""
-        if self.measure.is_rate:
-            return {condition: rates(values) for condition, values in self.training.items()}
-        bounds = self.measure.bounds
-        return {c: bootstrap(values, bounds=bounds) for c, values in self.training.items()}
+    `training` holds by condition what was measured ``(n_seeds, n_episodes)``.
+    """
+    if measure.is_rate:
+        return {condition: rates(values) for condition, values in training.items()}
+    return {c: bootstrap(values, bounds=measure.bounds) for c, values in training.items()}
 
 
 def analyse(results: Results) -> Analysis:
     """Estimate the table and what the curves need; seeds are the unit of sampling."""
     conditions, table = results.of_phase("training"), []
+    measures = results.measures or EPISODES[1:]  # foreign ones may have the return alone
     for condition in conditions:
         estimates: dict[str, Estimate] = {}
-        episodes = results.success(condition).shape[1]
-        for metric in metrics_of(results.measures, episodes):
-            phase = "evaluation" if metric.block == "evaluation" else "training"
-            name = metric.measure.name
-            if results.has(condition, phase, name):  # published results keep a part
-                values = results.values(condition, name, phase)
-                estimates[metric.title] = metric.estimate(values)
-            if metric.title == EVALUATED:
+        episodes = results.values(condition, measures[0].name).shape[1]
+        for title, m, block in metrics_of(measures, episodes):
+            phase = "evaluation" if block == "evaluation" else "training"
+            if results.has(condition, phase, m.name):  # published results keep a part
+                values = results.values(condition, m.name, phase)[:, BLOCKS[block]]
+                means = values.mean(axis=1)
+                estimates[title] = rate(values) if m.is_rate else bootstrap(means, bounds=m.bounds)
+            if title == EVALUATED:
                 estimates |= evaluated(results, condition)
         table.append(Summary(condition, len(results.seeds(condition)), estimates))
     followed = []
-    for m in results.measures:
+    for m in measures:
         own = [c for c in conditions if results.has(c, "training", m.name)]
         if own and (m.name == SUCCESS.name or not m.is_rate):
-            followed.append(Followed(m, {c: results.values(c, m.name) for c in own}))
+            followed.append((m, {c: results.values(c, m.name) for c in own}))
     return Analysis(tuple(table), cases=followed)
 
 
@@ -132,8 +110,9 @@ def draw(analysis: Analysis) -> Figures:
     followed = analysis.cases
     width = 3.6 * COLUMNS
     figure, panels = f.grid(len(followed), COLUMNS, (3.6, 2.1), (0.0, 1.2), width, sharex=True)
-    for axes, own in zip(panels.flat, followed, strict=False):
-        _panel(axes, own, [line.condition for line in analysis.table])
+    conditions = [line.condition for line in analysis.table]
+    for axes, (measured, training) in zip(panels.flat, followed, strict=False):
+        _panel(axes, measured, curves_of(measured, training), conditions)
     for axes in panels.flat[len(followed) - panels.shape[1] : len(followed)]:
         f.as_episodes(axes)
     seeds = {line.condition: line.seeds for line in analysis.table}
@@ -146,15 +125,17 @@ def draw(analysis: Analysis) -> Figures:
     return {"learning-curves": figure}
 
 
-def _panel(axes: Axes, followed: Followed, conditions: Sequence[str]) -> None:
+def _panel(
+    axes: Axes, measured: Measure, curves: Mapping[str, Estimate], conditions: Sequence[str]
+) -> None:
     from ...presentation.figures import as_rates, draw_curve
 
-    for condition, curve in followed.curves.items():
+    for condition, curve in curves.items():
         episodes = range(len(curve.value))  # counted from 0, as in rows and specs
         marker = "o" if len(curve.value) == 1 else None
         draw_curve(axes, episodes, curve, conditions.index(condition), marker=marker)
-    axes.set_title(followed.measure.heading, loc="left")
-    if followed.measure.is_rate:
+    axes.set_title(measured.heading, loc="left")
+    if measured.is_rate:
         as_rates(axes)
     else:
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))

@@ -12,7 +12,6 @@ closure; n (n - 1) / 2 in a chain of n agents.
 from __future__ import annotations
 
 import re
-import tracemalloc
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,7 +33,7 @@ from ...trials.trial import Trial, TrialResult
 from ..contact import ContactShares
 from ..study import check_rule_bases
 
-NUMBERS = ("robots", "agents", "messages", "team_bytes", "decision_median", "step_bytes")
+NUMBERS = ("robots", "agents", "messages", "team_bytes", "decision_median")
 """What of whole trials the analysis rests on."""
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
@@ -93,23 +92,10 @@ def measure(trial: Trial) -> TrialResult:
     usage = {
         "decision_median": float(np.median(session.deciding)),
         "decision_99": float(np.quantile(session.deciding, 0.99)),
-        "step_bytes": float(_of_a_step(session)),
     }
     if peak is not None:
         usage["process_bytes"] = float(peak)
     return session.result(numbers, usage)
-
-
-def _of_a_step(session: Session) -> int:
-    """Return the most memory that one decision holds beside what is held already [bytes]."""
-    team = of_fuzzy_agents(session.team)
-    prediction = team.predict(session.scenario)
-    tracemalloc.start()
-    try:
-        team.act(prediction, explore=False)
-        return tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
 
 
 def _forget_peak() -> None:
@@ -173,9 +159,7 @@ def _point(results: Results, condition: str, sizes: Sizes) -> Point:
     costs = {
         "decision [ms]": 1e3 * numbers["decision_median"],
         "learning [ms]": 1e3 * numbers["seconds.learning"] / steps,
-        "world [ms]": 1e3 * (numbers["seconds.physics"] + numbers["seconds.sensors"]) / steps,
         "team [MB]": 1e-6 * numbers["team_bytes"],
-        "step [MB]": 1e-6 * numbers["step_bytes"],
     }
     if "process_bytes" in numbers:
         costs["process [MB]"] = 1e-6 * numbers["process_bytes"]

@@ -63,6 +63,7 @@ def command(source: str, steps: int, changes: tuple[str, ...]) -> int:
 
 def _cases(source: str, changes: tuple[str, ...]) -> Iterator[Case]:
     """Yield what is to be checked, each scenario of a spec once."""
+    from ....core.learners import check_prediction
     from ....core.plugins.sources import active
     from ...errors import SpecError
     from ...spec.spec import Spec
@@ -84,13 +85,13 @@ def _cases(source: str, changes: tuple[str, ...]) -> Iterator[Case]:
     seen: set[Any] = set()
     for condition in Spec.load(Path(source), changes).conditions():
         settings = condition.settings.scenario
+        try:
+            check_prediction(condition.settings.learner, settings.build())
+        except ValueError as error:
+            raise SpecError(str(error)) from None
         if settings not in seen:
             seen.add(settings)
             # Played are the first episode and those in which failures begin.
             failures = getattr(settings, "failures", ())
             episodes = sorted({0, *(failure.episode for failure in failures)})
-            try:
-                settings.build()
-            except ValueError as error:
-                raise SpecError(str(error)) from None
             yield condition.label, settings.build, episodes

@@ -27,27 +27,37 @@ if TYPE_CHECKING:
     is_flag=True,
     help="Small versions of the studies: six minutes on two cores, and wide intervals.",
 )
+@click.option(
+    "--of",
+    default="nested-agents",
+    show_default=True,
+    metavar="PAPER",
+    help="Whose claims: this paper's, or those of action-dependency-graphs (arXiv 2506.00797).",
+)
 @options.jobs
 @options.formats("table", "json", "markdown")
-def command(out: Path | None, quick: bool, jobs: int | None, form: Format) -> int:
-    """Print one table: each claim of the paper, its measure, the result, the verdict.
+def command(out: Path | None, quick: bool, of: str, jobs: int | None, form: Format) -> int:
+    """Print one table: each claim of a paper, its measure, the result, the verdict.
 
     Without --out the table is made from the results that are committed in the repository.
     """
+    from ....core.plugins.messages import closest
     from ...claims import claims
     from ...claims.table import print_claims
     from ...errors import SpecError
     from ...presentation.progress import say
     from ...results import published
 
+    if of not in claims.PAPERS:
+        raise SpecError(f"--of = {of!r}: {closest(of, claims.PAPERS)}")
     if out is not None:
-        results = _run(out, quick=quick, jobs=jobs)
+        results = _run(out, of, quick=quick, jobs=jobs)
     elif quick or jobs is not None:
         raise SpecError(
             f"{'--quick' if quick else '--jobs'}: needs --out, where to run the studies"
         )
     elif claims.PUBLISHED.is_dir():
-        results = published.read(claims.PUBLISHED, claims.STUDIES_OF_CLAIMS)
+        results = published.read(claims.PUBLISHED, claims.studies_of(of))
     else:
         raise SpecError(
             "claims: the committed results are in the repository, in studies/claims/published, "
@@ -56,31 +66,27 @@ def command(out: Path | None, quick: bool, jobs: int | None, form: Format) -> in
     for study, of_study in results.items():
         if of_study.note:
             say(f"{study}: {of_study.note}")
-    print_claims(claims.judge({study: p.results for study, p in results.items()}), form)
+    print_claims(claims.judge({study: p.results for study, p in results.items()}, of), form)
     return 0
 
 
-def _run(out: Path, *, quick: bool, jobs: int | None) -> dict[str, Published]:
+def _run(out: Path, of: str, *, quick: bool, jobs: int | None) -> dict[str, Published]:
     """Run the studies of the claims, or what is left of them; return the results by study."""
-    from ...api.run_study import run_study
+    from ...api.study import run
     from ...claims import claims
     from ...errors import SpecError
     from ...presentation.progress import Terminal
     from ...results import published
-    from ...results.results import read
-    from ...spec.outline import StudyOutline
-    from ...spec.spec import Spec
 
     results = {}
-    for study in claims.STUDIES_OF_CLAIMS:
+    for study in claims.studies_of(of):
         name = study.replace("-", "_")
         folder = claims.QUICK if quick else claims.SPECS / name
-        spec = Spec.load(folder / f"{name}.toml")
-        with run_study(spec, out / study, jobs=jobs, observer=Terminal()) as store:
-            if failed := store.failed():
-                raise SpecError(
-                    f"{out / study}: {len(failed)} trials failed: nested-agents status "
-                    f"{out / study}"
-                )
-            results[study] = published.loads(published.dumps(StudyOutline.kept(store), read(store)))
+        ran = run(folder / f"{name}.toml", out / study, jobs=jobs, observer=Terminal())
+        if ran.failed:
+            raise SpecError(
+                f"{out / study}: {len(ran.failed)} trials failed: nested-agents status "
+                f"{out / study}"
+            )
+        results[study] = published.loads(published.dumps(ran.outline, ran.results))
     return results

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -10,7 +11,7 @@ from .. import options
 
 
 @click.command()
-@click.argument("sources", type=options.PATH, metavar="DIR...|FILE.json", nargs=-1, required=True)
+@options.sources
 @click.option(
     "--by",
     metavar="KEY",
@@ -27,32 +28,49 @@ from .. import options
 @click.option(
     "--reference", metavar="LABEL", help="What the others are compared with; by default the first."
 )
+@click.option(
+    "--statistics",
+    is_flag=True,
+    help="Add interquartile mean and probability of improvement, over the groups of --by as tasks.",
+)
+@options.plot
 @options.where
 @options.form
 @options.trust
 def command(
     sources: tuple[Path, ...],
-    by: str | None,
-    measure: str,
-    phase: str | None,
-    reference: str | None,
+    statistics: bool,
+    plot: Path | None,
     where: str | None,
     form: str,
     trust: bool,
+    **compared: Any,
 ) -> int:
     """Compare conditions of one study or several: effect, interval, p raw and adjusted, power.
 
     DIR is where a study is kept, FILE.json a file of results. Conditions are compared on the seeds
     that both have, on equal worlds.
     """
+    from ...errors import SpecError
     from ..display import print_table
     from ..loading import load_results
 
-    results = load_results(sources, None, where, is_trusted=trust)
-    comparison = results.compare(by, measure, phase=phase, reference=reference)
-    if form == "table":
-        print_table(comparison.table)
-        print("", *comparison.verdicts, sep="\n")
-    else:
-        print(getattr(comparison.table, form), end="")
+    results = load_results(sources, where=where, trust=trust)
+    comparison = results.compare(**compared)
+    if plot is not None:
+        from ...presentation.figures import write
+
+        try:
+            write(comparison.figure(), plot)
+        except ValueError as error:
+            raise SpecError(str(error)) from None
+    tables = [comparison.table, *([comparison.aggregated] if statistics else [])]
+    if form != "table":
+        print(*(getattr(table, form) for table in tables), sep="\n", end="")
+        return 0
+    print_table(tables[0])
+    print("", *comparison.verdicts, sep="\n")
+    if statistics:
+        print()
+        print_table(tables[1], comparison.statistics.notes)
     return 0

@@ -51,13 +51,11 @@ RANGE = re.compile(r"(\d{1,6})(?::(\d{1,6})(?::(\*?)(\d{1,6}))?)?", re.ASCII)
 def command(
     agents: str,
     topology: tuple[str, ...],
-    rules: int,
-    actions: int,
-    iterations: int,
     measured: bool,
     repeats: int | None,
     form: Form,
     plot: Path | None,
+    **quantities: int,
 ) -> int:
     """Print the cost of hierarchies, by formula (Eq. 18-23) and, if asked, measured."""
     from ....core.agents.cost import Problem
@@ -67,7 +65,7 @@ def command(
     from ...presentation.progress import say
 
     try:
-        problem, sizes = Problem(rules, actions, iterations), numbers(agents)
+        problem, sizes = Problem(**quantities), numbers(agents)
         if measured := measured or repeats is not None:
             say("measuring, first compiling what is not: no steps of more than a second or so")
         often = 1 if repeats is None else repeats

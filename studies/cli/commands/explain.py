@@ -40,9 +40,9 @@ def command(directory: Path, condition: str | None, seed: int | None, trust: boo
     folder = team.folder_of(directory, trial, conditions)
     folder.mkdir(parents=True, exist_ok=True)
     written = folder / "explanation.txt"
-    durable.write(written, ("\n".join(text(explanation)).rstrip() + "\n").encode())
+    durable.write(written, text(explanation).encode())
     figures = save(draw(explanation), folder)
-    print("\n".join(text(explanation, MOST_AGENTS)).rstrip() + "\n")
+    print(text(explanation, MOST_AGENTS))
     for path in (written, *figures):
         print(path)
     return 0

@@ -17,10 +17,9 @@ if TYPE_CHECKING:
 @options.directory
 @options.formats(
     "csv",
-    "parquet",
     "json",
-    text="Of the files; parquet needs the extra nested-agents[parquet]. Distances and returns are "
-    "left out of json.",
+    "marl-eval",
+    text="Of the files; distances and returns are left out of json.",
 )
 @click.option(
     "--out",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -28,14 +29,7 @@ from .. import options
 )
 @click.option("--timed/--no-timed", default=True, help="Try two episodes of every condition.")
 @options.changes
-def command(
-    spec: Path,
-    jobs: int | None,
-    deviation: float,
-    smallest: float,
-    timed: bool,
-    changes: tuple[str, ...],
-) -> int:
+def command(spec: Path, changes: tuple[str, ...], **supposed: Any) -> int:
     """Tell trials, time, memory and the differences that a study can find, before it is run.
 
     SPEC.toml says what to run. Two episodes of every condition are tried out.
@@ -43,6 +37,5 @@ def command(
     from ...api.planning import plan
     from ...spec.spec import Spec
 
-    made = Spec.load(spec, changes)
-    print(plan(made, jobs=jobs, deviation=deviation, smallest=smallest, timed=timed))
+    print(plan(Spec.load(spec, changes), **supposed))
     return 0

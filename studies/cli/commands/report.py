@@ -25,6 +25,6 @@ def command(directory: Path, out: Path | None, trust: bool) -> int:
     """
     from ..loading import load_results
 
-    path = load_results([directory], None, None, is_trusted=trust).report(out)
+    path = load_results([directory], trust=trust).report(out)
     print(f"{path}: {path.stat().st_size / 1e6:.1f} MB, nothing outside it is needed")
     return 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -11,17 +12,9 @@ from .. import options
 
 @click.command()
 @options.directory
-@options.jobs
-@options.address
-@options.accept_code
+@options.running
 @options.trust
-def command(
-    directory: Path,
-    jobs: int | None,
-    address: str | None,
-    accept_code: bool,
-    trust: bool,
-) -> int:
+def command(directory: Path, trust: bool, **running: Any) -> int:
     """Run the failed trials of a study again, and whatever is left of it.
 
     DIR is where the study is kept.
@@ -37,8 +30,5 @@ def command(
         trust_files(directory)
     with Store.open(directory) as store:
         spec = spec_of(store)
-    study = run(
-        spec, directory, jobs=jobs, address=address, retry_failed=True,
-        accept_code=accept_code, observer=Terminal(),
-    )  # fmt: skip
+    study = run(spec, directory, retry_failed=True, observer=Terminal(), **running)
     return show_results(study)

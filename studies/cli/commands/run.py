@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -19,21 +20,17 @@ from .. import options
     help="Where to keep the study; made if it does not exist. Every trial is kept the moment it "
     "finishes, so interrupting costs only those that are running.",
 )
-@options.jobs
-@options.address
-@options.accept_code
+@options.running
 @options.trust
 @options.figures
 @options.changes
 def command(
     spec: Path,
     out: Path,
-    jobs: int | None,
-    address: str | None,
-    accept_code: bool,
     trust: bool,
     figures: tuple[str, ...],
     changes: tuple[str, ...],
+    **running: Any,
 ) -> int:
     """Run the study of a spec; the same command again continues it.
 
@@ -59,8 +56,4 @@ def command(
             f"{error}; if you did not edit {spec}, it is damaged: nested-agents retry {out} goes "
             "on by the database"
         ) from None
-    study = run(
-        given, out, jobs=jobs, address=address, accept_code=accept_code,
-        observer=Terminal(),
-    )  # fmt: skip
-    return show_results(study, figures)
+    return show_results(run(given, out, observer=Terminal(), **running), figures)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from typing import Any
 
 import click
 
@@ -10,7 +10,7 @@ from .. import options
 
 
 @click.command()
-@click.argument("sources", type=options.PATH, metavar="DIR...|FILE.json", nargs=-1, required=True)
+@options.sources
 @options.as_study
 @options.where
 @click.option(
@@ -21,14 +21,7 @@ from .. import options
 )
 @options.form
 @options.trust
-def command(
-    sources: tuple[Path, ...],
-    study: str | None,
-    where: str | None,
-    columns: tuple[str, ...],
-    form: str,
-    trust: bool,
-) -> int:
+def command(columns: tuple[str, ...], form: str, **choice: Any) -> int:
     """Print conditions against estimates with their 95 % intervals, as at the end of a run.
 
     DIR is where a study is kept; several are analysed together, as the first one says. FILE.json is
@@ -37,7 +30,7 @@ def command(
     from ..display import print_study
     from ..loading import load_results
 
-    results = load_results(sources, study, where, is_trusted=trust)
+    results = load_results(**choice)
     if form == "table":
         print_study(results, columns)
     else:

@@ -54,13 +54,7 @@ def list_all() -> int:
 @options.formats("table", "json")
 @options.plot
 def show(
-    topology: str,
-    agents: int | None,
-    robots: int | None,
-    per: Agents,
-    actions: int,
-    form: Form,
-    plot: Path | None,
+    topology: str, form: Form, plot: Path | None, per: Agents, actions: int, **sizes: int | None
 ) -> int:
     """Show a topology: edges, order of decision, who sees whom, cost.
 
@@ -73,8 +67,8 @@ def show(
     try:
         views = _of_spec(topology)
         if views is None:
-            views = [view(topology, agents, robots, actions, per)]
-        elif agents or robots or per != "actuator":
+            views = [view(topology, actions=actions, per=per, **sizes)]
+        elif any(sizes.values()) or per != "actuator":
             raise SpecError(f"{topology}: is the spec of a study, which says its own agents")
         for number, shown in enumerate(views, 1):
             if plot is not None:

@@ -37,6 +37,7 @@ TEAMS = {
     "td-lambda, averaged": {"kind": "td-lambda", "step_size": 0.1, "averaging": 5.0},
     "batch-td": {"kind": "batch-td", "ridge": 0.1, "exploration": BURST},
     "batch-td, sigmoid": {"kind": "batch-td", "rule_base": {"membership": "sigmoid"}},
+    "fitted-q": {"kind": "fitted-q", "forgetting": 0.1, "exploration": BURST},
     "sampling": {
         "kind": "batch-td",
         "decision": {

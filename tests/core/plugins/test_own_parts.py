@@ -155,7 +155,7 @@ def test_rewards_that_are_not_predicted_cannot_decide(rule: str, agents, line_wo
     seen = join_agents(scenario, agents)
     team = team_of(BatchTDSettings.model_validate({"decision": {"rule": rule}}), seen)
     seen.reset(0)
-    said = rf"^learner\.decision\.rule = '{rule}': the scenario predicts no rewards, use value$"
+    said = rf"^learner\.decision\.rule = '{rule}': no rewards are predicted, use value$"
     with pytest.raises(ValueError, match=said):
         team.check(seen.predict())
     with pytest.raises(ValueError, match=said):

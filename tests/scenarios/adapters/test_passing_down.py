@@ -62,6 +62,42 @@ class Leaving(ParallelEnv):
         return told, paid, ends, breaks, infos
 
 
+class Climbing(Leaving):
+    """Two agents are paid what the climbing game pays, in each of `plays` steps."""
+
+    payoffs = np.array([[11, -30, 0], [-30, 7, 6], [0, 0, 5]])
+
+    def __init__(self, plays: int) -> None:
+        super().__init__()
+        self.possible_agents, self.plays = ["a", "b"], plays
+        self.chosen = {name: gymnasium.spaces.Discrete(3) for name in self.possible_agents}
+
+    def _told(self) -> Any:
+        return {name: np.zeros(1, dtype=np.float32) for name in self.possible_agents}
+
+    def step(self, actions: Any) -> Any:
+        self.time += 1
+        names, infos = self.possible_agents, {name: {} for name in self.possible_agents}
+        paid = dict.fromkeys(names, float(self.payoffs[actions["a"], actions["b"]]))
+        breaks = dict.fromkeys(names, self.time == self.plays)
+        self.agents = [] if self.time == self.plays else names
+        return self._told(), paid, dict.fromkeys(names, False), breaks, infos
+
+
+def of_joint_steps(env: PassingDownEnv, act: Any) -> Any:
+    """Yield an agent's observation and action with what `last` says that its next turn brought."""
+    begun: dict[str, tuple[Any, int]] = {}
+    for name in env.agent_iter():
+        seen, reward, ended, broken, _ = env.last()
+        if name in begun:
+            yield (name, *begun.pop(name), reward)
+        if ended or broken:
+            env.step(None)
+        else:
+            begun[name] = seen, act(name, seen)
+            env.step(begun[name][1])
+
+
 @pytest.mark.parametrize(
     "make",
     [
@@ -129,6 +165,44 @@ def test_who_has_left_passes_nothing_down() -> None:
     assert env.observe("b").tolist() == [2] + [0] * 6
     env.step(1)
     assert env.last()[:2] == (pytest.approx([2, 0, 0, 0, 1, 0, 0]), 3.0)
+
+
+def test_between_turns_of_a_step_nothing_is_to_be_learned() -> None:
+    env = PassingDownEnv(Climbing(plays=5))
+    env.reset()
+    for first in (0, 1, 2):
+        before = env.observe("a")[:1]
+        env.step(first)
+        # The next turn has no reward, and the value of the same state: the TD error is 0.
+        assert set(env.rewards.values()) == {0.0}
+        assert (env.observe("b")[:1] == before).all()
+        env.step(0)
+        assert env.rewards == dict.fromkeys("ab", Climbing.payoffs[first, 0])
+
+
+def test_one_reward_for_a_joint_step_is_learned_from() -> None:
+    plays, rng = 800, np.random.default_rng(0)
+    env = PassingDownEnv(Climbing(plays))
+    env.reset()
+    values: dict[tuple[str, bytes], Any] = {}
+    rewards: dict[str, list[float]] = {"a": [], "b": []}
+
+    def act(name: str, seen: Any) -> int:
+        row = values.setdefault((name, seen.tobytes()), np.zeros(3))
+        is_random = name == "a" or rng.random() < 0.1
+        return int(rng.integers(3)) if is_random else int(row.argmax())
+
+    for name, seen, action, reward in of_joint_steps(env, act):
+        rewards[name].append(reward)
+        row = values[name, seen.tobytes()]
+        row[action] += 0.1 * (reward - row[action])
+    assert rewards["a"] == rewards["b"]
+    assert len(rewards["a"]) == plays
+    env.reset()
+    best = values["a", env.observe("a").tobytes()].argmax()
+    env.step(int(best))
+    answer = values["b", env.observe("b").tobytes()].argmax()
+    assert Climbing.payoffs[best, answer] == 11
 
 
 @pytest.mark.parametrize(

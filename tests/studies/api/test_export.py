@@ -1,7 +1,6 @@
 import csv
 import os
 import re
-import sys
 from pathlib import Path
 
 import made_up
@@ -62,25 +61,6 @@ def test_csv_holds_every_episode_and_every_trial_with_every_swept_key(study, tmp
     assert len({row["identity"] for row in trials}) == 8
 
 
-def test_parquet_holds_the_same_with_types(study, tmp_path):
-    parquet = pytest.importorskip("pyarrow.parquet")
-    for form in ("csv", "parquet"):
-        assert main(["export", str(study), "--out", str(tmp_path), "--format", form]) == 0
-    for name in ("episodes", "trials"):
-        rows = read(tmp_path / f"{name}.csv")
-        table = parquet.read_table(tmp_path / f"{name}.parquet")
-        assert table.column_names == list(rows[0])
-        for row, item in zip(rows, table.to_pylist(), strict=True):
-            for key, value in item.items():
-                text = "" if value is None else str(int(value) if value in (0, 1) else value)
-                assert text == row[key] or float(text) == float(row[key])
-    types = {field.name: str(field.type) for field in parquet.read_schema(
-        tmp_path / "episodes.parquet")}  # fmt: skip
-    assert types["success"] == "bool"
-    assert types["scenario.action_repeat"] == types["seed"] == "int64"
-    assert types["return"] == "double"
-
-
 def test_the_second_time_only_on_request(study, tmp_path, capsys):
     line = ["export", str(study), "--out", str(tmp_path)]
     assert main(line) == 0
@@ -107,13 +87,6 @@ def test_an_error_leaves_what_was_there(study, tmp_path, monkeypatch):
     monkeypatch.setattr(os, "fsync", full)
     assert main(line) == 2
     assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
-
-
-def test_without_pyarrow_it_is_one_line(study, tmp_path, monkeypatch, capsys):
-    monkeypatch.setitem(sys.modules, "pyarrow", None)
-    assert main(["export", str(study), "--out", str(tmp_path), "--format", "parquet"]) == 2
-    assert "pip install 'nested-agents[parquet]'" in capsys.readouterr().err
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_file_in_the_way_of_the_folder_is_one_line(study, tmp_path, capsys):

@@ -53,11 +53,12 @@ def recordings(directory):
 
 
 @pytest.mark.slow
-def test_workers_keep_the_same_bytes(place, tmp_path):
+@pytest.mark.parametrize("backend", ["loky", "dask"])
+def test_workers_of_all_kinds_keep_the_same_bytes(backend, place, tmp_path):
     trials = trials_of(SPEC)
     with (
         made_up.opened(tmp_path, SPEC, arrangement.check(SPEC)) as store,
-        start_workers(2, None, len(trials)) as workers,
+        start_workers(backend, 2, None, len(trials)) as workers,
     ):
         assert [o.error for o in run_trials(trials, store, run_trial, workers)] == [None] * 6
     assert recordings(tmp_path) == recordings(place)

@@ -102,7 +102,7 @@ def test_a_trial_is_measured_without_being_changed() -> None:
     assert result.numbers["weight_bytes"] == 4 * 47 * 8, "four wheels"
     assert result.numbers["joint_actions"] == pytest.approx(340.0), "4 + 16 + 64 + 256"
     assert 0.0 < result.usage["decision_median"] <= result.usage["decision_99"]
-    assert result.usage["process_bytes"] > result.usage["step_bytes"] > 0
+    assert result.usage["process_bytes"] > 0
 
 
 def test_the_spec_reaches_from_2_to_64_robots() -> None:

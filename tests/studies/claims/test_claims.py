@@ -21,7 +21,7 @@ from made_up_results import (
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
 from nested_agents.studies.catalogue.study import load_study
 from nested_agents.studies.claims import claims
-from nested_agents.studies.claims.claims import CLAIMS, at_least, at_most, judge, within
+from nested_agents.studies.claims.claims import OWN, PAPERS, at_least, at_most, judge, within
 from nested_agents.studies.claims.measures import Measured
 from nested_agents.studies.claims.table import markdown, print_claims
 from nested_agents.studies.cli.main import main
@@ -107,10 +107,26 @@ def verdicts() -> dict[bool, dict[str, str]]:
     }
 
 
-@pytest.mark.parametrize("claim", [c.name for c in CLAIMS if c.name not in COMPUTED])
+@pytest.mark.parametrize("claim", [c.name for c in PAPERS[OWN] if c.name not in COMPUTED])
 def test_every_claim_can_hold_and_can_fail(claim, verdicts) -> None:
     assert verdicts[True][claim] == "holds"
     assert verdicts[False][claim] == "does not hold"
+
+
+@pytest.mark.parametrize(("good", "verdict"), [(True, "holds"), (False, "does not hold")])
+def test_claims_of_another_paper_are_decided_by_its_own_study(good, verdict) -> None:
+    names = ("with fill-in", "own edges", "chain", "none", "wrong edges")
+    shares = (0.98, 0.98, 0.98, 0.3, 0.3) if good else (0.3, 0.02, 0.98, 0.98, 0.9)
+    made = games(dict(zip(names, shares, strict=True))).frames()
+    found = judge({"fit": made}, "action-dependency-graphs")
+    assert [f.claim.name for f in found] == ["sparse", "enough", "fill-in", "edges", "right"]
+    assert {f.verdict for f in found} == {verdict}
+    assert {f.result for f in judge({}, "action-dependency-graphs")} == {"no results"}
+
+
+def test_the_claims_of_a_paper_that_nobody_knows_are_refused(capsys) -> None:
+    assert main(["claims", "--of", "mine"]) == 2
+    assert "--of = 'mine': known: action-dependency-graphs" in capsys.readouterr().err
 
 
 def test_the_costs_that_the_paper_prints_are_computed() -> None:
@@ -162,7 +178,7 @@ def spec_of(study: str, folder: Path | None = None) -> Spec:
 
 
 def test_claims_name_studies_and_conditions_that_their_specs_have() -> None:
-    for study in claims.STUDIES_OF_CLAIMS:
+    for study in claims.studies_of():
         for folder in (None, QUICK):
             spec = spec_of(study, folder)
             assert spec.study == study
@@ -238,7 +254,7 @@ def test_an_installed_package_says_where_the_results_are(tmp_path, capsys, monke
 def test_the_committed_results_make_the_page(capsys) -> None:
     files = list(claims.PUBLISHED.glob("*.json"))
     assert {path.stem for path in files} == {
-        *claims.STUDIES_OF_CLAIMS,
+        *claims.studies_of(),
         "edges-classes",
         "edges-hierarchies",
         "edges-arms",
@@ -263,6 +279,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "from-eight",
         "wide",
         "peers-tuning",
+        "peers-tuning-arm",
         "peers-one-robot",
         "peers-four-robots",
         "peers-100",
@@ -293,7 +310,7 @@ def test_the_table_is_printed_in_every_form(form, capsys, monkeypatch) -> None:
     out = capsys.readouterr().out
     if form == "json":
         records = json.loads(out)
-        assert [record["name"] for record in records] == [claim.name for claim in CLAIMS]
+        assert [record["name"] for record in records] == [claim.name for claim in PAPERS[OWN]]
         assert records[0]["low"] <= records[0]["value"] <= records[0]["high"]
     else:
         assert max(map(len, out.splitlines())) <= 80

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from nested_agents.studies.cli.display import print_table
+import nested_agents as na
+from nested_agents.studies.cli.display import print_table, show_results
 from nested_agents.studies.presentation.tables import tabulate
 from nested_agents.studies.results.statistics import Estimate
 from nested_agents.studies.results.summary import Summary
@@ -37,3 +38,17 @@ def test_columns_without_room_follow_below(monkeypatch, capsys):
         tables[width] = capsys.readouterr().out
     assert tables[40].count("default") > tables[120].count("default") == 1
     assert tables[120].splitlines()[0].split() == " ".join(TITLES).split()
+
+
+def test_what_learns_nothing_is_named(tmp_path, capsys):
+    """Carts never meet in two steps; of controls that is not said."""
+    spec = {
+        "seeds": 2, "episodes": 1, "steps": 2, "evaluation": 1, "scenario": {"kind": "line-up"},
+        "sweep": {"preset": ["default", "frozen", "planner"]},
+    }  # fmt: skip
+    study = na.run(spec, tmp_path, jobs=1, progress=False)
+    assert study.results.success("default", "evaluation").sum() == 0
+    assert study.unlearned == ("default",)
+    assert show_results(study, ["png"]) == 0
+    assert "hint    default: no better than frozen weights" in capsys.readouterr().out
+    assert study.where("condition != 'frozen'").unlearned == ()

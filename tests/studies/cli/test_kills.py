@@ -27,7 +27,7 @@ from nested_agents.studies.claims import claims
 from nested_agents.studies.cli.main import main
 learning_curve.measure = made_up.slow
 run.check = lambda spec: made_up.MEASURES
-claims.STUDIES_OF_CLAIMS = ("learning-curve",)
+claims.studies_of = lambda paper: ("learning-curve",)
 sys.exit(main(sys.argv[1:]))
 """
 

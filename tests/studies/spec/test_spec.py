@@ -505,6 +505,9 @@ def test_an_agent_for_every_actuator_is_no_part_of_an_identity() -> None:
         ({"agents": "wheel"}, "agents = 'wheel': must be 'actuator', 'body' or 'team'"),
         ({"overrides": [{"name": "a", "agents": 3}]}, "overrides[0].agents = 3: must be"),
         ({"sweep": {"agents": ["bodies"]}}, "agents = 'bodies': must be"),
+        ({"topology": "per-robot"}, "a key of its own: agents = 'body', topology = 'chain'"),
+        ({"topology": {"kind": "single-agent"}}, "a key of its own: agents = 'team'"),
+        ({"sweep": {"topology": ["chain", "per-robot"]}}, "a key of its own: agents = 'body'"),
     ],
 )
 def test_who_the_agents_are_is_refused_in_one_line(table, message: str) -> None:
@@ -551,7 +554,7 @@ def test_keys_that_no_learner_of_the_spec_has_are_refused(table) -> None:
         ({"robots": 3}, "did you mean 'scenario.robots'?"),
         ({"joints": 3, "scenario": {"kind": "kinematic-chain"}}, "mean 'scenario.joints' or"),
         ({"sweep": {"robots": [2, 3]}}, "did you mean 'scenario.robots'?"),
-        ({"scenario": {"ridge": 3.0}}, "did you mean 'learner.ridge'?"),
+        ({"scenario": {"ridge": 3.0}}, "did you mean 'learner.ridge' or"),
         ({"preset": "paper", "trace_decay": 0.3}, "did you mean 'learner.trace_decay'?"),
     ],
 )

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import made_up
 import pytest
-from distributed import LocalCluster
 
 from nested_agents.studies.api import run_study as studies_run
 from nested_agents.studies.catalogue import learning_curve
@@ -22,7 +21,6 @@ from nested_agents.studies.trials.keeping import pending
 from nested_agents.studies.workers import dask as dask_workers
 from nested_agents.studies.workers.dask import DaskWorkers
 from nested_agents.studies.workers.runner import ATTEMPTS, run_trials, save
-from nested_agents.studies.workers.worker import ONE_THREAD
 
 DASK = Path(sys.executable).with_name("dask")
 pytestmark = pytest.mark.slow
@@ -107,15 +105,8 @@ def test_a_worker_killed_in_a_cluster_costs_its_running_trial_only(cluster, tmp_
     assert sum(runs.values()) <= len(trials) + 1  # what it was running
 
 
-def test_a_trial_that_kills_every_worker(tmp_path, expected):
-    with (
-        LocalCluster(
-            2, threads_per_worker=1, env=ONE_THREAD, dashboard_address=None,
-            scheduler_kwargs={"allowed_failures": 0},
-        ) as cluster,
-        DaskWorkers.at(cluster.scheduler_address, None) as workers,
-        written(tmp_path) as (store, trials),
-    ):  # fmt: skip
+def test_a_local_cluster_and_a_trial_that_kills_every_worker(tmp_path, expected):
+    with DaskWorkers.local(2) as workers, written(tmp_path) as (store, trials):
         assert workers.processes == 2
         outcomes = list(run_trials(trials, store, made_up.deadly, workers))
         assert len(outcomes) == len(trials)
@@ -131,7 +122,7 @@ def test_a_trial_that_kills_every_worker(tmp_path, expected):
 def run(tmp_path, *arguments):
     spec = tmp_path / "spec.toml"
     spec.write_text(dumps(made_up.SPEC.table()))
-    line = ["run", str(spec), "--out", str(tmp_path / "out"), *arguments]
+    line = ["run", str(spec), "--out", str(tmp_path / "out"), "--backend", "dask", *arguments]
     return main(line)
 
 
@@ -166,7 +157,7 @@ def test_no_scheduler_there_is_one_line(tmp_path, monkeypatch, capsys, address):
 def test_dask_not_installed_is_one_line(tmp_path, monkeypatch, capsys):
     monkeypatch.delitem(sys.modules, "nested_agents.studies.workers.dask")
     monkeypatch.setitem(sys.modules, "distributed", None)
-    assert run(tmp_path, "--address", "tcp://127.0.0.1:9") == 2
+    assert run(tmp_path) == 2
     err = capsys.readouterr().err
     assert "distributed is not installed; pip install 'nested-agents[dask]'" in err
 

@@ -9,6 +9,7 @@ import made_up
 import pytest
 from joblib.externals.loky import get_reusable_executor
 
+from nested_agents.studies.errors import SpecError
 from nested_agents.studies.trials.keeping import pending
 from nested_agents.studies.workers.loky import LokyWorkers
 from nested_agents.studies.workers.runner import ATTEMPTS, run_trials
@@ -149,5 +150,11 @@ def test_whoever_stops_waits_for_no_trial():
 
 @pytest.mark.parametrize(("jobs", "trials", "expected"), [(512, 3, 3), (1, 3, 1), (2, 0, 1)])
 def test_no_more_workers_than_trials(jobs, trials, expected):
-    with start_workers(jobs, None, trials) as workers:
+    with start_workers("loky", jobs, None, trials) as workers:
         assert workers.processes == expected
+
+
+def test_an_unknown_backend_is_refused() -> None:
+    refused = pytest.raises(SpecError, match="backend = 'ray': known: dask, loky")
+    with refused, start_workers("ray", 1, None, 1):  # type: ignore[arg-type]
+        pass

@@ -51,6 +51,8 @@ class Quits(LineUp):
         self.when = settings.when
         if self.when == "begin":
             sys.exit(0)
+        if self.when == "error":
+            raise TypeError("no speeds")
 
     def step(self, joint_action):
         sys.exit(0)
@@ -84,10 +86,19 @@ def test_a_scenario_that_quits_fails_its_trials_and_no_others(tmp_path, capsys) 
         assert store.counts() == {"done": 2, "failed": 2}
 
 
-def test_a_scenario_that_quits_when_it_is_built_is_refused_in_one_line(tmp_path, capsys) -> None:
-    assert main(["run", spec(tmp_path, "begin"), "--out", str(tmp_path / "study")]) == 2
+@pytest.mark.parametrize(
+    ("when", "raised"),
+    [
+        ("begin", "raises SystemExit: 0 in line 15 of"),
+        ("error", "raises TypeError: no speeds in line 17 of"),
+    ],
+)
+def test_a_scenario_that_cannot_be_built_is_refused_in_one_line(
+    tmp_path, capsys, when: str, raised: str
+) -> None:
+    assert main(["run", spec(tmp_path, when), "--out", str(tmp_path / "study")]) == 2
     error = capsys.readouterr().err
-    assert "raises SystemExit: 0" in error
+    assert raised in error
     assert error.count("\n") == 1
     assert not (tmp_path / "study").exists()
 

@@ -1,0 +1,137 @@
+"""Bodies that are driven: who drives which variables, and where that leads, compiled.
+
+How much a driver moves what is a function of the present state of its body: a sum over the active
+rules of a rule base. It moves the variables of its own body and those of all others::
+
+    x_b(t + 1) = keep * x_b(t) + sum_k d_bk W_k phi(x_b(t)) + sum_(j != b, k) d_jk V_k phi(x_j(t))
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+
+from ..interface.scenario import Scenario, groups_of, roles_of
+from ..numerics.arrays import FloatArray
+from ..numerics.compiling import njit
+from ..rules.kernels.compact import active_compact
+from ..rules.kernels.fuzzy import Partition
+from ..rules.kernels.layout import Packed
+from ..rules.rule_base import RuleBase
+
+
+class Bodies:
+    """Which variables there are to predict, by body, and who drives them.
+
+    Bodies alike, in the roles of their agents, have the shared variables of their group each.
+    Unlike ones count as one body, which has those of all groups, the common ones once.
+
+    Parameters
+    ----------
+    scenario
+        Whose bodies they are.
+    products
+        Pairs of which variables rules are over, see `LearnedPredictorSettings`.
+    memberships
+        Membership functions per variable; none: the state space's own centres.
+
+    Attributes
+    ----------
+    members
+        ``(b, w)`` the agents of each body.
+    agents, columns
+        ``(b, v)`` each variable of a body is this column of this agent's state.
+    places
+        ``(2, G, s)`` each shared variable of a group is of this body this variable.
+    common
+        ``(v,)`` whether a variable is the same for all of several bodies.
+    rules
+        The rule base over the variables of a body: single ones, and pairs of one group's.
+    """
+
+    def __init__(self, scenario: Scenario, *, products: str, memberships: int | None) -> None:
+        space, groups, roles = scenario.state_space, groups_of(scenario), roles_of(scenario)
+        common = {j for j, v in enumerate(space.variables) if v.name in space.common}
+        columns = range(space.n_own, space.n_variables)
+        alike = len({tuple(roles[i] for i in group) for group in groups}) == 1
+        # Variables are pairs of a group and a column.
+        shared = [
+            [(0 if j in common and not alike else g, j) for j in columns]
+            for g in range(len(groups))
+        ]
+        once = list(dict.fromkeys(variable for own in shared for variable in own))
+        owned = shared if alike else [once]
+        place = {variable: (b, v) for b, own in enumerate(owned) for v, variable in enumerate(own)}
+        self.members = np.array(groups if alike else [range(len(roles))])
+        self.agents = np.array([[groups[g][0] for g, _ in own] for own in owned])
+        self.columns = np.array([[j for _, j in own] for own in owned])
+        self.places = np.moveaxis(np.array([[place[v] for v in own] for own in shared]), -1, 0)
+        first = owned[0]
+        self.common = np.array([len(owned) > 1 and j in common for _, j in first])
+        terms: list[tuple[int, ...]] = [(v,) for v in range(len(first))]
+        if products != "none":
+            every = products == "all" or len(groups) == 1
+            pairs = combinations(
+                (v for v, (_, j) in enumerate(first) if every or j not in common), 2
+            )
+            terms += [(v, u) for v, u in pairs if first[v][0] == first[u][0]]
+        parts = [Partition.of(space.variables[j], count=memberships) for _, j in first]
+        self.rules = RuleBase(parts, terms)
+
+
+@njit(cache=True)
+def driven_states(  # type: ignore[no-untyped-def]
+    present, drivers: FloatArray, weights: FloatArray, keep: FloatArray, ranges: FloatArray,
+    periods: FloatArray, horizon: int, packed: Packed,
+) -> FloatArray:  # fmt: skip
+    """Return the states ``(m, b, v)`` of bodies some decisions ahead, the drivers being held.
+
+    Parameters
+    ----------
+    present
+        ``(b, v)`` where they begin.
+    drivers
+        ``(m, b, k)`` of every joint action and body.
+    weights
+        ``(k, n_rules, 2 v)`` by driver, W of the body's own variables, then V of the others'.
+    keep
+        ``(v,)`` 1 for variables whose change is regressed, 0 for those whose value is.
+    ranges, periods
+        ``(2, v)`` what variables cannot leave; ``(v,)`` their periods, 0 where there is none.
+    horizon
+        Decisions ahead.
+    packed
+        Layout of the rule base.
+    """
+    (m, b, k), v = drivers.shape, present.shape[1]
+    states, moved = np.empty((m * b, v)), np.empty((b, 2 * v))
+    for c in range(m):
+        states[c * b : (c + 1) * b] = present
+    for _ in range(horizon):
+        rules, strengths = active_compact(states, packed)
+        for c in range(m):
+            moved[:] = 0.0
+            for i in range(b):
+                at = c * b + i
+                for j in range(k):
+                    driver = drivers[c, i, j]
+                    if driver == 0.0:
+                        continue
+                    for a in range(rules.shape[1]):
+                        share, effect = driver * strengths[at, a], weights[j, rules[at, a]]
+                        for x in range(2 * v):
+                            moved[i, x] += share * effect[x]
+            for x in range(v):
+                others = 0.0
+                for i in range(b):
+                    others += moved[i, v + x]
+                for i in range(b):
+                    value = keep[x] * states[c * b + i, x]
+                    value += moved[i, x] + (others - moved[i, v + x])
+                    if periods[x] > 0.0:
+                        value -= periods[x] * np.floor((value - ranges[0, x]) / periods[x])
+                    else:
+                        value = min(max(value, ranges[0, x]), ranges[1, x])
+                    states[c * b + i, x] = value
+    return states.reshape(m, b, v)

@@ -1,0 +1,78 @@
+"""What a learned predictor makes of one situation, at once for many joint actions."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..interface.prediction import Blocks, first_alike
+from ..numerics.arrays import FloatArray, IntArray
+
+
+class LearnedPrediction:
+    """Predicts from one situation; see `Prediction`.
+
+    Parameters
+    ----------
+    predictor
+        What has been learned, a `LearnedPredictor`.
+    present
+        ``(n, d)`` the states of all agents.
+
+    Attributes
+    ----------
+    alike
+        ``(G, L)`` the first robot-action index that comes to the same, of groups of equal size.
+    """
+
+    def __init__(self, predictor: Any, present: FloatArray) -> None:
+        self._predictor, self._present = predictor, present
+        self._reached = predictor.reached(present)
+        self._last: tuple[bytes, tuple[FloatArray, FloatArray]] | None = None
+        n, a, _ = self._reached.shape
+        same = (self._reached[:, :, None] == self._reached[:, None]).all(axis=3)
+        self._level = same.argmax(axis=2) if predictor.own_rules else np.tile(np.arange(a), (n, 1))
+        if predictor.digits.size:
+            groups, digits = np.array(predictor.groups), predictor.digits
+            places = a ** np.arange(digits.shape[1])[::-1]
+            keys = self._level[groups[:, None], digits[None]] @ places
+            self.alike = first_alike(keys)
+
+    def states_by_group(self, joint_actions: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Return own variables ``(n, m, n_own)`` and shared ones ``(G, m, d - n_own)``."""
+        key = joint_actions.tobytes()
+        if self._last is None or self._last[0] != key:
+            own = self._reached[np.arange(joint_actions.shape[1]), joint_actions]
+            drivers = self._predictor.drivers(own, joint_actions)
+            shared = self._predictor.after(self._present, drivers)
+            self._last = key, (np.ascontiguousarray(own.swapaxes(0, 1)), shared)
+        return self._last[1]
+
+    def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
+        """Return the next states ``(m, d)`` of `agent` for joint actions ``(m, n)``."""
+        own, shared = self.states_by_group(joint_actions)
+        return np.concatenate([own[agent], shared[self._predictor.group_of[agent]]], axis=1)
+
+
+class TabulatedPrediction(LearnedPrediction):
+    """The same of few agents, with tables of all their joint actions."""
+
+    @cached_property
+    def _table(self) -> tuple[FloatArray, IntArray]:
+        """Shared variables ``(G, rows, s)``, and the row of every joint-action index."""
+        p = self._predictor
+        same = self.alike[np.arange(len(p.groups)), p.local] @ p.divisors
+        first, row = np.unique(same, return_index=True, return_inverse=True)[1:]
+        return self.states_by_group(p.joint[first])[1], row
+
+    def blocks(self, agent: int) -> Blocks:
+        """Return the next states of `agent` for all joint actions."""
+        p, (shared, row) = self._predictor, self._table
+        g = p.group_of[agent]
+        own_rows = self._level[agent][p.digits[:, p.groups[g].index(agent)]]
+        own = self._reached[agent]
+        if not own.shape[1]:
+            own, own_rows = own[:1], own_rows[:0]
+        return Blocks(own, shared[g], int(p.divisors[g]), own_rows, row)

@@ -1,0 +1,171 @@
+"""State variables of a foreign environment: numbers of what its players observe."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cache, partial
+from typing import Any, cast
+
+import numpy as np
+from gymnasium.spaces import Box, Dict, Discrete, MultiBinary, MultiDiscrete
+from gymnasium.spaces.utils import flatten, flatten_space
+
+from ...core.interface.spaces import Variable
+from ...core.numerics.arrays import FloatArray
+from .settings import AdaptedSettings, Direction
+
+MOST_BOUND = 1e6
+"""A bound of a space beyond it is none."""
+MOST_CENTRES = 32
+"""Values of a discrete observation that each have a membership function of their own, at most."""
+
+
+def bounds_of(player: str, space: Any) -> FloatArray:
+    """Return the bounds ``(2, k)`` of the numbers that a player observes, infinite where none are.
+
+    Raises
+    ------
+    ValueError
+        If these are images or no numbers; one line.
+    """
+    of = f"observations of {player}" if player else "observations"
+    if isinstance(space, Discrete):
+        return np.array([[space.start], [space.start + space.n - 1]], dtype=np.float64)
+    for part in space.values() if isinstance(space, Dict) else [space]:
+        if not isinstance(part, Box | Discrete | MultiDiscrete | MultiBinary):
+            raise ValueError(f"{of}: {part}, allowed: a fixed number of numbers")
+        if isinstance(part, Box) and len(part.shape) > 1 and part.dtype == np.uint8:
+            raise ValueError(
+                f"{of}: images of shape {part.shape}, allowed: numbers; many environments have "
+                "another id or option whose observations are states"
+            )
+    flat = cast(Box, flatten_space(space))
+    ends = np.array([flat.low, flat.high], dtype=np.float64)
+    return np.where(np.abs(ends) > MOST_BOUND, np.copysign(np.inf, ends), ends)
+
+
+class Perception:
+    """What the agents of a foreign environment perceive.
+
+    Parameters
+    ----------
+    settings
+        Which numbers are state variables, and their ranges.
+    spaces
+        Of the players' observations.
+    bodies
+        The player of every body.
+    met
+        Returns the least and greatest numbers ``(2, k)`` of random episodes, given what makes them
+        of observations.
+
+    Attributes
+    ----------
+    variables
+        The state variables.
+    common
+        Names of those that are the same for all.
+
+    Raises
+    ------
+    ValueError
+        If the settings name what is not there, or a range is not known; one line.
+    """
+
+    def __init__(
+        self,
+        settings: AdaptedSettings,
+        spaces: Mapping[str, Any],
+        bodies: Sequence[str],
+        met: Callable[[Any], FloatArray],
+    ) -> None:
+        self._spaces, self._angles = spaces, settings.angles
+        self._players = [list(spaces).index(player) for player in bodies]
+        every = [bounds_of(player, space) for player, space in spaces.items()]
+        self._bounds = min(every, key=len)
+        self._count = min(bounds.shape[1] for bounds in every)
+        if not settings.variables and any(bounds.shape[1] > self._count for bounds in every):
+            raise ValueError(
+                "scenario.variables: players observe differently many numbers, say which to take"
+            )
+        chosen: dict[str, Any] = {**settings.variables, **settings.angles}
+        # Where variables are in what bodies observe: one row, of angles cosine and sine two.
+        places = {name: self._find(name, entries) for name, entries in chosen.items()}
+        if not settings.variables:
+            used = {int(i) for rows in places.values() for i in rows.ravel()}
+            left = [i for i in range(self._count) if i not in used]
+            places = {f"o{i}": np.full((1, len(bodies)), i) for i in left} | places
+        named = [("ranges", name) for name in settings.ranges]
+        named += [("success", name) for name in settings.success if name != "return"]
+        for key, name in named:
+            if name not in places:
+                known = ", ".join(places)
+                raise ValueError(f"scenario.{key}.{name}: no state variable, known: {known}")
+        self.variables = tuple(self._described(settings, places, cache(partial(met, self.numbers))))
+        if not self.variables:
+            raise ValueError("observations: none of their numbers changes in random episodes")
+        kept = [places[variable.name] for variable in self.variables]
+        self._first = np.stack([rows[0] for rows in kept], axis=1)
+        self._last = np.stack([rows[-1] for rows in kept], axis=1)
+        self._is_pair = np.array([len(rows) == 2 for rows in kept])
+        self._is_angle = np.array([variable.periodic for variable in self.variables])
+        is_common = (self._first == self._first[0]) & (self._last == self._last[0])
+        self.common = tuple(
+            variable.name
+            for variable, same in zip(self.variables, is_common.all(axis=0), strict=True)
+            if same and len(spaces) == 1
+        )
+
+    def _find(self, name: str, entries: Any) -> Any:
+        """Return where a variable is: ``(1, bodies)``, ``(2, bodies)`` of cosine and sine."""
+        if isinstance(entries, Direction):
+            return np.concatenate([self._find(name, entries.cos), self._find(name, entries.sin)])
+        n = len(self._players)
+        places = entries if isinstance(entries, tuple) else (entries,) * n
+        if len(places) != n or max(places) >= self._count:
+            raise ValueError(
+                f"scenario: variable {name!r} = {entries}: must be a number of the observation, 0 "
+                f"to {self._count - 1}, or a list of one for each of {n} bodies"
+            )
+        return np.array([places], dtype=np.int64)
+
+    def _described(
+        self, settings: AdaptedSettings, places: Mapping[str, Any], met: Callable[[], FloatArray]
+    ) -> Iterator[Variable]:
+        """Yield the variables; of all that there are, those that change."""
+        is_discrete = isinstance(next(iter(self._spaces.values())), Discrete)
+        for name, rows in places.items():
+            if name in self._angles:
+                yield Variable(name, "rad", -np.pi, np.pi, periodic=True)
+                continue
+            bounds = self._bounds[:, : self._count]
+            if name not in settings.ranges and not np.isfinite(bounds[:, rows]).all():
+                bounds = met()
+            given = bounds[0, rows].min(), bounds[1, rows].max()
+            low, high = map(float, settings.ranges.get(name, given))
+            if low < high:
+                values = np.arange(low, high + 1.0).tolist() if is_discrete else []
+                centres = tuple(values) if len(values) <= MOST_CENTRES else ()
+                yield Variable(name, "1", low, high, centres=centres)
+            elif settings.variables:
+                raise ValueError(
+                    f"scenario.variables.{name}: the environment gives it no bounds, and in "
+                    f"random episodes it is always {low:g}; give scenario.ranges.{name}"
+                )
+
+    def numbers(self, observations: Mapping[str, Any]) -> FloatArray:
+        """Return the numbers ``(players, k)`` of what players observe."""
+        rows: list[Any] = []
+        for player, space in self._spaces.items():
+            seen = observations[player]
+            rows.append([seen] if isinstance(space, Discrete) else flatten(space, seen))
+        return np.array([row[: self._count] for row in rows], dtype=np.float64)
+
+    def states(self, observations: Mapping[str, Any]) -> FloatArray:
+        """Return the states ``(bodies, d)`` of every body."""
+        numbers = self.numbers(observations)[self._players]
+        bodies = np.arange(len(numbers))[:, None]
+        states: FloatArray = numbers[bodies, self._first]
+        turned = np.where(self._is_pair, np.arctan2(numbers[bodies, self._last], states), states)
+        wrapped = (turned + np.pi) % (2.0 * np.pi) - np.pi
+        return np.where(self._is_angle, np.where(self._is_pair, turned, wrapped), states)

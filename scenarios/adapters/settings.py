@@ -1,0 +1,117 @@
+"""Settings of worlds of Gymnasium and PettingZoo: what their agents do, perceive and look ahead to.
+
+Reading them needs no simulator; it is imported when a world is built.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import AfterValidator, Field
+
+from ...core.plugins.settings import ScenarioSettings, Settings
+
+
+class FrozenTable(dict[str, Any]):
+    """A table that nobody changes, so that settings which hold it can be compared and hashed."""
+
+    def __hash__(self) -> int:  # type: ignore[override]
+        return hash(json.dumps(self, sort_keys=True, default=repr))
+
+
+Range = Annotated[tuple[float, float], AfterValidator(lambda ends: _ordered(ends))]
+Index = Annotated[int, Field(ge=0)]
+Entries = Index | Annotated[tuple[Index, ...], Field(min_length=1)]
+"""Which number of an observation, counted from 0: one for all bodies, or one for each body."""
+
+
+def _ordered(ends: tuple[float, float]) -> tuple[float, float]:
+    if ends[0] >= ends[1]:
+        raise ValueError("must be a range, the lower end first")
+    return ends
+
+
+class Direction(Settings):
+    """An angle that an observation tells by its cosine and sine."""
+
+    cos: Entries
+    """Where the cosine is."""
+    sin: Entries
+    """Where the sine is."""
+
+    def __hash__(self) -> int:
+        return hash((self.cos, self.sin))
+
+
+class AdaptedSettings(ScenarioSettings):
+    """What the worlds of Gymnasium and PettingZoo have in common."""
+
+    id: str = ""
+    """Which environment."""
+    options: Annotated[dict[str, Any], AfterValidator(FrozenTable)] = FrozenTable()
+    """What the environment is made with, by name."""
+    actions: Annotated[int, Field(ge=2, le=99)] = 5
+    """Levels, evenly spaced over its range, of each dimension of a continuous action; each is an
+    agent. Discrete actions stay as they are; of agents with fewer than others the last are the
+    first again."""
+    neutral: Index | None = None
+    """The action that an agent is taken to do where nothing is known of it; none: the level nearest
+    to 0, of discrete actions the first."""
+    hold: Annotated[int, Field(ge=1)] = 1
+    """Steps of the environment for which a decision is held; their rewards are added."""
+    predictor: Literal["none", "copy"] = "none"
+    """What predicts: nothing, or copies of the simulator, which are stepped for every joint action
+    that is tried. A copy knows the simulator exactly, its random numbers too."""
+    horizon: Annotated[int, Field(ge=1)] = 1
+    """Decisions that copies look ahead, the joint action being held; the reward predicted is the
+    mean of theirs."""
+    variables: Annotated[dict[str, Entries], AfterValidator(FrozenTable)] = FrozenTable()
+    """State variables by name: which number of the observation each is, one for all bodies or a
+    list of one for each. None: all that `angles` leaves and that change, called o0, o1 and so
+    on."""
+    angles: Annotated[dict[str, Entries | Direction], AfterValidator(FrozenTable)] = FrozenTable()
+    """State variables that are angles [rad], whose ends are the same point: where the observation
+    has them, or their ``cos`` and ``sin``."""
+    ranges: Annotated[dict[str, Range], AfterValidator(FrozenTable)] = FrozenTable()
+    """Ranges of state variables; of others they are those of the environment, and where it has
+    none, what random episodes meet."""
+    rewards: Literal["joint", "own"] = "joint"
+    """Whether all agents receive the mean reward, or those of each body its own."""
+    success: Annotated[dict[str, float | Range], AfterValidator(FrozenTable)] = FrozenTable()
+    """When an episode is a success: the least ``return``, and ranges of state variables in which
+    all agents are at the end. None: never."""
+
+    def warnings(self) -> tuple[str, ...]:
+        """Return that nothing is a success, if it is so."""
+        nothing = "scenario.success: nothing is said to be one, compare total_reward"
+        return () if self.success else (nothing,)
+
+    def scenario_defaults(self, preset: str) -> Mapping[str, Any]:
+        """Return that few joint actions are tried, where each is played by a copy."""
+        is_slow = self.predictor == "copy" and preset in ("default", "own-value", "frozen")
+        return {"learner": {"decision": {"evaluator": "best-response"}}} if is_slow else {}
+
+
+class GymnasiumSettings(AdaptedSettings):
+    """An environment of Gymnasium, each dimension of its action an agent."""
+
+    kind: Literal["gymnasium"] = "gymnasium"
+    id: str
+    """As ``gymnasium.make`` takes it: ``Pendulum-v1``, or ``module:name``."""
+    groups: tuple[tuple[Index, ...], ...] = ()
+    """Numbers of the agents of every body, from 0 on, in order; none: each is its own body."""
+
+    factory: ClassVar[str] = f"{__package__}.adapted:gymnasium_world"
+
+
+class PettingZooSettings(AdaptedSettings):
+    """An environment of PettingZoo, each of whose agents is a body."""
+
+    kind: Literal["pettingzoo"] = "pettingzoo"
+    id: str
+    """Its module, such as ``mpe2/simple_spread_v3``; it has ``parallel_env``, or an ``env`` whose
+    agents act in cycles."""
+
+    factory: ClassVar[str] = f"{__package__}.adapted:pettingzoo_world"

@@ -1,0 +1,91 @@
+"""The fit study: where edges matter, and which ones.
+
+Overrides are edges of one game, by name: the game's own ones, these with fill-in, as many wrong
+ones, all of a chain, those of a star, none. Sweeps vary the game. All edges of one game meet the
+same worlds, seed by seed: in games whose payoffs follow from the seed, the same payoffs.
+
+One measure was fixed beforehand: evaluation success. Of a game that is the share of evaluated plays
+that are optimal: if one play is evaluated, that of seeds that reach the optimum. In each game all
+edges are compared with none, as in the study `hierarchies`.
+"""
+
+from __future__ import annotations
+
+from ....core.interface.scenario import groups_of
+from ...errors import SpecError
+from ...results.analysis import Analysis, Figures
+from ...results.results import Results
+from ...results.sizes import Sizes
+from ...results.statistics import exactly, rate
+from ...results.summary import EVALUATED
+from ...spec.labels import label
+from ...spec.spec import Spec
+from ...trials.session import Session
+from ...trials.trial import Trial, TrialResult
+from ..hierarchies import HierarchyCase, analysis_of
+from ..study import check_evaluated
+
+PUBLISHED = ("success",)
+"""Measures of an episode that published results keep."""
+REFERENCE = "none"
+"""The edges that all others are compared with."""
+COLUMNS = 4
+"""Panels of the figure that stand beside each other, at most."""
+
+
+def check(spec: Spec) -> None:
+    """Raise `SpecError` unless trained teams are evaluated, and one has no edges."""
+    check_evaluated(spec)
+    if REFERENCE not in (override.name for override in spec.overrides):
+        raise SpecError(f'overrides: fit compares with name = "{REFERENCE}", there is none')
+
+
+def measure(trial: Trial) -> TrialResult:
+    """Train and evaluate; imported by name in workers."""
+    session = Session(trial)
+    session.train(trial.episodes)
+    session.evaluate()
+    hierarchy = trial.settings.arrange(session.world)[1]
+    bodies = float(len(groups_of(session.world)))
+    return session.result({"robots": bodies, "messages": float(hierarchy.messages)})
+
+
+def analyse(results: Results) -> Analysis:
+    """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
+    sizes, cases = Sizes.of(results, results.of_phase("evaluation")), []
+    if not sizes.keys:  # games of several sizes are told apart by other columns
+        sizes = Sizes(dict.fromkeys(sizes.counts, 1))
+    for condition, agents in sizes.counts.items():
+        columns = results.columns.get(condition, {"name": condition})
+        game = {k: v for k, v in columns.items() if k not in ("name", *sizes.keys) and v != ""}
+        messages = results.numbers(condition)["messages"][0]
+        success = rate(results.success(condition, "evaluation"))
+        values = {EVALUATED: success, "messages": exactly(messages)}
+        edges, of_game = str(columns.get("name", "")), label(game) if game else ""
+        cases.append(HierarchyCase(condition, edges, of_game, agents, sizes, values))
+    return analysis_of(results, cases, REFERENCE)
+
+
+def draw(analysis: Analysis) -> Figures:
+    """Return the figure: success by edges, a panel for each game."""
+    from ...presentation import figures as f  # matplotlib takes its time
+
+    cases = analysis.cases
+    games = list(dict.fromkeys(case.setting for case in cases))
+    edges = list(dict.fromkeys(case.hierarchy for case in cases))
+    each = 1.7, 0.6 + 0.22 * len(edges)
+    figure, panels = f.grid(len(games), COLUMNS, each, (1.2, 0.6), sharex=True, sharey=True)
+    for axes, game in zip(panels.flat, games, strict=False):
+        axes.set_title(game, loc="left")
+        for case in (case for case in cases if case.setting == game):
+            look = f.look(edges.index(case.hierarchy))
+            row, success = edges.index(case.hierarchy), case.values[EVALUATED]
+            f.draw_row(axes, row, success, look["color"], f.marker(row))
+        f.as_rates(axes, "x")
+        axes.grid(axis="x", alpha=0.25)
+    f.name_rows(panels[0, 0], edges)
+    figure.supxlabel(f"{EVALUATED}, bars: 95 % intervals", fontsize=9)
+    return {"fit": figure}
+
+
+__all__ = ["analyse", "check", "draw", "measure"]

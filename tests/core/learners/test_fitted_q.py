@@ -1,0 +1,208 @@
+"""Fitted Q against ridge regression written out in NumPy, and what it makes of a hierarchy."""
+
+import numpy as np
+import pytest
+
+from nested_agents.core.agents.messages import LostMessages
+from nested_agents.core.agents.team import Team
+from nested_agents.core.decision.settings import Decision
+from nested_agents.core.evaluators.evaluator import Deliberation
+from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
+from nested_agents.core.learners.batch import REWARD_SCALE
+from nested_agents.core.learners.fitted_q import FittedQ, FittedQSettings
+from nested_agents.core.rules.rule_base import RuleBase
+from nested_agents.core.rules.settings import RuleBaseSettings
+from nested_agents.scenarios.matrix_games.team_games import TeamGameSettings
+
+SPACE = StateSpace("gap", (Variable("gap", "m", 0.0, 1.0, centres=(0.0, 0.5, 1.0)),))
+TWO = ActionSet(("left", "right"), (0.0, 0.0), (0.0, 0.0), neutral=0)
+
+
+def made(n_told: int = 1, **keys: object) -> tuple[FittedQ, RuleBase]:
+    settings = FittedQSettings(**{"ridge": 0.5, "discount": 0.9, **keys})
+    _, rules = settings.rules_over(SPACE, TWO, n_told)
+    return settings.build(rules, np.array([0, 1])), rules
+
+
+def feed(
+    learner: FittedQ, lefts: np.ndarray, acts: np.ndarray, paid: np.ndarray, end: bool
+) -> None:
+    learner.begin_episode()
+    for t, (left, joint_action) in enumerate(zip(lefts, acts, strict=True)):
+        last = end and t == len(acts) - 1
+        learner.observe(left, float(paid[t]), last, left=left, joint_action=joint_action)
+    learner.end_episode()
+
+
+def by_hand(rules: RuleBase, settings: FittedQSettings, episodes: list[tuple]) -> np.ndarray:
+    """Weights of both agents: for each action a weighted ridge regression on one-step targets."""
+    theta = np.zeros((2, rules.n_rules))
+    for k in range(1, len(episodes) + 1):
+        paid = REWARD_SCALE * np.concatenate([episode[2] for episode in episodes[:k]])
+        low, high = paid.min() / (1 - settings.discount), paid.max() / (1 - settings.discount)
+        for i in range(2):
+            w = REWARD_SCALE * theta[i]
+            for _ in range(settings.regression_iterations):
+                phis, targets, weights = [], [], []
+                for e, (lefts, acts, rewards, end) in enumerate(episodes[:k]):
+                    for t, reward in enumerate(REWARD_SCALE * rewards):
+                        if t == len(rewards) - 1 and not end:
+                            continue  # what follows is not known
+                        phis.append(rules.features(np.append(lefts[t, i], acts[t, i])[None])[0])
+                        if t == len(rewards) - 1:
+                            target = reward / (1 - settings.discount)
+                        else:
+                            following = [np.append(lefts[t + 1, i], action) for action in (0, 1)]
+                            ahead = rules.features(np.array(following)) @ w
+                            target = reward + settings.discount * ahead.max()
+                        targets.append(np.clip(target, low, high))
+                        weights.append((1 - settings.forgetting) ** (k - 1 - e))
+                phi, weight = np.array(phis), np.array(weights)
+                gram = phi.T @ (weight[:, None] * phi) + settings.ridge * np.eye(rules.n_rules)
+                w = np.linalg.solve(gram, phi.T @ (weight * np.array(targets)))
+            step = w / REWARD_SCALE - theta[i]
+            theta[i] += settings.target_averaging_rate * step
+    return theta
+
+
+@pytest.mark.parametrize("keys", [{}, {"forgetting": 0.3, "target_averaging_rate": 0.5}])
+def test_weights_are_those_of_a_ridge_regression_for_each_action(keys: dict) -> None:
+    rng, (learner, rules) = np.random.default_rng(0), made(regression_iterations=3, **keys)
+    episodes = []
+    for length, end in ((6, True), (1, False), (5, False)):
+        gaps, told = rng.random((length, 2, 1)), rng.integers(0, 3, (length, 2, 1)).astype(float)
+        acts, paid = rng.integers(0, 2, (length, 2)), 0.01 * rng.normal(size=length)
+        episodes.append((np.concatenate([gaps, told], axis=2), acts, paid, end))
+    for episode in episodes:
+        feed(learner, *episode)
+    np.testing.assert_allclose(learner.theta, by_hand(rules, learner.settings, episodes), atol=1e-9)
+
+
+def test_an_interval_within_an_episode_changes_nothing_of_the_sums() -> None:
+    rng = np.random.default_rng(1)
+    lefts, acts = rng.random((9, 2, 2)), rng.integers(0, 2, (9, 2))
+    once, often = made()[0], made(interval=2)[0]
+    for learner in (once, often):
+        feed(learner, lefts, acts, np.arange(9) / 100, True)
+    np.testing.assert_allclose(once.arrays()["gram"], often.arrays()["gram"], atol=1e-12)
+
+
+def test_values_are_a_column_of_weights_for_each_action() -> None:
+    learner, _ = made()
+    # gap at 0, 0.5, 1; told left, right, nobody; for each left, right.
+    learner.theta[1] = [1, 2, 3, 4, 5, 6, 10, 20, 30, 40, 50, 60]
+    present = np.array([[0.0, 0.0], [0.75, 1.0]])
+    nothing = np.zeros((2, 2))
+    known = Deliberation(
+        1, np.array([1, 0]), None, list(learner.theta), nothing, np.random.default_rng(0),
+        present=present,
+    )  # fmt: skip
+    assert learner.values(known).tolist() == [0.5 * (3 + 5) + 30, 0.5 * (4 + 6) + 40]
+    assert (learner.counts.joint_actions, learner.counts.rule_evaluations) == (2, 12)
+
+
+def test_what_is_told_keeps_a_function_for_every_action_whatever_memberships_says() -> None:
+    settings = FittedQSettings(rule_base=RuleBaseSettings(memberships=4, order=2))
+    space, rules = settings.rules_over(SPACE, TWO, 2)
+    assert [v.name for v in space.variables] == ["gap", "told1", "told2", "action"]
+    assert [p.size for p in rules.partitions] == [4, 3, 3, 2]
+    assert rules.terms == ((0, 1, 3), (0, 2, 3), (1, 2, 3))
+
+
+def team(hierarchy: Hierarchy, *failures: LostMessages, **keys: object) -> Team:
+    game = TeamGameSettings(players=3, shape="line", seed=0).build()
+    return Team(FittedQSettings(**keys), game, hierarchy, np.random.SeedSequence(1), failures)
+
+
+def told_in(team: Team, decisions: int = 20) -> tuple[np.ndarray, np.ndarray]:
+    """What every agent was told ``(T, 3, k)``, and what all did ``(T, 3)``."""
+    told, did = [], []
+    team.begin_world(0, 0)
+    team.begin_episode()
+    for _ in range(decisions):
+        team.predict(None, np.zeros((3, 1)))
+        did.append(team.act(None))
+        told.append(team._left[:, 1:].copy())
+    return np.array(told), np.array(did)
+
+
+def chain(**keys: object) -> Hierarchy:
+    names = ("agent1", "agent2", "agent3")
+    return Hierarchy(names, [names[:2], names[1:]], **keys)
+
+
+def test_an_agent_sees_what_its_parents_decided_and_nothing_else() -> None:
+    told, did = told_in(team(chain(told="parents")))
+    assert told.shape == (20, 3, 1)
+    assert (told[:, 0] == 3).all(), "of nobody"
+    np.testing.assert_array_equal(told[:, 1:, 0], did[:, :2])
+
+
+def test_an_agent_sees_what_its_ancestors_decided_in_the_order_of_decision() -> None:
+    names = ("agent1", "agent2", "agent3")
+    told, did = told_in(team(Hierarchy(names, [("agent3", "agent1"), ("agent1", "agent2")])))
+    np.testing.assert_array_equal(told[:, 1], did[:, [2, 0]])
+    np.testing.assert_array_equal(told[:, 0, 0], did[:, 2])
+    assert told_in(team(chain(told="none")))[0].shape == (20, 3, 0)
+
+
+@pytest.mark.parametrize("unseen", ["maintain", "last"])
+def test_a_lost_message_is_read_as_the_decision_says(unseen: str) -> None:
+    lost = LostMessages(agents="agent1")
+    decision = Decision(unseen=unseen)
+    told, did = told_in(team(chain(told="parents"), lost, decision=decision))
+    before = np.append(0, did[:-1, 0])  # at first it is taken to have maintained
+    np.testing.assert_array_equal(told[:, 1, 0], before if unseen == "last" else 0 * before)
+    np.testing.assert_array_equal(told[:, 2, 0], did[:, 1])
+
+
+def test_who_is_told_learns_a_best_reply_and_who_is_not_does_not() -> None:
+    game = TeamGameSettings(game="permutation", players=2).build()
+    reached = []
+    for edges in ([("agent1", "agent2")], []):
+        shared = FittedQSettings(discount=0.0, weights="role", forgetting=0.2)
+        both = Team(shared, game, Hierarchy(game.agents, edges), np.random.SeedSequence(2))
+        for episode in range(10):
+            states = game.reset(episode)
+            both.begin_episode()
+            for _ in range(20):
+                both.predict(game, states)
+                both.act(None)
+                both.learn(game.step(both._last))
+            both.end_episode()
+        plays = [both.act(None, explore=False) for _ in range(20)]
+        reached.append(np.mean([a != b for a, b in plays]))
+    assert reached[0] == 1.0
+    assert reached[1] < 1.0
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        ({"decision": Decision(value_of="team")}, "learner.decision.value_of = 'team': fitted-q"),
+        ({"decision": Decision(evaluator="exact")}, "learner.decision.evaluator = 'exact'"),
+        ({"decision": Decision(rule="reward")}, "allowed: rule = value or random"),
+        ({"decision": Decision(unseen="plan")}, "unseen = maintain or last"),
+        ({"self_model": {"enabled": True}}, "learner.self_model"),
+    ],
+)
+def test_what_takes_a_prediction_is_refused(keys: dict, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        FittedQSettings(**keys).rules_over(SPACE, TWO, 0)
+
+
+def test_neighbours_are_refused_as_they_tell_nothing() -> None:
+    names = ("agent1", "agent2", "agent3")
+    with pytest.raises(ValueError, match=r"set topology\.oriented"):
+        team(Hierarchy(names, [], [names[:2]]))
+
+
+def test_a_team_goes_on_with_all_it_has_learned_unless_others_tell_it_something() -> None:
+    former, later = team(chain()), team(chain())
+    told_in(former)
+    former.learner.theta[:] = 1.0
+    later.continue_from(former, np.arange(3))
+    assert (later.learner.theta == 1.0).all()
+    with pytest.raises(ValueError, match="told by 1 fewer others than when it learned"):
+        team(chain(told="parents")).continue_from(former, np.arange(3))
