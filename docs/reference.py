@@ -13,6 +13,7 @@ import click
 import nested_agents
 from nested_agents.core.interface.measures import Measure
 from nested_agents.scenarios import SCENARIOS
+from nested_agents.scenarios.adapters.adapted import AdaptedWorld
 from nested_agents.scenarios.box_pushing.states.variables import STATE_VARIABLES
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
@@ -199,17 +200,17 @@ def columns() -> Iterator[str]:
         yield from table(headings, ((code(n) if "*" not in n else n, u, m) for n, u, m in rows))
     yield "## Measures of the scenarios\n"
     yield "A scenario declares its own measures ([](../extending.md#a-scenario)). These are those"
-    yield "of the built-in scenarios; those of environments of others depend on these.\n"
+    yield "of the built-in scenarios.\n"
+    adapted = "gymnasium", "pettingzoo"  # alike, and built only of an environment
     for kind in SCENARIOS.built_in:
-        if any(field.is_required() for field in SCENARIOS.model(kind).model_fields.values()):
-            continue
         yield f"### `{kind}`\n"
+        declared = AdaptedWorld if kind in adapted else SCENARIOS.parsed(kind).build()
         yield from table(
             ("column", "heading", "unit", "of the steps of an episode", "better", "bounds"),
             (
                 (code(m.name), m.title, m.unit, "yes (1) or no (0)" if m.is_rate else m.gathering,
                  m.better or "", bounds(m))
-                for m in SCENARIOS.parsed(kind).build().measures
+                for m in declared.measures
             ),
         )  # fmt: skip
 

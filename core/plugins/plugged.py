@@ -14,6 +14,7 @@ from typing import Any, Literal, cast
 from pydantic import create_model
 from pydantic_core import PydanticCustomError, core_schema
 
+from . import sources
 from .registry import Registry
 from .settings import Settings, tuples
 
@@ -105,13 +106,20 @@ class SettingsRegistry(Registry):
             def build(settings: Settings, *given: Any) -> Any:
                 given = (settings, *given) if has_own else given
                 named = {field: getattr(settings, field) for field in fields}
+                if not isinstance(thing, type):  # a function says it itself
+                    return thing(*given, **named)
                 try:
-                    if isinstance(thing, type):  # a function says it itself
-                        signature(thing).bind(*given, **named)
+                    signature(thing).bind(*given, **named)
                 except TypeError as error:
                     lacks = "" if has_own else "; it has no nested class Settings"
                     raise ValueError(f"{self.kind} {name!r}: {error}{lacks}") from None
-                return thing(*given, **named)
+                try:
+                    return thing(*given, **named)
+                except (ValueError, OSError):  # its own words
+                    raise
+                except Exception as error:
+                    raised = f"{sources.format_error(error)}{sources.place(error)}"
+                    raise ValueError(f"{self.kind} {name!r} raises {raised}") from error
 
             model.build = build  # type: ignore[attr-defined]
         return cast(type[Settings], model)

@@ -14,6 +14,7 @@ import ast
 import hashlib
 import linecache
 import sys
+import traceback
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -317,6 +318,13 @@ def format_error(error: BaseException) -> str:
     'ValueError: two lines'
     """
     return f"{type(error).__name__}: {message(error)}"
+
+
+def place(error: BaseException) -> str:
+    """Return the last line in files of the user's that an exception came through, or nothing."""
+    frames = [(frame.f_globals, line) for frame, line in traceback.walk_tb(error.__traceback__)]
+    places = [(g["__source_name__"], line) for g, line in frames if "__source_name__" in g]
+    return f" in line {places[-1][1]} of {places[-1][0]}" if places else ""
 
 
 def message(error: BaseException) -> str:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from .comparison import Difference
+from .statistics import Estimate
 from .summary import Summary
 
 if TYPE_CHECKING:
@@ -14,6 +15,17 @@ if TYPE_CHECKING:
 
 Figures: TypeAlias = "dict[str, Figure]"
 """The figures of an analysis by name."""
+
+
+class Case(NamedTuple):
+    """One condition of a study of systems, as its figure has it."""
+
+    system: str
+    """Name of its override: what learns and decides."""
+    setting: Any
+    """What else it differs in: the number of robots, the game, the exploration."""
+    values: Mapping[Any, Estimate]
+    """Its estimates, by title or by number of plays."""
 
 
 @dataclass(frozen=True)

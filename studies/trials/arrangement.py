@@ -20,7 +20,7 @@ from ...core.interface.measures import Measure, measures_of
 from ...core.interface.scenario import Scenario, lacking
 from ...core.learners import LearnerSettings, TeamSettings, check_prediction
 from ...core.numerics.arrays import IntArray
-from ...core.plugins.sources import format_error
+from ...core.plugins.sources import format_error, place
 from ..errors import SpecError
 from ..spec.conditions import Condition, ConditionSettings
 from ..spec.curriculum import Stage
@@ -171,10 +171,12 @@ def check(spec: Spec, chosen: Container[str] | None = None) -> tuple[Measure, ..
                     _check_saved(condition.settings)
             except ValueError as error:
                 raise SpecError(f"{error}{where}") from None
-            except (KeyboardInterrupt, Exception):
+            except KeyboardInterrupt:
                 raise
             except BaseException as error:
-                problem = f"the scenario or topology raises {format_error(error)}"
+                if isinstance(error, Exception) and not place(error):
+                    raise  # no code of the user's
+                problem = f"the scenario or topology raises {format_error(error)}{place(error)}"
                 raise SpecError(f"{problem}{where}") from None
     return joined(measures, conditions[0].columns)
 

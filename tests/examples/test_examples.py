@@ -5,7 +5,6 @@ from pathlib import Path
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
-import numpy as np
 import pytest
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -32,17 +31,6 @@ def test_ppo(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 def test_fault_recovery_is_read() -> None:
     path = EXAMPLES / "fault_recovery.py"
     compile(path.read_text(encoding="utf-8"), str(path), "exec")
-
-
-def test_a_task_of_gymnasium_is_predicted_to_the_letter() -> None:
-    module = runpy.run_path(str(EXAMPLES / "pendulum.py"))
-    pendulum = module["Pendulum"]()
-    pendulum.reset(7)
-    for action in (0, 4, 2, 1, 3):
-        joint = np.array([[action]])
-        predicted = pendulum.predict().states(0, joint)[0]
-        entered = pendulum.step(joint[0]).states[0]
-        assert predicted == pytest.approx(entered, abs=1e-12)
 
 
 def test_picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

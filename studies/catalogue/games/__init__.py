@@ -9,14 +9,13 @@ random numbers as they were.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from string import ascii_uppercase
 from textwrap import wrap
 
-from ...results.analysis import Analysis, Figures
+from ...results.analysis import Analysis, Case, Figures
 from ...results.results import Results
-from ...results.statistics import Estimate, rate
+from ...results.statistics import rate
 from ...results.summary import Summary, two_figures
 from ...results.verdicts import WIDTH
 from ...store.schema import EVALUATION
@@ -50,18 +49,6 @@ def measure(trial: Trial) -> TrialResult:
     return session.result()
 
 
-@dataclass(frozen=True)
-class GameCase:
-    """One condition."""
-
-    system: str
-    """Name of its override: what learns and decides."""
-    setting: tuple[str, ...]
-    """What it is compared in: the game, the exploration."""
-    optimal: Mapping[int, Estimate]
-    """By number of plays, the probability of the optimal joint action."""
-
-
 def analyse(results: Results) -> Analysis:
     """Estimate; 95 % Wilson intervals, seeds as the unit of sampling."""
     cases, table = [], []
@@ -73,7 +60,7 @@ def analyse(results: Results) -> Analysis:
         if results.has(condition, AFTER_ONE) and steps.shape[1] > 1:
             optimal[int(steps[0, 0])] = rate(results.success(condition, AFTER_ONE))
         optimal[int(steps[0].sum())] = rate(results.success(condition, "evaluation"))
-        cases.append(GameCase(str(columns.get("name", condition)), setting, optimal))
+        cases.append(Case(str(columns.get("name", condition)), setting, optimal))
         estimates = {titled(plays): estimate for plays, estimate in optimal.items()}
         table.append(Summary(condition, len(steps), estimates))
     return Analysis(tuple(table), tuple(_side_by_side(cases)), cases)
@@ -88,18 +75,18 @@ def titled(plays: int) -> str:
     return f"optimal, {plays:,} plays"
 
 
-def _side_by_side(cases: Sequence[GameCase]) -> Iterator[str]:
+def _side_by_side(cases: Sequence[Case]) -> Iterator[str]:
     """Yield the systems as columns, the settings as rows, for each number of plays."""
     systems = list(dict.fromkeys(case.system for case in cases))
     settings = list(dict.fromkeys(case.setting for case in cases))
     letters = dict(zip(systems, ascii_uppercase, strict=False))
     if len(letters) < 2 or len(letters) < len(systems):
         return
-    by_place = {(case.setting, case.system): case.optimal for case in cases}
+    by_place = {(case.setting, case.system): case.values for case in cases}
     widest = max(len(", ".join(setting)) for setting in settings)
     legend = "; ".join(f"{letter} {system}" for system, letter in letters.items())
     yield from ("", *wrap(legend, WIDTH))
-    for plays in dict.fromkeys(plays for case in cases for plays in case.optimal):
+    for plays in dict.fromkeys(plays for case in cases for plays in case.values):
         yield f"\nProbability of the optimal joint action after {plays:,} plays"
         yield " " * widest + "".join(f"{letter:>4}" for letter in letters.values())
         for setting in settings:
@@ -121,7 +108,7 @@ def draw(analysis: Analysis) -> Figures:
     systems = list(dict.fromkeys(case.system for case in cases))
     games = list(dict.fromkeys(case.setting[:1] for case in cases))
     rests = list(dict.fromkeys(case.setting[1:] for case in cases))
-    plays = sorted({count for case in cases for count in case.optimal})
+    plays = sorted({count for case in cases for count in case.values})
     looks = [(rest, count) for rest in rests for count in plays]
     each = 2.3, 0.5 + 0.24 * len(systems)
     figure, panels = f.grid(len(games), COLUMNS, each, (1.8, 0.9), sharex=True, sharey=True)
@@ -134,7 +121,7 @@ def draw(analysis: Analysis) -> Figures:
         axes.set_title(", ".join(game), loc="left")
         for case in (case for case in cases if case.setting[:1] == game):
             rest = case.setting[1:]
-            for count, estimate in case.optimal.items():
+            for count, estimate in case.values.items():
                 beside = looks.index((rest, count)) - (len(looks) - 1) / 2
                 row = systems.index(case.system) + APART * beside
                 own, marker = colours(rest, count), f.marker(rests.index(rest))

@@ -16,15 +16,14 @@ it succeeds when evaluated, and after how many decisions; and of a decision of a
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ....core.agents.team import of_fuzzy_agents
-from ...results.analysis import Analysis, Figures
+from ...results.analysis import Analysis, Case, Figures
 from ...results.results import Results
-from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap
+from ...results.statistics import NOT_NEGATIVE, bootstrap
 from ...results.summary import EVALUATED, Summary, evaluated
 from ...spec.spec import Spec
 from ...trials.session import Session
@@ -87,18 +86,6 @@ def measure(trial: Trial) -> TrialResult:
     return session.result(numbers, {"decision_median": float(np.median(session.deciding))})
 
 
-@dataclass(frozen=True)
-class RelatedCase:
-    """One condition."""
-
-    system: str
-    """Name of its override: how agents coordinate."""
-    world: str
-    """What else it differs in, such as the number of robots."""
-    values: Mapping[str, Estimate]
-    """Estimates by title, see `analyse`."""
-
-
 def analyse(results: Results) -> Analysis:
     """Estimate; 95 % intervals, seeds as the unit of sampling."""
     table, cases = [], []
@@ -113,7 +100,7 @@ def analyse(results: Results) -> Analysis:
         values = evaluated(results, condition)
         values |= {title: bootstrap(cost, bounds=NOT_NEGATIVE) for title, cost in costs.items()}
         columns = results.columns.get(condition, {})
-        cases.append(RelatedCase(str(columns.get("name", condition)), _world(columns), values))
+        cases.append(Case(str(columns.get("name", condition)), _world(columns), values))
         table.append(Summary(condition, len(steps), values))
     return Analysis(tuple(table), NOTES, cases)
 
@@ -139,12 +126,12 @@ def draw(analysis: Analysis) -> Figures:
 
     cases = analysis.cases
     systems = list(dict.fromkeys(case.system for case in cases))
-    worlds = list(dict.fromkeys(case.world for case in cases))
+    worlds = list(dict.fromkeys(case.setting for case in cases))
     size = (2.2 + 2.0 * len(PANELS), 1.1 + 0.26 * len(systems))
     figure, (panels,) = f.panels(1, len(PANELS), size, sharey=True)
     for axes, (name, title) in zip(panels, PANELS.items(), strict=True):
         for case in cases:
-            which = worlds.index(case.world)
+            which = worlds.index(case.setting)
             colour = f.look(which)["color"]
             row = systems.index(case.system) + APART * (which - (len(worlds) - 1) / 2)
             f.draw_row(axes, row, case.values[name], colour, markersize=3)

@@ -280,6 +280,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "from-eight",
         "wide",
         "peers-tuning",
+        "peers-tuning-arm",
         "peers-one-robot",
         "peers-four-robots",
         "peers-100",
