@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 from rich.console import Console
 from rich.progress import track
 
@@ -29,6 +30,7 @@ from ..trials.session import Session
 from ..trials.trial import Trial
 from . import rules as explain_rules
 from .body import Bodies
+from .predictor import errors_of
 from .rules import Parts
 
 
@@ -53,6 +55,8 @@ class Explanation:
     why there is none."""
     bodies: Bodies | None
     """What bodies believed their actuators to do; none: they have no self-model."""
+    errors: pd.DataFrame | None
+    """By how much predictions are wrong, see `errors_of`; none: the team has not learned them."""
 
 
 def explain(store: Store, trial: Trial) -> Explanation:
@@ -76,6 +80,7 @@ def explain(store: Store, trial: Trial) -> Explanation:
             parts=tuple(taken[row] for row in team.rows),
             policy=_policy(trial, team, scenario),
             bodies=bodies,
+            errors=errors_of(team, scenario, trial.seed),
         )
 
 

@@ -47,6 +47,7 @@ def text(explained: Explanation, agents: int | None = None) -> str:
         more=len(explained.agents) - len(names),
         verdicts=list(explain_body.verdicts(bodies, explained.actuators)) if bodies else (),
         effects=explain_body.table(bodies, explained.actuators) if bodies else "",
+        errors="" if explained.errors is None else explained.errors.to_string(float_format="%.3g"),
     )
     # Tables of pandas fill the last column with spaces.
     return "\n".join(line.rstrip() for line in rendered.splitlines()).rstrip() + "\n"

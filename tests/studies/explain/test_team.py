@@ -33,6 +33,10 @@ SPEC = Spec.of(
             {"name": "order 1"},
             {"name": "a pair", "learner": {"rule_base": {"products": [["gap", "side"]]}}},
             {"name": "random", "learner": {"kind": "frozen", "decision": {"rule": "random"}}},
+            {
+                "name": "learned",
+                "learner": {"self_model": {"enabled": False}, "predictor": {"kind": "learned"}},
+            },
             {"name": "unfinished", "learner": {"kind": "frozen"}},
         ],
     }
@@ -44,7 +48,7 @@ def study(tmp_path_factory):
     """Finished are all conditions but the last."""
     directory = tmp_path_factory.mktemp("study") / "out"
     with made_up.opened(directory, SPEC, MEASURES) as store:
-        for trial in trials_of(SPEC)[:3]:
+        for trial in trials_of(SPEC)[:4]:
             save(store, trial, run_trial(trial), 1.0)
     return directory
 
@@ -82,6 +86,20 @@ def test_several_variables_together_and_nothing_learned(study, capsys):
     assert status == 0
     assert "the agents have learned nothing" in said.out
     assert "Not drawn: actions are drawn at random." in said.out
+
+
+@pytest.mark.slow
+def test_errors_of_a_learned_predictor_stand_beside_persistence(study, capsys):
+    status, said = run(capsys, study, "--condition", "learned")
+    assert status == 0
+    lines = said.out.splitlines()
+    at = lines.index("PREDICTOR")
+    head = next(line for line in lines[at:] if "learned  " in line)
+    assert head.split() == ["learned", "as", "it", "is", "given"]
+    rows = {line.split()[0]: line.split()[1:] for line in lines[lines.index(head) + 1 :] if line}
+    # Within three short episodes it has been learned what an action does to the own wheel.
+    assert float(rows["wheel_speed"][0]) < float(rows["wheel_speed"][1])
+    assert len(rows["box_bearing"]) == 3
 
 
 @pytest.mark.parametrize(

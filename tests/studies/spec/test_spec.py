@@ -554,7 +554,7 @@ def test_keys_that_no_learner_of_the_spec_has_are_refused(table) -> None:
         ({"robots": 3}, "did you mean 'scenario.robots'?"),
         ({"joints": 3, "scenario": {"kind": "kinematic-chain"}}, "mean 'scenario.joints' or"),
         ({"sweep": {"robots": [2, 3]}}, "did you mean 'scenario.robots'?"),
-        ({"scenario": {"ridge": 3.0}}, "did you mean 'learner.ridge'?"),
+        ({"scenario": {"ridge": 3.0}}, "did you mean 'learner.ridge' or"),
         ({"preset": "paper", "trace_decay": 0.3}, "did you mean 'learner.trace_decay'?"),
     ],
 )
