@@ -245,7 +245,8 @@ def kills_of_others(number: int, rng: random.Random, folder: Path) -> Counter[st
         halves = {path for path, data in _written(place).items() if expected.get(path) != data}
         # What is there whole before the kill is not written over: that is refused.
         is_whole = expected and _written(place) == expected
-        status = 0 if is_whole else _wait(_child(command))
+        overwrite = ["--overwrite"] if name == "export" and _written(place) else []
+        status = 0 if is_whole else _wait(_child([*command, *overwrite]))
         is_equal = adversary.content(place / "study") == adversary.expected
         if halves or status or not is_equal or _written(place) != expected:
             print(f"{name}: {halves}, status {status}, study equal {is_equal}", file=sys.stderr)

@@ -59,6 +59,9 @@ class FittedQSettings(LearnerSettings):
     forgetting: Annotated[float, Field(ge=0, lt=1)] = 0.0
     """Share of its weight that experience loses from regression to regression: what it was worth to
     act so depends on what the others did then."""
+    mirrored: bool = False
+    """Whether what the mirror image of the team would have met is experience as well; of agents
+    that are told nothing."""
     exploration: Annotated[ExplorationSettings, Plugged(EXPLORATIONS)] = BurstExploration(
         rate=1.0, decay=0.85, floor=0.05, length=1.0
     )
@@ -69,6 +72,10 @@ class FittedQSettings(LearnerSettings):
     ) -> tuple[StateSpace, RuleBase]:
         """Return what values are functions of, the own action last, and their rule base."""
         self._check_decision()
+        if self.mirrored and n_told:
+            raise ValueError(
+                "learner.mirrored = true: messages have no mirror image; set topology.told = 'none'"
+            )
         told = [choice(f"told{k + 1}", (*actions.names, NOBODY)) for k in range(n_told)]
         names = tuple(variable.name for variable in told)
         known = StateSpace(

@@ -27,7 +27,7 @@ from .inputs import Inputs, RewardScale
 from .networks import Layers, drawing_from, prepare, weights_of
 from .passing import Passing
 from .peer import Peer, Seen
-from .settings import MultiAgentPPOSettings, PolicyGradientSettings
+from .settings import MultiAgentPPOSettings, PolicyGradientSettings, PPOSettings
 from .split_policy import SplitPolicy
 
 
@@ -114,31 +114,91 @@ class ActorCritic:
         buffer.reset()
 
 
-class PolicyGradient(Peer):
-    """What central and decentral forms of PPO share: acting by noisy logits, keeping, updating.
+class HierarchyPPO(Peer):
+    """One policy for every agent, on its own state and the actions that it is told.
 
     Parameters
     ----------
+    settings
+        Of PPO, whose weights are whose, and what the critic sees.
     scenario
         Where they act.
     seed
         Source of everything random in them.
-    value_of
-        Whether the reward of a step is that of each agent, or its mean for all.
+    hierarchy
+        Who is told by whom; None: nobody is.
 
     Attributes
     ----------
     parts
         By name, policies that share no weights.
+
+    Raises
+    ------
+    ValueError
+        If some agents are neighbours; one line.
     """
 
     is_sampled = True
 
-    def __init__(self, scenario: Scenario, seed: np.random.SeedSequence, value_of: str) -> None:
+    def __init__(
+        self,
+        settings: MultiAgentPPOSettings | PPOSettings,
+        scenario: Scenario,
+        seed: np.random.SeedSequence,
+        hierarchy: Hierarchy | None = None,
+    ) -> None:
         super().__init__(seed)
-        self.shape = len(scenario.agents), len(scenario.action_set)
-        self.value_of = value_of
-        self.parts: dict[str, ActorCritic] = {}
+        self.settings, self.inputs = settings, Inputs(scenario, numbered=settings.numbered)
+        self.shape = n, n_actions = len(scenario.agents), len(scenario.action_set)
+        hierarchy = hierarchy or Hierarchy(scenario.agents, [])
+        if hierarchy.neighbours:
+            raise ValueError(
+                f"learner.kind = {settings.kind!r}: neighbours decide at the same time and tell "
+                "each other nothing, use a topology without them"
+            )
+        owners = {"all": ("all",) * n, "role": roles_of(scenario), "own": scenario.agents}
+        names, rows = np.unique(owners[settings.weights], return_inverse=True)
+        self.passing = Passing(hierarchy, n_actions, rows)
+        self._n_joint = self.inputs.n_joint if settings.critic == "central" else 0
+        self.parts = {
+            str(name): self.part_of(np.flatnonzero(rows == row)) for row, name in enumerate(names)
+        }
+        self._actors = [part.actor for part in self.parts.values()]
+
+    def part_of(self, agents: IntArray) -> ActorCritic:
+        """Return the policy and critic of agents that share weights."""
+        widths = self.passing.width, self.inputs.n_own, self._n_joint
+        return ActorCritic(self.settings, agents, Discrete(self.shape[1]), widths, self.rng)
+
+    def of_actors(self, states: FloatArray) -> FloatArray:
+        """Return inputs of actors ``(rows, k)``: nothing is told yet, and each agent's state."""
+        own = self.inputs.each(states).astype(np.float32)
+        return np.hstack([np.zeros((len(own), self.passing.width), dtype=np.float32), own])
+
+    def with_critics(self, seen: FloatArray, states: FloatArray) -> FloatArray:
+        """Return inputs of actors, and after them all states if critics see these."""
+        if not self._n_joint:
+            return seen
+        joint = np.tile(self.inputs.joint(states).astype(np.float32), (len(seen), 1))
+        return np.hstack([seen, joint])
+
+    def decide(
+        self, states: FloatArray, noise: FloatArray
+    ) -> tuple[FloatArray, FloatArray, IntArray]:
+        """Return the inputs of actors, logits ``(n, A)``, and the greatest with noise ``(n,)``.
+
+        Agents decide from the top down; what is decided is written into what others see.
+        """
+        seen = self.of_actors(states)
+        logits, joint = np.empty(self.shape, np.float32), np.empty(self.shape[0], np.int64)
+        for turn in self.passing.turns:
+            agents = turn.agents
+            own = self._actors[turn.weights](seen[agents]).reshape(-1, self.shape[1])
+            logits[agents] = own
+            joint[agents] = (own + noise[agents]).argmax(axis=1)
+            self.passing.tell(turn, joint, seen)
+        return seen, logits, joint
 
     def act(self, prediction: Seen, *, explore: bool = True) -> IntArray:
         """Return a joint action ``(n,)``: drawn from the policies, or the most probable."""
@@ -154,7 +214,8 @@ class PolicyGradient(Peer):
         chosen = logits[np.arange(len(joint)), joint] - logsumexp(logits, axis=1)
         actions, logs = joint.reshape(len(seen), -1), chosen.reshape(len(seen), -1).sum(axis=1)
         reward = np.asarray(transition.reward, dtype=float)
-        reward = np.broadcast_to(reward.mean() if self.value_of == "team" else reward, len(seen))
+        is_joint = self.settings.value_of == "team"
+        reward = np.broadcast_to(reward.mean() if is_joint else reward, len(seen))
         seen = self.with_critics(seen, states)
         for part in self.parts.values():
             part.learn(seen, actions, logs, reward)
@@ -172,128 +233,17 @@ class PolicyGradient(Peer):
         weights = {name: weights_of(part.model.policy) for name, part in self.parts.items()}
         return {f"{name}.{key}": w for name, own in weights.items() for key, w in own.items()}
 
-    def of_actors(self, states: FloatArray) -> FloatArray:
-        """Return the inputs of actors ``(rows, k)`` before anything is decided."""
-        raise NotImplementedError
 
-    def with_critics(self, seen: FloatArray, states: FloatArray) -> FloatArray:
-        """Return inputs of actors ``(rows, k)``, and after them what critics see beside."""
-        return seen
+class CentralPPO(HierarchyPPO):
+    """One policy that sees all states, once, and acts for all agents."""
 
-    def decide(
-        self, states: FloatArray, noise: FloatArray
-    ) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Return the inputs of actors, logits ``(n, A)``, and the greatest with noise ``(n,)``."""
-        raise NotImplementedError
-
-
-class CentralPPO(PolicyGradient):
-    """One policy that sees all states and acts for all agents.
-
-    Parameters
-    ----------
-    settings
-        Of PPO.
-    scenario
-        Where it acts.
-    seed
-        Source of everything random in it.
-    """
-
-    def __init__(
-        self, settings: PolicyGradientSettings, scenario: Scenario, seed: np.random.SeedSequence
-    ) -> None:
-        super().__init__(scenario, seed, "team")
-        self.inputs = Inputs(scenario)
+    def part_of(self, agents: IntArray) -> ActorCritic:
+        """Return the policy and critic of all."""
         n, n_actions = self.shape
         actions = Discrete(n_actions) if n == 1 else MultiDiscrete([n_actions] * n)
         widths = 0, self.inputs.n_joint, 0
-        self.parts = {"all": ActorCritic(settings, np.arange(1), actions, widths, self.rng)}
+        return ActorCritic(self.settings, np.arange(1), actions, widths, self.rng)
 
     def of_actors(self, states: FloatArray) -> FloatArray:
-        """Return all states, once."""
+        """Return all states ``(1, k)``."""
         return self.inputs.joint(states)[None].astype(np.float32)
-
-    def decide(
-        self, states: FloatArray, noise: FloatArray
-    ) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Decide for all at once."""
-        seen = self.of_actors(states)
-        logits = self.parts["all"].actor(seen).reshape(self.shape)
-        return seen, logits, (logits + noise).argmax(axis=1)
-
-
-class HierarchyPPO(PolicyGradient):
-    """One policy for every agent, on its own state and the actions that it is told.
-
-    Parameters
-    ----------
-    settings
-        Of PPO, whose weights are whose, and what the critic sees.
-    scenario
-        Where they act.
-    seed
-        Source of everything random in them.
-    hierarchy
-        Who is told by whom; None: nobody is.
-
-    Raises
-    ------
-    ValueError
-        If some agents are neighbours; one line.
-    """
-
-    def __init__(
-        self,
-        settings: MultiAgentPPOSettings,
-        scenario: Scenario,
-        seed: np.random.SeedSequence,
-        hierarchy: Hierarchy | None = None,
-    ) -> None:
-        super().__init__(scenario, seed, settings.value_of)
-        n, n_actions = self.shape
-        hierarchy = hierarchy or Hierarchy(scenario.agents, [])
-        if hierarchy.neighbours:
-            raise ValueError(
-                f"learner.kind = {settings.kind!r}: neighbours decide at the same time and tell "
-                "each other nothing, use a topology without them"
-            )
-        self.inputs = Inputs(scenario, numbered=settings.numbered)
-        owners = {"all": ("all",) * n, "role": roles_of(scenario), "own": scenario.agents}
-        names, rows = np.unique(owners[settings.weights], return_inverse=True)
-        self.passing = Passing(hierarchy, n_actions, rows)
-        self._n_joint = self.inputs.n_joint if settings.critic == "central" else 0
-        widths = self.passing.width, self.inputs.n_own, self._n_joint
-        self.parts = {
-            str(name): ActorCritic(
-                settings, np.flatnonzero(rows == row), Discrete(n_actions), widths, self.rng
-            )
-            for row, name in enumerate(names)
-        }
-        self._actors = [part.actor for part in self.parts.values()]
-
-    def of_actors(self, states: FloatArray) -> FloatArray:
-        """Return what nobody has been told yet, and each agent's own state."""
-        own = self.inputs.each(states).astype(np.float32)
-        return np.hstack([np.zeros((len(own), self.passing.width), dtype=np.float32), own])
-
-    def with_critics(self, seen: FloatArray, states: FloatArray) -> FloatArray:
-        """Return them with all states beside, if critics see these."""
-        if not self._n_joint:
-            return seen
-        return np.hstack(
-            [seen, np.tile(self.inputs.joint(states), (len(seen), 1))], dtype=np.float32
-        )
-
-    def decide(
-        self, states: FloatArray, noise: FloatArray
-    ) -> tuple[FloatArray, FloatArray, IntArray]:
-        """Decide from the top down; what is decided is written into what others see."""
-        seen = self.of_actors(states)
-        logits, joint = np.empty(self.shape, dtype=np.float32), np.empty(len(seen), dtype=np.int64)
-        for turn in self.passing.turns:
-            agents = turn.agents
-            logits[agents] = own = self._actors[turn.weights](seen[agents])
-            joint[agents] = (own + noise[agents]).argmax(axis=1)
-            self.passing.tell(turn, joint, seen)
-        return seen, logits, joint

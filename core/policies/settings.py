@@ -75,6 +75,10 @@ class PPOSettings(PolicyGradientSettings):
 
     kind: Literal["ppo"] = "ppo"
     factory: ClassVar[str] = f"{__package__}.ppo:CentralPPO"
+    weights: ClassVar[str] = "all"
+    numbered: ClassVar[bool] = True
+    critic: ClassVar[str] = "own"
+    value_of: ClassVar[str] = "team"
 
 
 class MultiAgentPPOSettings(PolicyGradientSettings):

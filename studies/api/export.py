@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -49,42 +48,35 @@ def export(store: Store, folder: Path, form: Form, *, overwrite: bool = False) -
     SpecError
         If a file is in the way, or the database is damaged.
     """
-    writers = _writers(store, form)
-    suffix = "json" if form == "marl-eval" else form
-    paths = {name: folder / f"{name}.{suffix}" for name in writers}
-    for path in paths.values():
+    store.verify()
+    paths = {folder / name: text for name, text in _texts(store, form).items()}
+    for path in paths:
         if path.exists() and not overwrite:
             raise SpecError(f"{path}: exists; --overwrite replaces it, --out writes elsewhere")
-    store.verify()
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise SpecError(f"--out {folder}: {error.strerror or error}") from None
-    for name, write_to in writers.items():
-        write_to(paths[name])
-    return list(paths.values())
+    for path, text in paths.items():
+        durable.write(path, text.encode())
+    return list(paths)
 
 
-def _writers(store: Store, form: Form) -> dict[str, Callable[[Path], None]]:
-    """Return what writes each file, by its name."""
-    results = read(store)
+def _texts(store: Store, form: Form) -> dict[str, str]:
+    """Return the content of each file by its name."""
+    results, outline = read(store), StudyOutline.kept(store)
     if form == "json":
-        outline = StudyOutline.kept(store)
         kept = published_part(outline.study, results)
-        return {"results": lambda path: published.write(path, outline, kept)}
+        return {"results.json": published.dumps(outline, kept)}
     if form == "marl-eval":
         kinds = {c: own["scenario"]["kind"] for c, own in store.settings().items()}
-        text = marl_eval.dumps(results, kinds, StudyOutline.kept(store).study)
-        return {"marl-eval": lambda path: durable.write(path, text.encode())}
-    return {
-        "episodes": lambda path: _write_csv(results.episodes, path),
-        "trials": lambda path: _write_csv(results.trials, path),
-    }
+        return {"marl-eval.json": marl_eval.dumps(results, kinds, outline.study)}
+    frames = {"episodes.csv": results.episodes, "trials.csv": results.trials}
+    return {name: _as_csv(frame) for name, frame in frames.items()}
 
 
-def _write_csv(frame: DataFrame, path: Path) -> None:
-    """Write a frame as CSV: truth values as 0 and 1, texts as they may stand in a spreadsheet."""
-    with durable.replacing(path) as file:
-        text = io.TextIOWrapper(file, encoding="utf-8", newline="", write_through=True)
-        write_frame(text, frame)
-        text.detach()
+def _as_csv(frame: DataFrame) -> str:
+    """Return a frame as CSV: truth values are 0 and 1, texts as they may stand in a spreadsheet."""
+    text = io.StringIO()
+    write_frame(text, frame)
+    return text.getvalue()

@@ -80,7 +80,8 @@ def grid(
 
 def look(index: int) -> dict[str, Any]:
     """Return colour and dashes of a line, by which lines differ."""
-    return {"color": COLOURS[index % len(COLOURS)], "ls": STYLES[index % len(STYLES)]}
+    cycle = index // len(COLOURS)  # a colour that comes again has other dashes
+    return {"color": COLOURS[index % len(COLOURS)], "ls": STYLES[(index + cycle) % len(STYLES)]}
 
 
 def marker(index: int) -> str:

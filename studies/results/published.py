@@ -16,7 +16,6 @@ import numpy as np
 
 from ..errors import SpecError
 from ..spec.outline import StudyOutline
-from ..store import durable
 from ..store.schema import RESULTS_VERSION, measures_from, tables
 from ..store.schema import SECONDS as PARTS
 from . import marl_eval
@@ -104,11 +103,6 @@ def loads(text: str) -> Published:
     return Published(
         StudyOutline.noted(content["spec"], columns), results, int(content["results_version"])
     )
-
-
-def write(path: Path, outline: StudyOutline, results: Results) -> None:
-    """Write the same to a file, which is there whole or not at all."""
-    durable.write(path, dumps(outline, results).encode())
 
 
 def read(folder: Path, studies: Iterable[str]) -> dict[str, Published]:

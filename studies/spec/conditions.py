@@ -65,7 +65,7 @@ class ConditionSettings(Settings):
     def warnings(self) -> tuple[str, ...]:
         """Return what of its topology says nothing to its learner, a line each."""
         learner, topology = f"learner.kind = {self.learner.kind!r}", self.topology
-        if isinstance(self.learner, LearnerSettings):
+        if isinstance(self.learner, LearnerSettings) and not self.learner.values_actions:
             return ()
         if not self.learner.uses_hierarchy:
             ignored = topology != parse("chain")

@@ -37,6 +37,13 @@ def test_the_smallest_benchmark_runs(run: Run, tmp_path: Path) -> None:
     assert all(speed > 0 for speed in result["machine"]["speed"].values())
 
 
+@pytest.mark.slow
+def test_ppo_in_a_hierarchy_is_timed(run: Run) -> None:
+    pytest.importorskip("stable_baselines3", reason="extra [peers]")
+    lines = run("benchmarks.peers", "--number", "1", "--rounds", "1").splitlines()
+    assert lines[-1].startswith("update of 8 agents, chain / independent: ")
+
+
 def test_docs_hold_the_table_of_releases(run: Run) -> None:
     table = run("benchmarks.releases")
     assert table in (ROOT / "docs" / "benchmarks.md").read_text(encoding="utf-8"), table

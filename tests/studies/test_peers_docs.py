@@ -13,19 +13,22 @@ ROOT = Path(__file__).resolve().parents[2]
 TEXT = (ROOT / "docs" / "peers.md").read_text(encoding="utf-8")
 COLUMNS = ("success, 4", "success, 12", "evaluation success", "decisions", "CPU [s]")
 PREDICTORS = ("success, 2", "success, 6", "evaluation success", "decisions")
+SAMPLED = "success, sampled actions"
+ARM = ("success, 4", "success, 12", "evaluation success", SAMPLED, "decisions", "CPU [s]")
 LONG = ("success, 4", "success, 40", "success, 120", *COLUMNS[2:])
 
 
 @pytest.mark.parametrize(
     ("name", "columns"),
     [
-        ("peers-arm", COLUMNS),
+        ("peers-arm", ARM),
         ("peers-boxes", COLUMNS),
         ("peers-one-robot", COLUMNS),
         ("peers-four-robots", COLUMNS),
         ("peers-100", LONG),
         ("peers-arm-long", LONG),
         ("peers-tuning", ("success, 12", "evaluation success")),
+        ("peers-tuning-arm", ("success, 12", "evaluation success", SAMPLED)),
         ("peers-predictors", PREDICTORS),
         ("peers-plans", PREDICTORS),
     ],

@@ -137,7 +137,10 @@ def test_what_is_no_file_of_teams_is_refused(tmp_path, monkeypatch, capsys, text
     monkeypatch.chdir(tmp_path)
     (tmp_path / "teams.json").write_text(text)
     assert main(["topology", "show", "teams.json"]) == 2
-    assert "must be a list of names and of such lists" in capsys.readouterr().err
+    err = capsys.readouterr().err
+    assert "teams.json" in err
+    assert "members" in err
+    assert err.count("\n") == 1
 
 
 def test_hierarchies_say_how_small_a_difference_they_could_find() -> None:

@@ -14,6 +14,7 @@ from nested_agents.core.learners.fitted_q import FittedQ, FittedQSettings
 from nested_agents.core.rules.rule_base import RuleBase
 from nested_agents.core.rules.settings import RuleBaseSettings
 from nested_agents.scenarios.matrix_games.team_games import TeamGameSettings
+from nested_agents.studies.spec.spec import Spec
 
 SPACE = StateSpace("gap", (Variable("gap", "m", 0.0, 1.0, centres=(0.0, 0.5, 1.0)),))
 TWO = ActionSet(("left", "right"), (0.0, 0.0), (0.0, 0.0), neutral=0)
@@ -192,6 +193,12 @@ def test_what_takes_a_prediction_is_refused(keys: dict, message: str) -> None:
         FittedQSettings(**keys).rules_over(SPACE, TWO, 0)
 
 
+def test_messages_have_no_mirror_image() -> None:
+    with pytest.raises(ValueError, match=r"learner\.mirrored = true: messages have no mirror"):
+        FittedQSettings(mirrored=True).rules_over(SPACE, TWO, 1)
+    FittedQSettings(mirrored=True).rules_over(SPACE, TWO, 0)
+
+
 def test_neighbours_are_refused_as_they_tell_nothing() -> None:
     names = ("agent1", "agent2", "agent3")
     with pytest.raises(ValueError, match=r"set topology\.oriented"):
@@ -206,3 +213,10 @@ def test_a_team_goes_on_with_all_it_has_learned_unless_others_tell_it_something(
     assert (later.learner.theta == 1.0).all()
     with pytest.raises(ValueError, match="told by 1 fewer others than when it learned"):
         team(chain(told="parents")).continue_from(former, np.arange(3))
+
+
+def test_a_topology_that_says_whom_agents_consider_is_remarked_on() -> None:
+    silent = {"kind": "chain", "considers": "none"}
+    spec = Spec(preset="fitted-q", scenario={"kind": "line-up"}, topology=silent)
+    told = "topology.considers: left out, learner.kind = 'fitted-q' considers nobody"
+    assert any(told in line for c in spec.conditions() for line in c.settings.warnings())

@@ -1,6 +1,7 @@
 """PPO in a hierarchy: who is told what, one reward per joint step, what edges are worth."""
 
 from itertools import pairwise
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,7 +16,7 @@ from nested_agents.core.policies.peer import Seen
 from nested_agents.scenarios.line_up import LineUpSettings
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.trials.arrangement import check
+from nested_agents.studies.trials.arrangement import arrange, check
 from nested_agents.studies.trials.session import Session, run_trial
 from nested_agents.studies.trials.trial import trials_of
 
@@ -179,6 +180,38 @@ def test_a_topology_that_says_nothing_to_the_learner_is_remarked() -> None:
     assert spec_of("tree", kind="mappo").warnings() == (
         "topology: left out, learner.kind = 'mappo' passes no actions down",
     )
+
+
+MINE = """
+from typing import ClassVar
+import nested_agents as na
+
+class Mine(na.Peer):
+    class Settings(na.PeerSettings):
+        uses_hierarchy: ClassVar[bool] = USES
+
+    def __init__(self, settings, scenario, seed, hierarchy=None):
+        super().__init__(seed)
+        self.hierarchy = hierarchy
+"""
+SPEC = """
+scenario.kind = "line-up"
+topology = {kind = "tree", told = "parents"}
+learner.kind = "mine.py:Mine"
+"""
+
+
+@pytest.mark.parametrize("uses", [True, False])
+def test_a_learner_of_ones_own_is_given_the_hierarchy_if_it_asks(
+    tmp_path: Path, uses: bool
+) -> None:
+    (tmp_path / "mine.py").write_text(MINE.replace("USES", str(uses)), encoding="utf-8")
+    (tmp_path / "spec.toml").write_text(SPEC, encoding="utf-8")
+    spec = Spec.load(tmp_path / "spec.toml")
+    with spec.sources.active():
+        team: Any = arrange(spec.conditions()[0].settings, 0).team
+    assert (team.hierarchy.told if uses else team.hierarchy) == ("parents" if uses else None)
+    assert [line[:18] for line in spec.warnings()] == ([] if uses else ["topology: left out"])
 
 
 @pytest.mark.slow

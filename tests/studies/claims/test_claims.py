@@ -255,6 +255,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
     files = list(claims.PUBLISHED.glob("*.json"))
     assert {path.stem for path in files} == {
         *claims.studies_of(),
+        "fit",
         "edges-classes",
         "edges-hierarchies",
         "edges-arms",
@@ -279,6 +280,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "from-eight",
         "wide",
         "peers-tuning",
+        "peers-tuning-arm",
         "peers-one-robot",
         "peers-four-robots",
         "peers-100",

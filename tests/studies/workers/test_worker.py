@@ -101,3 +101,41 @@ def test_a_scenario_that_cannot_be_built_is_refused_in_one_line(
     assert raised in error
     assert error.count("\n") == 1
     assert not (tmp_path / "study").exists()
+
+
+RAISES = {
+    "raise RuntimeError('no power')": "RuntimeError: no power in line 7 of raises.py",
+    "{}['power']": "KeyError: 'power' in line 7 of raises.py",
+    "raise Mute": "Mute: in line 7 of raises.py",
+    "return 0": "TypeError: __init__() should return None, not 'int'",
+}
+BUILT = """from nested_agents.scenarios.line_up import LineUp, LineUpSettings
+class Mute(Exception):
+    def __str__(self): raise RuntimeError
+class Raises(LineUp):
+    def __init__(self):
+        super().__init__(LineUpSettings())
+        {}
+"""
+
+
+@pytest.mark.parametrize("act", RAISES)
+def test_whatever_a_scenario_raises_when_it_is_built_is_one_line(act, tmp_path, capsys) -> None:
+    (tmp_path / "raises.py").write_text(BUILT.replace("{}", act, 1))
+    spec = tmp_path / "spec.toml"
+    spec.write_text('[scenario]\nkind = "raises.py:Raises"\n')
+    assert main(["run", str(spec), "--out", str(tmp_path / "study")]) == 2
+    error = capsys.readouterr().err
+    assert f"scenario 'raises.py:Raises' raises {RAISES[act]}" in error
+    assert error.count("\n") == 1
+    assert not (tmp_path / "study").exists()
+
+
+def test_what_a_scenario_raises_on_being_asked_is_one_line_too(tmp_path, capsys) -> None:
+    text = BUILT.replace("{}", "pass", 1) + "    measures = property(lambda self: 1 / 0)\n"
+    (tmp_path / "raises.py").write_text(text)
+    spec = tmp_path / "spec.toml"
+    spec.write_text('[scenario]\nkind = "raises.py:Raises"\n')
+    assert main(["run", str(spec), "--out", str(tmp_path / "study")]) == 2
+    error = capsys.readouterr().err
+    assert "raises ZeroDivisionError: division by zero in line 8 of raises.py" in error
