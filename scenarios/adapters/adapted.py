@@ -259,7 +259,7 @@ def surveyed(settings: AdaptedSettings, make: Make) -> Survey:
         if fault := fault_of_copies(simulator, actuators.commands(neutral)):
             raise ValueError(
                 f"scenario.predictor = 'copy': the environment cannot be copied, {fault}; use "
-                "'none', with a learner that needs no prediction"
+                "'none' with learner.predictor.kind = 'learned', or one that needs no prediction"
             )
     return Survey(actuators, perception, agents, roles, groups)
 

@@ -21,6 +21,7 @@ from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import trials_of
 
+WORLDS = Path(__file__).resolve().parents[3] / "examples" / "worlds"
 PENDULUM = {"id": "Pendulum-v1", "angles": {"angle": {"cos": 0, "sin": 1}}}
 
 
@@ -270,6 +271,12 @@ def test_what_cannot_be_adapted_is_refused_in_one_line(make: Any, message: str) 
     with pytest.raises(ValueError, match=message) as refused:
         make()
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("path", sorted(WORLDS.glob("*.toml")), ids=lambda path: path.stem)
+def test_specs_of_worlds_of_others(path: Path) -> None:
+    spec = Spec.load(path)
+    assert {c.settings.scenario.kind for c in spec.conditions()} <= {"gymnasium", "pettingzoo"}
 
 
 def test_tables_and_discrete_observations() -> None:

@@ -99,7 +99,7 @@ def test_errors_of_a_learned_predictor_stand_beside_persistence(study, capsys):
     rows = {line.split()[0]: line.split()[1:] for line in lines[lines.index(head) + 1 :] if line}
     # Within three short episodes it has been learned what an action does to the own wheel.
     assert float(rows["wheel_speed"][0]) < float(rows["wheel_speed"][1])
-    assert len(rows["box_bearing"]) == 3
+    assert len(rows["gap"]) == 3
 
 
 @pytest.mark.parametrize(
