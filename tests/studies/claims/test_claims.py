@@ -256,6 +256,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
     assert {path.stem for path in files} == {
         *claims.studies_of(),
         "fit",
+        "fit-landmarks",
         "edges-classes",
         "edges-hierarchies",
         "edges-arms",
