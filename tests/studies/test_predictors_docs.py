@@ -9,7 +9,14 @@ PAGE = Path(__file__).resolve().parents[2] / "docs" / "predictors.md"
 
 
 @pytest.mark.parametrize(
-    "name", ["predictors", "predictors-arm", "predictors-pendulum", "predictors-cartpole"]
+    "name",
+    [
+        "predictors",
+        "predictors-arm",
+        "predictors-teams",
+        "predictors-pendulum",
+        "predictors-cartpole",
+    ],
 )
 def test_tables(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     columns = "training success", "evaluation success"

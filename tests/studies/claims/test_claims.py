@@ -289,6 +289,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "peers-predictors",
         "predictors",
         "predictors-arm",
+        "predictors-teams",
         "predictors-pendulum",
         "predictors-cartpole",
         "peers-plans",
