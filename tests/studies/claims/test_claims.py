@@ -290,6 +290,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "predictors",
         "predictors-arm",
         "predictors-teams",
+        "pendulum",
         "predictors-pendulum",
         "predictors-cartpole",
         "peers-plans",
