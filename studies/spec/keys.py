@@ -197,8 +197,8 @@ def nearest(prefix: str) -> str:
 
     Examples
     --------
-    >>> nearest("value_of")
-    "did you mean 'learner.decision.value_of'?"
+    >>> nearest("teammates")
+    "did you mean 'learner.decision.teammates'?"
     """
     all_tables = tables()
     full = dict.fromkeys(name for table in all_tables for name in table.full_names)
