@@ -8,8 +8,9 @@ between two directions, and values that are linear between centres by slope time
 where a bearing passes a centre. So a candidate costs one loop over the joints without a branch.
 
 The same joint actions come out as by `BestResponse` asking for every candidate's posture, and the
-same random numbers are drawn; `tests/scenarios/kinematic_chain` holds one against the other. An arm
-of 64 joints decides 25 times sooner, one of 1,024 joints 130 times (`benchmarks.decisions`).
+same random numbers are drawn; `tests/scenarios/kinematic_chain` holds one against the other.
+Measured once, both ways in one process, an arm of 16 joints decides 5 times sooner, one of 64
+joints 22 times and one of 256 joints 76 times; 1,024 joints, not compared, take 11 ms.
 """
 
 from __future__ import annotations
