@@ -39,8 +39,11 @@ def write(path: Path, content: bytes) -> None:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[BinaryIO]:
-    """Write a file that takes the place of `path` when the context ends without an error."""
-    temporary = path.with_name(f".{path.name}.new")
+    """Write a file that takes the place of `path` when the context ends without an error.
+
+    Several processes may do so at once: the last one's stays.
+    """
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.new")
     try:
         with open(temporary, "wb") as file:
             yield file

@@ -8,7 +8,7 @@ import pytest
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec import spec as spec_module
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.store import integrity
+from nested_agents.studies.store import durable, integrity
 from nested_agents.studies.store import store as store_module
 from nested_agents.studies.store.schema import RESULTS_VERSION
 from nested_agents.studies.store.store import DATABASE, SPEC_FILE, Store
@@ -273,3 +273,15 @@ def test_no_condition_is_computed_anew_to_go_on_with_a_study(finished, monkeypat
     monkeypatch.setattr(spec_module, "grid", None)
     with made_up.opened(finished) as store:
         assert pending(store, made_up.TRIALS) == []
+
+
+def test_two_processes_may_write_a_file_at_once(tmp_path, monkeypatch):
+    path = tmp_path / "figure.png"
+    with durable.replacing(path) as first:
+        first.write(b"first")
+        with monkeypatch.context() as other:
+            other.setattr("os.getpid", lambda: 1)
+            durable.write(path, b"second")
+        assert path.read_bytes() == b"second"
+    assert path.read_bytes() == b"first"
+    assert [p.name for p in tmp_path.iterdir()] == ["figure.png"]
