@@ -9,8 +9,6 @@ Examples
 ('cart1', 'cart2')
 """
 
-from __future__ import annotations
-
 from ..core.plugins.plugged import SettingsRegistry
 from ..core.plugins.settings import ScenarioSettings
 

@@ -1,7 +1,5 @@
 """Pictures of recorded episodes: the figure they are drawn on, and animations, GIF or MP4."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -8,8 +8,6 @@ the scenario's business: each has a registry and a view of its own, a dataclass 
 `n_situations`, how many it holds.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, Literal

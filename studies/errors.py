@@ -1,7 +1,5 @@
 """What is wrong with something that the user can mend, in one line to act on."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from decimal import Decimal
 

@@ -1,7 +1,5 @@
 """Checks that name the culprit: which agent is unknown, missing or named twice."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Sequence
 

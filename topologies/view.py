@@ -1,7 +1,5 @@
 """A hierarchy as the user sees it: in a table, as JSON, as a picture."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import sys

@@ -6,8 +6,6 @@ rules of a rule base. It moves the variables of its own body and those of all ot
     x_b(t + 1) = keep * x_b(t) + sum_k d_bk W_k phi(x_b(t)) + sum_(j != b, k) d_jk V_k phi(x_j(t))
 """
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a learned predictor makes of one situation, at once for many joint actions."""
 
-from __future__ import annotations
-
 from functools import cached_property
 from typing import Any
 

@@ -8,8 +8,6 @@ paper's chain of n agents the exponents are n, n - 1, ..., 1, and the sums have 
 All results are exact integers (one is a fraction) of any size; floats would overflow before n = 50.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from fractions import Fraction

@@ -7,8 +7,6 @@
 Recording, progress and plotting consume the records; none of them enters the loop.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from time import perf_counter

@@ -7,8 +7,6 @@ and policies stay paired. How an agent reads what it was not told is the team's 
 `nested_agents.core.decision.settings`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Annotated, ClassVar, Literal
 

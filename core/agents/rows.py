@@ -1,7 +1,5 @@
 """Whose consequent weights are whose: an agent's own, or those of its role."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..interface.scenario import Scenario, roles_of

@@ -7,8 +7,6 @@ improved by best responses, agent by agent, until none gains alone. Cost is line
 tables, whatever the width.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How values become a joint action, as it stands in the ``[learner.decision]`` table of a spec."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from ..evaluators import EVALUATORS, EvaluatorSettings

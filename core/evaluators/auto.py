@@ -4,8 +4,6 @@ Of many agents best responses around a plan reach greater values than a sample, 
 They are also taken for some, if the values of others decide too, and wherever there must be a plan.
 """
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from pydantic import Field

@@ -21,8 +21,6 @@ If the unseen are expected to keep to the plan, an agent plans for all of whom i
 The number of joint actions tried grows linearly with the number of bodies.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

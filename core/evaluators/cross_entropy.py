@@ -8,8 +8,6 @@ learned model Chua et al. 2018). What the best sequence begins with is done; the
 from nothing. It learns nothing and has the reward function: a control for what does learn.
 """
 
-from __future__ import annotations
-
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np

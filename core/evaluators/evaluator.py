@@ -1,7 +1,5 @@
 """What an evaluator is and what it is asked, and what those share that try joint actions."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal, NamedTuple, Protocol

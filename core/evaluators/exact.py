@@ -1,7 +1,5 @@
 """Every joint action of the agents below."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

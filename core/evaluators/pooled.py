@@ -5,8 +5,6 @@ worth to one that has the sum of their consequent weights; likewise for the agen
 the variables that they share. So the mean of many agents costs little more than the value of a few.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

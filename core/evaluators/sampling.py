@@ -1,7 +1,5 @@
 """A random sample of the joint actions of the agents below."""
 
-from __future__ import annotations
-
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np

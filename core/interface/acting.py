@@ -1,7 +1,5 @@
 """What the control loop asks of those who act, whoever they are: `Actors`."""
 
-from __future__ import annotations
-
 from typing import Any, Protocol
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What is measured of an episode: the columns of results that a scenario declares."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Literal

@@ -7,8 +7,6 @@ index. Groups are blocks of consecutive agents that move one body (the wheels of
 digits of one group read as a number are its *robot-action index*.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol, runtime_checkable

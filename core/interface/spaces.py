@@ -6,8 +6,6 @@ agent. Kernels use the split: an own block takes few distinct values while joint
 enumerated, so that its part of a rule base is contracted once.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property

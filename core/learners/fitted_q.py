@@ -16,8 +16,6 @@ The maximum is the agent's own: what it was told is part of x', and is not maxim
 one reward and one target for each *joint* step, so that no agent learns from another's turn.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
 

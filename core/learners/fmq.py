@@ -4,8 +4,6 @@ The frequency of the maximum reward tells an action that pays well if the others
 one that was lucky (Kapetanakis and Kudenko 2002).
 """
 
-from __future__ import annotations
-
 from typing import ClassVar, Literal
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The learner that never learns: the control of every learning curve."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import ClassVar, Literal
 

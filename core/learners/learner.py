@@ -1,7 +1,5 @@
 """What every learner is to a team, and what the settings of all learners share."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Annotated, ClassVar, Literal, Protocol
 

@@ -5,8 +5,6 @@ spoilt. Lauer and Riedmiller (2000) let values rise only; Matignon, Laurent and 
 let them fall, more slowly than they rise.
 """
 
-from __future__ import annotations
-
 from typing import ClassVar, Literal
 
 import numpy as np

@@ -4,8 +4,6 @@ It is for state spaces that hold what has been chosen beside the situation it wa
 the value of a state is the value of an action (Watkins and Dayan 1992).
 """
 
-from __future__ import annotations
-
 from itertools import product
 from typing import ClassVar, Literal
 

@@ -4,8 +4,6 @@ The team's value is the sum of the agents' values, each over its neighbours in a
 What all are paid together is shared out equally, so that the parts add up to it.
 """
 
-from __future__ import annotations
-
 from typing import ClassVar, Literal
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Online TD(lambda) with accumulating traces (Eq. 7-13)."""
 
-from __future__ import annotations
-
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np

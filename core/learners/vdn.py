@@ -4,8 +4,6 @@ What all are paid together says nothing of who earned it. The TD error of the su
 agent alike, who learn what their parts must be for the sum to be right.
 """
 
-from __future__ import annotations
-
 from typing import ClassVar, Literal
 
 import numpy as np

@@ -18,8 +18,6 @@ also made of the kernels that it calls and of the constants that it reads, where
 here the files that its own file imports, and those that these import, count as well.
 """
 
-from __future__ import annotations
-
 import atexit
 import contextlib
 import fcntl

@@ -1,7 +1,5 @@
 """Streams of random numbers that follow from one seed and are independent of each other."""
 
-from __future__ import annotations
-
 import numpy as np
 
 

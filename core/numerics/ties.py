@@ -1,7 +1,5 @@
 """The greatest of some values, where several may be equal."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from .arrays import FloatArray

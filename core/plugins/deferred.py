@@ -1,7 +1,5 @@
 """What is imported when it is first asked for, since modules take their time: libraries, parts."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 

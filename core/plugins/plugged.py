@@ -5,8 +5,6 @@ thing. A class with a nested ``Settings`` stands for the model that builds it; a
 whose fields are its annotated keyword-only parameters.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from inspect import isfunction, signature
 from typing import Any, Literal, cast

@@ -10,8 +10,6 @@ Each kind of thing has one registry. A thing gets in
 What has settings is in a registry of their models, see `plugged`.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Mapping

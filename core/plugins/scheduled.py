@@ -1,7 +1,5 @@
 """Settings of what fails: which things by name, and from when to when."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
 from typing import Annotated, ClassVar, Self, cast

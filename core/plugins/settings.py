@@ -4,8 +4,6 @@ Settings are the tables of a spec. Each model refuses unknown keys and values ou
 ranges when it is built; every field is documented beside it, with its unit.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 

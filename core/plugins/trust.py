@@ -7,8 +7,6 @@ in a list outside of all studies: ``$XDG_STATE_HOME/nested-agents/trusted``, by 
 ``~/.local/state``. What a study brings along is run if the list has it.
 """
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import os

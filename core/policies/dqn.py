@@ -1,7 +1,5 @@
 """DQN of stable-baselines3, decision by decision, for a scenario of one agent."""
 
-from __future__ import annotations
-
 import numpy as np
 from gymnasium.spaces import Discrete
 from stable_baselines3 import DQN

@@ -5,8 +5,6 @@ sine and cosine. These are the ranges that membership functions are laid over, s
 less of the variables than fuzzy agents do.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..interface.scenario import Scenario, groups_of

@@ -1,7 +1,5 @@
 """What peers with networks share: acting by their weights, their random numbers, their arrays."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any

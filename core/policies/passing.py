@@ -5,8 +5,6 @@ same weights. What an agent is told is one entry for every action of every agent
 told by, in agent order: 1 for an action of somebody who tells it, else 0.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

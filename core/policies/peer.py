@@ -1,7 +1,5 @@
 """What all peers are to the control loop."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, cast
 

@@ -10,8 +10,6 @@ reward of an episode that did not terminate is added the discounted value of the
 off in (Pardo et al. 2018).
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

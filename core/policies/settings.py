@@ -3,8 +3,6 @@
 Defaults are those of stable-baselines3, but for those that docs/peers.md names and accounts for.
 """
 
-from __future__ import annotations
-
 from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field

@@ -1,7 +1,5 @@
 """A policy of stable-baselines3 whose actor sees other inputs than its critic."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import torch

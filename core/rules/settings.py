@@ -1,7 +1,5 @@
 """The settings of a rule base, as they stand in the ``[learner.rule_base]`` table of a spec."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from pydantic import Field

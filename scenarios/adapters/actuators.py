@@ -1,7 +1,5 @@
 """The agents of a foreign environment: one for every number of its players' actions."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

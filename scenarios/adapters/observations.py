@@ -1,7 +1,5 @@
 """State variables of a foreign environment: numbers of what its players observe."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache, partial
 from typing import Any, cast

@@ -13,8 +13,6 @@ an agent span a joint step: from its turn to its next turn, with the reward that
 which is all that came between.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any

@@ -3,8 +3,6 @@
 Reading them needs no simulator; it is imported when a world is built.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal

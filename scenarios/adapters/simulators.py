@@ -4,8 +4,6 @@ A player acts and observes: the one of Gymnasium, an agent of PettingZoo. Who ha
 before its end observes what it last observed, and is paid nothing.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """The settings of box pushing, as they stand in the ``[scenario]`` table of a spec."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self
 

@@ -13,8 +13,6 @@ Importing this module registers ``NestedAgents/BoxPushing-v0`` with Gymnasium::
     gymnasium.make_vec(f"{module}:NestedAgents/BoxPushing-v0", 8, "async", steps=200)
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from functools import cached_property

@@ -10,8 +10,6 @@ function and one line in `CHECKS`; it returns what is wrong, in one line, or not
 it could not check. What a scenario raises is what is wrong with it.
 """
 
-from __future__ import annotations
-
 import random
 from collections.abc import Callable, Sequence
 from itertools import product, zip_longest

@@ -1,7 +1,5 @@
 """Episodes played as frames: what every step gave, copied, and compared to the last bit."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import zip_longest

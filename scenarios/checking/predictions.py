@@ -8,8 +8,6 @@ tables over all joint actions, `blocks` and `reward_table`. Compiled kernels rea
 looking at their sizes: a row too few is read from somewhere else in memory.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -5,8 +5,6 @@ are off. But one that is predicted exactly (``with_exact_prediction``) must sens
 predicted. What differs then is a variable that is computed in two ways.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from math import isnan
 from typing import NamedTuple

@@ -6,8 +6,6 @@ middle. What a fault makes of them may lie between two actions; then one of thes
 probabilities whose mean is the place between.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import gymnasium

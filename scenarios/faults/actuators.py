@@ -5,8 +5,6 @@ names actuators. A fault names them by pattern, ``"0"``, ``"walker_0.*"``, or by
 is not informed of it.
 """
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from ...core.plugins.scheduled import Names

@@ -6,8 +6,6 @@ coast; a *position* is held by a seized one, and none gives way. What an action 
 left to a `Mechanism`, or refused.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Literal
 

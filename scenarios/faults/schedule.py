@@ -5,8 +5,6 @@ on what the one before it holds, see `FailureSettings.held`. A world without fai
 here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Any
 

@@ -14,8 +14,6 @@ A failure lies between the command that an actuator gets and the speed that its 
 `FailureSettings.held`; the agents see the commands, and the failure only in how their bodies move.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, cast
 

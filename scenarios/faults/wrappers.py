@@ -12,8 +12,6 @@ From episode 3 on, the motor of a pendulum does a third of what it is commanded.
 ({}, array([0.66], dtype=float32))
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -9,8 +9,6 @@ has been. Joints are the darker the faster their command; failed ones are crosse
 dashed ring is the goal, as wide as the tolerance; the pale circle is the reach of the arm.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The built-in state variables of many predicted postures, compiled: `relational`, only faster."""
 
-from __future__ import annotations
-
 from math import pi
 
 import numpy as np

@@ -5,8 +5,6 @@ before; the first one from the x axis. Joint i stands where link i begins, so th
 base at the origin. The *tip* is the end of the last link.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...core.numerics.arrays import FloatArray

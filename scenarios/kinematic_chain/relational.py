@@ -4,8 +4,6 @@ Each is a function of a view and a joint, in NumPy: the definition, and the test
 compiled columns in `kernels`, which serve sensing and prediction.
 """
 
-from __future__ import annotations
-
 from math import pi
 
 import numpy as np

@@ -17,8 +17,6 @@ above it have decided, and takes the action that comes nearest to it.
   from the joint to the goal.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from typing import Annotated
 

@@ -11,8 +11,6 @@ a spec names it ``"mine.py:height"``::
         return view.places[:, joint, 1]
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What state variables are computed from: postures of the arm and the goal, many at once."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

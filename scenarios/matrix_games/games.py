@@ -16,8 +16,6 @@ For three agents there is no game in these papers. Ours pays the least of what e
 in their order, would be paid in climbing: 11 if all play a, 7 if all play b, 5 if all play c.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from itertools import combinations
 from math import isfinite

@@ -4,8 +4,6 @@ It follows `Team.act`, the explorers and the learners statement by statement; ra
 drawn in the same order. ``n`` agents, ``A`` actions; joint actions are joint-action indices.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

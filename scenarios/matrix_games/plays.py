@@ -12,8 +12,6 @@ It knows exact enumeration by an agent's own value, with all teammate models and
 if that explores uniformly and else takes the greatest value.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -15,8 +15,6 @@ Of polymatrix and permutation an agent sees nothing, or which one it is. Agents 
 that those who share weights can act differently only by what they see and are told.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from typing import Annotated, Any, ClassVar, Literal
 

@@ -1,7 +1,5 @@
 """The cost of hierarchies as a table, by the paper's formulas and measured."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape

@@ -7,8 +7,6 @@ its length. A worker has to start, too, to load or compile what each condition n
 each trial: that is measured here once.
 """
 
-from __future__ import annotations
-
 import resource
 import subprocess
 import sys

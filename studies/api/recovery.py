@@ -9,8 +9,6 @@ regained `REGAINED` of what was lost just after it, always compared with the sam
 fault. A seed that does not recover counts with all the episodes that were run: a lower bound.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """A recorded episode as an animation in a file, which a notebook shows."""
 
-from __future__ import annotations
-
 import base64
 from dataclasses import dataclass
 from pathlib import Path

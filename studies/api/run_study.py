@@ -3,8 +3,6 @@
 Nothing is printed here: who wants to see how it goes passes an `Observer`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path

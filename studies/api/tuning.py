@@ -5,8 +5,6 @@ successive halving (Jamieson and Talwalkar 2016) all of them are tried on two se
 on four, and so on: seeds are spent on what may be best. All meet the same worlds.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """How the work of touching is shared among robots, where a scenario tells who touches when."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...core.agents.loop import StepRecord

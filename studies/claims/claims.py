@@ -5,8 +5,6 @@ estimate with its 95 % interval. A claim *holds* if the whole interval meets the
 not hold* if none of it does, and is *not decided* in between, or by fewer than `LEAST_SEEDS`.
 """
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

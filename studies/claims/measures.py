@@ -4,8 +4,6 @@ Each public function is named by claims of ``claims.toml``; it returns an estima
 interval over seeds, or None where the results have not what it takes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

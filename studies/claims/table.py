@@ -1,7 +1,5 @@
 """The table of claims, for the terminal, for programs and for the documentation."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from typing import Any, Literal

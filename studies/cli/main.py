@@ -5,8 +5,6 @@ Statuses: 0 done, 1 a trial failed, 2 something the user can mend (one line on s
 module of that name in `commands`, which offers a click command called ``command``.
 """
 
-from __future__ import annotations
-
 import codecs
 import os
 import sys

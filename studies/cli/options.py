@@ -3,8 +3,6 @@
 An option that may be given several times takes several values at once, too: `complete`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 

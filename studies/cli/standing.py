@@ -1,7 +1,5 @@
 """How far a study is, in lines: what `status` prints and `watch` shows."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from ..presentation.words import count, duration

@@ -1,7 +1,5 @@
 """A study as it is watched: how far it is, learning curves as they grow, failures."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -11,8 +11,6 @@ Counting and timing use the line-up scenario, whose prediction costs next to not
 membership functions, with which every rule does fire.
 """
 
-from __future__ import annotations
-
 import re
 import tracemalloc
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """The figure of cost: formula, counts and times against the number of agents, on log scales."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from decimal import Decimal
 from fractions import Fraction

@@ -3,8 +3,6 @@
 A ratio beyond 2 ** 53, where floating-point numbers lie farther apart, is rounded to an integer.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import sys

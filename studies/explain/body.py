@@ -1,7 +1,5 @@
 """What bodies believe their actuators to do: the self-model against the bodies as built."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Figures of an explanation: functions of one variable, and the policy."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """How wrong a learned predictor is, variable by variable, beside persistence and the given one."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

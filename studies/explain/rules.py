@@ -11,8 +11,6 @@ the mean over the rules of all other variables. The *share* of a part is its sha
 of f, all rules being equally likely; which rules were ever visited it does not know.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import degrees

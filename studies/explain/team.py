@@ -5,8 +5,6 @@ content, its training is run again, in seconds, and held against the episodes th
 way the team explained is the team that was measured, or nothing is explained.
 """
 
-from __future__ import annotations
-
 import re
 import sys
 from collections.abc import Sequence

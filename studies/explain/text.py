@@ -1,7 +1,5 @@
 """The explanation of a trained team as text of 80 columns."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from textwrap import fill
 

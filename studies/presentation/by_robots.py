@@ -1,7 +1,5 @@
 """Lines over the number of robots: points with their intervals, a little beside each other."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """How every figure looks, and how figures are written to files."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path

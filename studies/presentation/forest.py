@@ -1,7 +1,5 @@
 """Forest plots: values with their intervals, one line each, against a line of no difference."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from matplotlib.axes import Axes

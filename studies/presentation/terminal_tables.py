@@ -1,7 +1,5 @@
 """A table of estimates for a terminal: no word is broken, whatever its width."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """Numbers of things and lengths of time in words."""
 
-from __future__ import annotations
-
 
 def count(number: int, what: str, plural: str = "s") -> str:
     """Return a number of things.

@@ -1,7 +1,5 @@
 """The page: what a study's directory holds, gathered and put into the template."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The figures of a study: as SVG to stand in a page, and as PDF to take away."""
 
-from __future__ import annotations
-
 import base64
 import io
 import re

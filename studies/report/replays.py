@@ -7,8 +7,6 @@ Any other that draws its episodes, one's own included, has them drawn as animati
 condition.
 """
 
-from __future__ import annotations
-
 import base64
 import tempfile
 from collections import Counter, defaultdict

@@ -1,7 +1,5 @@
 """What a report says in sentences: how far the study is, and what it was made with."""
 
-from __future__ import annotations
-
 import platform
 import re
 from collections.abc import Iterable

@@ -6,8 +6,6 @@ that are compared with each other. Intervals are percentiles, those of the autho
 where all runs of a task ended alike, they have no width there.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """What a study makes of its results: a table, words about it, and what its figures show."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias

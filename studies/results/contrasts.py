@@ -1,7 +1,5 @@
 """Conditions compared by any measure: all with one, or level by level within equal others."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 

@@ -6,8 +6,6 @@ trained were measured by. Here a condition is an algorithm, an episode of traini
 evaluation the absolute metrics. Of a step that lists several values their mean is read.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """Columns of results: their units and meanings, see ``columns.toml``, and how numbers are shown."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 

@@ -3,8 +3,6 @@
 All are permutation tests: they need no distribution, and bear the many ties of success rates.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

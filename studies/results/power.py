@@ -6,8 +6,6 @@ given size among several comparisons: as Holm's first step has it, p times their
 below `LEVEL`. The differences of single seeds are taken for independent and normal.
 """
 
-from __future__ import annotations
-
 import math
 from bisect import bisect_left
 from collections.abc import Sequence

@@ -5,8 +5,6 @@ left out. Claims are always decided
 by results in this form, so the committed files give the table that the run gave.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterable
 from pathlib import Path

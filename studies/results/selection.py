@@ -1,7 +1,5 @@
 """Results chosen and put together: a part of a study's trials, or those of several studies."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -5,8 +5,6 @@ of fewer than two seeds are not a number rather than of no width. Resamples of f
 few different values: below `FEW` seeds intervals of means are Student's.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

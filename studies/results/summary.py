@@ -1,7 +1,5 @@
 """The table of a study: conditions against estimates, and its cells as text."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

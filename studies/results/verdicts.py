@@ -1,7 +1,5 @@
 """Verdicts on comparisons: what they found, and what they could have detected."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from textwrap import wrap
 

@@ -5,8 +5,6 @@ own scenario: what a sweep or an override says of it holds in the stages, too, u
 otherwise.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Annotated, Any, NamedTuple
 

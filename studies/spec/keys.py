@@ -5,8 +5,6 @@ spec is validated, meanings and units from the docstrings of their fields. What 
 walked as well, so a new scenario or learner has its keys here from the first day.
 """
 
-from __future__ import annotations
-
 import inspect
 import json
 import re

@@ -1,7 +1,5 @@
 """How conditions are called, by the point of the sweeps that they are, and how long they train."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """Objects in a spec made by Python: put in the words that a TOML file would have for them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

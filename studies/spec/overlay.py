@@ -5,8 +5,6 @@ descends into tables. Where the two name a different `kind`, the lower one keeps
 kinds inherit in common: a trace decay says nothing to a learner that has no trace.
 """
 
-from __future__ import annotations
-
 import tomllib
 import typing
 from collections.abc import Iterator, Mapping

@@ -4,8 +4,6 @@ A preset states where it departs from the defaults of the settings models; a spe
 laid over it. `frozen`, `random` and `planner` are the controls of a learning curve.
 """
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path

@@ -4,8 +4,6 @@ pydantic says where and what; this module turns that into the path as it stands 
 value found there, what is allowed, and the closest known name.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 

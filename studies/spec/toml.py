@@ -1,7 +1,5 @@
 """Tables of settings written as TOML, which the standard library only reads."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Connections to the database of a study: written through, and errors in one line."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import sqlite3

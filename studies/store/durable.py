@@ -1,7 +1,5 @@
 """Files that are there whole or not at all, and recordings kept in them."""
 
-from __future__ import annotations
-
 import hashlib
 import io
 import os

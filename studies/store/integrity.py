@@ -1,7 +1,5 @@
 """A damaged database: noticed, set aside, and what can be trusted of it taken over."""
 
-from __future__ import annotations
-
 import os
 import sqlite3
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """What the database of a study holds, as rows and words; nothing is written here."""
 
-from __future__ import annotations
-
 import json
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping

@@ -5,8 +5,6 @@ anything runs at all is shown by the lock that the running process holds on ``.l
 system takes from it however it ends: a mark that outlived its process is passed over.
 """
 
-from __future__ import annotations
-
 import contextlib
 import fcntl
 import json

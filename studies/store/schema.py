@@ -5,8 +5,6 @@ of its rows, and what concerns the study as a whole has another one, in `meta`. 
 says how many trials have been run, so that none can be gone unnoticed.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import sqlite3

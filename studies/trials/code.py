@@ -5,8 +5,6 @@ it, has a digest of its text, to see at once whether it may have changed, and on
 tree, to see whether it has: comments and layout do not count.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterator, Mapping
 from importlib.util import find_spec

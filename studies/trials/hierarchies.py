@@ -1,7 +1,5 @@
 """The hierarchies of a spec, as they are built over the agents of its scenarios."""
 
-from __future__ import annotations
-
 from ...core.agents.cost import below_counts
 from ...core.interface.scenario import groups_of
 from ...topologies.view import HierarchyView

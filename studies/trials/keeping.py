@@ -1,7 +1,5 @@
 """A study and its store: opened to run what is left, if it is the same study, and read back."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """The measures of a study: those of its scenarios, joined."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 from ...core.interface.measures import Measure

@@ -1,7 +1,5 @@
 """Ctrl-C where it must not strike at once."""
 
-from __future__ import annotations
-
 import signal
 import threading
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Worker processes of this machine, by joblib's loky."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Sequence

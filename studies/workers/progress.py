@@ -1,7 +1,5 @@
 """How far a study is: counts of trials, and an estimate of the time left."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from statistics import fmean

@@ -4,8 +4,6 @@ A family of siblings with one interface, distinguished by the name of their back
 trial, its bits are the same: each trial has a process to itself, linear algebra uses one thread.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Literal, get_args

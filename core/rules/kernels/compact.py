@@ -4,8 +4,6 @@ The active rules of a term are the *corners* of a cube: per variable the lower o
 two active functions; bit v of a corner's number tells which it is of the term's variable v.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...numerics.arrays import FloatArray, IntArray

@@ -10,8 +10,6 @@ Innermost loops count without sign: an index that could be negative would be che
 Where five functions to a variable are spelled out, it is for the paper's case.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...numerics.compiling import njit

@@ -1,7 +1,5 @@
 """Values where every membership function may be active."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...numerics.arrays import FloatArray, IntArray

@@ -3,8 +3,6 @@
 There is one kernel for every way of valuing, so that none is compiled that is not used.
 """
 
-from __future__ import annotations
-
 from typing import TypeAlias
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Values of few states of every agent, and the TD update between two, for any partitions."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...numerics.arrays import FloatArray, IntArray

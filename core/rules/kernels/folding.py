@@ -1,7 +1,5 @@
 """Contraction of the shared axes of a term, for many situations side by side."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...numerics.compiling import njit

@@ -1,7 +1,5 @@
 """Which pairs of own and shared blocks joint actions lead to."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...numerics.compiling import njit

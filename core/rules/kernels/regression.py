@@ -1,7 +1,5 @@
 """Sums over all experience that a regression needs, by the few active rules of every row."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...numerics.arrays import FloatArray, IntArray

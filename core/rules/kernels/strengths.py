@@ -1,7 +1,5 @@
 """Firing strengths of one state, variable by variable, and their products over a term."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...numerics.arrays import FloatArray

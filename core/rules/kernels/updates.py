@@ -1,7 +1,5 @@
 """Changes of consequent weights and traces along feature vectors."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...numerics.arrays import FloatArray, IntArray

@@ -1,7 +1,5 @@
 """The settings of box pushing by pushing points."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
 

@@ -5,8 +5,6 @@ those that come to the same wheel speeds are followed once, and of the other rob
 within reach count.
 """
 
-from __future__ import annotations
-
 from itertools import product
 from math import log
 from typing import Any

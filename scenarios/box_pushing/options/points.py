@@ -6,8 +6,6 @@ are numbered by where they are on the outline. What is learned of a point is lea
 and means something else where the outline is another.
 """
 
-from __future__ import annotations
-
 from math import atan2
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a robot does once it has chosen a pushing point: it drives there, and pushes straight on."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from math import cos, sin
 from typing import Any

@@ -1,7 +1,5 @@
 """Ways of one robot around a box: where a twist leads, and how far it is to a place."""
 
-from __future__ import annotations
-
 from math import pi
 
 import numpy as np

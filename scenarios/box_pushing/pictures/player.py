@@ -8,8 +8,6 @@ Lengths are in units of `scale` metres, headings in 1/32768 of half a turn, whic
 wheel speeds in 1/127 of the greatest one.
 """
 
-from __future__ import annotations
-
 import base64
 import zlib
 from collections.abc import Mapping

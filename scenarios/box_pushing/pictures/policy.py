@@ -5,8 +5,6 @@ grid around it, at rest and looking at the box, the others stay behind the box; 
 greedily, and the predictor tells how the robot would move in the decision period.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, replace

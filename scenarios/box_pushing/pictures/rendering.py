@@ -14,8 +14,6 @@ end there, the wider the stronger the reading. Robots too small to show wheels s
 always solid, and are never drawn smaller than a few pixels.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

@@ -11,8 +11,6 @@ the last sweep's velocity. Without compliance and contact friction the robots ar
 kinematic push.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

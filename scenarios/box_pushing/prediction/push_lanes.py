@@ -8,8 +8,6 @@ constant offset is what compilers see through. The readable definition, some tho
 is the oracle of the tests, `tests/scenarios/box_pushing/push_oracle.py`.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ....core.numerics.compiling import njit

@@ -1,7 +1,5 @@
 """The settings of predictions."""
 
-from __future__ import annotations
-
 from ....core.plugins.settings import Positive, Settings
 
 

@@ -1,7 +1,5 @@
 """What predictions of the push start from: the present, and what is the same in all of them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

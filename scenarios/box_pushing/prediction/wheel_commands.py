@@ -7,8 +7,6 @@ so that its distinct *twists* are fewer still. A *robot-action index* is the act
 wheels read as one number in base ``A``; a *joint-action index*, those of all wheels.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -6,8 +6,6 @@ stand: of 256 situations of two robots the kernel takes a seventh of their time,
 are others, so that sensing, by which agents learn, keeps to the functions.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import pi
 

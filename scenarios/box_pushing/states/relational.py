@@ -6,8 +6,6 @@ turned, how far it has to go and whether it gets there. A further variable is on
 name in `variables.STATE_VARIABLES`, and, to be fast in prediction, one column of `kernels`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import pi
 

@@ -7,8 +7,6 @@ many situations at once. A further state space is one `BoxStateSpace` and one li
 `STATE_SPACES`; a spec may also list state variables by name, one's own among them, see `variables`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

@@ -14,8 +14,6 @@ Built-in variables are compiled for prediction: with one of its seven shared var
 here, the decision of a team of two e-Pucks takes about a third longer.
 """
 
-from __future__ import annotations
-
 from ....core.plugins.registry import Registry
 
 _PLACE = "nested_agents.scenarios.box_pushing.states.relational"

@@ -1,7 +1,5 @@
 """What state variables are computed from: situations of robots, box and goal, many at once."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

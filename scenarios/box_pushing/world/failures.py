@@ -4,8 +4,6 @@ A free wheel has no drive at all: it resists sideways motion only. All other kin
 described in `nested_agents.scenarios.faults.schedule`.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ....core.numerics.arrays import FloatArray

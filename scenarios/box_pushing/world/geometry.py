@@ -9,8 +9,6 @@ All are compiled and may be called from other compiled kernels. `nearest_points`
 computes first, once more: for `LANES` points side by side, without a branch.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import hypot, pi, sqrt
 from typing import Any

@@ -4,8 +4,6 @@ Every sensor looks along one ray from the rim of its robot and reads a number in
 touching, 0 when nothing is within its reach, and between them as `InfraredSettings` say.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import exp
 

@@ -4,8 +4,6 @@ Box2D takes convex polygons of at most 8 vertices and silently gets others wrong
 polygon, concave or with holes, goes through here first.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Sequence
 from heapq import heapify, heappop, heappush

@@ -14,8 +14,6 @@ reached while one of the robots has lost touch would be punished for ever, so re
 what R1 is there, whatever the robots do (`RewardSettings.pays_at_goal`).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

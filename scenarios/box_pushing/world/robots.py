@@ -8,8 +8,6 @@ exceed its traction limit (the friction circle), see `box_pushing.world.wheels`.
 robot is one table in ``robots.toml``; a spec may also describe one.
 """
 
-from __future__ import annotations
-
 import tomllib
 from math import radians
 from pathlib import Path

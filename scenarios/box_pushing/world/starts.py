@@ -6,8 +6,6 @@ is the direction from box to goal, *behind* the back of the box (its -x side). A
 distribution is one `Start` and one line in `STARTS`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import cos, pi, radians, sin

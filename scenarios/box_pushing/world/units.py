@@ -4,8 +4,6 @@ The world is one of robots that stand on a table: centimetres and hundreds of gr
 is no error, for the physics holds, but it was hardly intended.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from math import pi
 from typing import Any

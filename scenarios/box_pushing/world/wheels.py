@@ -17,8 +17,6 @@ servo under a steady load would yield the more the longer the step.
 Units are those of the caller as long as they are consistent.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

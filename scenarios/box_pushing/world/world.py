@@ -17,8 +17,6 @@ force not quite against the motion: sliding along its axes, a square meets 4 % l
 `friction_force`; along its diagonals and in turning, all of it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

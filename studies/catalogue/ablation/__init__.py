@@ -7,8 +7,6 @@ The differences are tested by permutation of signs, and p is adjusted by Holm's 
 conditions and both measures.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from ...results.analysis import Analysis, Figures

@@ -7,8 +7,6 @@ Friedman's test asks whether the orders differ at all, p adjusted by Holm's meth
 tests; and every order is compared with the first one as the study `ablation` compares.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

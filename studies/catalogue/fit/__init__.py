@@ -9,8 +9,6 @@ that are optimal: if one play is evaluated, that of seeds that reach the optimum
 edges are compared with none, as in the study `hierarchies`.
 """
 
-from __future__ import annotations
-
 from ....core.interface.scenario import groups_of
 from ...errors import SpecError
 from ...results.analysis import Analysis, Figures

@@ -7,8 +7,6 @@ optima miss it about every second time. The first of the two evaluations leaves 
 random numbers as they were.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from string import ascii_uppercase
 from textwrap import wrap

@@ -12,8 +12,6 @@ hierarchy's transitive closure. Decisions to the goal are those of successful ep
 hierarchy that succeeds only where it is easy looks quick.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ against the CPU seconds that training took, physics included, evaluations not. T
 is compared with all others at the end, paired by seed.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from time import process_time
 

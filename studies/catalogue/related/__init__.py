@@ -13,8 +13,6 @@ it succeeds when evaluated, and after how many decisions; and of a decision of a
   (sum over agents of ``|A| ** (1 + |below|)``, times |S|) and as counted in the running system.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -9,8 +9,6 @@ decided to each agent below it, so there is one message for every edge of the hi
 closure; n (n - 1) / 2 in a chain of n agents.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ success rate, and the ratio to the rate with the box of training. The agents' st
 the shape; the predictor by which they look ahead is given it (see docs/predictors.md).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...errors import SpecError

@@ -1,7 +1,5 @@
 """``nested-agents check``: whether scenarios keep their promises, those of a spec or one's own."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """``nested-agents compare``: conditions against each other, seed by seed."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """``nested-agents demo``: a small learning-curve study, from nothing to figures and a replay."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import click

@@ -1,7 +1,5 @@
 """``nested-agents explain``: what a trained team has learned, in words and figures."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import click

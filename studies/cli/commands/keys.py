@@ -1,7 +1,5 @@
 """``nested-agents keys``: what may stand in a spec."""
 
-from __future__ import annotations
-
 import click
 
 

@@ -1,7 +1,5 @@
 """``nested-agents plan``: what a study will take and what it can find."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

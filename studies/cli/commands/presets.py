@@ -1,7 +1,5 @@
 """``nested-agents presets``: the named starting points of a spec."""
 
-from __future__ import annotations
-
 import click
 
 

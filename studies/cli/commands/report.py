@@ -1,7 +1,5 @@
 """``nested-agents report``: a study as one HTML file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import click

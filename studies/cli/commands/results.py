@@ -1,7 +1,5 @@
 """``nested-agents results``: what a study measured, for reading and for other programs."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import click

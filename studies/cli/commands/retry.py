@@ -1,7 +1,5 @@
 """``nested-agents retry``: run failed trials again."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """``nested-agents run``: run the study of a spec."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

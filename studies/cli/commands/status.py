@@ -1,7 +1,5 @@
 """``nested-agents status``: how far a study is."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import click

@@ -1,7 +1,5 @@
 """``nested-agents table``: the results of a study, as one table."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import click

@@ -1,7 +1,5 @@
 """``nested-agents topology``: which hierarchies there are, and what one of them looks like."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 

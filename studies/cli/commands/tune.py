@@ -1,7 +1,5 @@
 """``nested-agents tune``: look for better settings of a spec."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """``nested-agents watch``: a study while it runs."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import click
