@@ -612,7 +612,7 @@ def test_a_value_out_of_range_is_not_taken_for_that_of_another_key() -> None:
     ("scenario", "estimate"),
     [
         ({"robots": 3000}, "robots = 3000: a worker would hold 1.2 GB, and a decision take 27 s"),
-        ({"robots": 10**999}, r"e\+999: a worker would hold 1.1e\+1991 GB, and a decision take 3.0e"),
+        ({"robots": 10**999}, r": a worker would hold 1.1e\+1991 GB, and a decision take 3.0e"),
         (
             {"kind": "kinematic-chain", "joints": 6000},
             "joints = 6000: a worker would hold 1.2 GB, and a decision take 0.36 s",
