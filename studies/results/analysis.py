@@ -1,7 +1,7 @@
 """What a study makes of its results: a table, words about it, and what its figures show."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from .comparison import Difference
@@ -36,5 +36,5 @@ class Analysis:
     """Lines that are printed below the table: legend, verdicts, power."""
     cases: Sequence[Any] = ()
     """What the study's figures are drawn from."""
-    differences: tuple[Difference, ...] = ()
-    """What was compared, p adjusted over all."""
+    differences: Mapping[str, Sequence[Difference]] = field(default_factory=dict)
+    """What was compared, by measure or by setting, p adjusted over all."""

@@ -12,6 +12,7 @@ WIDTH = 80
 """Of a line [characters]."""
 
 
+NOTHING = "Nothing to compare: no two conditions share two seeds."
 WORDS = ("worse", "better")
 """What a significantly lower and a higher success rate are called."""
 
@@ -30,21 +31,7 @@ def verdict_lines(
         yield from wrap(text, WIDTH, subsequent_indent="    ", break_on_hyphens=False)
 
 
-def verdicts(differences: Sequence[Difference], reference: str) -> list[str]:
-    """Return all that is to be said of differences of rates from a reference, see `printed`."""
-    heads = {
-        f"{title}, less that of {reference}": own for title, own in by_measure(differences).items()
-    }
-    return printed(heads)
-
-
-def by_measure(differences: Sequence[Difference]) -> dict[str, list[Difference]]:
-    """Return the differences of every measure by its title."""
-    titles = dict.fromkeys(d.measure for d in differences)
-    return {title: [d for d in differences if d.measure == title] for title in titles}
-
-
-def printed(
+def verdicts(
     groups: Mapping[str, Sequence[Difference]],
     words: tuple[str, str] = WORDS,
     *,

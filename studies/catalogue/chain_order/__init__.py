@@ -13,7 +13,6 @@ from dataclasses import replace
 from ...results.analysis import Analysis, Figures
 from ...results.comparison import order_tests
 from ...results.results import Results
-from ...results.verdicts import by_measure
 from .. import ablation
 from ..study import run_training as measure
 
@@ -56,7 +55,7 @@ def draw(analysis: Analysis) -> Figures:
     """Return the figure: what each order differs from the first one by."""
     from ...presentation import forest
 
-    figure = forest.draw(by_measure(analysis.differences), "difference from the first order")
+    figure = forest.draw(analysis.differences, "difference from the first order")
     return {} if figure is None else {"chain-order": figure}
 
 

@@ -89,12 +89,10 @@ def draw(analysis: Analysis) -> Figures:
     """
     from ...presentation import forest
 
-    asked = dict.fromkeys(case.setting for case in analysis.cases)
     names = {case.hierarchy for case in analysis.cases}
     figures = {"edges": _draw_parted(analysis)} if {*sum(PARTED, ())} <= names else {}
-    each = len(analysis.differences) // len(asked)
-    panels = {s: analysis.differences[k * each :][:each] for k, s in enumerate(asked)}
-    if (figure := forest.draw(panels, f"success less that {TRAINED}")) is not None:
+    figure = forest.draw(analysis.differences, f"success less that {TRAINED}")
+    if figure is not None:
         figures["differences"] = figure
     return figures
 

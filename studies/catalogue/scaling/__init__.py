@@ -18,8 +18,9 @@ import numpy as np
 
 from ....core.agents.team import of_fuzzy_agents
 from ....core.interface.scenario import groups_of
+from ....core.plugins.deferred import pd
 from ...results.analysis import Analysis, Figures
-from ...results.comparison import Array, of_shared_seeds
+from ...results.comparison import shared
 from ...results.results import Results
 from ...results.sizes import Sizes
 from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, exactly, rate
@@ -122,12 +123,10 @@ class Point:
     """Number of agents."""
     period: float | None
     """What a decision may take to keep up with the robots [s]; none: the scenario has no hurry."""
-    seeds: tuple[int, ...]
-    """Those that have finished."""
     values: dict[str, Estimate]
     """Estimates by title, see `analyse`."""
-    times: dict[str, Array]
-    """By title, times of single seeds ``(n_seeds,)``."""
+    times: dict[str, pd.Series]
+    """By title, times of single seeds."""
 
 
 def analyse(results: Results) -> Analysis:
@@ -142,7 +141,7 @@ def analyse(results: Results) -> Analysis:
         shown = {title: point.values[title] for title in titles if title in point.values}
         is_size = condition == str(point.robots)
         label = sizes.shown(point.robots) if is_size else condition
-        table.append(Summary(label, len(point.seeds), shown))
+        table.append(Summary(label, len(results.seeds(condition)), shown))
     notes = [
         f"\n{evaluator}, time with n agents:\n  "
         + "\n  ".join(f"{what} n^{_exponent_text(power)}" for what, power in by_what.items())
@@ -170,7 +169,7 @@ def _point(results: Results, condition: str, sizes: Sizes) -> Point:
     return Point(
         evaluator, sizes.word, sizes.counts[condition], int(numbers["agents"][0]),
         float(numbers["period_s"][0]) if "period_s" in numbers else None,
-        results.seeds(condition), values, {title: costs[title] for title in TIMES.values()},
+        values, {t: pd.Series(costs[t], results.seeds(condition)) for t in TIMES.values()},
     )  # fmt: skip
 
 
@@ -187,13 +186,12 @@ def exponents_of(points: Sequence[Point]) -> dict[str, dict[str, Estimate]]:
     exponents: dict[str, dict[str, Estimate]] = {}
     for evaluator in dict.fromkeys(p.evaluator for p in points):
         own = [p for p in points if p.evaluator == evaluator]
-        if len({p.agents for p in own}) < 2 or not set.intersection(*(set(p.seeds) for p in own)):
-            continue
         sizes = np.log([p.agents for p in own])
-        exponents[evaluator] = {}
         for what, title in TIMES.items():
-            times = of_shared_seeds([p.seeds for p in own], [p.times[title] for p in own])
-            exponents[evaluator][what] = bootstrap(np.polyfit(sizes, np.log(times), 1)[0])
+            times = np.stack(shared([p.times[title] for p in own]))
+            if len({*sizes}) > 1 and times.size:
+                estimate = bootstrap(np.polyfit(sizes, np.log(times), 1)[0])
+                exponents.setdefault(evaluator, {})[what] = estimate
     return exponents
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...errors import SpecError
 from ...results.analysis import Analysis, Figures
-from ...results.comparison import Difference, adjusted, ratio
+from ...results.comparison import Difference, adjusted, compare_pairs, ratio
 from ...results.results import Results
 from ...results.statistics import Estimate, bootstrap, rate
 from ...results.summary import Summary
@@ -64,7 +64,7 @@ def ratios_of(results: Results, condition: str) -> tuple[Difference, ...]:
     runs = base.mean(axis=1)
     return adjusted(
         [
-            Difference.of(box, "ratio", outcomes.mean(axis=1), runs, ratio(outcomes, base))
+            compare_pairs(box, "ratio", outcomes.mean(axis=1), runs, ratio(outcomes, base))
             for box, outcomes in others.items()
         ]
     )

@@ -14,7 +14,7 @@ what the episodes after the onset fall short of the level before, in episodes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
@@ -24,9 +24,10 @@ import numpy as np
 from ....core.agents.team import Team, of_fuzzy_agents
 from ....core.learners.frozen import FrozenSettings
 from ....core.learners.learner import LearnerSettings
+from ....core.plugins.deferred import pd
 from ...errors import SpecError
 from ...results.analysis import Analysis, Figures
-from ...results.comparison import Array, Difference, adjusted, of_shared_seeds
+from ...results.comparison import Array, Pair, differences
 from ...results.results import Results
 from ...results.statistics import NOT_NEGATIVE, bootstrap, rate
 from ...results.summary import Summary
@@ -45,6 +46,8 @@ NUMBERS = ("onset",)
 """What of whole trials the analysis rests on."""
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
+AT_END = "success at the end"
+"""What is compared."""
 BLOCK = 5
 """Episodes that a level is measured over."""
 REGAINED = 0.9
@@ -177,11 +180,11 @@ def analyse(results: Results) -> Analysis:
     adapts.
     """
     courses = courses_of(results)
-    gains = _gains(courses)
+    gains = differences({AT_END: list(_gains(courses))})
     notes = ["Named after the colon is what adapts to the failure."] if courses else []
     if not all(course.before.any() for course in courses):
         notes += ["No recovery is measured where no episode before the failure succeeded."]
-    notes += verdicts(gains, "nothing adapting")
+    notes += verdicts({f"{AT_END}, less that of nothing adapting": gains[AT_END]})
     return Analysis(tuple(map(_summary, courses)), tuple(notes), courses, gains)
 
 
@@ -232,19 +235,12 @@ def _summary(course: Course) -> Summary:
     return Summary(f"{course.fault}: {course.adapts}", len(course.success), estimates)
 
 
-def _gains(courses: Sequence[Course]) -> tuple[Difference, ...]:
-    bases = {course.fault: course for course in courses if course.adapts == "nothing"}
-    gains = []
-    for course in courses:
-        base = bases.get(course.fault)
-        if base is None or base is course:
-            continue
-        both = (course, base)
-        own, other = of_shared_seeds([c.seeds for c in both], [c.end.mean(axis=1) for c in both])
-        if len(own) >= 2:
-            named = f"{course.fault}, {course.adapts}"
-            gains.append(Difference.between(named, "success at the end", own, other, of_rates=True))
-    return adjusted(gains)
+def _gains(courses: Sequence[Course]) -> Iterator[Pair]:
+    """Yield every case with that of the same fault in which nothing adapts."""
+    ends = {(c.fault, c.adapts): pd.Series(c.end.mean(axis=1), c.seeds) for c in courses}
+    for (fault, adapts), end in ends.items():
+        if adapts != "nothing" and (fault, "nothing") in ends:
+            yield f"{fault}, {adapts}", AT_END, end, ends[fault, "nothing"]
 
 
 def draw(analysis: Analysis) -> Figures:
