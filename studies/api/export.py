@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import io
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
+from ...core.plugins.deferred import pd
 from ..catalogue.study import published_part
 from ..errors import SpecError
 from ..presentation.csv_text import write_frame
@@ -14,9 +15,6 @@ from ..results.results import read
 from ..spec.outline import StudyOutline
 from ..store import durable
 from ..store.store import Store
-
-if TYPE_CHECKING:
-    from pandas import DataFrame
 
 Form = Literal["csv", "json", "marl-eval"]
 
@@ -75,7 +73,7 @@ def _texts(store: Store, form: Form) -> dict[str, str]:
     return {name: _as_csv(frame) for name, frame in frames.items()}
 
 
-def _as_csv(frame: DataFrame) -> str:
+def _as_csv(frame: pd.DataFrame) -> str:
     """Return a frame as CSV: truth values are 0 and 1, texts as they may stand in a spreadsheet."""
     text = io.StringIO()
     write_frame(text, frame)

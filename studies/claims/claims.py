@@ -15,7 +15,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..presentation.cells import ends
+from ..presentation.tables import ends
 from ..results.results import NOTHING, Results
 from . import measures
 from .measures import Measured

@@ -16,9 +16,8 @@ from ..catalogue.shapes import ratios_of
 from ..catalogue.wheel_failure import courses_of
 from ..results.comparison import BySeed, difference, order_tests, paired_difference, ratio, shared
 from ..results.results import Results
-from ..results.sizes import Sizes
 from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
-from ..results.summary import EVALUATED
+from ..results.summary import EVALUATED, Sizes
 from ..store.schema import EVALUATION
 
 CONTACT = "contact_fraction"

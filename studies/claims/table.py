@@ -8,7 +8,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from ..presentation.cells import ends
+from ..presentation.tables import ends
 from .claims import Finding
 
 Format = Literal["table", "json", "markdown"]

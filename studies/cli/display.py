@@ -23,7 +23,7 @@ def print_table(table: SummaryTable, legend: Sequence[str] | None = None) -> Non
     """Print estimates by condition, each over its 95 % interval, and its legend or another one."""
     from rich.console import Console
 
-    from ..presentation.terminal_tables import print_rows
+    from ..presentation.tables import print_rows
 
     if table.rows:
         print_rows(table.titles, table.rows, Console())

@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import Any, TextIO
 
-if TYPE_CHECKING:
-    from pandas import DataFrame
+from ...core.plugins.deferred import pd
 
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """With what a spreadsheet's formula begins, if the spaces before it are left out."""
@@ -25,12 +24,12 @@ def write_csv(file: TextIO, names: Sequence[str], rows: Iterable[Sequence[Any]])
     writer.writerows(map(harmless, row) for row in rows)
 
 
-def write_frame(file: TextIO, frame: DataFrame) -> None:
+def write_frame(file: TextIO, frame: pd.DataFrame) -> None:
     """Write a frame with a header; truth values are 0 and 1, what is missing is an empty cell."""
     write_csv(file, list(frame.columns), rows_of(frame))
 
 
-def rows_of(frame: DataFrame) -> Iterator[tuple[Any, ...]]:
+def rows_of(frame: pd.DataFrame) -> Iterator[tuple[Any, ...]]:
     """Yield the rows of a frame as values of Python's own types; None is what is missing."""
     values: Any = frame.astype(object).where(frame.notna(), None)
     yield from values.itertuples(index=False, name=None)

@@ -10,17 +10,15 @@ import io
 import json
 from collections.abc import Sequence
 from shutil import get_terminal_size
-from typing import TYPE_CHECKING, Any, Literal, TextIO
+from typing import Any, Literal, TextIO
 
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
 from ...core.interface.measures import Measure
+from ...core.plugins.deferred import pd
 from .csv_text import rows_of, write_frame
-
-if TYPE_CHECKING:
-    from pandas import DataFrame
 
 Format = Literal["table", "csv", "json"]
 
@@ -29,7 +27,9 @@ FORMATS = {"seed": "d", "episode": "d", "steps": "d", "return": ".4g"}
 MISSING = "–"
 
 
-def write_rows(frame: DataFrame, measures: Sequence[Measure], form: Format, file: TextIO) -> None:
+def write_rows(
+    frame: pd.DataFrame, measures: Sequence[Measure], form: Format, file: TextIO
+) -> None:
     """Write a frame of episodes, some of whose columns are those of `measures`.
 
     CSV and JSON hold every digit, so equal results are equal bytes. Truth values are 0 and 1 in
@@ -50,7 +50,7 @@ def write_rows(frame: DataFrame, measures: Sequence[Measure], form: Format, file
         file.write(text.getvalue())
 
 
-def _table(frame: DataFrame, measures: dict[str, Measure]) -> Table:
+def _table(frame: pd.DataFrame, measures: dict[str, Measure]) -> Table:
     """Return the rows of one condition; no word and no number is broken if there is any room."""
     table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, header_style="")
     shown = [name for name in frame.columns if name in FORMATS or name in measures]
@@ -64,7 +64,7 @@ def _table(frame: DataFrame, measures: dict[str, Measure]) -> Table:
     return table
 
 
-def _cells(column: DataFrame, measure: Measure | None) -> list[str]:
+def _cells(column: pd.DataFrame, measure: Measure | None) -> list[str]:
     """Return the values of a column as text."""
     values = [value for (value,) in rows_of(column)]
     form = FORMATS[column.columns[0]] if measure is None else _format(measure, values)

@@ -5,23 +5,20 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
-from typing import TYPE_CHECKING
+from html import escape as in_html
 
 import numpy as np
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
 
 from ...core.plugins.deferred import pd
 from ...core.plugins.messages import near
 from ..errors import SpecError
 from ..results.statistics import FEW, Estimate
-from ..results.summary import Summary
-from .cells import Cell, Row, ends
+from ..results.summary import Summary, between, two_figures
 from .csv_text import write_csv
-from .terminal_tables import text_of
 from .words import count
-
-if TYPE_CHECKING:
-    from pandas import DataFrame
 
 MATHS_SPACE = r"\;"
 NOTHING = "no trial has finished"
@@ -66,7 +63,7 @@ class SummaryTable:
         cells = [[c.bracketed(" ") if c else "" for c in row] for *_, row in self.rows]
         index = [f"{condition}, {count(seeds, 'seed')}" for condition, seeds, _ in self.rows]
         table = pd.DataFrame(cells, index, self.titles).to_html(border=0)
-        return f"{table}<p><small>{escape(' '.join(self.legend))}</small></p>"
+        return f"{table}<p><small>{in_html(' '.join(self.legend))}</small></p>"
 
     @property
     def latex(self) -> str:
@@ -139,7 +136,7 @@ def _markdown(titles: Sequence[str], rows: Sequence[Row]) -> str:
     return "".join(f"| {' | '.join(line)} |\n" for line in escaped)
 
 
-def in_latex(frame: DataFrame, names: str, columns: str, note: str = "") -> str:
+def in_latex(frame: pd.DataFrame, names: str, columns: str, note: str = "") -> str:
     """Return a frame of LaTeX as a table of booktabs, a line after the other.
 
     Parameters
@@ -163,3 +160,90 @@ def in_latex(frame: DataFrame, names: str, columns: str, note: str = "") -> str:
 def _protected(text: str) -> str:
     """Return escaped text that is no option of the line before, and whose > any font shows."""
     return "{}" * text.startswith(("[", "*")) + text.replace(">", "$>$")
+
+
+@dataclass(frozen=True)
+class Cell:
+    """An estimate as text: its value, and the bounds of its interval, if they are known."""
+
+    value: str
+    bounds: tuple[str, str] | None
+
+    @classmethod
+    def of(cls, estimate: Estimate) -> Cell:
+        """Return the cell of an estimate."""
+        value, low, high = map(two_figures, ends(estimate))
+        return cls(value, None if np.isnan(estimate.low) else (low, high))
+
+    @property
+    def interval(self) -> str:
+        """The interval; nothing if it is not known."""
+        return between(*self.bounds) if self.bounds else ""
+
+    def bracketed(self, space: str) -> str:
+        """Return the value and, if it is known, its interval in brackets."""
+        return f"{self.value}{space}[{', '.join(self.bounds)}]" if self.bounds else self.value
+
+
+Row = tuple[str, int, tuple[Cell | None, ...]]
+"""Condition, number of seeds, and a cell per title; none where there is no estimate."""
+
+
+def ends(estimate: Estimate) -> tuple[float, float, float]:
+    """Return value and ends of the interval of an estimate of no dimension."""
+    return float(estimate.value), float(estimate.low), float(estimate.high)
+
+
+LABEL = 24
+"""What a condition's label may be broken to, if there is no room for all of it [characters]."""
+
+
+def print_rows(titles: Sequence[str], rows: Sequence[Row], console: Console) -> None:
+    """Print estimates by condition, each over its 95 % interval.
+
+    Columns that do not fit side by side without breaking a word follow below, as a further table.
+    """
+    for block in _blocks(titles, rows, console.width):
+        table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, header_style="bold")
+        table.add_column("", overflow="fold")
+        for i, width in block.items():
+            table.add_column(escape(titles[i]), justify="right", overflow="fold", width=width)
+        for condition, seeds, cells in rows:
+            shown = (cells[i] for i in block)
+            table.add_row(
+                f"{escape(condition)}\n[dim]{count(seeds, 'seed')}[/]",
+                *(f"{c.value}\n[dim]{c.interval or '–'}[/]" if c else "" for c in shown),
+            )
+        console.print(table)
+        console.print()
+
+
+def text_of(titles: Sequence[str], rows: Sequence[Row], width: int = 80) -> str:
+    """Return what `print_rows` prints, without colours."""
+    file = io.StringIO()
+    print_rows(titles, rows, Console(file=file, width=width, color_system=None))
+    lines = file.getvalue().splitlines()
+    return "\n".join(line.rstrip() for line in lines).rstrip()
+
+
+def _blocks(titles: Sequence[str], rows: Sequence[Row], width: int) -> list[dict[int, int]]:
+    """Return which columns stand side by side, and how wide each is: in as few blocks as fit.
+
+    Where titles fit in one line there is one block; otherwise they are broken between words.
+    """
+    label = max(max(len(c), len(count(seeds, "seed"))) for c, seeds, _ in rows)
+    texts = [
+        [text for _, _, row in rows if (c := row[i]) for text in (c.value, c.interval)]
+        for i in range(len(titles))
+    ]
+    pairs = list(zip(titles, texts, strict=True))
+    whole = [max(map(len, [title, *of_cells])) for title, of_cells in pairs]
+    if label + sum(1 + wide for wide in whole) <= width:
+        return [dict(enumerate(whole))]
+    broken = [max(map(len, [*title.split(), *of_cells])) for title, of_cells in pairs]
+    n, label = len(broken), min(label, LABEL)
+    for many in range(n, 0, -1):
+        blocks = [{i: broken[i] for i in range(k, min(k + many, n))} for k in range(0, n, many)]
+        if all(label + sum(1 + wide for wide in block.values()) <= width for block in blocks):
+            break
+    return blocks

@@ -9,9 +9,9 @@ from markupsafe import Markup
 from ..catalogue.study import analysed, drawn, load_study
 from ..presentation.tables import tabulate
 from ..presentation.words import count
+from ..results.analysis import identity_lines
 from ..results.contrasts import contrasts
 from ..results.results import read
-from ..results.verdicts import identity_lines
 from ..spec.outline import StudyOutline, sources_of
 from ..spec.toml import dumps
 from ..store.schema import RESULTS_VERSION

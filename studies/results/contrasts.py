@@ -10,12 +10,11 @@ from ...core.plugins.deferred import pd
 from ...core.plugins.messages import closest
 from ..errors import SpecError
 from ..spec.labels import aliases, label
+from .analysis import NOTHING, WORDS, identity_lines, verdicts
 from .comparison import Array, Difference, differences
-from .numbers import shown
-from .results import SECONDS, Results
+from .results import SECONDS, Results, shown
 from .statistics import bootstrap, rate
 from .summary import Summary
-from .verdicts import NOTHING, WORDS, identity_lines, verdicts
 
 STEPS = Measure("steps", "steps", "1", better="lower", least=0.0)
 EPISODES = (STEPS, Measure("return", "return", "1", better="higher"))

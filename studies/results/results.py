@@ -6,9 +6,11 @@ unit and meaning stand in ``frame.attrs["columns"]`` by its name.
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,7 +21,6 @@ from ...core.plugins.deferred import pd
 from ..store.reading import NamesAndRows
 from ..store.schema import EVALUATION
 from ..store.store import Store
-from .numbers import EPISODE_COLUMNS, NUMBERS, TRIAL_COLUMNS
 
 Array = NDArray[Any]
 
@@ -306,3 +307,31 @@ def join(
     phases = dict.fromkeys(phase for part in parts for phase in part.phases)
     usage = (name for part in parts for name in part.usage)
     return assemble(frames["episodes"], frames["trials"], phases, columns, measures, usage)
+
+
+_TABLES = tomllib.loads(Path(__file__).with_name("columns.toml").read_text(encoding="utf-8"))
+EPISODE_COLUMNS, TRIAL_COLUMNS, NUMBERS = (
+    {name: (unit, meaning) for name, (unit, meaning) in table.items()} for table in _TABLES.values()
+)
+"""Unit and meaning by name: of the columns of episodes that every scenario has, of those of trials,
+and of numbers of whole trials."""
+
+_TITLES = {"decision_median": "decision", "decision_99": "99th percentile of decisions"}
+"""Headings of numbers that are shown in milliseconds."""
+
+
+def shown(name: str) -> tuple[Measure, float]:
+    """Return how a number is shown, and by what it is multiplied for that.
+
+    Examples
+    --------
+    >>> measure, factor = shown("decision_median")
+    >>> measure.unit, factor
+    ('ms', 1000.0)
+    >>> shown("messages")[0].unit
+    '1'
+    """
+    if name in _TITLES:
+        return Measure(name, _TITLES[name], "ms", better="lower", least=0.0), 1e3
+    unit = "s" if name.startswith("seconds.") else "1"
+    return Measure(name, name, NUMBERS[name][0] if name in NUMBERS else unit), 1.0

@@ -24,7 +24,7 @@ from ...core.plugins.sources import format_error, place
 from ..errors import SpecError
 from ..spec.conditions import Condition, ConditionSettings
 from ..spec.curriculum import Stage
-from .measures import joined
+from .episodes import joined
 
 if TYPE_CHECKING:
     from ..spec.spec import Spec

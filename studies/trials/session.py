@@ -15,8 +15,7 @@ from ...core.interface.scenario import EpisodeRecorder, RecordedScenario
 from ..store.durable import TEAM, Recording
 from ..store.schema import EVALUATION, STAGE
 from .arrangement import Arrangement, arrange, teach, transfer
-from .episodes import EpisodeMeter, EpisodeRow, Stopwatch
-from .measures import joined
+from .episodes import EpisodeMeter, EpisodeRow, Stopwatch, joined
 from .trial import Trial, TrialResult
 
 EVALUATION_WORLDS = 10**6

@@ -9,12 +9,11 @@ conditions and both measures.
 
 from collections.abc import Sequence
 
-from ...results.analysis import Analysis, Figures
+from ...results.analysis import Analysis, Figures, verdicts
 from ...results.comparison import Pair, differences, phases_of
 from ...results.results import Results
 from ...results.statistics import exactly, rate
 from ...results.summary import Summary
-from ...results.verdicts import verdicts
 from ..study import run_training as measure
 
 PUBLISHED = ("success",)
@@ -48,9 +47,9 @@ def compared_with_first(results: Results, names: Sequence[str]) -> Analysis:
 
 def draw(analysis: Analysis) -> Figures:
     """Return the figures of an analysis by name."""
-    from ...presentation import forest
+    from ...presentation.figures import draw_forest
 
-    figure = forest.draw(analysis.differences, "difference from the first condition")
+    figure = draw_forest(analysis.differences, "difference from the first condition")
     return {} if figure is None else {"ablation": figure}
 
 

@@ -53,9 +53,9 @@ def _legend(orders: Sequence[str]) -> list[str]:
 
 def draw(analysis: Analysis) -> Figures:
     """Return the figure: what each order differs from the first one by."""
-    from ...presentation import forest
+    from ...presentation.figures import draw_forest
 
-    figure = forest.draw(analysis.differences, "difference from the first order")
+    figure = draw_forest(analysis.differences, "difference from the first order")
     return {} if figure is None else {"chain-order": figure}
 
 

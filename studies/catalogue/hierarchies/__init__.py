@@ -18,13 +18,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...errors import SpecError
-from ...results.analysis import Analysis, Figures
+from ...results.analysis import NOTHING, Analysis, Figures, verdicts
 from ...results.comparison import Array, Pair, differences
 from ...results.results import Results
-from ...results.sizes import Sizes
 from ...results.statistics import Estimate, bootstrap, exactly, rate
-from ...results.summary import EVALUATED, Summary
-from ...results.verdicts import NOTHING, verdicts
+from ...results.summary import EVALUATED, Sizes, Summary
 from ...spec.labels import label_but
 from ...spec.spec import Spec
 from ..scaling import NUMBERS, measure
@@ -158,7 +156,7 @@ def draw(analysis: Analysis) -> Figures:
     bars their 95 % intervals; hierarchies differ by colour and marker, and stand a little beside
     each other.
     """
-    from ...presentation import by_robots, figures  # matplotlib takes its time
+    from ...presentation import figures  # matplotlib takes its time
 
     cases = analysis.cases
     hierarchies = list(dict.fromkeys(case.hierarchy for case in cases))
@@ -171,16 +169,16 @@ def draw(analysis: Analysis) -> Figures:
             for axes, title in zip(column, (EVALUATED, DECIDING), strict=True):
                 robots, values = [c.robots for c in own], [c.values[title] for c in own]
                 if own:
-                    by_robots.draw_line(axes, robots, values, index, len(hierarchies))
+                    figures.draw_line(axes, robots, values, index, len(hierarchies))
         column[0].set_title(f"value of: {value_of}" if value_of else "", loc="left")
         column[1].set_xlabel(cases[0].sizes.word)
     for axes in panels.flat:
-        by_robots.scale_axis(axes, sorted({case.robots for case in cases}))
+        figures.scale_axis(axes, sorted({case.robots for case in cases}))
     figures.as_rates(panels[0, 0])
     figures.log_axis(panels[1, 0])
     for axes, title in zip(panels[:, 0], (EVALUATED, "deciding [ms]"), strict=True):
         axes.set_ylabel(title)
-    by_robots.name_lines(figure, hierarchies, "means over seeds, bars: 95 % intervals")
+    figures.name_lines(figure, hierarchies, "means over seeds, bars: 95 % intervals")
     return {"hierarchies": figure}
 
 

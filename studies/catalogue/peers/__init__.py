@@ -11,12 +11,11 @@ from time import process_time
 
 import numpy as np
 
-from ...results.analysis import Analysis, Figures
+from ...results.analysis import Analysis, Figures, verdicts
 from ...results.comparison import Array, differences
 from ...results.results import Results
 from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, stacked
 from ...results.summary import EVALUATED, Summary, evaluated
-from ...results.verdicts import verdicts
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..study import check_evaluated as check

@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -26,21 +26,17 @@ from ....core.learners.frozen import FrozenSettings
 from ....core.learners.learner import LearnerSettings
 from ....core.plugins.deferred import pd
 from ...errors import SpecError
-from ...results.analysis import Analysis, Figures
+from ...results.analysis import Analysis, Figures, verdicts
 from ...results.comparison import Array, Pair, differences
 from ...results.results import Results
 from ...results.statistics import NOT_NEGATIVE, bootstrap, rate
 from ...results.summary import Summary
-from ...results.verdicts import verdicts
 from ...spec.labels import label_but
 from ...spec.spec import Spec
 from ...trials.arrangement import arrange
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..study import check_rule_bases
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 NUMBERS = ("onset",)
 """What of whole trials the analysis rests on."""
@@ -260,7 +256,11 @@ def draw(analysis: Analysis) -> Figures:
     columns = panels.shape[1]
     for axes, fault in zip(panels.flat, faults, strict=False):
         for course in (c for c in courses if c.fault == fault):
-            _draw_course(axes, course, cases.index(course.adapts))
+            for onset in course.onsets:
+                axes.axvline(onset - 0.5, color="#888888", linewidth=0.8)
+            curve = bootstrap(_smoothed(course.success, course.onset), bounds=(0, 1))
+            episodes = range(len(curve.value))  # counted from 0, as in rows and specs
+            f.draw_curve(axes, episodes, curve, cases.index(course.adapts), alpha=0.1)
         axes.set_title("\n".join(wrap(fault, round(60 / columns))), loc="left")
         f.as_rates(axes)
         axes.grid(axis="y", alpha=0.25)
@@ -276,16 +276,6 @@ def draw(analysis: Analysis) -> Figures:
     return {"wheel-failure": figure}
 
 
-def _draw_course(axes: Axes, course: Course, index: int) -> None:
-    from ...presentation.figures import draw_curve
-
-    for onset in course.onsets:
-        axes.axvline(onset - 0.5, color="#888888", linewidth=0.8)
-    runs = _smoothed(course.success, course.onset)
-    episodes = np.arange(runs.shape[1])  # counted from 0, as in rows and specs
-    draw_curve(axes, episodes, bootstrap(runs, bounds=(0, 1)), index, alpha=0.1)
-
-
 def _smoothed(success: np.ndarray, onset: int) -> np.ndarray:
     """Return means over the episode and those before it, but not across the onset."""
     means = [
@@ -293,6 +283,3 @@ def _smoothed(success: np.ndarray, onset: int) -> np.ndarray:
         for e in range(success.shape[1])
     ]
     return np.stack(means, axis=1)
-
-
-__all__ = ["NUMBERS", "analyse", "check", "draw", "measure"]

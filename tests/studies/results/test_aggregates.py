@@ -5,7 +5,7 @@ import pytest
 
 from nested_agents.core.interface.measures import SUCCESS, Measure
 from nested_agents.studies.errors import SpecError
-from nested_agents.studies.presentation.profiles import draw
+from nested_agents.studies.presentation.figures import draw
 from nested_agents.studies.results import aggregates
 from nested_agents.studies.results.aggregates import (
     aggregate,

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
+from nested_agents.studies.results.analysis import power_lines, power_text, verdict_lines
 from nested_agents.studies.results.comparison import Difference, adjusted, compare_pairs
 from nested_agents.studies.results.paired_tests import LEVEL, paired_permutation
 from nested_agents.studies.results.power import (
@@ -13,7 +14,6 @@ from nested_agents.studies.results.power import (
     seeds_needed,
 )
 from nested_agents.studies.results.statistics import bootstrap
-from nested_agents.studies.results.verdicts import power_lines, power_text, verdict_lines
 
 
 def found_in_simulation(
