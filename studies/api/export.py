@@ -9,7 +9,7 @@ from typing import Literal
 from ...core.plugins.deferred import pd
 from ..catalogue.study import published_part
 from ..errors import SpecError
-from ..presentation.csv_text import write_frame
+from ..presentation.row_formats import write_frame
 from ..results import marl_eval, published
 from ..results.results import read
 from ..spec.outline import StudyOutline

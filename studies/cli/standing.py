@@ -6,8 +6,7 @@ from statistics import fmean
 
 from ..presentation.words import count, duration
 from ..spec.outline import StudyOutline, other_spec
-from ..store.running import last, look
-from ..store.store import Store
+from ..store.store import Store, last, look
 from ..trials.code import outdated
 from ..workers.worker import cores
 

@@ -18,10 +18,12 @@ from rich.console import Console
 from rich.progress import track
 
 from ...core.adaptation.learned_predictor import LearnedPredictor
+from ...core.adaptation.self_model import SelfModel
 from ...core.agents.loop import world_seed
 from ...core.agents.team import Team, of_fuzzy_agents
 from ...core.interface.scenario import Scenario
 from ...core.interface.spaces import Variable
+from ...core.numerics.arrays import FloatArray
 from ...core.rules.rule_base import RuleBase
 from ...scenarios.checking.predictions import apart
 from ..errors import SpecError
@@ -31,8 +33,25 @@ from ..store.store import Store
 from ..trials.session import EVALUATION_WORLDS, Session
 from ..trials.trial import Trial
 from . import rules as explain_rules
-from .body import Bodies
 from .rules import Parts
+
+Effects = tuple[FloatArray, ...]
+
+
+@dataclass
+class Bodies:
+    """What the bodies were believed to be at some moments."""
+
+    moments: dict[str, Effects]
+    """Effects of all bodies by moment: ``built``, perhaps ``before`` the first failure, ``after``
+    all training."""
+    deviations: Effects
+    """Standard deviations of the last of them, as the self-model has them."""
+
+    def note(self, moment: str, model: SelfModel) -> None:
+        """Note what is believed now."""
+        self.moments[moment] = tuple(effect.copy() for effect in model.effects)
+        self.deviations = model.deviations
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,10 @@ the condition's label says already, the swept keys, is left to CSV and JSON.
 
 from __future__ import annotations
 
+import csv
 import io
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from shutil import get_terminal_size
 from typing import Any, Literal, TextIO
 
@@ -18,7 +19,6 @@ from rich.table import Table
 
 from ...core.interface.measures import Measure
 from ...core.plugins.deferred import pd
-from .csv_text import rows_of, write_frame
 
 Format = Literal["table", "csv", "json"]
 
@@ -79,3 +79,44 @@ def _format(measure: Measure, values: Sequence[Any]) -> str:
     if largest >= 1000.0:
         return ".4g"
     return ".2f" if measure.unit == "1" else ".3f"
+
+
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""With what a spreadsheet's formula begins, if the spaces before it are left out."""
+
+
+def write_csv(file: TextIO, names: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
+    """Write a header and rows; None becomes an empty cell."""
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow(map(harmless, names))
+    writer.writerows(map(harmless, row) for row in rows)
+
+
+def write_frame(file: TextIO, frame: pd.DataFrame) -> None:
+    """Write a frame with a header; truth values are 0 and 1, what is missing is an empty cell."""
+    write_csv(file, list(frame.columns), rows_of(frame))
+
+
+def rows_of(frame: pd.DataFrame) -> Iterator[tuple[Any, ...]]:
+    """Yield the rows of a frame as values of Python's own types; None is what is missing."""
+    values: Any = frame.astype(object).where(frame.notna(), None)
+    yield from values.itertuples(index=False, name=None)
+
+
+def harmless(value: Any) -> Any:
+    """Return a value as it may stand in a spreadsheet, a truth value as 0 or 1.
+
+    Examples
+    --------
+    >>> [harmless(value) for value in ("=1+1", "@SUM(A1)", "-0.5", -0.5, "chain", None)]
+    ["'=1+1", "'@SUM(A1)", '-0.5', -0.5, 'chain', None]
+    """
+    if isinstance(value, bool):
+        return int(value)
+    if not isinstance(value, str) or not value.lstrip(" \n").startswith(FORMULA):
+        return value
+    try:
+        float(value)
+    except ValueError:
+        return f"'{value}"
+    return value

@@ -17,7 +17,7 @@ from ...core.plugins.messages import near
 from ..errors import SpecError
 from ..results.statistics import FEW, Estimate
 from ..results.summary import Summary, between, two_figures
-from .csv_text import write_csv
+from .row_formats import write_csv
 from .words import count
 
 MATHS_SPACE = r"\;"

@@ -27,8 +27,18 @@ from ...core.plugins.settings import Settings, tuples
 from ...core.plugins.sources import Sources, is_reference, named
 from ...topologies.checks import listed
 from ..errors import SpecError, show
-from .conditions import SECTIONS, Condition, Override, below, grid, layer_of, section
-from .curriculum import Curriculum, Length, Name
+from .conditions import (
+    SECTIONS,
+    Condition,
+    Curriculum,
+    Length,
+    Name,
+    Override,
+    below,
+    grid,
+    layer_of,
+    section,
+)
 from .objects import plain
 from .overlay import TomlTable, assignment, flat, overlay
 from .presets import PRESETS
