@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
-from ..errors import SpecError
+from ..errors import SpecError, refused
 from ..results.analysis import Analysis, Figures, identity_lines
 from ..results.results import Results
 from ..spec.studies import STUDIES
@@ -52,10 +52,8 @@ def load_study(name: str) -> Study:
     SpecError
         If there is none, it may not be run, or lacks a function that studies have; one line.
     """
-    try:
+    with refused(f"study = {name!r}: "):
         entry = STUDIES.find(name)
-    except ValueError as error:
-        raise SpecError(f"study = {name!r}: {error}") from None
     study = entry() if isinstance(entry, type) else entry
     missing = [part for part in PARTS if not callable(getattr(study, part, None))]
     if missing:

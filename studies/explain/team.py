@@ -26,7 +26,7 @@ from ...core.interface.spaces import Variable
 from ...core.numerics.arrays import FloatArray
 from ...core.rules.rule_base import RuleBase
 from ...scenarios.checking.predictions import apart
-from ..errors import SpecError
+from ..errors import SpecError, refused
 from ..store.durable import TEAM
 from ..store.schema import STAGE, columns
 from ..store.store import Store
@@ -120,11 +120,9 @@ def _policy(trial: Trial, team: Team, scenario: Any) -> Any:
 
 def _trained(store: Store, trial: Trial) -> tuple[Team, Scenario, Bodies | None]:
     arrays = store.recording(trial.identity, TEAM) if trial.keep_teams else None
-    try:
+    with refused(f"{store.directory}: "):  # a file that settings name may not be what it was
         session = Session(trial)
         team = of_fuzzy_agents(session.team)
-    except ValueError as error:  # a file that settings name is not what it was
-        raise SpecError(f"{store.directory}: {error}") from None
     model, bodies = team.self_model, None
     if model is not None:
         bodies = Bodies({}, ())

@@ -36,7 +36,7 @@ def write_rows(
     CSV, true and false in JSON.
     """
     if form == "csv":
-        write_frame(file, frame)
+        file.write(in_csv(frame))
     elif form == "json":
         names = list(frame.columns)
         lines = [json.dumps(dict(zip(names, row, strict=True))) for row in rows_of(frame)]
@@ -85,16 +85,18 @@ FORMULA = ("=", "+", "-", "@", "\t", "\r")
 """With what a spreadsheet's formula begins, if the spaces before it are left out."""
 
 
-def write_csv(file: TextIO, names: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
+def write_csv(file: TextIO, names: Iterable[str], rows: Iterable[Sequence[Any]]) -> None:
     """Write a header and rows; None becomes an empty cell."""
     writer = csv.writer(file, lineterminator="\n")
     writer.writerow(map(harmless, names))
     writer.writerows(map(harmless, row) for row in rows)
 
 
-def write_frame(file: TextIO, frame: pd.DataFrame) -> None:
-    """Write a frame with a header; truth values are 0 and 1, what is missing is an empty cell."""
-    write_csv(file, list(frame.columns), rows_of(frame))
+def in_csv(frame: pd.DataFrame) -> str:
+    """Return a frame with a header; truth values are 0 and 1, what is missing is an empty cell."""
+    file = io.StringIO()
+    write_csv(file, frame.columns, rows_of(frame))
+    return file.getvalue()
 
 
 def rows_of(frame: pd.DataFrame) -> Iterator[tuple[Any, ...]]:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from html import escape as in_html
+from typing import Any, NamedTuple
 
 import numpy as np
 from rich.console import Console
@@ -15,13 +17,14 @@ from rich.table import Table
 from ...core.plugins.deferred import pd
 from ...core.plugins.messages import near
 from ..errors import SpecError
-from ..results.statistics import FEW, Estimate
+from ..results.statistics import FEW, Estimate, exactly
 from ..results.summary import Summary, between, two_figures
-from .row_formats import write_csv
+from .row_formats import in_csv
 from .words import count
 
 MATHS_SPACE = r"\;"
 NOTHING = "no trial has finished"
+UNKNOWN = exactly(np.nan)
 
 
 @dataclass(frozen=True)
@@ -30,13 +33,8 @@ class SummaryTable:
 
     titles: tuple[str, ...]
     """Headings of the estimates."""
-    rows: tuple[Row, ...]
-    """Its lines."""
-    csv: str
-    """The whole table as CSV."""
-    markdown: str
-    """The whole table in Markdown. Printed, it is as on a terminal of 80 columns; a notebook shows
-    it as HTML."""
+    lines: tuple[Summary, ...]
+    """Its lines. Printed, it is as on a terminal of 80 columns; a notebook shows it as HTML."""
 
     def __str__(self) -> str:
         table = [text_of(self.titles, self.rows), ""] if self.rows else []
@@ -56,6 +54,36 @@ class SummaryTable:
         if all(seeds >= FEW for _, seeds, _ in self.rows):
             return ""
         return f"Intervals of fewer than {FEW} seeds: Student's (short if skewed), rates Wilson's."
+
+    @cached_property
+    def rows(self) -> tuple[Row, ...]:
+        """Its lines as text."""
+        rows = []
+        for line in self.lines:
+            estimates = (line.estimates.get(title) for title in self.titles)
+            cells = tuple(None if e is None else Cell.of(e) for e in estimates)
+            rows.append((line.condition, line.seeds, cells))
+        return tuple(rows)
+
+    @property
+    def csv(self) -> str:
+        """The whole table as CSV, with every digit."""
+        columns: dict[str, Any] = {"condition": [line.condition for line in self.lines]}
+        columns["seeds"] = [line.seeds for line in self.lines]
+        for title in self.titles:
+            estimates = (line.estimates.get(title, UNKNOWN) for line in self.lines)
+            parts = zip(*map(ends, estimates), strict=True)
+            columns |= zip((title, f"{title} low", f"{title} high"), parts, strict=True)
+        return in_csv(pd.DataFrame(columns))
+
+    @property
+    def markdown(self) -> str:
+        """The whole table in Markdown."""
+        lines = [["condition", "seeds", *self.titles], ["---"] * (2 + len(self.titles))]
+        for condition, seeds, cells in self.rows:
+            lines.append([condition, str(seeds), *(c.bracketed(" ") if c else "" for c in cells)])
+        escaped = [[text.replace("|", r"\|") for text in line] for line in lines]
+        return "".join(f"| {' | '.join(line)} |\n" for line in escaped)
 
     @property
     def html(self) -> str:
@@ -101,39 +129,7 @@ def tabulate(lines: Sequence[Summary], columns: Sequence[str] = ()) -> SummaryTa
             has = f"it has {', '.join(map(repr, titles)) or 'none'}"
             hint = f"{near(column, titles)} {has}".lstrip()
             raise SpecError(f"columns: the table has no {column!r}; {hint}")
-    titles = tuple(columns) or titles
-    rows = tuple(
-        (s.condition, s.seeds, tuple(_cell(s.estimates.get(title)) for title in titles))
-        for s in lines
-    )
-    return SummaryTable(titles, rows, _csv(lines, titles), _markdown(titles, rows))
-
-
-def _cell(estimate: Estimate | None) -> Cell | None:
-    return None if estimate is None else Cell.of(estimate)
-
-
-def _csv(lines: Sequence[Summary], titles: Sequence[str]) -> str:
-    file = io.StringIO()
-    heads = [f"{title}{end}" for title in titles for end in ("", " low", " high")]
-    rows = []
-    for line in lines:
-        values: list[object] = [line.condition, line.seeds]
-        for title in titles:
-            estimate = line.estimates.get(title)
-            numbers = (np.nan,) * 3 if estimate is None else ends(estimate)
-            values += ["" if np.isnan(value) else repr(value) for value in numbers]
-        rows.append(values)
-    write_csv(file, ["condition", "seeds", *heads], rows)
-    return file.getvalue()
-
-
-def _markdown(titles: Sequence[str], rows: Sequence[Row]) -> str:
-    lines = [["condition", "seeds", *titles], ["---"] * (2 + len(titles))]
-    for condition, seeds, cells in rows:
-        lines.append([condition, str(seeds), *(c.bracketed(" ") if c else "" for c in cells)])
-    escaped = [[text.replace("|", r"\|") for text in line] for line in lines]
-    return "".join(f"| {' | '.join(line)} |\n" for line in escaped)
+    return SummaryTable(tuple(columns) or titles, tuple(lines))
 
 
 def in_latex(frame: pd.DataFrame, names: str, columns: str, note: str = "") -> str:
@@ -162,8 +158,7 @@ def _protected(text: str) -> str:
     return "{}" * text.startswith(("[", "*")) + text.replace(">", "$>$")
 
 
-@dataclass(frozen=True)
-class Cell:
+class Cell(NamedTuple):
     """An estimate as text: its value, and the bounds of its interval, if they are known."""
 
     value: str

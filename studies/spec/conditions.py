@@ -30,7 +30,7 @@ from ...core.plugins.settings import ScenarioSettings, Settings, tuples, unwritt
 from ...scenarios import DEFAULT, SCENARIOS
 from ...topologies import build
 from ...topologies.config import Topology, parse
-from ..errors import SpecError, show
+from ..errors import SpecError, refused, show
 from .labels import label, scalar
 from .overlay import TomlTable, nested, overlay
 from .presets import PRESETS
@@ -349,7 +349,5 @@ def section(name: str, value: object) -> TomlTable:
     if not is_topology or not isinstance(value, str):
         allowed = "a name or a table" if is_topology else "a table"
         raise SpecError(f"{name} = {show(value)}: must be {allowed}")
-    try:
+    with refused(name.removesuffix("topology")):
         return parse(value).model_dump()
-    except ValueError as error:
-        raise SpecError(f"{name.removesuffix('topology')}{error}") from None

@@ -58,8 +58,6 @@ def start_workers(
         raise SpecError(f"backend = {backend!r}: {closest(backend, known)}")
     wanted = max(1, min(jobs or cores(), trials))
     if backend == "loky":
-        from .workers import LokyWorkers
-
         if address is not None:
             raise SpecError(f"--address {address}: is for --backend dask only")
         yield LokyWorkers(wanted)
