@@ -40,7 +40,7 @@ from ..results.selection import chosen, together
 from ..spec.outline import StudyOutline, other_spec, sources_of
 from ..store import durable
 from ..store.store import Store
-from ..workers.workers import Backend
+from ..workers.runner import Backend
 from . import replay
 from .comparison import Comparison
 

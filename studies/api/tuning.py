@@ -26,8 +26,7 @@ from ..spec.toml import dumps
 from ..store import durable
 from ..trials.arrangement import check
 from ..trials.trial import Trial, trials_of
-from ..workers.runner import Observer
-from ..workers.workers import Backend
+from ..workers.runner import Backend, Observer
 from .run_study import run_study
 from .study import StudyResults, load
 

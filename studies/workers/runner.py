@@ -11,7 +11,7 @@ from contextlib import closing
 from itertools import islice
 from pathlib import Path
 from queue import Empty, SimpleQueue
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from ..store.store import Running, Store
 from .worker import Outcome, RunTrial, ignore_interrupts, undisturbed
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from ..spec.spec import Spec
     from ..trials.trial import Trial, TrialResult
 
+Backend = Literal["loky", "dask"]
+"""``loky``: processes of this machine. ``dask``: workers of a Dask cluster."""
 ATTEMPTS = 2
 """How often a trial is run alone whose worker has died."""
 

@@ -9,7 +9,7 @@ import time
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future
 from contextlib import contextmanager
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
 from joblib.externals.loky import get_reusable_executor
 from joblib.externals.loky.process_executor import TerminatedWorkerError
@@ -17,11 +17,8 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 from ...core.plugins.messages import closest
 from ..errors import SpecError
 from ..trials.trial import Trial
-from .runner import Workers
+from .runner import Backend, Workers
 from .worker import ONE_THREAD, Outcome, RunTrial, attempt, begin, cores
-
-Backend = Literal["loky", "dask"]
-"""``loky``: processes of this machine. ``dask``: workers of a Dask cluster."""
 
 
 def check_jobs(jobs: int) -> None:

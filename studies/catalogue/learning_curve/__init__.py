@@ -4,7 +4,10 @@ Every claim of learning needs its controls beside it: one whose weights stay fro
 from luck, one that has the reward function tells it from what the predictor alone achieves.
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from ....core.interface.measures import SUCCESS, Measure
 from ...errors import SpecError
@@ -13,8 +16,10 @@ from ...results.contrasts import EPISODES, STEPS
 from ...results.results import Array, Results
 from ...results.statistics import Estimate, bootstrap, rate, rates
 from ...results.summary import EVALUATED, Summary, evaluated
-from ...spec.spec import Spec
 from ..study import run_training as measure
+
+if TYPE_CHECKING:
+    from ...spec.spec import Spec
 
 BLOCK = 5
 """Episodes at each end of training that the table averages over."""
