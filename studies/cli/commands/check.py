@@ -78,7 +78,7 @@ def _learned_errors(
     """Yield the errors of learned predictors by variable, see `errors_of`, each once."""
     from ....core.adaptation.predictors import LearnedPredictorSettings
     from ....core.agents.team import of_fuzzy_agents
-    from ...explain.predictor import errors_of
+    from ...explain.team import errors_of
     from ...spec.spec import Spec
     from ...trials.session import Session
     from ...trials.trial import trials_of
