@@ -42,6 +42,18 @@ def bounds_of(player: str, space: Any) -> FloatArray:
     return np.where(np.abs(ends) > MOST_BOUND, np.copysign(np.inf, ends), ends)
 
 
+def names_of(space: Any) -> list[str]:
+    """Return the names of the numbers of an observation: of a Dict by its keys, else o0 and on."""
+    if isinstance(space, Discrete):
+        return ["o0"]
+    if not isinstance(space, Dict):
+        return [f"o{i}" for i in range(cast(Box, flatten_space(space)).shape[0])]
+    counts = {key: cast(Box, flatten_space(part)).shape[0] for key, part in space.items()}
+    return [
+        key if count == 1 else f"{key}{i}" for key, count in counts.items() for i in range(count)
+    ]
+
+
 class Perception:
     """What the agents of a foreign environment perceive.
 
@@ -83,6 +95,7 @@ class Perception:
         self._bounds = min(every, key=len)
         self._lengths = [bounds.shape[1] for bounds in every]
         self._count = min(self._lengths)
+        self._names = names_of(next(iter(spaces.values())))[: self._count]
         if not settings.variables and max(self._lengths) > self._count:
             raise ValueError(
                 "scenario.variables: players observe differently many numbers, say which to take"
@@ -93,7 +106,7 @@ class Perception:
         if not settings.variables:
             used = {int(i) for rows in angles.values() for i in rows.ravel()}
             left = [i for i in range(self._count) if i not in used]
-            places = {f"o{i}": np.full((1, len(bodies)), i) for i in left}
+            places = {self._names[i]: np.full((1, len(bodies)), i) for i in left}
         for name in angles.keys() & places.keys():
             raise ValueError(f"scenario.angles.{name}: another state variable has this name")
         places |= angles
@@ -123,14 +136,16 @@ class Perception:
         if isinstance(entries, Direction):
             return np.concatenate([self._find(name, entries.cos), self._find(name, entries.sin)])
         n = len(self._players)
-        places = entries if isinstance(entries, tuple) else (entries,) * n
-        if len(places) != n or max(places) >= self._count:
+        each = entries if isinstance(entries, tuple) else (entries,) * n
+        known: list[str | int] = [*self._names, *range(self._count)]
+        if len(each) != n or not set(each) <= set(known):
             key = f"{'angles' if name in self._angles else 'variables'}.{name}"
             raise ValueError(
                 f"scenario.{key} = {entries}: must be a number of the observation, 0 to "
-                f"{self._count - 1}, or a list of one for each of {n} bodies"
+                f"{self._count - 1} or {', '.join(self._names)}, or a list of one for each of "
+                f"{n} bodies"
             )
-        return np.array([places], dtype=np.int64)
+        return np.array([[known.index(entry) % self._count for entry in each]], dtype=np.int64)
 
     def _described(
         self, settings: AdaptedSettings, places: Mapping[str, Any], met: Callable[[], FloatArray]

@@ -21,8 +21,10 @@ class FrozenTable(dict[str, Any]):
 
 Range = Annotated[tuple[float, float], AfterValidator(lambda ends: _ordered(ends))]
 Index = Annotated[int, Field(ge=0)]
-Entries = Index | Annotated[tuple[Index, ...], Field(min_length=1)]
-"""Which number of an observation, counted from 0: one for all bodies, or one for each body."""
+Entry = Index | str
+"""Which number of an observation: counted from 0, or by name."""
+Entries = Entry | Annotated[tuple[Entry, ...], Field(min_length=1)]
+"""Which number of an observation: one for all bodies, or one for each body."""
 
 
 def _ordered(ends: tuple[float, float]) -> tuple[float, float]:
@@ -81,8 +83,8 @@ class AdaptedSettings(ScenarioSettings):
     mean of theirs."""
     variables: Annotated[dict[str, Entries], AfterValidator(FrozenTable)] = FrozenTable()
     """State variables by name: which number of the observation each is, one for all bodies or a
-    list of one for each. None: all that `angles` leaves and that change, called o0, o1 and so
-    on."""
+    list of one for each. None: all that `angles` leaves and that change, called o0, o1 and so on,
+    or those of a Dict by its keys: ``height``, ``position0``, ``position1``."""
     angles: Annotated[dict[str, Entries | Direction], AfterValidator(FrozenTable)] = FrozenTable()
     """State variables that are angles [rad], whose ends are the same point: where the observation
     has them, or their ``cos`` and ``sin``."""

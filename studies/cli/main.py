@@ -39,6 +39,7 @@ COMMANDS: dict[str, str] = {
     "topology": "List the topologies, or show one of them.",
     "check": "Check that scenarios keep their promises.",
     "cost": "Print what hierarchies cost, by formula and measured.",
+    "benchmark": "Enter a learner in the benchmark push-n, and compare entries.",
     "claims": "Print the claims of the paper and the verdict on each.",
 }
 """The commands and what the help says of each; their modules are imported when asked for."""

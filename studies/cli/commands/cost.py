@@ -32,7 +32,8 @@ RANGE = re.compile(r"(\d{1,6})(?::(\d{1,6})(?::(\*?)(\d{1,6}))?)?", re.ASCII)
     metavar="SPEC...",
     default=("chain",),
     help="One or more topologies as in a spec: chain teams tree:2 ..., or LABEL=SPEC with a label "
-    "of your own; single-agent: Eq. 23.",
+    "of your own; single-agent: Eq. 23; or ways to decide: best-response, max-plus, fitted-q, "
+    "hierarchy-ppo.",
 )
 @click.option("--rules", type=int, metavar="N", default=5**7, help="|S|, rules of one agent.")
 @click.option("--actions", type=int, metavar="N", default=4, help="|A|, actions of one agent.")
@@ -46,6 +47,10 @@ RANGE = re.compile(r"(\d{1,6})(?::(\d{1,6})(?::(\*?)(\d{1,6}))?)?", re.ASCII)
     metavar="N",
     help="Measure so often, each time with a new team; from 2 on times have an interval.",
 )
+@click.option(
+    "--network/--no-network",
+    help="Also count messages, and how long a decision waits for them at 1 and 10 ms each.",
+)
 @options.formats("table", "json", "csv", "latex")
 @options.plot
 def command(
@@ -53,6 +58,7 @@ def command(
     topology: tuple[str, ...],
     measured: bool,
     repeats: int | None,
+    network: bool,
     form: Form,
     plot: Path | None,
     **quantities: int,
@@ -69,7 +75,9 @@ def command(
         if measured := measured or repeats is not None:
             say("measuring, first compiling what is not: no steps of more than a second or so")
         often = 1 if repeats is None else repeats
-        rows = cost_table(topology, sizes, problem, measured=measured, repeats=often).rows
+        rows = cost_table(
+            topology, sizes, problem, measured=measured, repeats=often, network=network
+        ).rows
         if plot is not None:
             from ...cost.figure import draw
 

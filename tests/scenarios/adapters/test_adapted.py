@@ -274,6 +274,7 @@ IMAGE = Box(0, 255, (8, 8, 3), np.uint8)
         (lambda: from_gymnasium(Odd(done=Box(-np.inf, 1.0, (2,)))), "wrap it in RescaleAction"),
         (lambda: from_gymnasium(Carts(), variables={"a": 2}), r"give scenario\.ranges\.a"),
         (lambda: from_gymnasium(Carts(), variables={"a": 9}), "a = 9: must be a numb"),
+        (lambda: from_gymnasium(Carts(), variables={"a": "b"}), "0 to 3 or o0, o1, o2, o3"),
         (lambda: from_gymnasium(Carts(), variables={"a": (1, 1, 1)}), "one for each of 2"),
         (lambda: from_gymnasium(Carts(), ranges={"b": (0.0, 1.0)}), r"ranges\.b: no state variab"),
         (lambda: from_gymnasium(Carts(), ranges={"o0": (1.0, 0.0)}), "the lower end first"),
@@ -304,8 +305,14 @@ def test_specs_of_worlds_of_others(path: Path) -> None:
 
 def test_tables_and_discrete_observations() -> None:
     table = Dict({"goal": Box(-1.0, 1.0, (2,)), "odds": MultiDiscrete([2, 3])})
-    world = from_gymnasium(Odd(table), variables={"x": 0, "y": 1})
-    assert [v.name for v in world.state_space.variables] == ["x", "y"]
+    world = from_gymnasium(Odd(table), variables={"x": 0, "y": "goal1", "each": ("goal0", 1)})
+    assert [v.name for v in world.state_space.variables] == ["x", "y", "each"]
+    observed = {"goal": np.array([0.3, -0.4]), "odds": np.array([0, 1])}
+    states = world.states_of({"": observed})
+    assert states == pytest.approx(np.array([[0.3, -0.4, 0.3], [0.3, -0.4, -0.4]]))
+    named = Dict({"height": Box(0.0, 1.0, (1,)), "side": Discrete(2)})
+    names = [v.name for v in from_gymnasium(Odd(named)).state_space.variables]
+    assert names == ["height", "side0", "side1"]
     (variable,) = from_gymnasium(Odd(Discrete(3))).state_space.variables
     assert variable.centres == (0.0, 1.0, 2.0)
 

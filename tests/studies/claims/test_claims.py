@@ -262,6 +262,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "edges-arms",
         "edges-games",
         "edges-broken",
+        "edges-sixteen",
         "arms",
         "arm-transfer",
         "long-arms",
