@@ -46,9 +46,11 @@ def export(store: Store, folder: Path, form: Form, *, overwrite: bool = False) -
     """
     store.verify()
     paths = {folder / name: text for name, text in _texts(store, form).items()}
-    for path in paths:
-        if path.exists() and not overwrite:
-            raise SpecError(f"{path}: exists; --overwrite replaces it, --out writes elsewhere")
+    there = [path for path in paths if path.exists()]
+    # Of an export that was killed the first file is left, and is what would be written.
+    is_rest = len(there) < len(paths) and all(_holds(path, paths[path]) for path in there)
+    if there and not (overwrite or is_rest):
+        raise SpecError(f"{there[0]}: exists; --overwrite replaces it, --out writes elsewhere")
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -56,6 +58,10 @@ def export(store: Store, folder: Path, form: Form, *, overwrite: bool = False) -
     for path, text in paths.items():
         durable.write(path, text.encode())
     return list(paths)
+
+
+def _holds(path: Path, text: str) -> bool:
+    return path.is_file() and path.read_bytes() == text.encode()
 
 
 def _texts(store: Store, form: Form) -> dict[str, str]:

@@ -142,7 +142,7 @@ def tune(
         If there is nothing to tune, or it cannot be run; one line says why.
     """
     spec, out = Spec.read(spec, study=Path(out)), Path(out)
-    _check(spec, trials, seeds, first_seed)
+    _check(spec, trials, seeds, first_seed, draw)
     points = _sampled(spec, trials, draw)
     study = _study(spec, points, range(first_seed, first_seed + seeds))
     everything, planned = trials_of(study), dict[str, Trial]()
@@ -187,12 +187,13 @@ def rungs(configurations: int, seeds: int) -> Iterator[tuple[int, int]]:
     yield configurations, seeds
 
 
-def _check(spec: Spec, trials: int, seeds: int, first_seed: int) -> None:
-    for name, value, least in (
-        ("trials", trials, 2), ("seeds", seeds, 2), ("first-seed", first_seed, FIRST_SEED)
+def _check(spec: Spec, trials: int, seeds: int, first_seed: int, draw: int) -> None:
+    for name, value, allowed in (
+        ("trials", trials, range(2, 10_001)), ("seeds", seeds, range(2, 10_001)),
+        ("first-seed", first_seed, range(FIRST_SEED, 10**9)), ("draw", draw, range(10**9)),
     ):  # fmt: skip
-        if value < least:
-            raise SpecError(f"--{name} {value}: must be at least {least}")
+        if value not in allowed:
+            raise SpecError(f"--{name} {value}: allowed {allowed[0]:,} to {allowed[-1]:,}")
     if spec.sweep or spec.overrides:
         raise SpecError("sweep, overrides: must be absent, tune takes a spec of one condition")
     if spec.evaluation < 1:

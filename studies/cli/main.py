@@ -105,7 +105,11 @@ def run_to_status(program: str, run: Callable[[], int]) -> int:
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
         message = f"{where}{error.strerror or error}"
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as error:
+        from ...core.plugins.sources import place
+
+        if where := place(error):  # in code of a file of the user, or raised by it
+            print(f"{program}: interrupted{where}", file=sys.stderr)
         return 130
     print(f"{program}: error: {' '.join(message.split())}", file=sys.stderr)
     return 2

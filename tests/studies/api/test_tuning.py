@@ -86,9 +86,10 @@ def test_the_same_draw_gives_the_same_configurations() -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        (["--trials", "1"], "--trials 1: must be at least 2"),
-        (["--seeds", "1"], "--seeds 1: must be at least 2"),
-        (["--first-seed", "9999"], "--first-seed 9999: must be at least 10000"),
+        (["--trials", "1"], "--trials 1: allowed 2 to 10,000"),
+        (["--draw", "-1"], "--draw -1: allowed 0 to"),
+        (["--seeds", "1"], "--seeds 1: allowed 2 to 10,000"),
+        (["--first-seed", "9999"], "--first-seed 9999: allowed 10,000 to"),
         (["--set", "evaluation=0"], "evaluation = 0: tune compares evaluation success"),
         (["--set", "seeds=[10003]"], "seeds: 10003 would be tuned on and reported"),
         (["--set", "tune.'learner.rigde'=[1]"], "learner.rigde = 1: unknown key"),
