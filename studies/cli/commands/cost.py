@@ -65,8 +65,7 @@ def command(
 ) -> int:
     """Print the cost of hierarchies, by formula (Eq. 18-23) and, if asked, measured."""
     from ....core.agents.cost import Problem
-    from ...api.costs import cost_table
-    from ...cost.table import written
+    from ...cost.table import cost_table, written
     from ...errors import refused
     from ...presentation.progress import say
 
