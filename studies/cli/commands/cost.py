@@ -35,11 +35,9 @@ RANGE = re.compile(r"(\d{1,6})(?::(\d{1,6})(?::(\*?)(\d{1,6}))?)?", re.ASCII)
     "of your own; single-agent: Eq. 23; or ways to decide: best-response, max-plus, fitted-q, "
     "hierarchy-ppo.",
 )
-@click.option("--rules", type=int, metavar="N", default=5**7, help="|S|, rules of one agent.")
-@click.option("--actions", type=int, metavar="N", default=4, help="|A|, actions of one agent.")
-@click.option(
-    "--iterations", type=int, metavar="N", default=450, help="L, iterations (steps) of an epoch."
-)
+@options.number("--rules", "N", 5**7, "|S|, rules of one agent.")
+@options.number("--actions", "N", 4, "|A|, actions of one agent.")
+@options.number("--iterations", "N", 450, "L, iterations (steps) of an epoch.")
 @click.option("--measured/--no-measured", help="Also count and time steps of the running system.")
 @click.option(
     "--repeats",

@@ -27,12 +27,7 @@ Form = Literal["csv", "json", "marl-eval"]
     "marl-eval",
     text="Of the files; distances and returns are left out of json.",
 )
-@click.option(
-    "--out",
-    type=options.PATH,
-    metavar="PATH",
-    help="Folder of the files; by default export in the study's own.",
-)
+@options.out("Folder of the files; by default export in the study's own.", "PATH")
 @click.option("--overwrite", is_flag=True, help="Replace files that are there.")
 def command(directory: Path, form: Form, out: Path | None, overwrite: bool) -> int:
     """Write one file with a row for every episode, and one with a row for every trial.
