@@ -1,16 +1,14 @@
-"""What the online learners share: traces, one update per step, and TD(0) of normalised steps."""
+"""What the online learners share: traces and one update per step; and one that never learns."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from ..numerics.arrays import FloatArray, IntArray
-from ..plugins.settings import Positive
-from ..rules.kernels.updates import add_features
 from ..rules.rule_base import RuleBase
 from .learner import LearnerSettings
 
@@ -111,33 +109,25 @@ class Online(ABC):
             self.weights = self.theta
 
 
-class OneStepSettings(LearnerSettings):
-    """What the settings of `OneStep` learners share."""
+class FrozenSettings(LearnerSettings):
+    """No learning: the consequents stay zero. The control of every learning curve."""
 
-    step_size: Positive = 0.1
-    """alpha, divided by the squared length of the feature vector."""
+    kind: Literal["frozen"] = "frozen"
+    factory: ClassVar[str] = f"{__name__}:Frozen"
 
 
-class OneStep(Online):
-    """TD(0) whose steps are divided by the squared lengths of feature vectors."""
+class Frozen(Online):
+    """Never learns: the consequent weights stay as they are, zero from the start."""
 
-    def _step(
-        self, states: FloatArray, delta: FloatArray, lengths: FloatArray | np.float64 | None = None
-    ) -> int:
-        """Add ``alpha delta phi / lengths`` to the weights; return how many there are.
+    kept = ("theta",)
 
-        Parameters
-        ----------
-        states
-            ``(n, d)`` of which phi are the feature vectors.
-        delta
-            ``(n,)`` errors.
-        lengths
-            ``(n,)`` or one for all: what steps are divided by; the squared lengths of phi if none
-            is given.
-        """
-        if lengths is None:
-            lengths = self.rules.squared_lengths(states)
-        steps = self.settings.step_size * delta / lengths
-        add_features(self.weights, self.rows, states, steps, self.rules.layout)
-        return self.theta.size
+    def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
+        return 0
+
+    def arrays(self) -> dict[str, FloatArray]:
+        """Return the weights, which is all there is."""
+        return {"theta": self.theta}
+
+    def restore(self, arrays: Mapping[str, FloatArray]) -> None:
+        """Continue from `arrays`."""
+        super().restore({"previous": self.theta[:0], "rewards": self._rewards, **arrays})

@@ -22,8 +22,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ....core.agents.team import Team, of_fuzzy_agents
-from ....core.learners.frozen import FrozenSettings
 from ....core.learners.learner import LearnerSettings
+from ....core.learners.online import FrozenSettings
 from ...errors import SpecError
 from ...results.analysis import Analysis, Figures
 from ...results.comparison import Array, Difference, adjusted, of_shared_seeds

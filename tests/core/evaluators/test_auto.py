@@ -9,7 +9,7 @@ from nested_agents.core.evaluators.best_response import BestResponse
 from nested_agents.core.evaluators.exact import ExactEnumeration
 from nested_agents.core.evaluators.sampling import Sampling
 from nested_agents.core.interface.hierarchy import Hierarchy
-from nested_agents.core.learners.frozen import FrozenSettings
+from nested_agents.core.learners.online import FrozenSettings
 
 
 @pytest.mark.parametrize("teammates", ["best-response", "uniform"])

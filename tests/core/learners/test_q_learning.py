@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from nested_agents.core.interface.spaces import StateSpace, Variable
-from nested_agents.core.learners.q_learning import QLearningSettings
+from nested_agents.core.learners.one_step import QLearningSettings
 from nested_agents.core.rules.rule_base import RuleBase
 from nested_agents.core.rules.settings import RuleBaseSettings
 
