@@ -494,8 +494,7 @@ def _predictor_of(
                 f"learner.{name}.enabled: revises what the scenario predicts, and {named} predicts "
                 "in its place; use 'given'"
             )
-    predictor: LearnedPredictor | Persistence = settings.predictor.build(scenario)
-    return predictor
+    return settings.predictor.build(scenario)
 
 
 def of_fuzzy_agents(team: Actors) -> Team:

@@ -119,8 +119,7 @@ def states_by_group(
     """Return the own variables ``(n, m, n_own)`` and the shared ones ``(G, m, d - n_own)``."""
     own_way = getattr(prediction, "states_by_group", None)
     if own_way is not None:
-        parts: tuple[FloatArray, FloatArray] = own_way(joint_actions)
-        return parts
+        return own_way(joint_actions)
     each = range(joint_actions.shape[1])
     states = np.stack([prediction.states(i, joint_actions) for i in each])
     return states[:, :, :n_own], states[[group[0] for group in groups], :, n_own:]

@@ -186,8 +186,7 @@ def can_draw(scenario: Scenario) -> bool:
 def groups_of(scenario: Scenario) -> tuple[tuple[int, ...], ...]:
     """Return the agents by body, consecutive; of a scenario without ``groups``, each alone."""
     single = tuple((i,) for i in range(len(scenario.agents)))
-    groups: tuple[tuple[int, ...], ...] = getattr(scenario, "groups", single)
-    return groups
+    return getattr(scenario, "groups", single)
 
 
 def joint_reward(reward: float | FloatArray, groups: Sequence[Sequence[int]]) -> float | FloatArray:
@@ -208,5 +207,4 @@ def roles_of(scenario: Scenario) -> tuple[str, ...]:
 
     Of a scenario without ``roles``, every agent has its own.
     """
-    roles: tuple[str, ...] = getattr(scenario, "roles", tuple(scenario.agents))
-    return roles
+    return getattr(scenario, "roles", tuple(scenario.agents))

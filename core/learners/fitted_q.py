@@ -128,8 +128,7 @@ class FittedQ(BatchTD):
         self.counts.joint_actions += self._n_actions
         self.counts.rule_evaluations += len(deliberation.own_weights)
         weights = deliberation.own_weights.reshape(-1, self._n_actions)
-        values: FloatArray = strengths[0] @ weights[active[0]]
-        return values
+        return strengths[0] @ weights[active[0]]
 
     def observe(  # type: ignore[override]  # what is asked for by name is given
         self,
@@ -157,10 +156,9 @@ class FittedQ(BatchTD):
 
         def values_of(theta: FloatArray) -> FloatArray:
             columns = np.ascontiguousarray(theta.reshape(-1, n_actions).T)
-            best: FloatArray = np.max(
+            return np.max(
                 [regression.row_values(own, active, strengths) for own in columns], axis=0
             )
-            return best
 
         def solve(moment: FloatArray) -> FloatArray:
             columns = zip(solvers, moment.reshape(-1, n_actions).T, strict=True)

@@ -54,8 +54,7 @@ class Online(ABC):
             met[:, 0], met[:, 1] = states, entered
         values = self.rules.each(self.of_agents(weights), met)
         ahead = 0.0 if entered is None else self.discount * values[:, 1]
-        td_errors: FloatArray = rewards + ahead - values[:, 0]
-        return td_errors
+        return rewards + ahead - values[:, 0]
 
     def begin_episode(self) -> None:
         """Clear the traces."""

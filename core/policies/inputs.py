@@ -94,8 +94,7 @@ class RewardScale:
             before = value - self._mean
             self._mean += before / self._count
             self._squares += before * (value - self._mean)
-        clipped: FloatArray = np.clip(rewards / np.sqrt(self._squares / self._count), -10.0, 10.0)
-        return clipped
+        return np.clip(rewards / np.sqrt(self._squares / self._count), -10.0, 10.0)
 
     def end_episode(self) -> None:
         """Begin anew."""

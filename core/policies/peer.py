@@ -20,8 +20,7 @@ class Seen:
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of `agent` as the scenario predicts them."""
-        predicted: FloatArray = cast(Any, self.scenario).predict().states(agent, joint_actions)
-        return predicted
+        return cast(Any, self.scenario).predict().states(agent, joint_actions)
 
 
 class Peer:

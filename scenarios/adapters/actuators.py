@@ -4,10 +4,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from gymnasium.spaces import Box, Discrete, MultiDiscrete
+from gymnasium.spaces import Box, Discrete
 
 from ...core.interface.spaces import ActionSet
 from ...core.numerics.arrays import FloatArray, IntArray
+from ..faults.action_scales import limits_of
 
 
 class Actuators:
@@ -84,17 +85,10 @@ class Actuators:
 
 def _commands(player: str, space: Any, levels: int) -> Sequence[FloatArray]:
     """Return what each of a player's agents may command, a row for each."""
-    if isinstance(space, Discrete):
-        return [space.start + np.arange(space.n, dtype=float)]
-    if isinstance(space, MultiDiscrete):
-        ends = zip(space.start.ravel(), space.nvec.ravel(), strict=True)
-        return [start + np.arange(n, dtype=float) for start, n in ends]
-    of = f" of {player}" if player else ""
-    if not isinstance(space, Box):
-        raise ValueError(f"actions{of}: {space}, allowed Box, Discrete or MultiDiscrete")
-    if not space.is_bounded():
-        raise ValueError(f"actions{of}: {space} has no bounds; wrap it in RescaleAction")
-    return list(np.linspace(space.low.ravel(), space.high.ravel(), levels, dtype=float).T)
+    low, high = limits_of(space, f"actions of {player}" if player else "actions")
+    if isinstance(space, Box):
+        return list(np.linspace(low, high, levels, dtype=float).T)
+    return [np.arange(first, last + 1, dtype=float) for first, last in zip(low, high, strict=True)]
 
 
 def _names(player: str, count: int) -> list[str]:

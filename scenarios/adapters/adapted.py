@@ -28,15 +28,7 @@ from .actuators import Actuators
 from .copies import copies_of, fault_of_copies
 from .observations import Perception
 from .settings import AdaptedSettings, GymnasiumSettings, PettingZooSettings
-from .simulators import (
-    GymnasiumSimulator,
-    Make,
-    Played,
-    Simulator,
-    make_gymnasium,
-    make_pettingzoo,
-    parallel_simulator,
-)
+from .simulators import Make, Played, Simulator, make_by_id, simulator_of
 
 EPISODES, STEPS = 10, 200
 """Random episodes from which unknown ranges are taken, and the most steps of each."""
@@ -80,7 +72,7 @@ class AdaptedWorld:
     recorded = ("joint_action",)
     repeats = True
 
-    def __init__(self, settings: AdaptedSettings, make: Make) -> None:
+    def __init__(self, settings: AdaptedSettings, make: Make = make_by_id) -> None:
         survey = surveyed(settings, make)
         self.settings, self._make, self._simulator = settings, make, make(settings, None)
         self._actuators, self._perception = survey.actuators, survey.perception
@@ -113,12 +105,14 @@ class AdaptedWorld:
         played = self.play(self._simulator, joint_action)
         self._last = np.array(joint_action)
         self._states = self.states_of(played.observations)
-        mean = float(np.mean(list(played.rewards.values())))
+        paid = np.array(list(played.rewards.values()))
+        mean = float(paid.mean())
         self._return += mean
-        info, reward = {**self.measure(), "env_reward": mean}, self.reward(played)
+        is_joint = self.settings.rewards == "joint" or len(paid) == 1
         return Transition(
-            self._states, reward, played.terminated, played.truncated, info, absorbing=False
-        )
+            self._states, mean if is_joint else paid[self._body], played.terminated,
+            played.truncated, {**self.measure(), "env_reward": mean}, absorbing=False,
+        )  # fmt: skip
 
     def measure(self) -> Mapping[str, Any]:
         """Return the last joint action, and whether the present state is a success."""
@@ -143,13 +137,6 @@ class AdaptedWorld:
     def states_of(self, observations: Mapping[str, Any]) -> FloatArray:
         """Return the states ``(n, d)`` of all agents."""
         return self._perception.states(observations)[self._body]
-
-    def reward(self, played: Played) -> float | FloatArray:
-        """Return the reward of all agents, or each one's ``(n,)``."""
-        paid = np.array(list(played.rewards.values()))
-        if self.settings.rewards == "joint" or len(paid) == 1:
-            return float(paid.mean())
-        return paid[self._body]
 
     def _predict(self) -> CopiedPrediction:
         """Predict from the present state."""
@@ -296,16 +283,6 @@ def _met(simulator: Simulator, actuators: Actuators, numbers_of: Any) -> FloatAr
     return np.array([np.min(numbers, axis=(0, 1)), np.max(numbers, axis=(0, 1))])
 
 
-def gymnasium_world(settings: GymnasiumSettings) -> AdaptedWorld:
-    """Return an environment that Gymnasium knows, as a scenario."""
-    return AdaptedWorld(settings, make_gymnasium)
-
-
-def pettingzoo_world(settings: PettingZooSettings) -> AdaptedWorld:
-    """Return an environment of a module of PettingZoo, as a scenario."""
-    return AdaptedWorld(settings, make_pettingzoo)
-
-
 def from_gymnasium(
     env: gymnasium.Env[Any, Any] | Callable[..., gymnasium.Env[Any, Any]], **keys: Any
 ) -> AdaptedWorld:
@@ -328,7 +305,7 @@ def from_gymnasium(
     >>> from_gymnasium(gymnasium.make("Pendulum-v1"), actions=3).action_set.names
     ('-2', '0', '2')
     """
-    return AdaptedWorld(GymnasiumSettings(id="", **keys), _maker(env, GymnasiumSimulator))
+    return AdaptedWorld(GymnasiumSettings(id="", **keys), _maker(env))
 
 
 def from_pettingzoo(env: Any, **keys: Any) -> AdaptedWorld:
@@ -347,13 +324,13 @@ def from_pettingzoo(env: Any, **keys: Any) -> AdaptedWorld:
     ValueError
         As `AdaptedWorld`.
     """
-    return AdaptedWorld(PettingZooSettings(id="", **keys), _maker(env, parallel_simulator))
+    return AdaptedWorld(PettingZooSettings(id="", **keys), _maker(env))
 
 
-def _maker(env: Any, simulator: Callable[[Any], Simulator]) -> Make:
+def _maker(env: Any) -> Make:
     def make(settings: AdaptedSettings, render_mode: str | None) -> Simulator:
         if not callable(env):
-            return simulator(env)
-        return simulator(env() if render_mode is None else env(render_mode=render_mode))
+            return simulator_of(env)
+        return simulator_of(env() if render_mode is None else env(render_mode=render_mode))
 
     return make

@@ -70,8 +70,7 @@ class Seat:
 
     def observe(self, states: FloatArray) -> FloatArray:
         """Return the observation in the states ``(n, d)`` of all wheels."""
-        seen: FloatArray = states.ravel()[self.places].astype(np.float32)
-        return seen
+        return states.ravel()[self.places].astype(np.float32)
 
     def paid(self, reward: float | FloatArray) -> float:
         """Return the mean reward of the wheels; `reward` is one, or ``(n,)`` of all wheels."""

@@ -192,8 +192,7 @@ def is_close(differences: FloatArray, expected: FloatArray) -> Any:
 
 def differs(scenario: Scenario, states: FloatArray, expected: FloatArray) -> BoolArray:
     """Return which numbers of states ``(..., d)`` differ beyond rounding."""
-    wrong: BoolArray = ~is_close(apart(scenario, np.asarray(states), expected), expected)
-    return wrong
+    return ~is_close(apart(scenario, np.asarray(states), expected), expected)
 
 
 def fault_of_sharing(scenario: Scenario, states: FloatArray) -> str | None:

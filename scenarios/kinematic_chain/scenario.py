@@ -199,8 +199,7 @@ class KinematicChain:
 
     def _places(self) -> FloatArray:
         """Return joints and tip ``(n + 1, 2)`` [m]."""
-        places: FloatArray = postures_of(self._angles[None], self.length)[0]
-        return places
+        return postures_of(self._angles[None], self.length)[0]
 
     def _distance(self) -> float:
         return float(np.hypot(*(self._goal - self._places()[-1])))
@@ -331,10 +330,7 @@ class ChainPrediction:
             approaches,
         )
         places = ends_of(self.angles + self.turns[self._joints, plan], self.arm.length)
-        joint: IntArray = respond(
-            places, self.goal, self.before, plan.copy(), order, options, exploring, rng
-        )
-        return joint
+        return respond(places, self.goal, self.before, plan.copy(), order, options, exploring, rng)
 
     def commands(self, joint_action: IntArray) -> FloatArray:
         """Return the joint speeds ``(n,)`` that a joint action ``(n,)`` would command [rad/s]."""

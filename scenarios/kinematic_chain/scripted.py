@@ -54,8 +54,7 @@ class _Scripted(ABC):
         turns[above] = prediction.turns[above, deliberation.joint_action[above]]
         places = ends_of(prediction.angles + turns, prediction.arm.length)
         wanted = self._wanted(prediction, agent, above, places)
-        values: FloatArray = -np.abs(prediction.turns[agent] - wanted)
-        return values
+        return -np.abs(prediction.turns[agent] - wanted)
 
     @abstractmethod
     def _wanted(

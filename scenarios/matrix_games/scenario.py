@@ -169,8 +169,7 @@ class MatrixGamePrediction:
 
     def rewards(self, joint_actions: IntArray) -> FloatArray:
         """Return the expected payoffs ``(m,)`` of joint actions ``(m, n)``; for planners."""
-        expected: FloatArray = self._game.payoffs.mean(axis=0)[tuple(joint_actions.T)]
-        return expected
+        return self._game.payoffs.mean(axis=0)[tuple(joint_actions.T)]
 
 
 def _state_space(

@@ -116,8 +116,7 @@ class Polymatrix(Game):
         """Return the mean over the edges."""
         edges = np.arange(len(self._tables))
         both = joint_actions[:, self._first], joint_actions[:, self._second]
-        mean: FloatArray = self._tables[edges, *both].mean(axis=1)
-        return mean
+        return self._tables[edges, *both].mean(axis=1)
 
 
 class Permutation(Game):
@@ -143,8 +142,7 @@ class Landmarks(Game):
         """Return the share of landmarks that are taken, less the cost of the mean distance."""
         n = len(self.seen)
         far = self.seen[np.arange(n), joint_actions].mean(axis=1)
-        paid: FloatArray = distinct(joint_actions) / n - self._cost * far
-        return paid
+        return distinct(joint_actions) / n - self._cost * far
 
     def is_optimal(self, joint_action: IntArray) -> bool:
         """Return whether every landmark is taken, by whomever."""
@@ -166,8 +164,7 @@ def distinct(joint_actions: IntArray) -> IntArray:
     >>> distinct(np.array([[0, 1, 2], [1, 1, 0]])).tolist()
     [3, 2]
     """
-    different: IntArray = 1 + (np.diff(np.sort(joint_actions, axis=1), axis=1) > 0).sum(axis=1)
-    return different
+    return 1 + (np.diff(np.sort(joint_actions, axis=1), axis=1) > 0).sum(axis=1)
 
 
 class TeamGame:

@@ -35,8 +35,7 @@ def _angle(
 
 def _missed(view: View, bearing: FloatArray) -> FloatArray:
     off = np.clip(bearing, -0.5 * pi, 0.5 * pi)
-    missed: FloatArray = view.distance * np.sin(off)
-    return missed
+    return view.distance * np.sin(off)
 
 
 @state_variable("m", 0.0, 0.5, centres=GAPS, labels=NEARNESS, mirrored="same")
@@ -61,8 +60,7 @@ def side(view: View, robot: int) -> FloatArray:
 def others_gap(view: View, robot: int) -> FloatArray:
     """Greatest gap of the other robots; of the robot itself if it is alone."""
     others = [r for r in range(view.gaps.shape[1]) if r != robot] or [robot]
-    gaps: FloatArray = view.gaps[:, others].max(axis=1)
-    return gaps
+    return view.gaps[:, others].max(axis=1)
 
 
 @_angle(SIDES, common=True)
@@ -126,8 +124,7 @@ def others_away(view: View, robot: int) -> FloatArray:
     Of a robot that is alone, its own.
     """
     others = [r for r in range(view.gaps.shape[1]) if r != robot] or [robot]
-    away: FloatArray = np.clip(view.gaps[:, others] / AWAY, 0.0, 1.0).mean(axis=1)
-    return away
+    return np.clip(view.gaps[:, others] / AWAY, 0.0, 1.0).mean(axis=1)
 
 
 @_angle((-1.2, -0.4, 0.0, 0.4, 1.2), common=True)

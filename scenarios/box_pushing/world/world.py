@@ -214,12 +214,11 @@ class World:
         Of the box alone, and of the other robots alone; a sensor reads the greater one.
         """
         outline = self.box.outline
-        readings: FloatArray = infrared_readings(
+        return infrared_readings(
             self.robot_poses, self._radii, self._sensors, self.box_pose,
             outline.edges, outline.rounding, self.sensor.reach, self.sensor.decay,
             self.sensor.index,
         )  # fmt: skip
-        return readings
 
     def _step(self, speeds: FloatArray) -> None:
         """Advance by one physics step; the inner loop."""
