@@ -78,7 +78,7 @@ MODULES = {
         "box_pushing.prediction.predictors", "box_pushing.world.boxes",
         "box_pushing.world.robots", "box_pushing.world.failures",
         "box_pushing.pictures.rendering", "box_pushing.options.config",
-        "box_pushing.options.points", "box_pushing.options.scenario",
+        "box_pushing.options.pushing", "box_pushing.options.scenario",
         "kinematic_chain.config", "kinematic_chain.scenario",
         "kinematic_chain.view", "kinematic_chain.variables", "matrix_games.games",
         "matrix_games.scenario", "line_up", "faults.settings", "faults.actuators",

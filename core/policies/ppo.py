@@ -22,11 +22,10 @@ from ..interface.hierarchy import Hierarchy
 from ..interface.scenario import Scenario, Transition, roles_of
 from ..numerics.arrays import FloatArray, IntArray
 from .inputs import Inputs, RewardScale
-from .networks import Layers, drawing_from, prepare, weights_of
+from .networks import Layers, SplitPolicy, drawing_from, prepare, weights_of
 from .passing import Passing
 from .peer import Peer, Seen
 from .settings import MultiAgentPPOSettings, PolicyGradientSettings, PPOSettings
-from .split_policy import SplitPolicy
 
 
 class ActorCritic:

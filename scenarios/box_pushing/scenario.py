@@ -139,23 +139,6 @@ class BoxPushing:
         self._step = 0
         self._saved: WorldState | None = None
 
-    @property
-    def bounds(self) -> FloatArray:
-        """What the state variables cannot leave, ``(d, 2)``; infinite where there is no limit."""
-        depth = self.robot.radius + self.box.reach
-        limits = []
-        for variable in self.state_space.variables:
-            if variable.periodic:
-                limits.append((variable.low, variable.high))
-            elif self._space.is_own(variable.name):
-                limits.append((-np.inf, np.inf))
-            elif variable.unit == "m/s":
-                limits.append((-self.robot.max_speed, self.robot.max_speed))
-            else:
-                low = -depth if variable.name.endswith("gap") else 0.0
-                limits.append((-np.inf if variable.low < 0.0 else low, np.inf))
-        return np.array(limits)
-
     def partners(self) -> tuple[int, ...]:
         """Return for every wheel the one opposite on its robot, or itself if it is in the middle.
 

@@ -176,8 +176,7 @@ def _wrong_values(scenario: Scenario, frame: Frame) -> Iterator[str]:
         if array.dtype.kind == "f" and not np.isfinite(array).all():
             yield f"{name} is not finite"
     states, variables = np.asarray(frame["states"]), scenario.state_space.variables
-    limits = [(v.low, v.high) if v.periodic else (-np.inf, np.inf) for v in variables]
-    low, high = np.array(getattr(scenario, "bounds", limits)).T
+    low, high = np.array(getattr(scenario, "bounds", scenario.state_space.bounds)).T
     for _, i in np.argwhere((states < low) | (states > high)):
         yield f"{variables[i].name} leaves [{low[i]}, {high[i]}]"
     yield from faults_of_sharing(scenario, states)

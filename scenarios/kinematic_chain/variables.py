@@ -19,7 +19,7 @@ from ...core.interface.spaces import Variable
 from ...core.numerics.arrays import FloatArray
 from ...core.plugins.registry import Registry
 from ..state_variables import find_variable, guarded, space_of
-from .kernels import COMPILED, columns
+from .relational import COMPILED, columns
 from .view import ChainView
 
 _PLACE = "nested_agents.scenarios.kinematic_chain.relational"

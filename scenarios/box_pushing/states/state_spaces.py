@@ -67,11 +67,6 @@ class BoxStateSpace:
                 block[:, column] = self.functions[column].checked(safe, robot)
         return blocks
 
-    def is_own(self, variable: str) -> bool:
-        """Return whether a variable is one of the user's own, of which nothing else is known."""
-        shared = zip(self.functions, self.compiled, strict=True)
-        return self.of_users and variable in [f.variable.name for f, c in shared if not c]
-
 
 def _paper_own(poses: FloatArray, speeds: FloatArray, goal: FloatArray) -> FloatArray:
     ahead = goal[:2] - poses[:, :2]
