@@ -44,6 +44,12 @@ class _Known(NamedTuple):
     tried: IntArray
     worths: FloatArray
 
+    def holds(self, concerned: IntArray, plan: IntArray) -> bool:
+        """Return whether it is of the same interest, and of the plan but for the body's agents."""
+        if self.concerned is not concerned:
+            return False
+        return all(i in self.free for i in np.flatnonzero(self.plan != plan).tolist())
+
 
 class BestResponse(Aggregation):
     """Plans for other agents by one sweep of best responses.
@@ -78,6 +84,7 @@ class BestResponse(Aggregation):
         sizes = {2, *(k for group in groups for k in range(1, len(group) + 1))}
         largest_first = sorted(sizes, reverse=True)  # which is refused before others are made
         self._actions = {k: combinations(tuple(range(k)), self.n_actions) for k in largest_first}
+        self._numbers = np.arange(max(map(len, self._actions.values())))
         self._widest = max(map(len, groups))
         # Per agent, whom it considers, itself included, in the order of decision; those of its
         # body; the others.
@@ -91,6 +98,7 @@ class BestResponse(Aggregation):
         self._prediction: Prediction | None = None
         self._plans: dict[int, IntArray] = {}
         self._known: _Known | None = None
+        self._alike: list[tuple[IntArray, IntArray]] = []
 
     def values(self, deliberation: Deliberation) -> FloatArray:
         """Return the value ``(A,)`` of each action of the deciding agent."""
@@ -100,12 +108,24 @@ class BestResponse(Aggregation):
         first = agent == self.hierarchy.order[0]
         if first or deliberation.prediction is not self._prediction:
             self._prediction, self._plans, self._known = deliberation.prediction, {}, None
+            self._alike = self._compared(deliberation.prediction)
         plan, free = self._plan(deliberation), self._own[agent]
-        tried, worths = self._valued(deliberation, plan, free)
+        known, concerned = self._known, self.concerned[agent]
+        if known is not None and not known.holds(concerned, plan):
+            known = None
+        if known is not None and set(free) < set(known.free):
+            known = _remaining(known, plan, free)
+        else:
+            value = None if known is None else known.worths[self._index(plan, known.free)]
+            tried = self._actions[len(free)]
+            self.count(agent, len(tried))
+            worths = self._valued(deliberation, plan, free, value)
+            known = _Known(concerned, plan.copy(), free, tried, worths)
+        self._known = known
         best = np.full(self.n_actions, -np.inf)
-        np.maximum.at(best, tried[:, free.index(agent)], worths)
+        np.maximum.at(best, known.tried[:, free.index(agent)], known.worths)
         # What its body does is kept in the plan; what it takes in the end may be told.
-        plan[list(free)] = tried[greatest(worths, deliberation.rng)]
+        plan[list(free)] = known.tried[greatest(known.worths, deliberation.rng)]
         return best
 
     def decide(self, first: Deliberation, exploring: Exploring) -> IntArray | None:
@@ -141,25 +161,29 @@ class BestResponse(Aggregation):
         return plan
 
     def _valued(
-        self, deliberation: Deliberation, plan: IntArray, free: tuple[int, ...]
-    ) -> tuple[IntArray, FloatArray]:
-        """Return the actions ``(m, k)`` of the free agents of a body, and what each is worth.
+        self,
+        deliberation: Deliberation,
+        plan: IntArray,
+        free: tuple[int, ...],
+        value: float | None,
+    ) -> FloatArray:
+        """Return what all actions of the free agents of a body are worth, the plan `value`.
 
-        The second agent of a body finds what the first one did, if their interest is the same.
+        That is not predicted again, nor are actions that come to the same.
         """
-        known, concerned = self._known, self.concerned[deliberation.agent]
-        if known is not None and known.concerned is concerned and set(free) < set(known.free):
-            changed = np.flatnonzero(known.plan != plan)
-            if all(i in known.free for i in changed):
-                places = [known.free.index(i) for i in free]
-                decided = [k for k in range(len(known.free)) if k not in places]
-                actions = plan[[known.free[k] for k in decided]]
-                same = (known.tried[:, decided] == actions).all(axis=1)
-                return known.tried[same][:, places], known.worths[same]
-        tried = self._actions[len(free)]
-        worths = self.worth(deliberation, _with(plan, free, tried))
-        self._known = _Known(concerned, plan.copy(), free, tried, worths)
-        return tried, worths
+        body, tried = self._group_of[free[0]], self._actions[len(free)]
+        worths = np.empty(len(tried))
+        alike: IntArray = self._numbers[: len(tried)]
+        predicted: IntArray = alike
+        if free == self.problem.groups[body]:
+            alike, predicted = self._alike[body]
+        if value is not None:
+            planned = alike[self._index(plan, free)]
+            worths[planned], predicted = value, predicted[predicted != planned]
+        if len(predicted):
+            varied = _with(plan, free, tried[predicted])
+            worths[predicted] = self.predicted_worth(deliberation, varied)
+        return worths[alike]
 
     def _planned(self, deliberation: Deliberation) -> IntArray:
         """Return a plan ``(n,)`` for the agent and those that it plans for."""
@@ -171,10 +195,15 @@ class BestResponse(Aggregation):
         bodies: dict[int, list[int]] = {}
         for i in free:
             bodies.setdefault(self._group_of[i], []).append(i)
-        plan = self._started(deliberation, free)
-        for members in map(tuple, bodies.values()):
-            tried = _with(plan, members, self._distinct(deliberation.prediction, members))
-            plan = tried[greatest(self.worth(deliberation, tried), rng)].copy()
+        plan, value = self._started(deliberation, free), None
+        for body, members in bodies.items():
+            worths = self._valued(deliberation, plan, tuple(members), value)
+            # Told apart in agent order, even where the agents of a body decide in another.
+            whole = len(members) == len(self.problem.groups[body])
+            distinct = self._alike[body][1] if whole else self._numbers[: len(worths)]
+            self.count(agent, len(distinct))
+            best = distinct[greatest(worths[distinct], rng)]
+            plan[members], value = self._actions[len(members)][best], worths[best]
         return plan
 
     def _started(self, deliberation: Deliberation, free: tuple[int, ...]) -> IntArray:
@@ -194,15 +223,29 @@ class BestResponse(Aggregation):
             starts.append(self._actions[2][:, (rank >= cut).astype(np.int64)])
         return np.unique(np.concatenate(starts), axis=0)
 
-    def _distinct(self, prediction: Prediction, members: tuple[int, ...]) -> IntArray:
-        """Return the actions ``(m, k)`` of agents of one body, but those alike to others."""
-        actions = self._actions[len(members)]
-        alike = getattr(prediction, "alike", None)
-        group = self.problem.groups[self._group_of[members[0]]]
-        if alike is None or len(members) < len(group):
-            return actions
-        indices = np.arange(len(actions))
-        return actions[alike[self._group_of[members[0]], : len(actions)] == indices]
+    def _compared(self, prediction: Prediction) -> list[tuple[IntArray, IntArray]]:
+        """Return for every body which action each comes to the same as, and the distinct ones."""
+        sizes = [len(self._actions[len(group)]) for group in self.problem.groups]
+        alike = getattr(prediction, "alike", [self._numbers] * len(sizes))
+        rows = [row[:size] for row, size in zip(alike, sizes, strict=True)]
+        return [(row, np.flatnonzero(row == self._numbers[: len(row)])) for row in rows]
+
+    def _index(self, plan: IntArray, agents: tuple[int, ...]) -> int:
+        """Return which of all actions of agents of one body the plan has for them."""
+        index = 0
+        for i in agents:
+            index = index * self.n_actions + int(plan[i])
+        return index
+
+
+def _remaining(known: _Known, plan: IntArray, free: tuple[int, ...]) -> _Known:
+    """Return what is known of the free agents' actions, those decided being in the plan."""
+    places = [known.free.index(i) for i in free]
+    decided = [k for k in range(len(known.free)) if k not in places]
+    actions = plan[[known.free[k] for k in decided]]
+    same = (known.tried[:, decided] == actions).all(axis=1)
+    worths = known.worths[same]
+    return _Known(known.concerned, plan.copy(), free, known.tried[same][:, places], worths)
 
 
 def _planners(problem: DecisionProblem) -> list[int]:

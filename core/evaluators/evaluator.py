@@ -218,9 +218,13 @@ class Aggregation:
 
     def worth(self, deliberation: Deliberation, joint_actions: IntArray) -> FloatArray:
         """Return what joint actions ``(m, n)`` are worth to the deciding agent, ``(m,)``."""
+        self.count(deliberation.agent, len(joint_actions))
+        return self.predicted_worth(deliberation, joint_actions)
+
+    def predicted_worth(self, deliberation: Deliberation, joint_actions: IntArray) -> FloatArray:
+        """Return the same of joint actions that are counted elsewhere."""
         prediction: Any = deliberation.prediction
         concerned = self.concerned[deliberation.agent]
-        self.count(deliberation.agent, len(joint_actions))
 
         def values() -> FloatArray:
             if len(concerned) > 1:

@@ -29,8 +29,8 @@ COMPILED = tuple(STATE_VARIABLES.built_in)
     AWAY_OTHERS, CONTACT_PUSH, CONTACT_CROSS_TRACK, PATH, PATH_CROSS_TRACK,
 ) = range(0, len(COMPILED) * LANES, LANES)  # fmt: skip
 # Rows of what several variables need; no column can name them.
-_COURSE, _X, _Y, _WEIGHT, _NEAREST = range(
-    len(COMPILED) * LANES, (len(COMPILED) + 5) * LANES, LANES
+_COURSE, _X, _Y, _WEIGHT, _WIDEST, _SECOND, _AWAY, _COS, _SIN, _NEAREST = range(
+    len(COMPILED) * LANES, (len(COMPILED) + 10) * LANES, LANES
 )
 _SIZE = _NEAREST + rows.NEAREST_SIZE
 _OF_PUSH = (PUSH, CROSS_TRACK)
@@ -121,6 +121,7 @@ def _of_box(box, goal, before, periods, first, count, work):  # type: ignore[no-
         dx, dy = gx - bx[k], gy - by[k]
         course, distance = angle_of(dx, dy), np.sqrt(dx * dx + dy * dy)
         work[_COURSE + k] = course
+        work[_COS + k], work[_SIN + k] = np.cos(psi[k]), np.sin(psi[k])
         work[DISTANCE + k] = distance
         work[APPROACH + k] = (before - distance) / periods
         turn = wrapped(psi[k] - turned)
@@ -205,7 +206,7 @@ def _of_face(robot, box, edges, first, count, work):  # type: ignore[no-untyped-
     )  # fmt: skip
     near = work[_NEAREST:]
     for k in range(count):
-        cos, sin = np.cos(turn[k]), np.sin(turn[k])
+        cos, sin = work[_COS + k], work[_SIN + k]
         dx, dy = x[k] - bx[k], y[k] - by[k]
         near[rows.LOCAL_X + k] = cos * dx + sin * dy
         near[rows.LOCAL_Y + k] = cos * dy - sin * dx
@@ -254,20 +255,30 @@ def _of_path(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=_EXACT)
+def _of_all(gaps, first, count, work):  # type: ignore[no-untyped-def]
+    """Write the two greatest gaps of all robots, and how many robots are away."""
+    for k in range(count):
+        work[_WIDEST + k] = work[_SECOND + k] = -np.inf
+        work[_AWAY + k] = 0.0
+    for r in range(len(gaps)):
+        gap = gaps[r, first : first + count]
+        for k in range(count):
+            widest = work[_WIDEST + k]
+            work[_SECOND + k] = max(work[_SECOND + k], min(gap[k], widest))
+            work[_WIDEST + k] = max(widest, gap[k])
+            work[_AWAY + k] += min(max(gap[k] / AWAY, 0.0), 1.0)
+
+
+@njit(cache=True, fastmath=_EXACT)
 def _of_others(gaps, robot, first, count, work):  # type: ignore[no-untyped-def]
     """Write the greatest gap of the other robots and how many are away; of one alone its own."""
-    n = len(gaps)
-    share = 1.0 / max(n - 1, 1)
+    n, gap = len(gaps), gaps[robot, first : first + count]
+    share, alone = 1.0 / max(n - 1, 1), n == 1
     for k in range(count):
-        work[OTHERS + k] = -np.inf
-        work[AWAY_OTHERS + k] = 0.0
-    for r in range(n):
-        if r != robot or n == 1:
-            gap = gaps[r, first : first + count]
-            for k in range(count):
-                work[OTHERS + k] = max(work[OTHERS + k], gap[k])
-                away = min(max(gap[k] / AWAY, 0.0), 1.0)
-                work[AWAY_OTHERS + k] += share * away
+        away = min(max(gap[k] / AWAY, 0.0), 1.0)
+        work[AWAY_OTHERS + k] = away if alone else share * (work[_AWAY + k] - away)
+        others = work[_SECOND + k] if gap[k] == work[_WIDEST + k] else work[_WIDEST + k]
+        work[OTHERS + k] = gap[k] if alone else others
 
 
 @njit(cache=True)
@@ -310,6 +321,7 @@ def _relational(  # type: ignore[no-untyped-def]
     for first in range(0, m, LANES):
         count = min(LANES, m - first)
         _of_box(box, goal, before, periods, first, count, work)
+        _of_all(gaps, first, count, work)
         if of_push is not None:
             _of_push(robots, box, goal, first, count, work)
         if of_contact is not None:

@@ -154,16 +154,17 @@ class Remembered:
 @pytest.mark.parametrize("membership", ["triangular", "sigmoid"])
 @pytest.mark.parametrize("order", [1, 2, 3])
 def test_pooled_means_are_means(order: int, membership: str) -> None:
-    names = ("own", "mine", "ours", "common")
-    space = StateSpace(
-        "demo", tuple(Variable(name, "m", 0.0, 1.0) for name in names), 1, ("ours", "common")
-    )
+    # One that is a circle of each kind, its states beyond the range on either side.
+    variables = [Variable(f"{name}s", "m", 0.0, 1.0) for name in ("own", "mine", "our", "common")]
+    circles = [Variable(v.name[:-1], "rad", -0.3, 0.6, True, (-0.2, 0.1, 0.5)) for v in variables]
+    pairs = [v for pair in zip(variables, circles, strict=True) for v in pair]
+    space = StateSpace("demo", tuple(pairs), 2, tuple(v.name for v in pairs[4:]))
     rules = RuleBase.build(space, RuleBaseSettings(order=order, membership=membership))
     rng = np.random.default_rng(order)
     groups, agents = ((0, 1), (2, 3), (4, 5)), np.array([1, 2, 3, 5])
-    states = rng.uniform(size=(6, 7, 4))
-    states[1::2, :, 1] = states[::2, :, 1]
-    states[:, :, 2:] = states[0, :, 2:]
+    states = rng.uniform(-0.5, 1.5, size=(6, 7, 8))
+    states[1::2, :, 2:4] = states[::2, :, 2:4]
+    states[:, :, 4:] = states[0, :, 4:]
     theta = rng.normal(size=(6, rules.n_rules))
     pooling = Pooling(rules, groups)
     expected = np.mean([rules.values(theta[i], states[i]) for i in agents], axis=0)
@@ -194,7 +195,9 @@ class InStep:
         return (joint[:, 1:] == joint[:, :-1]).mean(axis=1)
 
 
-def decided(hierarchy, first, plan="private", unseen="maintain", seed=0) -> list[np.ndarray]:
+def decided(
+    hierarchy, first, plan="private", unseen="maintain", seed=0, prediction=None
+) -> list[np.ndarray]:
     """What all value their actions at, after the first agent does `first` whatever it values."""
     n = len(hierarchy)
     rules = RuleBase.build(
@@ -204,7 +207,8 @@ def decided(hierarchy, first, plan="private", unseen="maintain", seed=0) -> list
         rules, hierarchy, A, tuple((i,) for i in range(n)), "reward", "best-response", 0.9, "own",
         unseen, plan, hierarchy.told == "ancestors",
     )  # fmt: skip
-    search, prediction, rng = BestResponse(problem), InStep(), np.random.default_rng(seed)
+    search, rng = BestResponse(problem), np.random.default_rng(seed)
+    prediction = prediction or InStep()
     joint, values = np.full(n, NEUTRAL), []
     for agent in hierarchy.order:
         told = np.array(hierarchy.above(agent), dtype=np.int64)
@@ -216,6 +220,25 @@ def decided(hierarchy, first, plan="private", unseen="maintain", seed=0) -> list
         values.append(search.values(deliberation))
         joint[agent] = first if agent == hierarchy.order[0] else values[-1].argmax()
     return values
+
+
+def test_the_plan_is_not_predicted_again() -> None:
+    """Six of one wheel: 16 starts, then all four actions of the first, three of every other."""
+    tried: list[int] = []
+
+    class Noted(InStep):
+        def rewards(self, joint: np.ndarray) -> np.ndarray:
+            tried.append(len(joint))
+            return super().rewards(joint)
+
+    class Twins(Noted):
+        alike = np.array([[0, 1, 1, 0]] * 6)
+
+    hierarchy = Hierarchy(NAMES, PAIRS)
+    for prediction, each in ((Noted(), 3), (Twins(), 1)):
+        tried.clear()
+        decided(hierarchy, 0, prediction=prediction)
+        assert tried[1:7] == [each + 1] + 5 * [each]
 
 
 NAMES = tuple("abcdef")
