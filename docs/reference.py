@@ -60,7 +60,7 @@ MODULES = {
         "decision.exploration", "rules.kernels.fuzzy", "rules.rule_base", "rules.settings",
         "learners.learner", "learners.td", "learners.batch", "learners.one_step",
         "learners.sums", "learners.online", "evaluators.evaluator", "evaluators.auto",
-        "evaluators.exact", "evaluators.sampling", "evaluators.best_response",
+        "evaluators.exact", "evaluators.best_response",
         "evaluators.coordination", "evaluators.cross_entropy",
         "coordination.elimination", "coordination.max_plus", "adaptation.self_model",
         "adaptation.calibration", "agents.cost", "plugins.registry", "plugins.plugged",

@@ -241,7 +241,7 @@ class Aggregation:
             self._last = weights, concerned, self._pooling.pooled(weights, concerned)
         return self._last[2]
 
-    def by_states(self, deliberation: Deliberation, tried: IntArray) -> FloatArray:
+    def worths(self, deliberation: Deliberation, tried: IntArray) -> FloatArray:
         """Value ``(A, m)`` each own action with each of the joint actions `tried` ``(m, k)``."""
         agent, a = deliberation.agent, self.n_actions
         joint = np.tile(deliberation.joint_action, (a * len(tried), 1))
@@ -257,11 +257,24 @@ class Aggregation:
             return rewards()
         return rewards() + self.problem.discount * values()
 
-    def aggregate(self, values: FloatArray, probabilities: FloatArray | None) -> FloatArray:
-        """Return per row ``(A, m)`` the maximum, mean or weighted mean, by the teammate model.
+    def aggregate(
+        self, deliberation: Deliberation, tried: IntArray, probabilities: FloatArray | None
+    ) -> FloatArray:
+        """Return the maximum, mean or weighted mean ``(A,)`` of worths, by the teammate model.
 
-        Probabilities are ``(m,)``, or ``(A, m)`` where they depend on the own action.
+        Parameters
+        ----------
+        deliberation
+            Whose.
+        tried
+            ``(m, k)`` joint actions of the agents below.
+        probabilities
+            Of these ``(m,)``, or ``(A, m)`` where they depend on the own action; none: equal ones.
         """
+        if self.indifferent(deliberation):
+            self.count(deliberation.agent, self.n_actions * len(tried))
+            return np.zeros(self.n_actions)
+        values = self.worths(deliberation, tried)
         if self.problem.teammates == "best-response":
             return values.max(axis=1)
         if probabilities is not None and probabilities.ndim == 2:

@@ -18,7 +18,7 @@ import numpy as np
 from ...core.interface.spaces import Variable
 from ...core.numerics.arrays import FloatArray
 from ...core.plugins.registry import Registry
-from ..state_variables import find_variable, guarded, space_of
+from ..state_variables import filled, find_variable, space_of
 from .relational import COMPILED, columns
 from .view import ChainView
 
@@ -48,13 +48,8 @@ class ChainStates:
     """
 
     def __init__(self, names: Sequence[str]) -> None:
-        things = [find_variable(CHAIN_VARIABLES, name) for name in names]
-        self.space = space_of("+".join(names), SPEED, things)
-        self._own = [
-            (column, thing)
-            for column, (name, thing) in enumerate(zip(names, things, strict=True), 1)
-            if name not in COMPILED
-        ]
+        self._things = [find_variable(CHAIN_VARIABLES, name) for name in names]
+        self.space = space_of("+".join(names), SPEED, self._things)
         # Beyond the last of the compiled columns: the column is none of these.
         rows = [COMPILED.index(name) if name in COMPILED else len(COMPILED) for name in names]
         self._rows = np.array([-1, *rows])
@@ -64,9 +59,5 @@ class ChainStates:
         states: FloatArray = columns(
             view.places, view.angles, view.speeds, view.goal, view.before, first, count, self._rows
         )
-        if self._own:
-            safe = guarded(view)
-            for column, thing in self._own:
-                for i in range(count):
-                    states[i, :, column] = thing.checked(safe, first + i)
+        filled(states[:, :, 1:], self._things, view, range(first, first + count))
         return states

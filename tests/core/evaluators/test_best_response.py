@@ -14,9 +14,8 @@ from nested_agents.core.evaluators.evaluator import (
     ValueOf,
     concerned,
 )
-from nested_agents.core.evaluators.exact import ExactEnumeration
+from nested_agents.core.evaluators.exact import ExactEnumeration, Sampling, SamplingSettings
 from nested_agents.core.evaluators.pooled import Pooling
-from nested_agents.core.evaluators.sampling import Sampling, SamplingSettings
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.interface.spaces import StateSpace, Variable
 from nested_agents.core.numerics.arrays import FloatArray

@@ -18,8 +18,7 @@ from nested_agents.core.evaluators.evaluator import (
     combinations,
     probabilities_of,
 )
-from nested_agents.core.evaluators.exact import ExactEnumeration
-from nested_agents.core.evaluators.sampling import Sampling, SamplingSettings
+from nested_agents.core.evaluators.exact import ExactEnumeration, Sampling, SamplingSettings
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.interface.prediction import Blocks
 from nested_agents.core.interface.spaces import StateSpace, Variable

@@ -295,7 +295,7 @@ def test_what_is_common_is_sensed_once() -> None:
         return StateVariable(Variable(name, "m", 0.0, 1.0), function, common)
 
     seen = view([[-0.2, 0, 0], [0.2, 0, 0]], [0, 0, 0], [0.06, 0.1])
-    sensed([counted("same", True), counted("own", False)], [True, False], seen, [0, 1])
+    sensed([counted("same", True), counted("own", False)], seen, [0, 1])
     assert asked == [("same", 0), ("own", 0), ("own", 1)]
 
 
