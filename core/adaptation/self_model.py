@@ -19,10 +19,12 @@ multiplied by that ratio (Birge 1932).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
-from ..numerics.arrays import FloatArray
+from ..interface.scenario import EmbodiedScenario, Scenario, Transition
+from ..numerics.arrays import FloatArray, IntArray
 from ..plugins.settings import Positive, Settings
 
 MEMORY = 100
@@ -99,6 +101,34 @@ class SelfModel:
                 self._units, self._ratios, self._covariances, strict=True
             )
         )
+
+    @classmethod
+    def of(cls, settings: SelfModelSettings, scenario: Scenario) -> SelfModel | None:
+        """Return that of a scenario's bodies, none if it is not enabled.
+
+        Raises
+        ------
+        ValueError
+            If the scenario has no bodies on wheels.
+        """
+        if not settings.enabled:
+            return None
+        if not isinstance(scenario, EmbodiedScenario):
+            raise ValueError("learner.self_model.enabled: the scenario has no bodies on wheels")
+        return cls(settings, scenario.nominal_effects)
+
+    def adapt(self, prediction: Any, joint_action: IntArray, transition: Transition) -> None:
+        """Revise all effects by how the bodies moved by a joint action.
+
+        What contact is predicted to take from the motion is given back: a robot that moves a load
+        is slow, not broken.
+        """
+        if transition.twists is None:
+            return
+        speeds, slips = prediction.commands(joint_action), prediction.slips(joint_action)
+        free = transition.twists[-len(slips) :] - slips
+        for body, group in enumerate(prediction.groups):
+            self.observe(body, speeds[list(group)], free[body])
 
     def observe(self, robot: int, speeds: FloatArray, twist: FloatArray) -> None:
         """Take in one twist ``(3,)`` measured under commanded wheel speeds ``(w,)``."""
