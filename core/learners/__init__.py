@@ -25,7 +25,7 @@ LEARNERS = SettingsRegistry(
         "q-learning": f"{__name__}.one_step:QLearningSettings",
         "vdn": f"{__name__}.sums:ValueDecompositionSettings",
         "fitted-q": f"{__name__}.fitted_q:FittedQSettings",
-        "frozen": f"{__name__}.online:FrozenSettings",
+        "frozen": f"{__name__}.td:FrozenSettings",
         "ppo": f"{PEERS}:PPOSettings",
         "ippo": f"{PEERS}:IPPOSettings",
         "hierarchy-ppo": f"{PEERS}:HierarchyPPOSettings",

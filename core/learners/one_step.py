@@ -20,7 +20,7 @@ from ..plugins.settings import Fraction, NonNegative, Positive
 from ..rules.kernels.updates import add_features
 from ..rules.rule_base import RuleBase
 from .learner import LearnerSettings
-from .online import Online
+from .td import Online
 
 
 class OneStepSettings(LearnerSettings):

@@ -8,7 +8,7 @@ from pydantic import Field, field_validator, model_validator
 from ...core.plugins.settings import Positive, ScenarioSettings
 from ..state_variables import referred
 from .prediction.settings import BeliefSettings
-from .states.variables import STATE_VARIABLES
+from .states.relational import STATE_VARIABLES
 from .world import units
 from .world.settings import (
     CONTROL_PERIOD,

@@ -28,13 +28,12 @@ from .prediction.situation import Premises, Situation
 from .states.state_spaces import state_space_for
 from .states.view import View
 from .world.boxes import box_for, growth
-from .world.failures import WheelFailures
 from .world.geometry import wrap
 from .world.reward import Task, reward
 from .world.robots import nominal_effect, robot_for
 from .world.settings import CONTROL_PERIOD
 from .world.starts import place
-from .world.world import World, WorldState
+from .world.world import WheelFailures, World, WorldState
 
 if TYPE_CHECKING:
     from .pictures.policy import Policy

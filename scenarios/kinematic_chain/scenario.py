@@ -22,12 +22,11 @@ from ...core.interface.scenario import Transition
 from ...core.interface.spaces import ActionSet
 from ...core.numerics.arrays import FloatArray, IntArray
 from ...core.rules.rule_base import RuleBase
-from ..faults.schedule import Failures
+from ..faults.settings import Failures
 from .config import PERIOD, REACH, KinematicChainSettings
-from .kinematics import ends_of, postures_of
 from .responses import Options, respond
 from .variables import ChainStates
-from .view import ChainView
+from .view import ChainView, ends_of, postures_of
 
 MEASURES = (
     SUCCESS,

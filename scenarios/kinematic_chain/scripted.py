@@ -26,8 +26,8 @@ from pydantic import Field
 from ...core.evaluators import EvaluatorSettings
 from ...core.evaluators.evaluator import Counts, DecisionProblem, Deliberation
 from ...core.numerics.arrays import FloatArray, IntArray
-from .kinematics import ends_of, jacobian_of
 from .scenario import ChainPrediction
+from .view import ends_of, jacobian_of
 
 
 class _Scripted(ABC):

@@ -21,8 +21,7 @@ from ...core.agents.team import Team
 from ...core.decision.exploration import Boltzmann, EpsilonDecreasingBoltzmann
 from ...core.evaluators.exact import ExactEnumeration
 from ...core.learners.one_step import FMQ, OptimisticTD
-from ...core.learners.online import Frozen
-from ...core.learners.td import TDLambda
+from ...core.learners.td import Frozen, TDLambda
 from ...core.numerics.arrays import FloatArray, IntArray
 from .kernel import DECREASING, GREEDY, SAMPLED, Deciding, Exploring, Learning, play
 

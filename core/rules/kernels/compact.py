@@ -241,7 +241,7 @@ def td_compact(  # type: ignore[no-untyped-def]
     rewards: FloatArray, discount: float, step_size: float, lengths: FloatArray, decay: float,
     packed: Packed,
 ) -> None:  # fmt: skip
-    """Do what `core.rules.kernels.few_states.td_dense` does, triangular partitions."""
+    """Do what `core.rules.kernels.updates.td_dense` does, triangular partitions."""
     lay = unpack(packed)
     strengths, spare = strengths_room(lay)
     functions, room, _ = _room(lay)

@@ -15,6 +15,9 @@ The box rubs on the ground by one friction joint at each of its friction points.
 its force to the limit after weighting it with the box's mass as seen from the joint, which leaves
 force not quite against the motion: sliding along its axes, a square meets 4 % less than its
 `friction_force`; along its diagonals and in turning, all of it.
+
+A wheel that fails as free has no drive at all: it resists sideways motion only. All other kinds of
+failure are described in `nested_agents.scenarios.faults.settings`.
 """
 
 from collections.abc import Sequence
@@ -25,6 +28,7 @@ import numpy as np
 from Box2D import _Box2D
 
 from ....core.numerics.arrays import FloatArray
+from ...faults.settings import Failures, Free
 from .boxes import BoxSpec
 from .geometry import gaps
 from .infrared import infrared_readings, sensor_directions
@@ -279,3 +283,29 @@ def _handles(body: Any) -> tuple[Any, Any, Any]:
 def _twist(handles: tuple[Any, Any, Any]) -> tuple[float, float, float]:
     body, _, velocity = handles
     return get_x(velocity) / UNIT, get_y(velocity) / UNIT, get_omega(body)
+
+
+class WheelFailures(Failures):
+    """The failures that a spec schedules, and the wheels under them."""
+
+    @property
+    def grip(self) -> FloatArray:
+        """What multiplies the drive stiffness of every wheel ``(n,)``: 0 for free ones, else 1."""
+        grip = np.ones(len(self.failed))
+        for failure, wheels in self.active():
+            if isinstance(failure, Free):
+                grip[wheels] = 0.0
+        return grip
+
+    def advance(self, world: World, commands: FloatArray, step: int, periods: int) -> None:
+        """Let a world go on through (a part of) a step, its wheels being commanded `commands`."""
+        if self.strike(step):
+            world.set_grip(self.grip)
+        if not self._settings:
+            world.advance(commands, periods)
+            return
+        touched = np.zeros(len(world.robots))
+        for speeds in self.driven(commands, periods):
+            world.advance(speeds, 1)
+            touched += world.contact_time
+        world.contact_time = touched / periods

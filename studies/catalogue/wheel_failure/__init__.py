@@ -23,7 +23,7 @@ import numpy as np
 
 from ....core.agents.team import Team, of_fuzzy_agents
 from ....core.learners.learner import LearnerSettings
-from ....core.learners.online import FrozenSettings
+from ....core.learners.td import FrozenSettings
 from ...errors import SpecError
 from ...results.analysis import Analysis, Figures
 from ...results.comparison import Array, Difference, adjusted, of_shared_seeds

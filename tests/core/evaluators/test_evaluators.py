@@ -22,8 +22,7 @@ from nested_agents.core.evaluators.exact import ExactEnumeration, Sampling, Samp
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.interface.prediction import Blocks
 from nested_agents.core.interface.spaces import StateSpace, Variable
-from nested_agents.core.rules.rule_base import RuleBase
-from nested_agents.core.rules.settings import RuleBaseSettings
+from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
 
 A = 4
 NEUTRAL = 2

@@ -5,7 +5,7 @@ import pytest
 
 from nested_agents.core.learners.batch import REWARD_SCALE, BatchTD, BatchTDSettings
 from nested_agents.core.learners.learner import Learner
-from nested_agents.core.learners.online import Frozen, FrozenSettings
+from nested_agents.core.learners.td import Frozen, FrozenSettings
 
 from .test_shared_weights import LEARNING, ROLES, experience, feed, learner_of, rules_of
 
