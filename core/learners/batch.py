@@ -29,9 +29,11 @@ MOST_RULES = 4096
 Function = Callable[[FloatArray], FloatArray]
 
 
-class ReplaySettings(LearnerSettings):
-    """What learners share that regress on all experience, after every episode and during it."""
+class BatchTDSettings(LearnerSettings):
+    """Batch TD(lambda): towards what followed, regressing on all experience."""
 
+    kind: Literal["batch-td"] = "batch-td"
+    factory: ClassVar[str] = f"{__name__}:BatchTD"
     ridge: Positive = 10.0
     """Weight of the squared consequents against squared errors of rewards scaled by 100: larger, if
     values are jagged; smaller, if they are flat."""
@@ -43,15 +45,7 @@ class ReplaySettings(LearnerSettings):
     interval: Annotated[int, Field(ge=1)] = 100
     """Decisions of an episode after which is regressed without waiting for its end."""
     mirrored: bool = False
-    """Whether what the mirror image of the team would have met is experience as well, of
-    agents whose states hold no messages."""
-
-
-class BatchTDSettings(ReplaySettings):
-    """Batch TD(lambda): towards what followed."""
-
-    kind: Literal["batch-td"] = "batch-td"
-    factory: ClassVar[str] = f"{__name__}:BatchTD"
+    """Whether what the mirror image of the team would have met is experience as well."""
     trace_decay: Fraction = 0.0
     """Trace decay lambda: 0 bootstraps from the next state, 1 sums the rewards of an episode."""
 

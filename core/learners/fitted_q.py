@@ -32,13 +32,14 @@ from ..plugins.settings import Positive
 from ..rules.kernels import regression
 from ..rules.kernels.fuzzy import Partition
 from ..rules.rule_base import RuleBase
-from .batch import BatchTD, Function, ReplaySettings, solver
+from .batch import BatchTD, Function, solver
+from .learner import LearnerSettings
 
 NOBODY = "nobody"
 """What an agent is told by a sender that it has not."""
 
 
-class FittedQSettings(ReplaySettings):
+class FittedQSettings(LearnerSettings):
     """Fitted Q: values of actions, without a predictor."""
 
     kind: Literal["fitted-q"] = "fitted-q"
@@ -56,6 +57,9 @@ class FittedQSettings(ReplaySettings):
     forgetting: Annotated[float, Field(ge=0, lt=1)] = 0.0
     """Share of its weight that experience loses from regression to regression: what it was worth to
     act so depends on what the others did then."""
+    mirrored: bool = False
+    """Whether what the mirror image of the team would have met is experience as well; of agents
+    that are told nothing."""
     exploration: Annotated[ExplorationSettings, Plugged(EXPLORATIONS)] = BurstExploration(
         rate=1.0, decay=0.85, floor=0.05, length=1.0
     )

@@ -23,26 +23,22 @@ from pydantic import Field
 
 from ...core.coordination.elimination import Elimination
 from ...core.coordination.shapes import Shape, shaped
-from ...core.interface.measures import SUCCESS, Measure
+from ...core.interface.measures import Measure
 from ...core.interface.scenario import Transition
 from ...core.interface.spaces import ActionSet, StateSpace, Variable, choice
 from ...core.numerics.arrays import FloatArray, IntArray
 from ...core.plugins.deferred import nx
 from ...core.plugins.settings import NonNegative, ScenarioSettings
+from .games import OF_OPTIMA
 
 PLAY = Variable("play", "1", 0.0, 1.0, centres=(0.0, 1.0))
 """What those see who see nothing: 0 always."""
 MEASURES = (
-    Measure(SUCCESS.name, SUCCESS.title, source="optimal", better="higher", is_rate=True),
-    Measure(
-        "optimal_plays", "optimal plays", source="optimal", gathering="mean", better="higher",
-        least=0.0, greatest=1.0,
-    ),
+    *OF_OPTIMA,
     Measure(
         "share_of_best", "payoff over the best", gathering="mean", better="higher", greatest=1.0
     ),
-)  # fmt: skip
-"""Success is that the last play of an episode was optimal."""
+)
 
 
 class TeamGameSettings(ScenarioSettings):
