@@ -1,5 +1,6 @@
 """The agents of a foreign environment: one for every number of its players' actions."""
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -22,23 +23,35 @@ class Actuators:
         Of each dimension of a Box.
     neutral
         Index of the neutral action; None: the level nearest to 0, or the first discrete action.
+    bodies
+        The agents of each body of an only player; none: each is its own. Of several players each
+        is a body.
 
     Attributes
     ----------
-    names
+    names, roles
         Of the agents.
     groups
-        Agents by player.
+        Agents by body.
+    players
+        Whose each body is.
     action_set
         Of every agent, the actions of the one that has most.
 
     Raises
     ------
     ValueError
-        If actions are of other kinds, unbounded or mixed; one line.
+        If actions are of other kinds, unbounded or mixed, or bodies do not hold all agents; one
+        line.
     """
 
-    def __init__(self, spaces: Mapping[str, Any], levels: int, neutral: int | None) -> None:
+    def __init__(
+        self,
+        spaces: Mapping[str, Any],
+        levels: int,
+        neutral: int | None,
+        bodies: Sequence[Sequence[int]] = (),
+    ) -> None:
         self._spaces = spaces
         tables = {player: _commands(player, space, levels) for player, space in spaces.items()}
         if len({isinstance(space, Box) for space in spaces.values()}) > 1:
@@ -49,13 +62,32 @@ class Actuators:
             raise ValueError("actions: agents have 1 each, allowed: at least 2")
         # An agent with fewer actions has them again from the first on.
         self._commanded = np.array([np.resize(row, n_actions) for row in rows])
-        self.groups: tuple[tuple[int, ...], ...] = ()
         self.names: tuple[str, ...] = ()
+        self.groups: tuple[tuple[int, ...], ...] = ()
         for player, table in tables.items():
             first = len(self.names)
             self.groups += (tuple(range(first, first + len(table))),)
             self.names += tuple(_names(player, len(table)))
+        self._spans = [slice(group[0], group[-1] + 1) for group in self.groups]
+        self.roles = tuple(re.sub(r"_?\d+(?=$|[.])", "", name, count=1) for name in self.names)
+        self.players = list(spaces)
+        if len(spaces) == 1:
+            self._embody(bodies)
         self.action_set = self._action_set(neutral)
+
+    def _embody(self, bodies: Sequence[Sequence[int]]) -> None:
+        """Make the agents of an only player those of bodies."""
+        singles = tuple((i,) for i in range(len(self.names)))
+        if bodies and [(i,) for body in bodies for i in body] != [*singles]:
+            raise ValueError(
+                f"scenario.groups = {[list(body) for body in bodies]}: must hold the numbers 0 to "
+                f"{len(singles) - 1} of the agents once each, in order"
+            )
+        if bodies:
+            named = enumerate(bodies, 1)
+            self.names = tuple(f"body{b}.{k + 1}" for b, body in named for k in range(len(body)))
+        self.groups = tuple(map(tuple, bodies)) or singles
+        self.roles, self.players = self.names, self.players * len(self.groups)
 
     def _action_set(self, neutral: int | None) -> ActionSet:
         is_continuous = isinstance(next(iter(self._spaces.values())), Box)
@@ -75,10 +107,9 @@ class Actuators:
     def commands(self, joint_action: IntArray) -> dict[str, Any]:
         """Return the players' actions for a joint action ``(n,)``."""
         commanded = self._commanded[np.arange(len(joint_action)), joint_action]
-        given = {}
-        for (player, space), group in zip(self._spaces.items(), self.groups, strict=True):
-            own = commanded[group[0] : group[-1] + 1]
-            is_one = isinstance(space, Discrete)
+        given: dict[str, Any] = {}
+        for (player, space), span in zip(self._spaces.items(), self._spans, strict=True):
+            own, is_one = commanded[span], isinstance(space, Discrete)
             given[player] = int(own[0]) if is_one else own.reshape(space.shape).astype(space.dtype)
         return given
 

@@ -8,12 +8,11 @@ again to be drawn.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping
 from copy import copy
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -73,13 +72,11 @@ class AdaptedWorld:
     repeats = True
 
     def __init__(self, settings: AdaptedSettings, make: Make = make_by_id) -> None:
-        survey = surveyed(settings, make)
+        self._actuators, self._perception = surveyed(settings, make)
         self.settings, self._make, self._simulator = settings, make, make(settings, None)
-        self._actuators, self._perception = survey.actuators, survey.perception
-        self.agents, self.action_set = survey.agents, self._actuators.action_set
-        self.groups = survey.groups
+        self.agents, self.roles = self._actuators.names, self._actuators.roles
+        self.groups, self.action_set = self._actuators.groups, self._actuators.action_set
         self._body = np.repeat(np.arange(len(self.groups)), [len(group) for group in self.groups])
-        self.roles = survey.roles
         self.state_space = StateSpace(
             "observed", self._perception.variables, common=self._perception.common
         )
@@ -213,18 +210,8 @@ class CopiedPrediction:
         return self._played[key]
 
 
-class Survey(NamedTuple):
-    """What is known of an environment before it is played."""
-
-    actuators: Actuators
-    perception: Perception
-    agents: tuple[str, ...]
-    roles: tuple[str, ...]
-    groups: tuple[tuple[int, ...], ...]
-
-
 @lru_cache(maxsize=32)
-def surveyed(settings: AdaptedSettings, make: Make) -> Survey:
+def surveyed(settings: AdaptedSettings, make: Make) -> tuple[Actuators, Perception]:
     """Return what is found of an environment once, the same in every process.
 
     Raises
@@ -233,37 +220,18 @@ def surveyed(settings: AdaptedSettings, make: Make) -> Survey:
         If the settings do not fit the environment, or it cannot be adapted or copied; one line.
     """
     simulator = make(settings, None)
-    actuators = Actuators(simulator.action_spaces, settings.actions, settings.neutral)
-    agents, groups, players = actuators.names, actuators.groups, list(simulator.players)
-    roles = tuple(re.sub(r"_?\d+(?=$|[.])", "", name, count=1) for name in agents)
-    if len(players) == 1:
-        agents, groups = _bodies(getattr(settings, "groups", ()), agents)
-        roles, players = agents, players * len(groups)
+    bodies = getattr(settings, "groups", ())
+    actuators = Actuators(simulator.action_spaces, settings.actions, settings.neutral, bodies)
     met = partial(_met, simulator, actuators)
-    perception = Perception(settings, simulator.observation_spaces, players, met)
+    perception = Perception(settings, simulator.observation_spaces, actuators.players, met)
     if settings.predictor == "copy":
-        neutral: IntArray = np.full(len(agents), actuators.action_set.neutral)
+        neutral: IntArray = np.full(len(actuators.names), actuators.action_set.neutral)
         if fault := fault_of_copies(simulator, actuators.commands(neutral)):
             raise ValueError(
                 f"scenario.predictor = 'copy': the environment cannot be copied, {fault}; use "
                 "'none' with learner.predictor.kind = 'learned', or one that needs no prediction"
             )
-    return Survey(actuators, perception, agents, roles, groups)
-
-
-def _bodies(
-    chosen: tuple[tuple[int, ...], ...], agents: tuple[str, ...]
-) -> tuple[tuple[str, ...], tuple[tuple[int, ...], ...]]:
-    """Return the agents' names and these by body, each alone where nothing else is said."""
-    if not chosen:
-        return agents, tuple((i,) for i in range(len(agents)))
-    if [i for group in chosen for i in group] != list(range(len(agents))):
-        raise ValueError(
-            f"scenario.groups = {[list(group) for group in chosen]}: must hold the numbers 0 to "
-            f"{len(agents) - 1} of the agents once each, in order"
-        )
-    names = (f"body{b + 1}.{k + 1}" for b, group in enumerate(chosen) for k in range(len(group)))
-    return tuple(names), chosen
+    return actuators, perception
 
 
 def _met(simulator: Simulator, actuators: Actuators, numbers_of: Any) -> FloatArray:

@@ -102,6 +102,7 @@ class BoxPushing:
         self.groups = tuple(
             tuple(range(r * wheels, (r + 1) * wheels)) for r in range(settings.robots)
         )
+        self._body = np.repeat(np.arange(settings.robots), wheels)
         self.agents = tuple(
             f"robot{r + 1}.{name}"
             for r in range(settings.robots)
@@ -202,7 +203,7 @@ class BoxPushing:
         )[0]
         paid: float | FloatArray = float(gained[0])
         if self.settings.reward.of == "robot":
-            paid = np.repeat(gained, [len(group) for group in self.groups])
+            paid = gained[self._body]
         sensed = perf_counter()
         if terminated:
             # Does the box come to rest within the tolerance when all wheels stop?
@@ -320,10 +321,5 @@ class BoxPushing:
             poses[None], world.box_pose[None], world.gaps[None], self._goal, origin, 1.0,
             self.box.outline, self.box.friction_radius,
         )  # fmt: skip
-        n_own, shared = self._space.space.n_own, self._space.sensed(view, range(len(poses)))
-        states = np.empty((len(self.agents), self._space.space.n_variables))
-        for r, group in enumerate(self.groups):
-            for agent in group:
-                own = self._space.own(poses[r : r + 1], self._speeds[agent : agent + 1], self._goal)
-                states[agent, :n_own], states[agent, n_own:] = own[0], shared[r, 0]
-        return states
+        own = self._space.own(poses[self._body], self._speeds, self._goal)
+        return np.hstack([own, self._space.sensed(view, range(len(poses)))[self._body, 0]])
