@@ -30,7 +30,6 @@ from ..interface.scenario import (
     Scenario,
     Transition,
     groups_of,
-    joint_reward,
     roles_of,
 )
 from ..interface.spaces import ActionSet, StateSpace, Variable
@@ -175,7 +174,9 @@ class JointAgents:
     def step(self, joint_action: IntArray) -> Transition:
         """Carry out the actions of those who act."""
         transition = self.scenario.step(self.actions(joint_action))
-        reward = joint_reward(transition.reward, self.blocks)
+        reward = transition.reward
+        if np.ndim(reward):  # each acts for the mean reward of its agents
+            reward = np.array([np.take(reward, block).mean() for block in self.blocks])
         return replace(transition, states=self._states(transition.states), reward=reward)
 
     def _predict(self) -> JointPrediction:

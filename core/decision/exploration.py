@@ -61,21 +61,18 @@ class BoltzmannExploration(ExplorationSettings):
     """
 
     kind: Literal["boltzmann"] = "boltzmann"
+    factory: ClassVar[str] = f"{__name__}:Boltzmann"
     max_temperature: Positive = 500.0
     """Temperature that is added at first, T_max."""
     decay: NonNegative = 0.006
     """Decay of the temperature per step, s."""
 
-    def build(self, n_agents: int) -> Explorer:
-        """Return the explorer of a team."""
-        return Boltzmann(self)
-
 
 class Boltzmann:
     """Samples the Boltzmann distribution; the clock counts the steps of the whole run."""
 
-    def __init__(self, settings: BoltzmannExploration | PaperExploration) -> None:
-        self.settings: Any = settings
+    def __init__(self, settings: Any, n_agents: int) -> None:
+        self.settings = settings
         self.memory: FloatArray = np.zeros(1)  # t, the steps counted by the clock
 
     @property
@@ -108,6 +105,7 @@ class PaperExploration(ExplorationSettings):
     """
 
     kind: Literal["paper"] = "paper"
+    factory: ClassVar[str] = f"{__name__}:EpsilonDecreasingBoltzmann"
     epsilon: Fraction = 1.0
     """Exploration rate at the start; not printed in the paper."""
     max_temperature: Annotated[float, Field(gt=1)] = 100.0
@@ -120,10 +118,6 @@ class PaperExploration(ExplorationSettings):
     """Take the action of greatest probability (Section V), or sample Eq. 14."""
     explore: Literal["uniform", "boltzmann"] = "uniform"
     """How the "random action" of the other case is drawn; not stated in the paper."""
-
-    def build(self, n_agents: int) -> Explorer:
-        """Return the explorer of a team."""
-        return EpsilonDecreasingBoltzmann(self)
 
 
 class EpsilonDecreasingBoltzmann(Boltzmann):

@@ -200,14 +200,6 @@ def combinations(agents: tuple[int, ...], n_actions: int) -> IntArray:
     return np.ascontiguousarray(grid.T, dtype=np.int64)
 
 
-def probabilities_of(frequencies: FloatArray, below: tuple[int, ...]) -> FloatArray:
-    """Return the probability ``(A ** k,)`` of each joint action of the k agents below."""
-    probabilities = np.ones(1)
-    for agent in below:
-        probabilities = np.multiply.outer(probabilities, frequencies[agent]).ravel()
-    return probabilities / probabilities.sum()
-
-
 def concerned(hierarchy: Hierarchy, value_of: ValueOf) -> list[IntArray]:
     """Return, for every agent, the agents whose values decide what it does, in agent order.
 

@@ -7,18 +7,19 @@ from pydantic import Field
 
 from ..numerics.arrays import FloatArray, IntArray
 from ..rules.kernels.enumeration import Tried
-from .evaluator import (
-    Aggregation,
-    DecisionProblem,
-    Deliberation,
-    EvaluatorSettings,
-    combinations,
-    probabilities_of,
-)
+from .evaluator import Aggregation, DecisionProblem, Deliberation, EvaluatorSettings, combinations
 
 TABLES = ("blocks", "reward_table")
 """What predictions have that know what all joint actions lead to."""
 Samples = Annotated[int, Field(ge=1, le=1_000_000)]
+
+
+def probabilities_of(frequencies: FloatArray, below: tuple[int, ...]) -> FloatArray:
+    """Return the probability ``(A ** k,)`` of each joint action of the k agents below."""
+    probabilities = np.ones(1)
+    for agent in below:
+        probabilities = np.multiply.outer(probabilities, frequencies[agent]).ravel()
+    return probabilities / probabilities.sum()
 
 
 class ExactEnumeration(Aggregation):

@@ -189,19 +189,6 @@ def groups_of(scenario: Scenario) -> tuple[tuple[int, ...], ...]:
     return getattr(scenario, "groups", single)
 
 
-def joint_reward(reward: float | FloatArray, groups: Sequence[Sequence[int]]) -> float | FloatArray:
-    """Return the reward of those who act for groups of agents: the mean of each group's rewards.
-
-    Examples
-    --------
-    >>> joint_reward(0.5, [(0, 1)]), joint_reward(np.array([1.0, 3.0, 5.0]), [(0, 1), (2,)])
-    (0.5, array([2., 5.]))
-    """
-    if np.ndim(reward) == 0:
-        return reward
-    return np.array([np.asarray(reward)[list(group)].mean() for group in groups])
-
-
 def roles_of(scenario: Scenario) -> tuple[str, ...]:
     """Return the role of every agent: agents of one role may share weights.
 

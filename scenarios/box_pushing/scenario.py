@@ -33,7 +33,7 @@ from .world.reward import Task, reward
 from .world.robots import nominal_effect, robot_for
 from .world.settings import CONTROL_PERIOD
 from .world.starts import place
-from .world.world import WheelFailures, World, WorldState
+from .world.world import WheelFailures, World
 
 if TYPE_CHECKING:
     from .pictures.policy import Policy
@@ -96,8 +96,6 @@ class BoxPushing:
         similar = settings.scaling == "similar"
         self._unit = growth(settings.box, settings.robots) if similar else 1.0
         robots = [self.robot] * settings.robots
-        # Whether they fit is better known now than in the middle of a study.
-        place(settings.start, np.random.default_rng(0), robots, self.box)
         wheels = len(self.robot.wheels)
         self.groups = tuple(
             tuple(range(r * wheels, (r + 1) * wheels)) for r in range(settings.robots)
@@ -133,11 +131,7 @@ class BoxPushing:
             settings.prediction_horizon * CONTROL_PERIOD,
         )  # fmt: skip
         self.horizon = max(1, round(settings.prediction_horizon / settings.action_repeat))
-        self._goal: FloatArray = np.zeros(3)
-        self._sensing = np.random.default_rng(0)  # until reset
-        self._speeds: FloatArray = np.zeros(len(self.agents))
-        self._step = 0
-        self._saved: WorldState | None = None
+        self.reset(0)  # whether the robots fit is better known now than in the middle of a study
 
     def partners(self) -> tuple[int, ...]:
         """Return for every wheel the one opposite on its robot, or itself if it is in the middle.
@@ -168,7 +162,7 @@ class BoxPushing:
             self.settings.start, rng, [self.robot] * self.settings.robots, self.box, self._unit
         )
         self.world.place(robots, box)
-        self._speeds = np.zeros(len(self.agents))
+        self._speeds: FloatArray = np.zeros(len(self.agents))
         self._step = 0
         self._failures.begin(seed, episode)
         self.world.set_grip(self._failures.grip)

@@ -21,13 +21,7 @@ import numpy as np
 
 from ...core.interface.scenario import RecordedScenario, Scenario, groups_of, lacking, roles_of
 from .frames import Examination, Frame, at, bits, differences, fields, measured, opening
-from .predictions import (
-    MOST_JOINT_ACTIONS,
-    faults_of_prediction,
-    faults_of_sharing,
-    has_tables,
-    too_many,
-)
+from .predictions import faults_of_prediction, faults_of_sharing, has_tables, too_many
 from .sensing import Findings, faults_of_sensing, met_variables, predicted_steps
 
 STEPS = 5
@@ -235,8 +229,8 @@ def _predicts(of: Examination) -> Iterator[str]:
     for action in actions[:STEPS]:
         yield from faults_of_prediction(scenario, actions, rng)
         scenario.step(action)
-    if has_tables(scenario.predict()) and too_many(scenario):
-        of.unchecked["tables"] = f"more than {MOST_JOINT_ACTIONS:,} joint actions"
+    if has_tables(scenario.predict()) and (why := too_many(scenario)):
+        of.unchecked["tables"] = why
 
 
 def _senses(of: Examination) -> Iterator[str]:

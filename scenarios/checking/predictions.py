@@ -61,9 +61,10 @@ def has_tables(prediction: Any) -> bool:
     return hasattr(prediction, "blocks") and hasattr(prediction, "reward_table")
 
 
-def too_many(scenario: Scenario) -> bool:
-    """Return whether a scenario has more joint actions than tables are asked for."""
-    return len(scenario.action_set) ** len(scenario.agents) > MOST_JOINT_ACTIONS
+def too_many(scenario: Scenario) -> str:
+    """Return that a scenario has more joint actions than tables are asked for, if it has."""
+    count = len(scenario.action_set) ** len(scenario.agents)
+    return f"more than {MOST_JOINT_ACTIONS:,} joint actions" if count > MOST_JOINT_ACTIONS else ""
 
 
 def _misformed(scenario: Scenario, prediction: Any, joint_actions: IntArray) -> Iterator[str]:

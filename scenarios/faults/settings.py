@@ -110,13 +110,7 @@ class Noisy(FailureSettings):
 
 
 KINDS: Mapping[str, type[FailureSettings]] = {
-    "seized": Seized,
-    "free": Free,
-    "weak": Weak,
-    "reversed": Reversed,
-    "stuck": Stuck,
-    "delayed": Delayed,
-    "noisy": Noisy,
+    kind.__name__.lower(): kind for kind in (Seized, Free, Weak, Reversed, Stuck, Delayed, Noisy)
 }
 """The kinds of failure by name."""
 DISCRIMINATOR = Field(discriminator="kind")

@@ -85,10 +85,7 @@ class KinematicChain:
         self._failures = Failures(settings.failures, self.agents, self._limits)
         # What an informed prediction knows of the next step, while the others tell of the last.
         self._known = Failures(settings.failures, self.agents, self._limits)
-        self._goal: FloatArray = np.zeros(2)
-        self._angles: FloatArray = np.zeros(n)
-        self._speeds: FloatArray = np.zeros(n)
-        self._step = 0
+        self.reset(0)
 
     def partners(self) -> tuple[int, ...]:
         """Return for every joint the one in whose place it stands in the mirror: itself."""
@@ -103,7 +100,8 @@ class KinematicChain:
         rng, n = np.random.default_rng(seed), len(self.agents)
         bend = min(MOST_BEND, 3.0 * np.sqrt(2.0 / n), self.settings.joint_limit or np.inf)
         self._angles = np.append(rng.uniform(-np.pi, np.pi), rng.uniform(-bend, bend, n - 1))
-        self._speeds, self._step = np.zeros(n), 0
+        self._speeds: FloatArray = np.zeros(n)
+        self._step = 0
         tip = self._places()[-1]
         while True:
             radius = np.sqrt(rng.uniform(GOAL_RADII[0] ** 2, GOAL_RADII[1] ** 2))

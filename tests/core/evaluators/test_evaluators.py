@@ -16,9 +16,13 @@ from nested_agents.core.evaluators.evaluator import (
     Rule,
     Teammates,
     combinations,
+)
+from nested_agents.core.evaluators.exact import (
+    ExactEnumeration,
+    Sampling,
+    SamplingSettings,
     probabilities_of,
 )
-from nested_agents.core.evaluators.exact import ExactEnumeration, Sampling, SamplingSettings
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.interface.prediction import Blocks
 from nested_agents.core.interface.spaces import StateSpace, Variable
