@@ -56,7 +56,7 @@ MODULES = {
     "core": ("How agents perceive, predict, decide and learn, and what that costs.", (
         "interface.hierarchy", "interface.spaces", "interface.prediction",
         "interface.scenario", "interface.measures", "agents.team",
-        "agents.rows", "adaptation.mirror", "agents.loop", "decision.settings",
+        "adaptation.mirror", "agents.loop", "decision.settings",
         "decision.exploration", "rules.kernels.fuzzy", "rules.rule_base",
         "learners.learner", "learners.td", "learners.batch", "learners.one_step",
         "learners.sums", "evaluators.evaluator", "evaluators.auto",
@@ -64,7 +64,7 @@ MODULES = {
         "evaluators.coordination", "evaluators.cross_entropy",
         "coordination.elimination", "coordination.max_plus", "adaptation.self_model",
         "adaptation.calibration", "agents.cost", "plugins.registry", "plugins.plugged",
-        "plugins.settings", "interface.acting", "numerics.streams", "numerics.ties",
+        "plugins.settings", "numerics.streams", "numerics.ties",
         "policies.settings",
         "policies.peer", "policies.inputs",
     )),

@@ -25,13 +25,7 @@ import numpy as np
 
 from ..interface.measures import measures_of
 from ..interface.prediction import Blocks, Prediction
-from ..interface.scenario import (
-    EmbodiedScenario,
-    Scenario,
-    Transition,
-    groups_of,
-    roles_of,
-)
+from ..interface.scenario import EmbodiedScenario, Scenario, Transition, groups_of, roles_of
 from ..interface.spaces import ActionSet, StateSpace, Variable
 from ..numerics.arrays import FloatArray, IntArray
 

@@ -15,17 +15,15 @@ from ..adaptation.predictors import GivenPredictor
 from ..adaptation.self_model import SelfModel
 from ..decision.exploration import Explorer
 from ..evaluators.evaluator import NOTHING_GIVEN, DecisionProblem, Deliberation, Evaluator
-from ..interface.acting import Actors
 from ..interface.hierarchy import Hierarchy
 from ..interface.prediction import NOT_EXPLORING, Prediction
-from ..interface.scenario import EmbodiedScenario, Scenario, Transition, groups_of
+from ..interface.scenario import Actors, EmbodiedScenario, Scenario, Transition, groups_of, rows_of
 from ..learners import check_prediction
 from ..learners.learner import Learner, LearnerSettings
 from ..numerics.arrays import FloatArray, IntArray
 from ..numerics.streams import set_words, words_of
 from ..numerics.ties import greatest
 from .messages import MessageFailure, Messages
-from .rows import rows_of
 
 
 class Team:

@@ -68,7 +68,7 @@ class BoltzmannExploration(ExplorationSettings):
     """Decay of the temperature per step, s."""
 
 
-class Boltzmann:
+class Boltzmann(Explorer):
     """Samples the Boltzmann distribution; the clock counts the steps of the whole run."""
 
     def __init__(self, settings: Any, n_agents: int) -> None:
@@ -80,9 +80,6 @@ class Boltzmann:
         """T(t) = 1 + T_max exp(-s t)."""
         s = self.settings
         return 1.0 + s.max_temperature * float(np.exp(-s.decay * self.memory[0]))
-
-    def begin_episode(self) -> None:
-        """Go on counting."""
 
     def continue_from(self, former: Boltzmann) -> None:
         """Go on with the clock."""
@@ -167,7 +164,7 @@ class BurstExploration(ExplorationSettings):
     """Mean number of decisions for which a random action is repeated."""
 
 
-class Bursts:
+class Bursts(Explorer):
     """Random actions held for a geometric number of decisions, less often in later episodes."""
 
     def __init__(self, settings: BurstExploration, n_agents: int) -> None:
@@ -202,9 +199,6 @@ class Bursts:
     def continue_from(self, former: Bursts) -> None:
         """Go on counting episodes; bursts end with an episode."""
         self.memory[0] = former.memory[0]
-
-    def advance(self) -> None:
-        """Bursts run down in `choose`."""
 
     def choose(self, agent: int, values: FloatArray, rng: np.random.Generator) -> int:
         """Return the held action, start a burst, or take the greatest."""

@@ -5,8 +5,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from ..interface.acting import Actors
-from ..interface.scenario import Scenario
+from ..interface.scenario import Actors, Scenario
 from ..numerics.arrays import FloatArray, IntArray
 
 

@@ -97,9 +97,8 @@ class BoxPushing:
         self._unit = growth(settings.box, settings.robots) if similar else 1.0
         robots = [self.robot] * settings.robots
         wheels = len(self.robot.wheels)
-        self.groups = tuple(
-            tuple(range(r * wheels, (r + 1) * wheels)) for r in range(settings.robots)
-        )
+        every = np.arange(settings.robots * wheels).reshape(-1, wheels)
+        self.groups = tuple(map(tuple, every.tolist()))
         self._body = np.repeat(np.arange(settings.robots), wheels)
         self.agents = tuple(
             f"robot{r + 1}.{name}"

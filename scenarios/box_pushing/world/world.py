@@ -42,6 +42,8 @@ TOUCHING = 0.001
 of 0.5 mm."""
 SKIN = 0.005
 """Rounding of polygons in Box2D [dm]; its default is twice that."""
+SUBSTEPS = 4
+"""Physics steps of a control period."""
 VELOCITY_ITERATIONS = 8
 POSITION_ITERATIONS = 3
 
@@ -76,8 +78,6 @@ class World:
         The robots; their wheels, in this order, are the actuators.
     box
         The box.
-    substeps
-        Physics steps per control period.
     infrared
         Response of the infrared sensors; none: the e-Puck's. The world adds no noise to it.
 
@@ -110,17 +110,13 @@ class World:
         robots: Sequence[RobotSettings],
         box: BoxSpec,
         *,
-        substeps: int = 4,
         infrared: InfraredSettings | None = None,
     ) -> None:
-        if substeps < 1:
-            raise ValueError(f"substeps = {substeps}, must be at least 1")
         self.robots = tuple(robots)
         self.box = box
-        self.substeps = substeps
         self.sensor = infrared or InfraredSettings()
         self.n_wheels = sum(len(robot.wheels) for robot in robots)
-        self.dt = CONTROL_PERIOD / substeps
+        self.dt = CONTROL_PERIOD / SUBSTEPS
         self._radii: FloatArray = np.array([robot.radius for robot in robots])
         self._sensors = sensor_directions(robots)
         self.set_grip(np.ones(self.n_wheels))
@@ -201,7 +197,7 @@ class World:
         speeds = np.asarray(wheel_speeds, dtype=float) * UNIT
         touched = np.zeros(len(self.robots))
         for _ in range(periods):
-            for _ in range(self.substeps):
+            for _ in range(SUBSTEPS):
                 self._step(speeds)
             self._observe()
             touched += self.contact
