@@ -9,14 +9,11 @@ digits of one group read as a number are its *robot-action index*.
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import partial
 from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
 from ..numerics.arrays import FloatArray, IntArray
-
-_NO_ROWS = partial(np.zeros, 0, dtype=np.int64)
 
 
 @dataclass(frozen=True)
@@ -36,10 +33,10 @@ class Blocks:
     divisor: int
     """``A`` to the power of the number of agents behind the group: the robot-action index of
     joint-action index ``c`` is ``c // divisor % A ** w``."""
-    own_rows: IntArray = field(default_factory=_NO_ROWS)
+    own_rows: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     """``(A ** w,)`` the row of `own` of every robot-action index, where several lead to one; empty:
     each has its row."""
-    shared_rows: IntArray = field(default_factory=_NO_ROWS)
+    shared_rows: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     """``(A ** n,)`` the row of `shared` of every joint-action index; empty: each has its row."""
     alone: bool = False
     """Whether own variables are those that the group would reach alone, which is an approximation
