@@ -59,7 +59,7 @@ MODULES = {
         "adaptation.mirror", "agents.loop", "decision.settings",
         "decision.exploration", "rules.kernels.fuzzy", "rules.rule_base",
         "learners.learner", "learners.td", "learners.batch", "learners.one_step",
-        "learners.sums", "evaluators.evaluator", "evaluators.auto",
+        "evaluators.evaluator", "evaluators.auto",
         "evaluators.exact", "evaluators.best_response",
         "evaluators.coordination", "evaluators.cross_entropy",
         "coordination.elimination", "coordination.max_plus", "adaptation.self_model",

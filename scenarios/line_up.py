@@ -81,6 +81,7 @@ class LineUp:
         self.settings = settings
         n_agents = settings.carts
         self.agents = tuple(f"cart{i + 1}" for i in range(n_agents))
+        self.groups = tuple((i,) for i in range(n_agents))
         self.roles = ("cart",) * n_agents
         self.action_set = ActionSet()
         self.state_space = StateSpace("line-up", (DISTANCE, LEAD), n_own=1)

@@ -8,6 +8,12 @@ pays well if the others do their part from one that was lucky (Kapetanakis and K
 Q-learning learns values of states and actions from the best action that could follow. It is for
 state spaces that hold what has been chosen beside the situation it was chosen in: there the value
 of a state is the value of an action (Watkins and Dayan 1992).
+
+Agents' values may add up to the team's. In sparse cooperative Q-learning each agent learns its part
+of the sum, over its neighbours in a coordination graph; what all are paid together is shared out
+equally, so that the parts add up to it (Kok and Vlassis 2006). In value decomposition the sum
+learns from one error: what all are paid says nothing of who earned it, and the TD error of the sum
+goes back to every agent alike (Sunehag et al. 2018).
 """
 
 from itertools import product
@@ -177,3 +183,55 @@ class QLearning(OneStep):
             met[:, :, self._columns] = self._choices
             delta += self.discount * self.rules.each(self.of_agents(self.theta), met).max(axis=1)
         return self._step(states, delta)
+
+
+class SparseCooperativeSettings(OneStepSettings):
+    """Agents learn the parts of a sum, each by its share of the reward."""
+
+    kind: Literal["sparse-cooperative"] = "sparse-cooperative"
+    factory: ClassVar[str] = f"{__name__}:SparseCooperative"
+
+
+class SparseCooperative(OneStep):
+    """TD(0) for each part of a sum (Kok and Vlassis 2006, Eq. 11, on after-states).
+
+    On entering state s' after state s, agent i of n learns::
+
+        delta_i = R_i(s) + gamma f_i(s') - f_i(s)
+        theta_i = theta_i + alpha delta_i phi_i(s) / |phi_i(s)|^2
+
+    where R_i is its own reward, or R / n if one is paid to all: then the deltas add up to the TD
+    error of ``sum_i f_i``. The state entered stands for the best one, which is what the greedy
+    joint action of the graph leads to.
+    """
+
+    def observe(self, states: FloatArray, reward: float | FloatArray, terminated: bool) -> int:
+        """Update for the step from the previous states to these, each agent by its share."""
+        shared = reward / len(states) if np.ndim(reward) == 0 else reward
+        return super().observe(states, shared, terminated)
+
+
+class ValueDecompositionSettings(OneStepSettings):
+    """The sum of all agents' values learns from the TD error of the team."""
+
+    kind: Literal["vdn"] = "vdn"
+    factory: ClassVar[str] = f"{__name__}:ValueDecomposition"
+    step_size: Positive = 0.1
+    """alpha, divided by the squared length of all agents' feature vectors together."""
+
+
+class ValueDecomposition(SparseCooperative):
+    """TD(0) on the sum of the agents' values, without the networks of the original.
+
+    On entering state s' after state s, with R the reward of all (the sum, if each has its own)::
+
+        delta   = R(s) + gamma sum_i f_i(s') - sum_i f_i(s)
+        theta_i = theta_i + alpha delta phi_i(s) / sum_j |phi_j(s)|^2
+
+    The state entered stands for what the agents' greatest values lead to, as in all learners here.
+    """
+
+    def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
+        delta = self.errors(self.theta, states, rewards, entered).sum()
+        lengths = self.rules.squared_lengths(states).sum()
+        return self._step(states, np.full(len(states), delta), lengths)

@@ -14,6 +14,7 @@ from pydantic import Field
 
 from ..numerics.arrays import FloatArray, IntArray
 from ..plugins.settings import Fraction, Positive
+from ..rules.kernels.compact import td_update
 from ..rules.rule_base import RuleBase
 from .learner import LearnerSettings
 
@@ -183,7 +184,7 @@ class TDLambda(Online):
         lengths: FloatArray = np.ones(len(states))
         if self.settings.normalised:
             lengths = self.rules.squared_lengths(states)
-        self.rules.td_update(
+        td_update(
             self.weights, self.rows, self.trace, self.reach, states,
             states if entered is None else entered, rewards,
             0.0 if entered is None else self.discount, self.settings.step_size, lengths,

@@ -25,12 +25,12 @@ from ..interface.prediction import Blocks
 from ..interface.spaces import StateSpace
 from ..numerics.arrays import FloatArray, IntArray
 from ..plugins.settings import Positive, Settings
-from .kernels.compact import active_compact, each_compact, td_compact, total_compact
+from .kernels.compact import active_compact, each_compact, total_compact
 from .kernels.dense import values_dense
 from .kernels.enumeration import Tried, enumerate_dense, enumerate_looked_up
 from .kernels.fuzzy import Partition
 from .kernels.layout import layout, unpack
-from .kernels.updates import each_dense, td_dense
+from .kernels.updates import each_dense
 
 
 class RuleBaseSettings(Settings):
@@ -117,8 +117,6 @@ class RuleBase:
         self.dtype = np.dtype(dtype)
         self.compact = self.partitions[0].membership == "triangular"
         self._enumerate = enumerate_looked_up if self.compact else enumerate_dense
-        # One TD(lambda) update of all agents, see `td_dense`, given the layout; shapes are trusted.
-        self.td_update = td_compact if self.compact else td_dense
 
     @classmethod
     def build(cls, space: StateSpace, settings: RuleBaseSettings) -> RuleBase:

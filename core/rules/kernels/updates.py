@@ -1,6 +1,6 @@
 """Changes of consequent weights and traces along feature vectors.
 
-For any partitions also values of few states of every agent, and the TD update between two.
+For any partitions also values of few states of every agent.
 """
 
 import numpy as np
@@ -126,7 +126,7 @@ def _sums(rows, one, two, first, second, tops, parts, least):  # type: ignore[no
 
 
 @njit(cache=True)
-def _values_of_two(theta, one, two, lay: Layout) -> tuple[float, float]:  # type: ignore[no-untyped-def]
+def values_of_two(theta, one, two, lay: Layout) -> tuple[float, float]:  # type: ignore[no-untyped-def]
     """Return f of two states given their strengths; theta is read once."""
     f = g = 0.0
     for t in range(len(lay.lengths)):
@@ -167,45 +167,5 @@ def each_dense(theta: FloatArray, states: FloatArray, packed: Packed) -> FloatAr
             other = min(k + 1, s - 1)
             all_strengths(states[i, k], lay, one, room)
             all_strengths(states[i, other], lay, two, room)
-            out[i, k], out[i, other] = _values_of_two(theta[i], one, two, lay)
+            out[i, k], out[i, other] = values_of_two(theta[i], one, two, lay)
     return out
-
-
-@njit(cache=True)
-def td_dense(  # type: ignore[no-untyped-def]
-    theta, rows: IntArray, trace, reach, states: FloatArray, entered: FloatArray,
-    rewards: FloatArray, discount: float, step_size: float, lengths: FloatArray, decay: float,
-    packed: Packed,
-) -> None:  # fmt: skip
-    """Make one TD update of every agent (Eq. 7, 12, 13), any partitions.
-
-    Parameters
-    ----------
-    theta
-        ``(n_rows, n_rules)`` consequent weights, modified.
-    rows
-        ``(n,)`` the row of theta of every agent.
-    trace
-        ``(n, n_rules)`` eligibility traces, modified.
-    reach
-        ``(n, parts of all rows)``, see `core.rules.kernels.updates.advance`, modified.
-    states, entered
-        ``(n, d)`` the previous states of the agents and those that followed.
-    rewards, discount
-        ``(n,)`` received in the previous states; weight of what follows, 0 if they were terminal.
-    step_size, lengths
-        Step size, and ``(n,)`` what it is divided by for every agent.
-    decay
-        Discount times trace decay.
-    packed
-        Layout of the rule base.
-    """
-    lay = unpack(packed)
-    one, room = strengths_room(lay)
-    two = np.empty_like(one)
-    for i in range(len(states)):
-        all_strengths(states[i], lay, one, room)
-        all_strengths(entered[i], lay, two, room)
-        now, ahead = _values_of_two(theta[rows[i]], one, two, lay)
-        step = step_size * (rewards[i] + discount * ahead - now) / lengths[i]
-        advance(theta[rows[i]], trace[i], reach[i], one, decay, step, lay)
