@@ -22,7 +22,7 @@ ALLOWED = {
 }
 STUDIES = (
     "errors", "store", "spec", "trials", "workers", "results", "presentation", "catalogue",
-    "claims", "cost", "explain", "report", "api", "cli",
+    "claims", "cost", "explain", "report", "api", "benchmark", "cli",
 )  # fmt: skip
 """The rooms of studies/, each of which may import those before it."""
 MAX_BYTES = 1_000_000

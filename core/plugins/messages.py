@@ -41,7 +41,7 @@ def closest(name: object, known: Iterable[str]) -> str:
 def mistaken(key: object, known: Collection[str], problem: Mapping[str, Any]) -> str:
     """Return "; did you mean ...?" if a key that refuses its value is nearly another one's name.
 
-    A value that is only out of range, by the `problem` that pydantic found, is of the right key.
+    A value that is only out of range, by the `problem` that was found, is of the right key.
 
     Examples
     --------
@@ -50,7 +50,8 @@ def mistaken(key: object, known: Collection[str], problem: Mapping[str, Any]) ->
     >>> mistaken("robots", ["robot", "robots"], {"type": "less_than_equal"})
     ''
     """
-    others = () if "_than" in problem["type"] else set(known) - {str(key)}
+    of_key = "_than" in problem["type"] or problem["type"] == "value_error"
+    others = () if of_key else set(known) - {str(key)}
     hint = near(key, others, cutoff=0.85)
     return f"; {hint}" if hint else ""
 
@@ -74,6 +75,7 @@ def rule(message: str) -> str:
     message = re.sub(r"^\w+ should have (.*) after validation", r"must have \1", message)
     return (
         message.replace("a valid ", "a ")
+        .replace("Field required", "must have all keys that it needs")
         .replace("less than or equal to", "at most")
         .replace("greater than or equal to", "at least")
     )

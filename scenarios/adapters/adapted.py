@@ -72,7 +72,13 @@ class AdaptedWorld:
     repeats = True
 
     def __init__(self, settings: AdaptedSettings, make: Make = make_by_id) -> None:
-        self._actuators, self._perception = surveyed(settings, make)
+        try:
+            self._actuators, self._perception = surveyed(settings, make)
+        except ValueError:  # says what does not fit
+            raise
+        except Exception as error:  # an environment may be anybody's
+            which = f"scenario.id = {settings.id!r}:" if settings.id else "the environment"
+            raise ValueError(f"{which} cannot be played, {format_error(error)}") from None
         self.settings, self._make, self._simulator = settings, make, make(settings, None)
         self.agents, self.roles = self._actuators.names, self._actuators.roles
         self.groups, self.action_set = self._actuators.groups, self._actuators.action_set

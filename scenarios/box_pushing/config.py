@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from ...core.plugins.settings import Positive, ScenarioSettings
+from ...core.plugins.settings import Positive, ScenarioSettings, team_size
 from ..state_variables import referred
 from .prediction.settings import BeliefSettings
 from .states.relational import STATE_VARIABLES
@@ -40,8 +40,8 @@ class BoxTaskSettings(ScenarioSettings):
     """Robots, box, task and servo layer: what all scenarios of box pushing have in common."""
 
     player: ClassVar[str] = f"{__package__}.pictures.player"
-    robots: Annotated[int, Field(ge=1, le=64)] = 2
-    """Number of robots."""
+    robots: Annotated[int, Field(ge=1), team_size(7.5e-7, agents=2)] = 2
+    """Number of robots, as many as memory and time allow by estimate."""
     robot: str | RobotSettings = "e-puck"
     """Robot by name, or a table that describes one."""
     box: str | BoxSettings = "square"

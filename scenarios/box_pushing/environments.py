@@ -133,13 +133,16 @@ class Game(ABC):
     def begin(self, seed: int | None, options: Mapping[str, Any] | None) -> FloatArray:
         """Start the next episode; a seed starts the stream of worlds and their count afresh.
 
-        The option ``episode`` sets the number of the episode, by which failures are scheduled.
+        The option ``episode`` sets the number of the episode, by which failures are scheduled, and
+        ``world`` the seed of its world, in place of the next one of the stream.
         """
         if seed is not None:
             self._seeds, self._episode = np.random.default_rng(seed), -1
         self._episode = int((options or {}).get("episode", self._episode + 1))
         self._step, self.agents = 0, list(self.possible_agents)
-        states = self.scenario.reset(int(self._seeds.integers(2**63)), self._episode)
+        world = (options or {}).get("world")
+        world = int(self._seeds.integers(2**63)) if world is None else world
+        states = self.scenario.reset(world, self._episode)
         self._recorder = EpisodeRecorder(self.scenario) if self.render_mode else None
         return states
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Union
 from pydantic import Field, field_validator
 
 from ...core.plugins.scheduled import Names
-from ...core.plugins.settings import NonNegative, Positive, ScenarioSettings, Settings
+from ...core.plugins.settings import NonNegative, Positive, ScenarioSettings, Settings, team_size
 from ..faults.settings import DISCRIMINATOR, KINDS, FailureSettings, befalling
 from ..state_variables import referred
 
@@ -64,8 +64,8 @@ class KinematicChainSettings(ScenarioSettings):
 
     kind: Literal["kinematic-chain"] = "kinematic-chain"
     factory: ClassVar[str] = f"{__package__}.scenario:KinematicChain"
-    joints: Annotated[int, Field(ge=2, le=1024)] = 4
-    """Number of joints, an agent each."""
+    joints: Annotated[int, Field(ge=2), team_size(1e-8)] = 4
+    """Number of joints, an agent each, as many as memory and time allow by estimate."""
     joint_limit: Annotated[float, Field(gt=0, le=3.141592653589793)] | None = None
     """Greatest angle of every joint but the base, either way [rad]; none: links pass each other."""
     failures: tuple[Failure, ...] = ()

@@ -73,7 +73,7 @@ def the_key(name: str) -> Key:
     [
         ("scenario.termination_radius", "number", "1.5", "> 0", "m"),
         ("scenario.start", "text", '"medium"', '"easy", "medium", "hard"', ""),
-        ("scenario.robots", "whole number", "2", ">= 1, <= 64", ""),
+        ("scenario.robots", "whole number", "2", ">= 1", ""),
         ("scenario.box.holes", "list of list of pair of number", "[]", "at least 3 of them", "m"),
         ("learner.rule_base.memberships", "whole number", "none", ">= 2, <= 15", ""),
         ("topology.members", "nested lists of text", "none", "", ""),

@@ -604,5 +604,23 @@ def test_seeds_may_be_a_range() -> None:
 
 
 def test_a_value_out_of_range_is_not_taken_for_that_of_another_key() -> None:
-    with pytest.raises(SpecError, match=r"robots = 200: must be at most 64$"):
-        Spec.of({"scenario": {"robots": 200}})
+    with pytest.raises(SpecError, match=r"robots = 0: must be at least 1$"):
+        Spec.of({"scenario": {"robots": 0}})
+
+
+@pytest.mark.parametrize(
+    ("scenario", "estimate"),
+    [
+        ({"robots": 3000}, "robots = 3000: a worker would hold 1.2 GB, and a decision take 27 s"),
+        ({"robots": 10**999}, r": a worker would hold 1.1e\+1991 GB, and a decision take 3.0e"),
+        (
+            {"kind": "kinematic-chain", "joints": 6000},
+            "joints = 6000: a worker would hold 1.2 GB, and a decision take 0.36 s",
+        ),
+    ],
+)
+def test_a_team_too_large_for_a_worker_is_refused_by_an_estimate(scenario, estimate) -> None:
+    allowed = ", by estimate, allowed up to 1 GB and 5 s$"
+    with pytest.raises(SpecError, match=estimate + ".*" + allowed):
+        Spec.of({"scenario": scenario})
+    assert Spec.of({"scenario": {"robots": 512}})

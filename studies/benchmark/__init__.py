@@ -1,0 +1,1 @@
+"""The benchmark push-n: its entries, and how learners are entered."""
