@@ -40,7 +40,7 @@ class OneStep(Online):
     """TD(0) whose steps are divided by the squared lengths of feature vectors."""
 
     def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
-        return self._step(states, self.errors(self.weights, states, rewards, entered))
+        return self._step(states, self.errors(states, rewards, entered))
 
     def _step(
         self, states: FloatArray, delta: FloatArray, lengths: FloatArray | np.float64 | None = None
@@ -86,7 +86,7 @@ class OptimisticTD(OneStep):
     """
 
     def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
-        delta = self.errors(self.theta, states, rewards, entered)
+        delta = self.errors(states, rewards, entered)
         return self._step(states, np.maximum(delta, self.settings.falling * delta))
 
 
@@ -177,11 +177,11 @@ class QLearning(OneStep):
         self._choices = np.array(list(product(*centres)))
 
     def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
-        delta = self.errors(self.theta, states, rewards, None)
+        delta = self.errors(states, rewards, None)
         if entered is not None:
             met = np.repeat(entered[:, None], len(self._choices), axis=1)
             met[:, :, self._columns] = self._choices
-            delta += self.discount * self.rules.each(self.of_agents(self.theta), met).max(axis=1)
+            delta += self.discount * self.rules.each(self.of_agents, met).max(axis=1)
         return self._step(states, delta)
 
 
@@ -232,6 +232,6 @@ class ValueDecomposition(SparseCooperative):
     """
 
     def _update(self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None) -> int:
-        delta = self.errors(self.theta, states, rewards, entered).sum()
+        delta = self.errors(states, rewards, entered).sum()
         lengths = self.rules.squared_lengths(states).sum()
         return self._step(states, np.full(len(states), delta), lengths)

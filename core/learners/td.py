@@ -42,23 +42,20 @@ class Online(ABC):
         self._previous: FloatArray | None = None
         self._rewards: FloatArray = np.zeros(len(rows))
 
-    def of_agents(self, weights: FloatArray) -> FloatArray:
-        """Return the row of every agent ``(n, n_rules)``, no copy if each has its own."""
-        return weights if len(weights) == len(self.rows) else weights[self.rows]
+    @property
+    def of_agents(self) -> FloatArray:
+        """The weights of every agent ``(n, n_rules)``, no copy if each has its own row."""
+        return self.weights if len(self.weights) == len(self.rows) else self.weights[self.rows]
 
     def errors(
-        self,
-        weights: FloatArray,
-        states: FloatArray,
-        rewards: FloatArray,
-        entered: FloatArray | None,
+        self, states: FloatArray, rewards: FloatArray, entered: FloatArray | None
     ) -> FloatArray:
-        """Return the TD errors ``(n,)`` of `states` by rows of weights (Eq. 7)."""
+        """Return the TD errors ``(n,)`` of `states` (Eq. 7)."""
         met = states[:, None]
         if entered is not None:
             met = np.empty((len(states), 2, states.shape[1]))
             met[:, 0], met[:, 1] = states, entered
-        values = self.rules.each(self.of_agents(weights), met)
+        values = self.rules.each(self.of_agents, met)
         ahead = 0.0 if entered is None else self.discount * values[:, 1]
         return rewards + ahead - values[:, 0]
 
