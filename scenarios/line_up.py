@@ -85,7 +85,7 @@ class LineUp:
         self.roles = ("cart",) * n_agents
         self.action_set = ActionSet()
         self.state_space = StateSpace("line-up", (DISTANCE, LEAD), n_own=1)
-        self.reset(0)
+        LineUp.reset(self, 0)
 
     def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
         """Put the carts at rest, each 0.2 to 1 m from the line on the same side."""

@@ -130,7 +130,8 @@ class BoxPushing:
             settings.prediction_horizon * CONTROL_PERIOD,
         )  # fmt: skip
         self.horizon = max(1, round(settings.prediction_horizon / settings.action_repeat))
-        self.reset(0)  # whether the robots fit is better known now than in the middle of a study
+        # Whether the robots fit is better known now than in the middle of a study.
+        BoxPushing.reset(self, 0)
 
     def partners(self) -> tuple[int, ...]:
         """Return for every wheel the one opposite on its robot, or itself if it is in the middle.

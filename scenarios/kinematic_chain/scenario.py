@@ -85,7 +85,7 @@ class KinematicChain:
         self._failures = Failures(settings.failures, self.agents, self._limits)
         # What an informed prediction knows of the next step, while the others tell of the last.
         self._known = Failures(settings.failures, self.agents, self._limits)
-        self.reset(0)
+        KinematicChain.reset(self, 0)
 
     def partners(self) -> tuple[int, ...]:
         """Return for every joint the one in whose place it stands in the mirror: itself."""
