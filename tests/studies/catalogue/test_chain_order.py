@@ -94,3 +94,33 @@ def test_the_specs_hold_distinct_orders_of_at_least_twenty_seeds(name: str, orde
     spec = Spec.load(STUDIES / f"{name}.toml")
     assert len(spec.conditions()) == orders
     assert len(spec.seeds) >= 20
+
+
+@pytest.mark.parametrize(
+    ("chances", "verdict"),
+    [
+        ((1.0, 1.0), "ppo, 3 orders, within 0.1: equal (-.07 to .07)"),
+        ((0.6, 0.0), "ppo, 3 orders, within 0.1: the order matters (-.75 to -.40)"),
+        ((0.5, 0.6), "ppo, 3 orders, within 0.1: not decided"),
+    ],
+)
+def test_orders_are_compared_within_overrides(chances: tuple[float, float], verdict: str) -> None:
+    rng = np.random.default_rng(2)
+    orders = {"chain": chances[0], "chain:reversed": chances[0], "chain:b,a": chances[1]}
+    success, columns = {}, {}
+    for name in ("fuzzy", "ppo"):
+        for order, chance in orders.items():
+            label = f"{name}, topology={order}"
+            own = chance if name == "ppo" else 1.0
+            success[label] = {"success": (rng.random((20, 10)) < own).astype(float)}
+            columns[label] = {"name": name, "topology": order}
+    numbered = dict.fromkeys(success, tuple(range(20)))
+    made = Arrays(success, success, seeds=numbered, columns=columns)
+    analysis = analyse(made.frames())
+    assert [line.condition for line in analysis.table][:2] == [
+        "fuzzy, chain",
+        "fuzzy, chain:reversed",
+    ]
+    assert analysis.notes[0].startswith("fuzzy, 3 orders, within 0.1: equal")
+    assert analysis.notes[1].startswith(verdict)
+    assert len(analysis.differences) == 4
