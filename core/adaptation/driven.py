@@ -81,7 +81,7 @@ class Bodies:
 @njit(cache=True)
 def driven_states(  # type: ignore[no-untyped-def]
     present, drivers: FloatArray, weights: FloatArray, keep: FloatArray, ranges: FloatArray,
-    periods: FloatArray, horizon: int, packed: Packed,
+    periods: FloatArray, horizon: int, passes: int, packed: Packed,
 ) -> FloatArray:  # fmt: skip
     """Return the states ``(m, b, v)`` of bodies some decisions ahead, the drivers being held.
 
@@ -99,15 +99,20 @@ def driven_states(  # type: ignore[no-untyped-def]
         ``(2, v)`` what variables cannot leave; ``(v,)`` their periods, 0 where there is none.
     horizon
         Decisions ahead.
+    passes
+        How often each is computed: by the rules of where it begins, then of the middle of the way.
     packed
         Layout of the rule base.
     """
     (m, b, k), v = drivers.shape, present.shape[1]
-    states, moved = np.empty((m * b, v)), np.empty((b, 2 * v))
+    begun, moved = np.empty((m * b, v)), np.empty((b, 2 * v))
     for c in range(m):
-        states[c * b : (c + 1) * b] = present
-    for _ in range(horizon):
-        rules, strengths = active_compact(states, packed)
+        begun[c * b : (c + 1) * b] = present
+    middle, states = begun.copy(), begun.copy()
+    for ahead in range(horizon * passes):
+        if ahead % passes == 0:
+            begun[:], middle[:] = states, states
+        rules, strengths = active_compact(middle, packed)
         for c in range(m):
             moved[:] = 0.0
             for i in range(b):
@@ -125,11 +130,15 @@ def driven_states(  # type: ignore[no-untyped-def]
                 for i in range(b):
                     others += moved[i, v + x]
                 for i in range(b):
-                    value = keep[x] * states[c * b + i, x]
+                    at = c * b + i
+                    value = keep[x] * begun[at, x]
                     value += moved[i, x] + (others - moved[i, v + x])
+                    middle[at, x] = 0.5 * (begun[at, x] + value)
                     if periods[x] > 0.0:
                         value -= periods[x] * np.floor((value - ranges[0, x]) / periods[x])
+                        turns = np.floor((middle[at, x] - ranges[0, x]) / periods[x])
+                        middle[at, x] -= periods[x] * turns
                     else:
                         value = min(max(value, ranges[0, x]), ranges[1, x])
-                    states[c * b + i, x] = value
+                    states[at, x] = value
     return states.reshape(m, b, v)

@@ -37,6 +37,8 @@ MOST_TABULATED = 4**6
 """Joint actions up to which a prediction has tables of all."""
 STEADY = 1e-6
 """Ridge of own variables: what has been seen of them is believed at once."""
+PASSES = 3
+"""How often a prediction by the middle of the way is computed, which follows from it in turn."""
 GRAIN = 1e-3
 """Own variables that differ by less than this, in units of their range, are the same."""
 
@@ -164,7 +166,8 @@ class LearnedPredictor:
         b, v = bodies.agents.shape
         change = self._apart(after, before)[:, bodies.agents, bodies.columns]
         present = before[:, bodies.agents, bodies.columns]
-        phi = bodies.rules.features(present.reshape(-1, v)).reshape(len(before), b, 1, -1)
+        where = present + 0.5 * change if self.settings.midpoint else present
+        phi = bodies.rules.features(where.reshape(-1, v)).reshape(len(before), b, 1, -1)
         features = self.drivers(after[..., : self.space.n_own], joint)[..., None] * phi
         features = features.reshape(len(before), b, -1)
         targets = np.concatenate([change, after[:, bodies.agents, bodies.columns]], axis=2)
@@ -242,9 +245,10 @@ class LearnedPredictor:
         # Before anything is learned the present is all that has been seen.
         ranges[0] = np.minimum(ranges[0], present.min(axis=0))
         ranges[1] = np.maximum(ranges[1], present.max(axis=0))
+        passes = PASSES if self.settings.midpoint else 1
         moved = driven_states(
             present, drivers, m["weights"], m["keep"],
-            ranges, self.periods[columns], self.horizon, bodies.rules.layout,
+            ranges, self.periods[columns], self.horizon, passes, bodies.rules.layout,
         )  # fmt: skip
         body, place = bodies.places
         return np.moveaxis(moved[:, body, place], 0, 1)

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from ..interface.scenario import Scenario
 from ..numerics.arrays import FloatArray, IntArray
-from ..plugins.settings import PartSettings, Positive
+from ..plugins.settings import PartSettings, Positive, unwritten
 
 
 class GivenPredictor(PartSettings):
@@ -40,6 +40,9 @@ class LearnedPredictorSettings(PartSettings):
     those that are its own to the body, or of the ``common`` ones, too."""
     memberships: Annotated[int, Field(ge=2, le=15)] | None = None
     """Membership functions per variable, spread evenly; none: the state space's own centres."""
+    midpoint: Annotated[bool, unwritten(False)] = False
+    """Whether what moves what is taken from the middle of the way of a decision, where motion
+    changes what moves what, and not from its beginning."""
     mirrored: bool | None = None
     """Whether what the mirror image of the team would have met is experience as well; none: if the
     scenario tells what a mirror does."""

@@ -113,11 +113,14 @@ class SettingsRegistry(Registry):
                     raise ValueError(f"{self.kind} {name!r}: {error}{lacks}") from None
                 try:
                     return thing(*given, **named)
-                except (ValueError, OSError):  # its own words
+                except OSError:
                     raise
                 except Exception as error:
-                    raised = f"{sources.format_error(error)}{sources.place(error)}"
-                    raise ValueError(f"{self.kind} {name!r} raises {raised}") from error
+                    where = sources.place(error)
+                    raised = f"{self.kind} {name!r} raises {sources.format_error(error)}"
+                    if isinstance(error, ValueError):  # its own words
+                        raised = f"{sources.message(error)}{',' if where else ''}"
+                    raise ValueError(f"{raised}{where}") from error
 
             model.build = build  # type: ignore[attr-defined]
         return cast(type[Settings], model)

@@ -81,7 +81,13 @@ class AdaptedWorld:
     repeats = True
 
     def __init__(self, settings: AdaptedSettings, make: Make) -> None:
-        survey = surveyed(settings, make)
+        try:
+            survey = surveyed(settings, make)
+        except ValueError:  # says what does not fit
+            raise
+        except Exception as error:  # an environment may be anybody's
+            which = f"scenario.id = {settings.id!r}:" if settings.id else "the environment"
+            raise ValueError(f"{which} cannot be played, {format_error(error)}") from None
         self.settings, self._make, self._simulator = settings, make, make(settings, None)
         self._actuators, self._perception = survey.actuators, survey.perception
         self.agents, self.action_set = survey.agents, self._actuators.action_set

@@ -5,9 +5,9 @@ Reading them needs no simulator; it is imported when a world is built.
 
 import json
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, model_validator
 
 from ...core.plugins.settings import ScenarioSettings, Settings
 
@@ -21,14 +21,24 @@ class FrozenTable(dict[str, Any]):
 
 Range = Annotated[tuple[float, float], AfterValidator(lambda ends: _ordered(ends))]
 Index = Annotated[int, Field(ge=0)]
-Entries = Index | Annotated[tuple[Index, ...], Field(min_length=1)]
-"""Which number of an observation, counted from 0: one for all bodies, or one for each body."""
+Entry = Index | str
+"""Which number of an observation: counted from 0, or by name."""
+Entries = Entry | Annotated[tuple[Entry, ...], Field(min_length=1)]
+"""Which number of an observation: one for all bodies, or one for each body."""
 
 
 def _ordered(ends: tuple[float, float]) -> tuple[float, float]:
     if ends[0] >= ends[1]:
         raise ValueError("must be a range, the lower end first")
     return ends
+
+
+def _measurable(success: dict[str, Any]) -> dict[str, Any]:
+    for name, ends in success.items():
+        if isinstance(ends, tuple) == (name == "return"):
+            needed = "a number, the least" if name == "return" else "a range"
+            raise ValueError(f"{name} must be {needed}")
+    return success
 
 
 class Direction(Settings):
@@ -38,6 +48,12 @@ class Direction(Settings):
     """Where the cosine is."""
     sin: Entries
     """Where the sine is."""
+
+    @model_validator(mode="after")
+    def _two(self) -> Self:
+        if self.cos == self.sin:
+            raise ValueError("cos and sin must be two numbers of the observation")
+        return self
 
     def __hash__(self) -> int:
         return hash((self.cos, self.sin))
@@ -57,18 +73,18 @@ class AdaptedSettings(ScenarioSettings):
     neutral: Index | None = None
     """The action that an agent is taken to do where nothing is known of it; none: the level nearest
     to 0, of discrete actions the first."""
-    hold: Annotated[int, Field(ge=1)] = 1
+    hold: Annotated[int, Field(ge=1, le=10_000)] = 1
     """Steps of the environment for which a decision is held; their rewards are added."""
     predictor: Literal["none", "copy"] = "none"
     """What predicts: nothing, or copies of the simulator, which are stepped for every joint action
     that is tried. A copy knows the simulator exactly, its random numbers too."""
-    horizon: Annotated[int, Field(ge=1)] = 1
+    horizon: Annotated[int, Field(ge=1, le=10_000)] = 1
     """Decisions that copies look ahead, the joint action being held; the reward predicted is the
     mean of theirs."""
     variables: Annotated[dict[str, Entries], AfterValidator(FrozenTable)] = FrozenTable()
     """State variables by name: which number of the observation each is, one for all bodies or a
-    list of one for each. None: all that `angles` leaves and that change, called o0, o1 and so
-    on."""
+    list of one for each. None: all that `angles` leaves and that change, called o0, o1 and so on,
+    or those of a Dict by its keys: ``height``, ``position0``, ``position1``."""
     angles: Annotated[dict[str, Entries | Direction], AfterValidator(FrozenTable)] = FrozenTable()
     """State variables that are angles [rad], whose ends are the same point: where the observation
     has them, or their ``cos`` and ``sin``."""
@@ -77,7 +93,9 @@ class AdaptedSettings(ScenarioSettings):
     none, what random episodes meet."""
     rewards: Literal["joint", "own"] = "joint"
     """Whether all agents receive the mean reward, or those of each body its own."""
-    success: Annotated[dict[str, float | Range], AfterValidator(FrozenTable)] = FrozenTable()
+    success: Annotated[
+        dict[str, float | Range], AfterValidator(_measurable), AfterValidator(FrozenTable)
+    ] = FrozenTable()
     """When an episode is a success: the least ``return``, and ranges of state variables in which
     all agents are at the end. None: never."""
 

@@ -5,7 +5,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from ...core.plugins.settings import Positive, ScenarioSettings, check_team
+from ...core.plugins.settings import Positive, ScenarioSettings, team_size
 from ..state_variables import referred
 from .prediction.settings import BeliefSettings
 from .states.variables import STATE_VARIABLES
@@ -26,7 +26,7 @@ class BoxTaskSettings(ScenarioSettings):
     """Robots, box, task and servo layer: what all scenarios of box pushing have in common."""
 
     player: ClassVar[str] = f"{__package__}.pictures.player"
-    robots: Annotated[int, Field(ge=1)] = 2
+    robots: Annotated[int, Field(ge=1), team_size(7.5e-7, agents=2)] = 2
     """Number of robots, as many as memory and time allow by estimate."""
     robot: str | RobotSettings = "e-puck"
     """Robot by name, or a table that describes one."""
@@ -51,12 +51,6 @@ class BoxTaskSettings(ScenarioSettings):
     """Distance of the box from the goal [m] beyond which an episode is broken off."""
     orientation_tolerance: Positive | None = None
     """Orientation error that still counts as reached [rad]; none: any."""
-
-    @field_validator("robots")
-    @classmethod
-    def _fits(cls, robots: int) -> int:
-        check_team(2 * robots, 7.5e-7)
-        return robots
 
     def warnings(self) -> tuple[str, ...]:
         """Return sizes that are probably given in another unit, a line each.

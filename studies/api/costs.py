@@ -45,13 +45,15 @@ def cost_table(
     *,
     measured: bool = False,
     repeats: int = 1,
+    network: bool = False,
 ) -> CostTable:
     """Return what hierarchies cost, by Eq. 18-23 and, if asked, measured.
 
     Parameters
     ----------
     topologies
-        As in a spec, or ``label=topology`` with a label of one's own.
+        As in a spec, or ``label=topology`` with a label of one's own; ``single-agent``, or ways to
+        decide: ``best-response``, ``max-plus``, ``fitted-q``, ``hierarchy-ppo``.
     agents
         Numbers of agents.
     problem
@@ -60,6 +62,8 @@ def cost_table(
         Whether to count and time steps of the running system, too.
     repeats
         How often steps are timed, each with a new team; from two on the time has an interval.
+    network
+        Whether to count the messages of a decision, and how many of them follow one another.
 
     Raises
     ------
@@ -69,4 +73,4 @@ def cost_table(
     if not 1 <= repeats <= MOST_REPEATS:
         raise ValueError(f"repeats = {repeats}, allowed: 1 to {MOST_REPEATS}")
     times = repeats if measured else 0
-    return CostTable(tuple(cost_rows(topologies, list(agents), problem, times)))
+    return CostTable(tuple(cost_rows(topologies, list(agents), problem, times, network)))

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from ..catalogue.study import published_part
 from ..errors import SpecError
-from ..presentation.csv_text import write_frame
+from ..presentation.row_formats import in_csv
 from ..results import marl_eval, published
 from ..results.results import read
 from ..spec.outline import StudyOutline
 from ..store import durable
 from ..store.store import Store
-
-if TYPE_CHECKING:
-    from pandas import DataFrame
 
 Form = Literal["csv", "json", "marl-eval"]
 
@@ -50,9 +46,11 @@ def export(store: Store, folder: Path, form: Form, *, overwrite: bool = False) -
     """
     store.verify()
     paths = {folder / name: text for name, text in _texts(store, form).items()}
-    for path in paths:
-        if path.exists() and not overwrite:
-            raise SpecError(f"{path}: exists; --overwrite replaces it, --out writes elsewhere")
+    there = [path for path in paths if path.exists()]
+    # Of an export that was killed the first file is left, and is what would be written.
+    is_rest = len(there) < len(paths) and all(_holds(path, paths[path]) for path in there)
+    if there and not (overwrite or is_rest):
+        raise SpecError(f"{there[0]}: exists; --overwrite replaces it, --out writes elsewhere")
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -60,6 +58,10 @@ def export(store: Store, folder: Path, form: Form, *, overwrite: bool = False) -
     for path, text in paths.items():
         durable.write(path, text.encode())
     return list(paths)
+
+
+def _holds(path: Path, text: str) -> bool:
+    return path.is_file() and path.read_bytes() == text.encode()
 
 
 def _texts(store: Store, form: Form) -> dict[str, str]:
@@ -72,11 +74,4 @@ def _texts(store: Store, form: Form) -> dict[str, str]:
         kinds = {c: own["scenario"]["kind"] for c, own in store.settings().items()}
         return {"marl-eval.json": marl_eval.dumps(results, kinds, outline.study)}
     frames = {"episodes.csv": results.episodes, "trials.csv": results.trials}
-    return {name: _as_csv(frame) for name, frame in frames.items()}
-
-
-def _as_csv(frame: DataFrame) -> str:
-    """Return a frame as CSV: truth values are 0 and 1, texts as they may stand in a spreadsheet."""
-    text = io.StringIO()
-    write_frame(text, frame)
-    return text.getvalue()
+    return {name: in_csv(frame) for name, frame in frames.items()}

@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 from ...core.plugins.deferred import pd
 from ...topologies.view import aligned, readable
-from ..presentation.csv_text import write_csv
+from ..presentation.row_formats import write_csv
 from ..presentation.tables import in_latex
 from .cost import PAPER, RULES, CostRow
 
@@ -29,6 +29,8 @@ FORMULAS = (
 """Columns by name, with their heading."""
 MEASURED = ("formula", "counted", "rules valued", "updates", "ms", "MB")
 """Headings of what was measured per step."""
+NETWORK = ("messages", "in turn", "1 ms", "10 ms", "1 ms*", "10 ms*")
+"""Headings of messages, and of the seconds that a decision waits for them."""
 OF_THE_PAPER = PAPER.chain_closed_form(4)
 """Operations of four agents by Eq. 19, with the paper's |S|, |A| and L."""
 COUNTS = ("joint_actions", "rule_evaluations", "weight_updates")
@@ -72,6 +74,8 @@ def _record(row: CostRow) -> dict[str, Any]:
     record["nested_asymptotic"] = None if asymptotic is None else round(asymptotic)
     if row.ratio is not None:
         record["ratio"] = float(row.ratio) if row.ratio < 2**53 else round(row.ratio)
+    if row.network is not None:
+        record["messages"], record["messages_in_turn"] = row.network
     for what, counts in (("_formula", row.formula), ("", row.measured and row.measured.counted)):
         if counts is not None:
             record |= {f"{name}{what}_per_step": getattr(counts, name) for name in COUNTS}
@@ -98,21 +102,35 @@ def _all_digits() -> Iterator[None]:
 
 
 def _cells(rows: Sequence[CostRow]) -> list[list[list[str]]]:
-    """Return the formulas line by line, headings first; then, if asked, what was measured."""
-    tables = [[["n", "topology", *titles]] for titles in (dict(FORMULAS).values(), MEASURED)]
-    for row in rows:
-        formulas = [scientific(getattr(row, name)) for name, _ in FORMULAS]
-        for table, cells in zip(tables, (formulas, _measured_cells(row)), strict=True):
-            table.append([str(row.agents), row.topology, *cells])
-    return tables[: 1 + any(row.formula is not None for row in rows)]
+    """Return the formulas line by line, headings first; then what was measured, and messages."""
+    return [
+        [["n", "topology", *titles], *([str(r.agents), r.topology, *cells(r)] for r in rows)]
+        for titles, asked, cells in (
+            (dict(FORMULAS).values(), True, _formula_cells),
+            (MEASURED, any(row.formula is not None for row in rows), _measured_cells),
+            (NETWORK, any(row.network is not None for row in rows), _network_cells),
+        )
+        if asked
+    ]
+
+
+def _formula_cells(row: CostRow) -> list[str]:
+    return [scientific(getattr(row, name)) for name, _ in FORMULAS]
+
+
+def _network_cells(row: CostRow) -> list[str]:
+    assert row.network is not None
+    waits = (_amount(1e-3 * ms * count) for count in reversed(row.network) for ms in (1, 10))
+    return [*(f"{count:,}" for count in row.network), *waits]
 
 
 def _table(rows: Sequence[CostRow]) -> str:
-    formulas, *measured = _cells(rows)
+    formulas, *others = _cells(rows)
     lines = [*aligned(formulas, "><>>>>>"), ""]
     lines.append("Operations: nested by Eq. 18, chains by Eq. 19 and 21; single agent by Eq. 23.")
     if any(row.agents == 4 and row.nested_closed_form == OF_THE_PAPER for row in rows):
         lines.append("The paper prints 2.45e12 (nested) and 1.1e27 (single agent) for n = 4.")
+    measured = [cells for cells in others if cells[0][2] != NETWORK[0]]
     for cells in measured:
         same = [row.formula == row.measured.counted for row in rows if row.measured is not None]
         lines += ["", f"Per step of the running system (line-up scenario, |A| = 4, |S| = {RULES}):"]
@@ -123,6 +141,11 @@ def _table(rows: Sequence[CostRow]) -> str:
             lines += [f"±: a 95 % interval of the mean of {most} repeats, each with a new team;"]
         lines += ["-: not measured, beyond a second or so a step."]
         lines += [f"All counts equal the formulas in {sum(same)} of {len(same)} rows."] * bool(same)
+    for cells in others[len(measured) :]:
+        lines += ["", "Messages of a decision, and how long it waits for them [s]:", ""]
+        lines += [*aligned(cells, "><>>>>>>"), ""]
+        lines += ["in turn: how many follow one another, others going at once, of 1 or 10 ms each;"]
+        lines += ["*: on a channel that carries one message at a time."]
     return "\n".join(lines)
 
 

@@ -32,7 +32,8 @@ RANGE = re.compile(r"(\d{1,6})(?::(\d{1,6})(?::(\*?)(\d{1,6}))?)?", re.ASCII)
     metavar="SPEC...",
     default=("chain",),
     help="One or more topologies as in a spec: chain teams tree:2 ..., or LABEL=SPEC with a label "
-    "of your own; single-agent: Eq. 23.",
+    "of your own; single-agent: Eq. 23; or ways to decide: best-response, max-plus, fitted-q, "
+    "hierarchy-ppo.",
 )
 @click.option("--rules", type=int, metavar="N", default=5**7, help="|S|, rules of one agent.")
 @click.option("--actions", type=int, metavar="N", default=4, help="|A|, actions of one agent.")
@@ -46,6 +47,10 @@ RANGE = re.compile(r"(\d{1,6})(?::(\d{1,6})(?::(\*?)(\d{1,6}))?)?", re.ASCII)
     metavar="N",
     help="Measure so often, each time with a new team; from 2 on times have an interval.",
 )
+@click.option(
+    "--network/--no-network",
+    help="Also count messages, and how long a decision waits for them at 1 and 10 ms each.",
+)
 @options.formats("table", "json", "csv", "latex")
 @options.plot
 def command(
@@ -53,6 +58,7 @@ def command(
     topology: tuple[str, ...],
     measured: bool,
     repeats: int | None,
+    network: bool,
     form: Form,
     plot: Path | None,
     **quantities: int,
@@ -61,21 +67,21 @@ def command(
     from ....core.agents.cost import Problem
     from ...api.costs import cost_table
     from ...cost.table import written
-    from ...errors import SpecError
+    from ...errors import refused
     from ...presentation.progress import say
 
-    try:
+    with refused():
         problem, sizes = Problem(**quantities), numbers(agents)
         if measured := measured or repeats is not None:
             say("measuring, first compiling what is not: no steps of more than a second or so")
         often = 1 if repeats is None else repeats
-        rows = cost_table(topology, sizes, problem, measured=measured, repeats=often).rows
+        rows = cost_table(
+            topology, sizes, problem, measured=measured, repeats=often, network=network
+        ).rows
         if plot is not None:
             from ...cost.figure import draw
 
             draw(rows, plot)
-    except ValueError as error:
-        raise SpecError(str(error)) from None
     print(written(rows, form))
     return 0
 

@@ -100,6 +100,34 @@ def test_what_is_held_goes_on_and_angles_wrap() -> None:
     assert ahead == pytest.approx(np.array([[1.0, -3.0, 1.0], [0.0, 4.0, 0.0]]), abs=1e-3)
 
 
+class Springs(Rails):
+    """A sledge whose speed is worth more where the middle of its way is farther to the right."""
+
+    def reset(self, seed: Any, episode: int = 0) -> np.ndarray:
+        super().reset(seed)
+        self.places *= 0.4
+        return self.states()
+
+    def step(self, joint_action: np.ndarray) -> Transition:
+        before = self.places
+        super().step(joint_action)
+        driven = 0.2 * self.speeds
+        # The way is driven * (1 + 0.4 * (before + after) / 2).
+        self.places = (before + driven * (1.0 + 0.2 * before)) / (1.0 - 0.2 * driven)
+        return Transition(self.states(), 0.0, False, False, {})
+
+
+def test_what_moves_what_is_taken_from_the_middle_of_the_way() -> None:
+    errors = {}
+    for midpoint in (False, True):
+        settings = LEARNED.model_copy(update={"midpoint": midpoint})
+        predictor, _ = trained(Springs(1), settings)
+        # From 1 m at 1 m/s: (1 + 0.2 * 1.2) / 0.96 = 1.2917 m.
+        ahead = predictor.predict(np.array([[0.5, 1.0, 0.5]])).states(0, np.array([[0]]))
+        errors[midpoint] = abs(ahead[0, 1] - 1.2917)
+    assert errors[True] < 2e-4 < 2e-3 < errors[False]
+
+
 def test_before_any_experience_nothing_changes() -> None:
     states = np.array([[0.5, 4.0, 0.2], [0.0, 1.0, 0.2]])
     joint = np.array([[0, 1], [2, 3]])

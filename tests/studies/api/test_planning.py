@@ -38,10 +38,12 @@ def test_more_seeds_find_smaller_differences() -> None:
 
 
 def test_learning_from_all_that_is_kept_grows_with_the_square_of_training() -> None:
-    pace = Pace(acting=0.001, learning=0.0, regression=1e-6, bytes=(0.0, 0.0))
-    one, two = (pace.seconds(100, [n], 0) - 0.1 * n for n in (100, 200))
+    pace = Pace(0.001, 0.0, 1e-6, bytes=(0.0, 0.0), steps=(50, 100), evaluating=(0.2, 0.5))
+    one, two = (pace.seconds([n], 0)[1] - 0.1 * n for n in (100, 200))
     assert two / one == pytest.approx(4.0, rel=0.01)
-    assert pace.seconds(100, [10], 500) == pytest.approx(1.5 + 1e-6 * 100**2 * 55)
+    quick, slow = pace.seconds([10], 3)
+    assert quick == pytest.approx(0.5 + 0.6 + 1e-6 * 50**2 * 55)
+    assert slow == pytest.approx(1.0 + 1.5 + 1e-6 * 100**2 * 55)
 
 
 def test_what_is_tried_is_on_a_seed_that_no_study_reports() -> None:

@@ -151,3 +151,20 @@ def test_a_scenario_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFixture[st
         assert complaint in err
     assert main(["check", f"{path}:sound", "--set", "seeds=2"]) == 2
     assert "not over a Python file" in capsys.readouterr().err
+
+
+def test_errors_of_learned_predictors_are_shown_once_beside_those_of_persistence(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "spec.toml"
+    path.write_text(
+        'seeds = 2\nscenario = { kind = "line-up", carts = 2 }\n'
+        "[sweep]\n"
+        '"learner.predictor.kind" = ["given", "learned"]\n'
+        '"learner.discount" = [0.5, 0.9]\n'
+    )
+    assert main(["check", str(path), "--steps", "6"]) == 0
+    _, table = capsys.readouterr().out.split("what 8 episodes teach to predict")
+    head, *rows = (line for line in table.splitlines() if line)
+    assert head.split() == ["learned", "as", "it", "is", "given"]
+    assert [row.split()[0] for row in rows] == ["distance", "lead"]
