@@ -32,12 +32,10 @@ def analyse(results: Results) -> Analysis:
     """Estimate and compare; 95 % intervals, seeds as the unit of sampling."""
     conditions = results.of_phase("training")
     if any({"name", "topology"} <= results.columns.get(c, {}).keys() for c in conditions):
-        compared = contrasts(results, by="topology")
-        notes = (
-            *map(equivalence, filter(lambda g: g.differences, compared.groups)),
-            *compared.notes,
-        )
-        return Analysis(compared.table, notes, differences=compared.differences)
+        by_order = contrasts(results, by="topology")
+        groups = [group for group in by_order.groups if group.differences]
+        notes = (*map(equivalence, groups), *by_order.notes)
+        return Analysis(by_order.table, notes, (), {g.setting: g.differences for g in groups})
     compared = ablation.compared_with_first(results, shortened(conditions))
     tests = order_tests(results)
     notes = (*(test.verdict for test in tests), *compared.notes, *_legend(conditions))
