@@ -13,7 +13,6 @@ from dataclasses import replace
 from ...results.analysis import Analysis, Figures
 from ...results.comparison import order_tests
 from ...results.results import Results
-from ...results.verdicts import by_measure
 from .. import ablation
 from ..study import run_training as measure
 
@@ -54,9 +53,9 @@ def _legend(orders: Sequence[str]) -> list[str]:
 
 def draw(analysis: Analysis) -> Figures:
     """Return the figure: what each order differs from the first one by."""
-    from ...presentation import forest
+    from ...presentation.figures import draw_forest
 
-    figure = forest.draw(by_measure(analysis.differences), "difference from the first order")
+    figure = draw_forest(analysis.differences, "difference from the first order")
     return {} if figure is None else {"chain-order": figure}
 
 
