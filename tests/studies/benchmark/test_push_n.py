@@ -108,6 +108,7 @@ def test_worlds_are_those_of_evaluations_in_studies() -> None:
     np.testing.assert_array_equal(worlds[18], env.seats["single"].observe(states))
 
 
+@pytest.mark.slow
 def test_a_spec_is_entered(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "mine.toml").write_text('preset = "random"\nepisodes = 1\n')
     told = ["--name", "r", "--about", "by chance", "--given", "nothing", "--robots", "2"]
