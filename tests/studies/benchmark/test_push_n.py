@@ -132,7 +132,7 @@ def test_specs_that_break_a_rule(
     tmp_path: Path, spec: str, message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "mine.toml").write_text(spec)
-    told = ["--name", "r", "--about", "a", "--robots", "2", "--out", str(tmp_path / "out")]
+    told = ["--name", "r", "--about", "a", "--robots", "2", "4", "--out", str(tmp_path / "out")]
     assert main(["benchmark", "run", str(tmp_path / "mine.toml"), *told]) == 2
     error = capsys.readouterr().err
     assert message in error
