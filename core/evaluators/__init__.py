@@ -18,7 +18,7 @@ EVALUATORS = SettingsRegistry(
         "sampling": f"{__name__}.sampling:SamplingSettings",
         "variable-elimination": f"{__name__}.coordination:VariableEliminationSettings",
         "max-plus": f"{__name__}.coordination:MaxPlusSettings",
-        "best-response": f"{__name__}.best_response:BestResponse",
+        "best-response": f"{__name__}.best_response:BestResponseSettings",
         "cross-entropy": f"{__name__}.cross_entropy:CrossEntropySettings",
     },
     EvaluatorSettings,

@@ -72,7 +72,7 @@ class Columns:
             np.ascontiguousarray(view.box.T), np.ascontiguousarray(view.gaps.T),
             view.goal, view.origin, view.before, view.periods, view.outline.edges,
             view.friction_radius,
-            np.array(robots), self.rows, *self._groups,
+            np.fromiter(robots, np.int64), self.rows, *self._groups,
         )  # fmt: skip
         return states
 
