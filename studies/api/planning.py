@@ -49,6 +49,8 @@ FASTER, SLOWER = 0.7, 2.2
 """By what the time of another process, and other seeds, differ from what was tried."""
 IDLER = 2.0
 """By how much a busy machine may be less so by then."""
+KEEPING = np.array([0.02, 0.15])
+"""Seconds to hand out a trial and to keep it, from and to: a disk takes longer than a processor."""
 STARTS = 5
 """Starts of a process that a run takes: the command's own, its workers', which start together, and
 as much as three more for the store, the tables and the figures."""
@@ -175,14 +177,16 @@ def _taken(spec: Spec, trials: Sequence[Trial], processes: int) -> tuple[Range, 
     started = STARTS * (_used() - used)
     with spec.sources.active():
         tried = [try_out(trial) for trial in trials[: len(spec.conditions())]]
-    started += sum(each.loading for each in tried)
-    quick, slow = len(spec.seeds) * np.sum([one.seconds for one in tried], axis=0) / processes
+    loading = sum(each.loading for each in tried)  # less, if what was compiled here is kept
+    each_seed = np.sum([one.seconds / processes + KEEPING for one in tried], axis=0)
+    quick, slow = len(spec.seeds) * each_seed
     # Processes that have no trial left wait for the last one.
     slow += (1 - 1 / processes) * max(each.seconds[1] for each in tried)
     busy = max((time.perf_counter() - begin) / (_used() - used), 1.0)
     least, most = FASTER * max(busy / IDLER, 1.0), SLOWER * busy
     memory = _resident() + max(each.memory for each in tried)
-    return (least * (started + quick), most * (started + slow)), processes * memory
+    seconds = least * (started + quick), most * (started + loading + slow)
+    return seconds, processes * memory
 
 
 def try_out(trial: Trial) -> Tried:
