@@ -50,8 +50,7 @@ from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.spec.toml import dumps
 from nested_agents.studies.store import durable
-from nested_agents.studies.store.running import LOCK
-from nested_agents.studies.store.store import DATABASE, Store
+from nested_agents.studies.store.store import DATABASE, LOCK, Store
 from nested_agents.studies.trials.arrangement import check
 from nested_agents.studies.trials.keeping import open_to_run, pending, spec_of
 from nested_agents.studies.trials.session import run_trial
@@ -183,7 +182,7 @@ class Here:
     def arrivals(
         self, trials: Sequence[Trial], run_trial: RunTrial, started: Callable[[str], None]
     ) -> Generator[Outcome]:
-        """See `nested_agents.studies.workers.arrivals.Workers.arrivals`."""
+        """See `nested_agents.studies.workers.runner.Workers.arrivals`."""
         for trial in trials:
             started(trial.identity)
             time.sleep(0.08)

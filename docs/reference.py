@@ -20,7 +20,7 @@ from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
 from nested_agents.scenarios.kinematic_chain.variables import CHAIN_VARIABLES
 from nested_agents.studies.cli.main import COMMANDS
 from nested_agents.studies.cli.main import nested_agents as program
-from nested_agents.studies.results.numbers import EPISODE_COLUMNS, NUMBERS, TRIAL_COLUMNS
+from nested_agents.studies.results.results import EPISODE_COLUMNS, NUMBERS, TRIAL_COLUMNS
 from nested_agents.studies.spec.keys import tables
 from nested_agents.studies.spec.presets import PRESETS
 from nested_agents.studies.spec.toml import dumps

@@ -6,6 +6,8 @@ the wheels of a robot. Keyword-only parameters are the settings of a topology, a
 ``[topology]`` table of a spec. A graph becomes a `Hierarchy` in `nested_agents.topologies.build`.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterable, Sequence
 from itertools import chain as concatenated
 from itertools import zip_longest

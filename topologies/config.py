@@ -5,6 +5,8 @@ A string is ``"kind"`` or ``"kind:argument"``, see `parse`. A further topology i
 follow ``kind:`` is in `ARGUMENTS`.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Annotated, Any, Literal, Self, get_args
 

@@ -22,6 +22,8 @@ actions of the other, as if it were below, and neither is told what the other do
 joint-action learners (everybody is everybody's neighbour) and coordination graphs (few are).
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterable, Sequence
 from typing import Annotated, Any, Literal
 

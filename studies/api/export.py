@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from ..catalogue.study import published_part
 from ..errors import SpecError
-from ..presentation.csv_text import write_frame
+from ..presentation.row_formats import in_csv
 from ..results import marl_eval, published
 from ..results.results import read
 from ..spec.outline import StudyOutline
 from ..store import durable
 from ..store.store import Store
-
-if TYPE_CHECKING:
-    from pandas import DataFrame
 
 Form = Literal["csv", "json", "marl-eval"]
 
@@ -78,11 +74,4 @@ def _texts(store: Store, form: Form) -> dict[str, str]:
         kinds = {c: own["scenario"]["kind"] for c, own in store.settings().items()}
         return {"marl-eval.json": marl_eval.dumps(results, kinds, outline.study)}
     frames = {"episodes.csv": results.episodes, "trials.csv": results.trials}
-    return {name: _as_csv(frame) for name, frame in frames.items()}
-
-
-def _as_csv(frame: DataFrame) -> str:
-    """Return a frame as CSV: truth values are 0 and 1, texts as they may stand in a spreadsheet."""
-    text = io.StringIO()
-    write_frame(text, frame)
-    return text.getvalue()
+    return {name: in_csv(frame) for name, frame in frames.items()}

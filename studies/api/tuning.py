@@ -26,8 +26,7 @@ from ..spec.toml import dumps
 from ..store import durable
 from ..trials.arrangement import check
 from ..trials.trial import Trial, trials_of
-from ..workers.runner import Observer
-from ..workers.workers import Backend
+from ..workers.runner import Backend, Observer
 from .run_study import run_study
 from .study import StudyResults, load
 
@@ -147,7 +146,7 @@ def tune(
     points = _sampled(spec, trials, draw)
     study = _study(spec, points, range(first_seed, first_seed + seeds))
     everything, planned = trials_of(study), dict[str, Trial]()
-    observer = _Rungs() if progress else Observer()
+    observer = Terminal() if progress else Observer()
     names = list(points)
     for n_configurations, n_seeds in rungs(len(points), seeds):
         names = names[:n_configurations]
@@ -287,19 +286,3 @@ def _table(results: Results, points: Mapping[str, Point], seeds: Iterable[int]) 
     values = pd.DataFrame(list(points.values()), dtype=object)
     table = lines.astype({"seeds": int}).join(values).astype(object)
     return table.sort_values(list(means), ascending=False, ignore_index=True)
-
-
-class _Rungs(Terminal):
-    """Shows how each rung goes; what is said of a study is said once."""
-
-    def __init__(self) -> None:
-        self._said: set[str] = set()
-
-    def announce(self, spec: Spec, directory: Path, processes: int) -> None:
-        """Rungs are announced by their size."""
-
-    def note(self, line: str) -> None:
-        """Say it, if it has not been said."""
-        if line not in self._said:
-            self._said.add(line)
-            super().note(line)

@@ -5,7 +5,6 @@ Statuses: 0 done, 1 a trial failed, 2 something the user can mend (one line on s
 module of that name in `commands`, which offers a click command called ``command``.
 """
 
-import codecs
 import os
 import sys
 import warnings
@@ -87,7 +86,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     warnings.filterwarnings("ignore", message=r"Glyph .* missing from font")
     for stream in (sys.stdout, sys.stderr):
         if getattr(stream, "errors", None) == "strict":
-            stream.reconfigure(errors=PLAIN)  # type: ignore[union-attr]
+            stream.reconfigure(errors="replace")  # type: ignore[union-attr]
     return run_to_status(PROGRAM, lambda: _run(arguments or ["--help"]))
 
 
@@ -133,15 +132,3 @@ def _run(arguments: list[str]) -> int:
         raise SpecError(
             f"code of a file that the spec names calls sys.exit({error.code})"
         ) from None
-
-
-def _plain(error: UnicodeError) -> tuple[str, int]:
-    """Return what stands for characters that a terminal has not, such as dashes."""
-    assert isinstance(error, UnicodeEncodeError)
-    signs = error.object[error.start : error.end]
-    return "".join("-" if sign in "–—−" else "?" for sign in signs), error.end
-
-
-PLAIN = "nested-agents-plain"
-"""Name of the way in which text is written where it cannot be encoded."""
-codecs.register_error(PLAIN, _plain)

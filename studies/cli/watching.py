@@ -13,8 +13,7 @@ from rich.text import Text
 
 from ..results.results import NOTHING, Results, read
 from ..store.store import Store
-from ..workers.progress import Progress, progress
-from .standing import describe, warnings
+from .standing import Progress, describe, progress, warnings
 
 BLOCKS = "▁▂▃▄▅▆▇█"
 CURVE = 24

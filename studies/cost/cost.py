@@ -21,7 +21,6 @@ from fractions import Fraction
 from functools import cache
 from itertools import chain
 from statistics import median
-from typing import NamedTuple
 
 from ...core.agents.cost import Problem, below_counts, is_chain
 from ...core.agents.joint_agents import join_agents
@@ -53,32 +52,24 @@ LEARNER = TDLambdaSettings(
 """The learner that is counted and timed: the paper's, over the two variables of line-up."""
 
 
-class Way(NamedTuple):
-    """A way to decide that stands in place of a topology."""
-
-    topology: str
-    """Who is told and considered by whom."""
-    evaluator: str | None
-    """Of the learner that is counted and timed; none: it is not."""
-    tried: Callable[[int, int], list[int]] | None
-    """How many joint actions each of n agents tries that has so many actions; none: all of those
-    that it considers."""
-
-
 def _around_a_plan(n: int, actions: int) -> list[int]:
     cuts = {round(share * n) for share in CUTS} - {0, n}
     starts = actions + len(cuts) * actions * (actions - 1)
     return [starts + (n + 1) * actions] + [actions] * (n - 1)
 
 
-WAYS = {
+WAYS: dict[str, tuple[str, Callable[[int, int], list[int]] | None]] = {
     # The first agent of a chain plans for all and hands its plan down.
-    "best-response": Way("chain", "best-response", _around_a_plan),
-    "max-plus": Way("coordination-graph", "max-plus", None),
+    "best-response": ("chain", _around_a_plan),
+    "max-plus": ("coordination-graph", None),
     # Forward passes without a prediction: an agent values its actions, or draws one.
-    "fitted-q": Way("chain", None, lambda n, actions: [actions] * n),
-    "hierarchy-ppo": Way("chain", None, lambda n, actions: [1] * n),
+    "fitted-q": ("chain", lambda n, actions: [actions] * n),
+    "hierarchy-ppo": ("chain", lambda n, actions: [1] * n),
 }
+"""Ways to decide that stand in place of a topology: that by which they are told, and how many joint
+actions each of n agents tries that has so many actions; none: all of those that it considers."""
+PASSES = ("fitted-q", "hierarchy-ppo")
+"""Those of them that are not counted and timed."""
 MOST_OPERATIONS = 4 * 10**8
 """Rule evaluations a step beyond which nothing is measured: about a second a step."""
 LEAST_SECONDS, MOST_TIMES = 0.3, 100
@@ -173,10 +164,10 @@ def cost_rows(
 
 def joint_actions(text: str, n: int, actions: int) -> list[int]:
     """Return how many joint actions each of n agents tries in a decision."""
-    way = WAYS.get(text, Way(text, None, None))
-    if way.tried is not None:
-        return way.tried(n, actions)
-    return [actions ** (1 + below) for below in agents_below(way.topology, n)]
+    topology, tried = WAYS.get(text, (text, None))
+    if tried is not None:
+        return tried(n, actions)
+    return [actions ** (1 + below) for below in agents_below(topology, n)]
 
 
 def messages(text: str, n: int) -> tuple[int, int]:
@@ -188,7 +179,7 @@ def messages(text: str, n: int) -> tuple[int, int]:
     """
     if text == SINGLE_AGENT:
         return 2 * (n - 1), 2 * (n > 1)
-    hierarchy = _hierarchy(WAYS[text].topology if text in WAYS else text, n)
+    hierarchy = _hierarchy(WAYS.get(text, (text,))[0], n)
     if not hierarchy.neighbours:
         return hierarchy.messages, hierarchy.depth - 1
     rounds = MaxPlusSettings().rounds
@@ -233,8 +224,7 @@ def step_formula(text: str, n: int) -> Counts:
 
 def measure(text: str, n: int, repeats: int = 1) -> StepCost | None:
     """Count and time a step of n agents; none where it would take too long or too much memory."""
-    is_run = text not in WAYS or WAYS[text].evaluator is not None
-    if not is_run or step_formula(text, n).rule_evaluations > MOST_OPERATIONS:
+    if text in PASSES or step_formula(text, n).rule_evaluations > MOST_OPERATIONS:
         return None
     learner, scenario, hierarchy = _arrange(text, LineUpSettings(carts=n).build())
     _warm_up()
@@ -277,10 +267,9 @@ def _arrange(text: str, line_up: LineUp) -> tuple[TDLambdaSettings, Scenario, Hi
         base = LEARNER.rule_base.model_copy(update={"order": 2 * n})
         learner = LEARNER.model_copy(update={"rule_base": base})
         return learner, scenario, Hierarchy(scenario.agents, [])
-    topology, evaluator, _ = WAYS.get(text, Way(text, None, None))
-    settings = parse(topology)
+    settings = parse(WAYS.get(text, (text,))[0])
     usual = "variable-elimination" if settings.kind == "coordination-graph" else "exact"
-    decision = Decision(rule="value", evaluator=evaluator or usual)
+    decision = Decision(rule="value", evaluator=text if text in WAYS else usual)
     learner = LEARNER.model_copy(update={"decision": decision})
     return learner, line_up, build(settings, line_up.agents, pairs(n))
 

@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 from ...core.plugins.deferred import pd
 from ...topologies.view import aligned, readable
-from ..presentation.csv_text import write_csv
+from ..presentation.row_formats import write_csv
 from ..presentation.tables import in_latex
 from .cost import PAPER, RULES, CostRow
 

@@ -1,20 +1,20 @@
 """Conditions compared by any measure: all with one, or level by level within equal others."""
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ...core.interface.measures import Measure
+from ...core.plugins.deferred import pd
 from ...core.plugins.messages import closest
 from ..errors import SpecError
 from ..spec.labels import aliases, label
+from .analysis import NOTHING, WORDS, identity_lines, verdicts
 from .comparison import Array, Difference, differences
-from .numbers import shown
-from .results import SECONDS, Results
+from .results import SECONDS, Results, shown
 from .statistics import bootstrap, rate
 from .summary import Summary
-from .verdicts import WORDS, identity_lines, printed
 
 STEPS = Measure("steps", "steps", "1", better="lower", least=0.0)
 EPISODES = (STEPS, Measure("return", "return", "1", better="higher"))
@@ -78,8 +78,7 @@ class Contrasts:
             )
             for g in self.groups
         }
-        nothing = ["Nothing to compare: no two conditions share two seeds."]
-        lines = printed(groups, words, of_rates=self.measure.is_rate) or nothing
+        lines = verdicts(groups, words, of_rates=self.measure.is_rate) or [NOTHING]
         return (*lines, *identity_lines(self.identical))
 
 
@@ -117,17 +116,14 @@ def contrasts(
         phase = "evaluation" if is_whole else "training"
     shown_as, values, phase = _values(results, measure, phase)
     groups = _groups([c for c in results.columns if c in values], results.columns, by, reference)
-    names = {condition: name for _, members in groups for name, condition in members}
-    pairs = [(c, c, members[0][1]) for _, members in groups for _, c in members[1:]]
-    compared = {
-        d.condition: replace(d, condition=names[d.condition])
-        for d in differences(
-            results, pairs, {measure: lambda _, c: values[c]}, of_rates=shown_as.is_rate
-        )
+    by_seed = {c: pd.Series(own, results.seeds(c)) for c, own in values.items()}
+    pairs = {
+        setting: [(name, measure, by_seed[c], by_seed[members[0][1]]) for name, c in members[1:]]
+        for setting, members in groups
     }
-    made = []
+    compared, made = differences(pairs, of_rates=shown_as.is_rate), []
     for setting, members in groups:
-        own = tuple(compared[c] for _, c in members if c in compared)
+        own = compared[setting]
         lines = _lines(results, shown_as, phase, setting, members, values, own)
         trained = {
             name: results.values(c, shown_as.name)

@@ -12,7 +12,7 @@ from ...core.plugins.registry import Registry
 from ...core.plugins.settings import Settings
 from ...scenarios import SCENARIOS
 from ...topologies import TOPOLOGIES
-from ..errors import SpecError
+from ..errors import SpecError, refused
 from .studies import STUDIES
 
 REGISTRIES: dict[str, Registry] = {
@@ -93,7 +93,5 @@ def _of_settings(settings: Settings, registry: Registry | None) -> Any:
 
 
 def _name(thing: Any, registry: Registry) -> str:
-    try:
+    with refused(f"{registry.kind}: "):
         return registry.reference_to(thing)
-    except ValueError as error:
-        raise SpecError(f"{registry.kind}: {error}") from None

@@ -26,9 +26,19 @@ from ...core.plugins.messages import closest
 from ...core.plugins.settings import Settings, tuples
 from ...core.plugins.sources import Sources, is_reference, named
 from ...topologies.checks import listed
-from ..errors import SpecError, show
-from .conditions import SECTIONS, Condition, Override, below, grid, layer_of, section
-from .curriculum import Curriculum, Length, Name
+from ..errors import SpecError, refused, show
+from .conditions import (
+    SECTIONS,
+    Condition,
+    Curriculum,
+    Length,
+    Name,
+    Override,
+    below,
+    grid,
+    layer_of,
+    section,
+)
 from .objects import plain
 from .overlay import TomlTable, assignment, flat, overlay
 from .presets import PRESETS
@@ -240,10 +250,8 @@ class Spec(Settings):
         except RecursionError:
             raise SpecError(f"{source}: is nested too deeply") from None
         for change in changes:
-            try:
+            with refused(f"--set {change}: "):
                 table = _changed(table, assignment(change))
-            except ValueError as error:
-                raise SpecError(f"--set {change}: {error}") from None
         return cls.of(table, Sources(folder, study=study))
 
     def conditions(self) -> tuple[Condition, ...]:

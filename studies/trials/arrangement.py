@@ -22,9 +22,8 @@ from ...core.learners import LearnerSettings, TeamSettings, check_prediction
 from ...core.numerics.arrays import IntArray
 from ...core.plugins.sources import format_error, place
 from ..errors import SpecError
-from ..spec.conditions import Condition, ConditionSettings
-from ..spec.curriculum import Stage
-from .measures import joined
+from ..spec.conditions import Condition, ConditionSettings, Stage
+from .episodes import joined
 
 if TYPE_CHECKING:
     from ..spec.spec import Spec

@@ -3,7 +3,7 @@
 from ...core.agents.cost import below_counts
 from ...core.interface.scenario import groups_of
 from ...topologies.view import HierarchyView
-from ..errors import SpecError
+from ..errors import refused
 from ..spec.conditions import ConditionSettings
 from ..spec.spec import Spec
 
@@ -23,10 +23,8 @@ def views(spec: Spec) -> list[HierarchyView]:
         for condition in spec.conditions():
             others = {f"{condition.label}, {name}": s for name, s in condition.evaluations}
             for label, settings in ({condition.label: condition.settings} | others).items():
-                try:
+                with refused(after=f" (condition {label!r})"):
                     view = _view(label, settings)
-                except ValueError as error:
-                    raise SpecError(f"{error} (condition {label!r})") from None
                 hierarchy = view.hierarchy
                 parts = hierarchy.told, hierarchy.considers, view.failures, view.tries
                 distinct.setdefault((hierarchy.agents, hierarchy.edges, *parts), view)

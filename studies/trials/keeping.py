@@ -23,7 +23,7 @@ from ..store.reading import Reading
 from ..store.schema import Noted
 from ..store.store import Store, locked
 from . import code
-from .measures import column_of
+from .episodes import column_of
 from .trial import AS_IN_SPEC, Trial, trials_of
 
 SAME = (*AS_IN_SPEC, "evaluations")

@@ -134,40 +134,21 @@ def _of_box(box, goal, before, periods, first, count, work):  # type: ignore[no-
 
 
 @njit(cache=True, fastmath=_EXACT)
-def _of_push(robots, box, goal, first, count, work):  # type: ignore[no-untyped-def]
-    """Write where the robots' middle would push the box, and its cross-track error."""
-    n = len(robots)
-    for k in range(count):
-        work[_X + k] = work[_Y + k] = 0.0
-    for r in range(n):
-        x, y = robots[r, 0, first : first + count], robots[r, 1, first : first + count]
-        for k in range(count):
-            work[_X + k] += x[k]
-            work[_Y + k] += y[k]
-    for k in range(count):
-        work[_WEIGHT + k] = n
-    _of_middle(box, goal, first, count, work, PUSH, CROSS_TRACK)
+def _of_middle(robots, gaps, touching, box, goal, first, count, work, push, cross_track):  # type: ignore[no-untyped-def]
+    """Write into two rows where the robots' middle would push the box, and its cross-track error.
 
-
-@njit(cache=True, fastmath=_EXACT)
-def _of_contact_push(robots, gaps, box, goal, first, count, work):  # type: ignore[no-untyped-def]
-    """Write the same of the robots in contact, see `View.contact_push`."""
+    Those `touching` weigh more, see `View.contact_push`, or all the same.
+    """
     for k in range(count):
         work[_X + k] = work[_Y + k] = work[_WEIGHT + k] = 0.0
     for r in range(len(robots)):
         x, y = robots[r, 0, first : first + count], robots[r, 1, first : first + count]
         apart = gaps[r, first : first + count]
         for k in range(count):
-            weight = np.exp(-max(apart[k], 0.0) / CLOSE) + LEAST
+            weight = np.exp(-max(apart[k], 0.0) / CLOSE) + LEAST if touching else 1.0
             work[_X + k] += weight * x[k]
             work[_Y + k] += weight * y[k]
             work[_WEIGHT + k] += weight
-    _of_middle(box, goal, first, count, work, CONTACT_PUSH, CONTACT_CROSS_TRACK)
-
-
-@njit(cache=True, fastmath=_EXACT)
-def _of_middle(box, goal, first, count, work, push, cross_track):  # type: ignore[no-untyped-def]
-    """Write into two rows where a weighted middle would push the box, and its cross-track error."""
     gx, gy = goal[0], goal[1]
     bx, by = box[0, first : first + count], box[1, first : first + count]
     for k in range(count):
@@ -231,7 +212,7 @@ def _of_path(  # type: ignore[no-untyped-def]
 ):
     """Write where the box is going and by how much it will miss the goal, see `View.path`.
 
-    Behind `_of_contact_push`, whose weighted middle it takes; `middle` ``(3, m)`` is scratch.
+    Behind `_of_middle` of those in contact, which it takes; `middle` ``(3, m)`` is scratch.
     """
     bx, by = box[0, first : first + count], box[1, first : first + count]
     for k in range(count):
@@ -323,8 +304,8 @@ def _relational(  # type: ignore[no-untyped-def]
     columns
         Where the rows of the variables begin, see `Columns`.
     of_push, of_contact, of_path, of_face
-        None where nothing is wanted that `_of_push`, `_of_contact_push`, `_of_path` or `_of_face`
-        writes: numba leaves out branches on None, so that this is not even compiled.
+        None where nothing is wanted that `_of_middle` of all or of those in contact, `_of_path` or
+        `_of_face` writes: numba leaves out branches on None, so that this is not even compiled.
     """
     m, aways = box.shape[1], np.empty((len(gaps), LANES))
     out, work = np.empty((len(wanted), m, len(columns))), np.empty(_SIZE)
@@ -334,9 +315,11 @@ def _relational(  # type: ignore[no-untyped-def]
         _of_box(box, goal, before, periods, first, count, work)
         _of_all(gaps, first, count, aways, work)
         if of_push is not None:
-            _of_push(robots, box, goal, first, count, work)
+            _of_middle(robots, gaps, False, box, goal, first, count, work, PUSH, CROSS_TRACK)
         if of_contact is not None:
-            _of_contact_push(robots, gaps, box, goal, first, count, work)
+            _of_middle(
+                robots, gaps, True, box, goal, first, count, work, CONTACT_PUSH, CONTACT_CROSS_TRACK
+            )
         if of_path is not None:
             _of_path(box, origin, periods, edges, friction_radius, middle, first, count, work)
         for i in range(len(wanted)):

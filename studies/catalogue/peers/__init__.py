@@ -11,12 +11,11 @@ from time import process_time
 
 import numpy as np
 
-from ...results.analysis import Analysis, Figures
-from ...results.comparison import Array, differences, mean_success, with_first
+from ...results.analysis import Analysis, Figures, verdicts
+from ...results.comparison import Array, differences
 from ...results.results import Results
 from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, stacked
 from ...results.summary import EVALUATED, Summary, evaluated
-from ...results.verdicts import verdicts
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..study import check_evaluated as check
@@ -101,9 +100,13 @@ def analyse(results: Results) -> Analysis:
                 tuple(rate(success) for success in every.values()),
             )
         )
-    compared = differences(results, with_first(conditions), {EVALUATED: mean_success("evaluation")})
-    notes = ["success, N: when evaluated after N episodes of training."] if courses else []
-    notes += verdicts(compared, conditions[0]) if compared else []
+    if not courses:
+        return Analysis(())
+    success = [results.means(condition, "evaluation") for condition in conditions]
+    pairs = [(c, EVALUATED, own, success[0]) for c, own in zip(conditions, success, strict=True)]
+    compared = differences({EVALUATED: pairs[1:]})
+    notes = ["success, N: when evaluated after N episodes of training."]
+    notes += verdicts({f"{EVALUATED}, less that of {conditions[0]}": compared[EVALUATED]})
     return Analysis(tuple(table), tuple(notes), courses, compared)
 
 
@@ -114,8 +117,6 @@ def draw(analysis: Analysis) -> Figures:
     """
     from ...presentation import figures as f  # matplotlib takes its time
 
-    if not analysis.cases:
-        return {}
     figure, panels = f.panels(1, 2, (7.2, 3.4), sharey=True)
     for i, course in enumerate(analysis.cases):
         for axes, spent in zip(panels[0], (course.decisions, course.seconds), strict=True):

@@ -149,6 +149,3 @@ def draw(analysis: Analysis) -> Figures:
     ]
     f.add_legend(figure, handles, ncols=5)
     return {"related": figure}
-
-
-__all__ = ["NUMBERS", "analyse", "check", "draw", "measure"]

@@ -10,7 +10,7 @@ import click
 from .. import options
 
 if TYPE_CHECKING:
-    from ...claims.table import Format
+    from ...claims.claims import Format
     from ...results.published import Published
 
 
@@ -43,7 +43,7 @@ def command(out: Path | None, quick: bool, of: str, jobs: int | None, form: Form
     """
     from ....core.plugins.messages import closest
     from ...claims import claims
-    from ...claims.table import print_claims
+    from ...claims.claims import print_claims
     from ...errors import SpecError
     from ...presentation.progress import say
     from ...results import published

@@ -67,10 +67,10 @@ def command(
     from ....core.agents.cost import Problem
     from ...api.costs import cost_table
     from ...cost.table import written
-    from ...errors import SpecError
+    from ...errors import refused
     from ...presentation.progress import say
 
-    try:
+    with refused():
         problem, sizes = Problem(**quantities), numbers(agents)
         if measured := measured or repeats is not None:
             say("measuring, first compiling what is not: no steps of more than a second or so")
@@ -82,8 +82,6 @@ def command(
             from ...cost.figure import draw
 
             draw(rows, plot)
-    except ValueError as error:
-        raise SpecError(str(error)) from None
     print(written(rows, form))
     return 0
 

@@ -31,4 +31,9 @@ def command(out: Path, jobs: int | None, print_spec: bool) -> int:
     from ..display import show_results
 
     study = run(Spec.parse(text), out, jobs=jobs, observer=Terminal())
-    return show_results(study, with_replays=True)
+    status = show_results(study)
+    for episode in ("first", "last") if not study.failed else ():
+        path = out / "replay" / f"{episode}-episode.gif"
+        path.parent.mkdir(exist_ok=True)
+        print(f"replay  {study.replay(episode=episode, path=path).path}")
+    return status

@@ -60,9 +60,9 @@ def show(
     teams.json, ...; or the spec of a study, whose hierarchies are shown over its own agents.
     """
     from ....topologies.drawing import draw
-    from ...errors import SpecError
+    from ...errors import SpecError, refused
 
-    try:
+    with refused():
         views = _of_spec(topology)
         if views is None:
             views = [view(topology, actions=actions, per=per, **sizes)]
@@ -75,8 +75,6 @@ def show(
                 bodies, failing = shown.bodies, shown.failing
                 draw(shown.hierarchy, path, bodies=bodies, title=shown.title, failing=failing)
             print(printed(shown, form), end="\n\n" if number < len(views) else "\n")
-    except ValueError as error:
-        raise SpecError(str(error)) from None
     return 0
 
 

@@ -59,7 +59,7 @@ def test_what_was_interrupted_goes_on_and_runs_nothing_twice(tuned, tmp_path, mo
                 if len(ran) in (3, 9):  # in the first rung, and in the last
                     raise KeyboardInterrupt
 
-    monkeypatch.setattr(tuning, "_Rungs", Interrupting)
+    monkeypatch.setattr(tuning, "Terminal", Interrupting)
     budget = {**BUDGET, "progress": True}
     for _ in range(2):
         with pytest.raises(KeyboardInterrupt):

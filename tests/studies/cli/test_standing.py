@@ -4,11 +4,10 @@ import made_up
 import pytest
 
 from nested_agents.studies.cli.main import main
+from nested_agents.studies.cli.standing import _estimate, progress
 from nested_agents.studies.store import integrity
-from nested_agents.studies.store.running import LOCK, MARK, Running, look
-from nested_agents.studies.store.store import Store
+from nested_agents.studies.store.store import LOCK, MARK, Running, Store, look
 from nested_agents.studies.trials import code
-from nested_agents.studies.workers.progress import _estimate, progress
 from nested_agents.studies.workers.runner import save
 from nested_agents.studies.workers.worker import cores
 
