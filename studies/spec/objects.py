@@ -43,7 +43,9 @@ def plain(value: Any, key: str = "") -> Any:
         If an object is defined in no file, so that no worker could ever find it.
     """
     if isinstance(value, Mapping):
-        return {k: plain(v, key if k == "kind" else str(k)) for k, v in value.items()}
+        table = {k: plain(v, key if k == "kind" else str(k)) for k, v in value.items()}
+        kind = table.get("kind")
+        return table | kind if isinstance(kind, dict) else table
     if isinstance(value, list | tuple):
         return type(value)(plain(v, key) for v in value)
     registry = REGISTRIES.get(key.rpartition(".")[2])

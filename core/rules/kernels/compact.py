@@ -284,7 +284,7 @@ def td_update(  # type: ignore[no-untyped-def]
 def active_compact(states: FloatArray, packed: Packed) -> tuple[IntArray, FloatArray]:
     """Return the active rules ``(m, k)`` and their strengths ``(m, k)``, triangular partitions."""
     lay = unpack(packed)
-    rules = np.empty((len(states), lay.n_active), np.int64)
+    rules = np.empty((len(states), lay.n_active), np.int32)  # of all experience they are kept
     strengths = np.empty((len(states), lay.n_active))
     (lows, highs, shares), (numbers, products), _ = _room(lay)
     for s in range(len(states)):
