@@ -33,7 +33,7 @@ _PLACES = {
     "Deliberation": ("core.evaluators.evaluator", "Deliberation"),
     "EvaluatorSettings": ("core.evaluators", "EvaluatorSettings"),
     "ExplorationSettings": ("core.decision.exploration", "ExplorationSettings"),
-    "FrozenSettings": ("core.learners.frozen", "FrozenSettings"),
+    "FrozenSettings": ("core.learners.td", "FrozenSettings"),
     "Hierarchy": ("core.interface.hierarchy", "Hierarchy"),
     "KinematicChain": ("scenarios.kinematic_chain.scenario", "KinematicChain"),
     "KinematicChainSettings": ("scenarios.kinematic_chain.config", "KinematicChainSettings"),

@@ -15,9 +15,9 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any, NamedTuple
 
-from ...core.plugins.deferred import located
 from ...scenarios import SCENARIOS
 from ..errors import SpecError
 from ..presentation.words import count
@@ -162,7 +162,7 @@ def _scene_of(recording: Recording) -> tuple[Any, dict[str, Any]]:
 def _players() -> tuple[Any, ...]:
     """Return the players of the built-in scenarios."""
     models: list[Any] = [SCENARIOS.model(name) for name in SCENARIOS.built_in]
-    return tuple(map(located, dict.fromkeys(m.player for m in models if m.player)))
+    return tuple(map(resolve_name, dict.fromkeys(m.player for m in models if m.player)))
 
 
 def _reached(store: Store) -> Mapping[tuple[str, int, int], bool]:

@@ -100,3 +100,33 @@ def test_the_specs_hold_distinct_orders_of_at_least_twenty_seeds(name: str, orde
     spec = Spec.load(STUDIES / f"{name}.toml")
     assert len(spec.conditions()) == orders
     assert len(spec.seeds) >= 20
+
+
+@pytest.mark.parametrize(
+    ("chances", "verdict"),
+    [
+        ((1.0, 1.0), "equal (-.06 to .06)"),
+        ((0.6, 0.2), "the order matters (-.45 to "),
+        ((0.5, 0.55), "not decided ("),
+    ],
+)
+def test_orders_are_compared_within_overrides(chances: tuple[float, float], verdict: str) -> None:
+    rng = np.random.default_rng(2)
+    orders = {"chain": chances[0], "chain:reversed": chances[0], "chain:b,a": chances[1]}
+    success, columns = {}, {}
+    for name in ("fuzzy", "ppo"):
+        for order, chance in orders.items():
+            label = f"{name}, topology={order}"
+            own = chance if name == "ppo" else 1.0
+            success[label] = {"success": (rng.random((60, 10)) < own).astype(float)}
+            columns[label] = {"name": name, "topology": order}
+    numbered = dict.fromkeys(success, tuple(range(60)))
+    made = Arrays(success, success, seeds=numbered, columns=columns)
+    analysis = analyse(made.frames())
+    assert [line.condition for line in analysis.table][:2] == [
+        "fuzzy, chain",
+        "fuzzy, chain:reversed",
+    ]
+    assert analysis.notes[0] == "fuzzy, 3 orders, within 0.1: equal (-.06 to .06)"
+    assert analysis.notes[1].startswith(f"ppo, 3 orders, within 0.1: {verdict}")
+    assert {name: len(own) for name, own in analysis.differences.items()} == {"fuzzy": 2, "ppo": 2}
