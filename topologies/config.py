@@ -133,10 +133,8 @@ def parse(text: str | Mapping[str, Any]) -> TopologySettings:
             return _made("file", {"path": text})
         if sources.is_reference(text) or text in TOPOLOGIES.installed():
             return _made(text, {})
-    except SettingsError as error:
-        raise ValueError(f"topology {text!r}: {error.problem}") from None
     except ValueError as error:
-        raise ValueError(f"topology {text!r}: {error}") from None
+        raise ValueError(f"topology {text!r}: {getattr(error, 'problem', error)}") from None
     if "." in kind or "/" in kind:
         folder = sources.active().folder
         is_there = folder is not None and (folder / text).exists()

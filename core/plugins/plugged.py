@@ -141,11 +141,9 @@ def _parameters(thing: Any) -> dict[str, Any]:
     if not isfunction(thing):
         return {}
     fields: dict[str, Any] = {}
-    for p in signature(thing).parameters.values():
+    for p in signature(thing, eval_str=True).parameters.values():
         if p.kind is p.KEYWORD_ONLY and p.annotation is not p.empty:
-            is_text = isinstance(p.annotation, str)  # as postponed annotations are
-            type_ = eval(p.annotation, thing.__globals__) if is_text else p.annotation
-            fields[p.name] = type_, ... if p.default is p.empty else p.default
+            fields[p.name] = p.annotation, ... if p.default is p.empty else p.default
     return fields
 
 

@@ -18,11 +18,11 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from textwrap import wrap
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.numerics.arrays import FloatArray
+from ...core.numerics.arrays import FloatArray, IntArray
 from ...core.plugins.deferred import optimize
 from ..errors import SpecError
 from ..presentation.words import count, duration
@@ -49,6 +49,8 @@ FASTER, SLOWER = 0.7, 2.2
 """By what the time of another process, and other seeds, differ from what was tried."""
 IDLER = 2.0
 """By how much a busy machine may be less so by then."""
+KEEPING = np.array([0.02, 0.15])
+"""Seconds to hand out a trial and to keep it, from and to: a disk takes longer than a processor."""
 STARTS = 5
 """Starts of a process that a run takes: the command's own, its workers', which start together, and
 as much as three more for the store, the tables and the figures."""
@@ -59,48 +61,15 @@ Range = tuple[float, float]
 """From and to."""
 
 
-@dataclass(frozen=True)
-class Pace:
-    """What the trials of a condition take [s of processor time]."""
+class Tried(NamedTuple):
+    """What a condition takes, by one of its trials."""
 
-    acting: float
-    """Of a step of training, without learning."""
-    learning: float
-    """That a step of training takes more: for each of the episode that has ended."""
-    regression: float
-    """The same for every step that is kept by then."""
-    bytes: tuple[float, float]
-    """What the team holds [bytes], and how much more for every step of training."""
-    steps: Range
-    """Mean steps of an episode of training."""
-    evaluating: Range = (0.0, 0.0)
-    """Of an episode of each evaluation."""
-    building: float = 0.0
-    """To build a trial's world and team."""
-    loading: float = 0.0
-    """To import, load and compile what the first step needs, once a process."""
-
-    def seconds(self, training: Sequence[int], evaluation: int) -> Range:
-        """Return the time of a trial, from and to.
-
-        Parameters
-        ----------
-        training
-            Episodes of training, stage by stage.
-        evaluation
-            Episodes of each evaluation.
-        """
-
-        def of(steps: float, evaluating: float) -> float:
-            learning = sum(
-                self.learning * steps * n + self.regression * steps**2 * n * (n + 1) / 2
-                for n in training
-            )
-            acting = self.acting * steps * sum(training) + evaluating * evaluation
-            return self.building + acting + learning
-
-        quick, slow = map(of, self.steps, self.evaluating)
-        return quick, slow
+    seconds: FloatArray
+    """Processor time [s] of a trial, from and to."""
+    loading: float
+    """Processor time [s] to import, load and compile what the first step needs, once a process."""
+    memory: float
+    """What the team holds in the end [bytes]."""
 
 
 @dataclass(frozen=True)
@@ -203,31 +172,25 @@ def plan(
 
 def _taken(spec: Spec, trials: Sequence[Trial], processes: int) -> tuple[Range, float]:
     """Return the time of a study [s], from and to, and its memory [bytes]."""
-    loading, largest, each = 0.0, 0.0, np.zeros((0, 2))
     begin, used = time.perf_counter(), _used()
     subprocess.run([sys.executable, "-c", START], check=True)
     started = STARTS * (_used() - used)
     with spec.sources.active():
-        for trial in trials[: len(spec.conditions())]:
-            training = [*(stage.episodes for stage in trial.curriculum), trial.episodes]
-            pace = paced(trial)
-            each = np.vstack([each, pace.seconds(training, trial.evaluation)])
-            loading += pace.loading
-            held, more = pace.bytes
-            largest = max(largest, held + more * pace.steps[1] * sum(training))
+        tried = [try_out(trial) for trial in trials[: len(spec.conditions())]]
+    loading = sum(each.loading for each in tried)  # less, if what was compiled here is kept
+    each_seed = np.sum([one.seconds / processes + KEEPING for one in tried], axis=0)
+    quick, slow = len(spec.seeds) * each_seed
     # Processes that have no trial left wait for the last one.
-    quick, slow = len(spec.seeds) * each.sum(axis=0) / processes
-    slow += (1 - 1 / processes) * each[:, 1].max()
+    slow += (1 - 1 / processes) * max(each.seconds[1] for each in tried)
     busy = max((time.perf_counter() - begin) / (_used() - used), 1.0)
-    seconds = (
-        FASTER * max(busy / IDLER, 1.0) * (started + loading + quick),
-        SLOWER * busy * (started + loading + slow),
-    )
-    return seconds, processes * (_resident() + largest)
+    least, most = FASTER * max(busy / IDLER, 1.0), SLOWER * busy
+    memory = _resident() + max(each.memory for each in tried)
+    seconds = least * (started + quick), most * (started + loading + slow)
+    return seconds, processes * memory
 
 
-def paced(trial: Trial) -> Pace:
-    """Return what a condition's trials take, by trying one of them out."""
+def try_out(trial: Trial) -> Tried:
+    """Return what the trials of a condition take."""
     alone = replace(trial, seed=SEED, curriculum=(), evaluation=min(trial.evaluation, EPISODES))
     brief = replace(alone, episodes=1, steps=2, evaluation_steps=None)
     loading, building = _seconds(partial(run_trial, brief)), _seconds(partial(Session, alone))
@@ -238,25 +201,45 @@ def paced(trial: Trial) -> Pace:
     ):
         taken.append(_seconds(partial(session.train, 1, k)))
     own, others = _seconds(session.evaluate), _seconds(session.run_other_evaluations)
-    tried: dict[str, list[float]] = {}
+    lengths: dict[str, list[float]] = {}
     for row in session.result().rows:
-        tried.setdefault(row.phase, []).append(float(row.steps))
-    steps, most = np.array(tried.pop("training")), trial.evaluation_steps or trial.steps
-    acting = own / sum(tried.get("evaluation", [1.0]))
-    evaluated = (own + others) / max(sum(map(sum, tried.values())), 1.0)
-    # An episode of T steps takes T (a + b N) to learn from, N being the steps kept by its end.
+        lengths.setdefault(row.phase, []).append(float(row.steps))
+    steps, most = np.array(lengths.pop("training")), trial.evaluation_steps or trial.steps
+    acting = own / sum(lengths.get("evaluation", [1.0]))
+    evaluated = (own + others) / max(sum(map(sum, lengths.values())), 1.0)
+    evaluating = evaluated * sum((_others(each, most) for each in lengths.values()), np.zeros(2))
+    episodes = np.array([*(stage.episodes for stage in trial.curriculum), trial.episodes])
+    left = episodes.sum() - k
+    mean = (steps.sum() + left * _others(steps[k // 2 :], trial.steps)) / episodes.sum()
+    learning = learned(steps, np.array(taken) - acting * steps, mean, episodes)
+    seconds = building + acting * mean * episodes.sum() + learning
+    kept = mean[1] * episodes.sum() / steps.sum()
+    memory = held + kept * max(_bytes(session) - held, 0.0)
+    return Tried(seconds + trial.evaluation * evaluating, loading, memory)
+
+
+def learned(
+    steps: FloatArray, taken: FloatArray, mean: FloatArray, episodes: IntArray
+) -> FloatArray:
+    """Return the processor time [s] to learn from all episodes of a trial.
+
+    An episode of T steps takes T (a + b N) to learn from, N being the steps kept by its end.
+
+    Parameters
+    ----------
+    steps, taken
+        Of the episodes that were tried: their steps, and the time that was learned from them [s].
+    mean
+        Mean steps of an episode; several possible ones.
+    episodes
+        How many there are in every stage of training.
+    """
     (per_step, per_kept), _ = optimize.nnls(
-        np.stack([steps, steps * np.cumsum(steps)], axis=1),
-        np.maximum(np.array(taken) - acting * steps, 0.0),
+        np.stack([steps, steps * np.cumsum(steps)], axis=1), np.maximum(taken, 0.0)
     )
-    more = max(_bytes(session) - held, 0.0) / steps.sum()
-    episodes = sum(stage.episodes for stage in trial.curriculum) + trial.episodes
-    mean = (steps.sum() + (episodes - k) * _others(steps[k // 2 :], trial.steps)) / episodes
-    evaluating = evaluated * sum((_others(each, most) for each in tried.values()), np.zeros(2))
-    return Pace(
-        acting, float(per_step), float(per_kept), (held, float(more)), tuple(mean),
-        tuple(evaluating), building, loading,
-    )  # fmt: skip
+    kept = mean * (episodes * (episodes + 1)).sum() / 2
+    total: FloatArray = mean * (per_step * episodes.sum() + per_kept * kept)
+    return total
 
 
 def _others(tried: Sequence[float] | FloatArray, most: int) -> FloatArray:

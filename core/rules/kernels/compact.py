@@ -10,7 +10,7 @@ from ...numerics.arrays import FloatArray, IntArray
 from ...numerics.compiling import njit
 from .layout import Layout, Packed, unpack
 from .strengths import all_strengths, pair, strengths_room
-from .updates import advance
+from .updates import advance, values_of_two
 
 
 @njit(cache=True)
@@ -236,21 +236,48 @@ def total_compact(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def td_compact(  # type: ignore[no-untyped-def]
+def td_update(  # type: ignore[no-untyped-def]
     theta, rows: IntArray, trace, reach, states: FloatArray, entered: FloatArray,
     rewards: FloatArray, discount: float, step_size: float, lengths: FloatArray, decay: float,
     packed: Packed,
 ) -> None:  # fmt: skip
-    """Do what `core.rules.kernels.few_states.td_dense` does, triangular partitions."""
+    """Make one TD update of every agent (Eq. 7, 12, 13), any partitions.
+
+    Parameters
+    ----------
+    theta
+        ``(n_rows, n_rules)`` consequent weights, modified.
+    rows
+        ``(n,)`` the row of theta of every agent.
+    trace
+        ``(n, n_rules)`` eligibility traces, modified.
+    reach
+        ``(n, parts of all rows)``, see `core.rules.kernels.updates.advance`, modified.
+    states, entered
+        ``(n, d)`` the previous states of the agents and those that followed.
+    rewards, discount
+        ``(n,)`` received in the previous states; weight of what follows, 0 if they were terminal.
+    step_size, lengths
+        Step size, and ``(n,)`` what it is divided by for every agent.
+    decay
+        Discount times trace decay.
+    packed
+        Layout of the rule base.
+    """
     lay = unpack(packed)
-    strengths, spare = strengths_room(lay)
+    one, spare = strengths_room(lay)
+    two = np.empty_like(one)
     functions, room, _ = _room(lay)
     for i in range(len(states)):
-        ahead = _value(theta[rows[i]], entered[i], lay, functions, room)
-        now = _value(theta[rows[i]], states[i], lay, functions, room)
-        all_strengths(states[i], lay, strengths, spare)
+        all_strengths(states[i], lay, one, spare)
+        if lay.sigmoid:
+            all_strengths(entered[i], lay, two, spare)
+            now, ahead = values_of_two(theta[rows[i]], one, two, lay)
+        else:
+            now = _value(theta[rows[i]], states[i], lay, functions, room)
+            ahead = _value(theta[rows[i]], entered[i], lay, functions, room)
         step = step_size * (rewards[i] + discount * ahead - now) / lengths[i]
-        advance(theta[rows[i]], trace[i], reach[i], strengths, decay, step, lay)
+        advance(theta[rows[i]], trace[i], reach[i], one, decay, step, lay)
 
 
 @njit(cache=True)
