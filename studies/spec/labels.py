@@ -1,7 +1,7 @@
 """How conditions are called, by the point of the sweeps that they are, and how long they train."""
 
 import hashlib
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 from ..errors import show
@@ -89,3 +89,22 @@ def scalar(value: object) -> object:
     """Return a value as it stands in a column: a number or text as it is, else in TOML."""
     is_scalar = isinstance(value, int | float | str) and not isinstance(value, bool)
     return value if is_scalar else show(value, width=None)
+
+
+def lengths(curricula: Iterable[Sequence[int]], episodes: int) -> str:
+    """Return in words the episodes of training, stage by stage, that there are.
+
+    Parameters
+    ----------
+    curricula
+        Of every condition, the episodes of its stages.
+    episodes
+        Those after them.
+
+    Examples
+    --------
+    >>> lengths([[10, 6], [10, 6]], 8), lengths([[10, 6], []], 8), lengths([[]], 1)
+    ('10 + 6 + 8 episodes', '10 + 6 + 8 or 8 episodes', '1 episode')
+    """
+    sums = dict.fromkeys(" + ".join(map(str, [*stages, episodes])) for stages in curricula)
+    return f"{' or '.join(sums)} episode{'' if list(sums) == ['1'] else 's'}"

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ...core.plugins.sources import Sources
 from ..errors import SpecError, show
 from ..store.database import DATABASE, SPEC_FILE
+from .labels import lengths
 
 if TYPE_CHECKING:
     from ..store.reading import Reading
@@ -38,12 +39,10 @@ class StudyOutline:
 
     @property
     def lengths(self) -> str:
-        """Episodes of training, stage by stage, in words: ``10 + 6 + 8 or 8 episodes``."""
+        """Episodes of training, stage by stage, in words."""
         common = self.table.get("curriculum", ())
         curricula = [o.get("curriculum", common) for o in self.table.get("overrides", [{}])]
-        numbers = ([*(s["episodes"] for s in stages), self.episodes] for stages in curricula)
-        sums = dict.fromkeys(" + ".join(map(str, own)) for own in numbers)
-        return f"{' or '.join(sums)} episode{'' if list(sums) == ['1'] else 's'}"
+        return lengths(([s["episodes"] for s in stages] for stages in curricula), self.episodes)
 
     @classmethod
     def of(cls, spec: Spec) -> StudyOutline:

@@ -13,6 +13,7 @@ from ...core.interface.measures import Measure
 from ...core.interface.scenario import Scenario
 from ...core.plugins.sources import Sources, named
 from ..spec.conditions import ConditionSettings, Stage
+from ..spec.labels import lengths
 from ..store.durable import Recording
 from ..store.schema import RESULTS_VERSION, Planned
 from .episodes import EpisodeRow
@@ -113,6 +114,11 @@ class Trial:
     def planned(self) -> Planned:
         """What a store notes of it."""
         return Planned(self.identity, self.condition, self.seed, self.recorded)
+
+    @property
+    def lengths(self) -> str:
+        """Its episodes of training, stage by stage, in words."""
+        return lengths([[stage.episodes for stage in self.curriculum]], self.episodes)
 
     @property
     def recorded(self) -> dict[int, str]:
