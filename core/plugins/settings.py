@@ -6,11 +6,11 @@ ranges when it is built; every field is documented beside it, with its unit.
 
 from collections.abc import Mapping
 from decimal import Decimal
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
-from .deferred import located
 from .messages import one_line
 
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -142,7 +142,7 @@ class PartSettings(Settings):
         """
         if not self.factory:
             raise TypeError(f"{type(self).__name__} {self.kind!r} says not how it is built")
-        return located(self.factory)(self, *given)
+        return resolve_name(self.factory)(self, *given)
 
 
 class ScenarioSettings(PartSettings):

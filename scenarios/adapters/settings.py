@@ -3,21 +3,12 @@
 Reading them needs no simulator; it is imported when a world is built.
 """
 
-import json
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import AfterValidator, Field, model_validator
 
 from ...core.plugins.settings import ScenarioSettings, Settings
-
-
-class FrozenTable(dict[str, Any]):
-    """A table that nobody changes, so that settings which hold it can be compared and hashed."""
-
-    def __hash__(self) -> int:  # type: ignore[override]
-        return hash(json.dumps(self, sort_keys=True, default=repr))
-
 
 Range = Annotated[tuple[float, float], AfterValidator(lambda ends: _ordered(ends))]
 Index = Annotated[int, Field(ge=0)]
@@ -55,16 +46,14 @@ class Direction(Settings):
             raise ValueError("cos and sin must be two numbers of the observation")
         return self
 
-    def __hash__(self) -> int:
-        return hash((self.cos, self.sin))
-
 
 class AdaptedSettings(ScenarioSettings):
     """What the worlds of Gymnasium and PettingZoo have in common."""
 
+    factory: ClassVar[str] = f"{__package__}.adapted:AdaptedWorld"
     id: str = ""
     """Which environment."""
-    options: Annotated[dict[str, Any], AfterValidator(FrozenTable)] = FrozenTable()
+    options: dict[str, Any] = Field(default_factory=dict)
     """What the environment is made with, by name."""
     actions: Annotated[int, Field(ge=2, le=99)] = 5
     """Levels, evenly spaced over its range, of each dimension of a continuous action; each is an
@@ -81,23 +70,26 @@ class AdaptedSettings(ScenarioSettings):
     horizon: Annotated[int, Field(ge=1, le=10_000)] = 1
     """Decisions that copies look ahead, the joint action being held; the reward predicted is the
     mean of theirs."""
-    variables: Annotated[dict[str, Entries], AfterValidator(FrozenTable)] = FrozenTable()
+    variables: dict[str, Entries] = Field(default_factory=dict)
     """State variables by name: which number of the observation each is, one for all bodies or a
     list of one for each. None: all that `angles` leaves and that change, called o0, o1 and so on,
     or those of a Dict by its keys: ``height``, ``position0``, ``position1``."""
-    angles: Annotated[dict[str, Entries | Direction], AfterValidator(FrozenTable)] = FrozenTable()
+    angles: dict[str, Entries | Direction] = Field(default_factory=dict)
     """State variables that are angles [rad], whose ends are the same point: where the observation
     has them, or their ``cos`` and ``sin``."""
-    ranges: Annotated[dict[str, Range], AfterValidator(FrozenTable)] = FrozenTable()
+    ranges: dict[str, Range] = Field(default_factory=dict)
     """Ranges of state variables; of others they are those of the environment, and where it has
     none, what random episodes meet."""
     rewards: Literal["joint", "own"] = "joint"
     """Whether all agents receive the mean reward, or those of each body its own."""
-    success: Annotated[
-        dict[str, float | Range], AfterValidator(_measurable), AfterValidator(FrozenTable)
-    ] = FrozenTable()
+    success: Annotated[dict[str, float | Range], AfterValidator(_measurable)] = Field(
+        default_factory=dict
+    )
     """When an episode is a success: the least ``return``, and ranges of state variables in which
     all agents are at the end. None: never."""
+
+    def __hash__(self) -> int:
+        return hash(repr(self))  # tables have no hash of their own
 
     def warnings(self) -> tuple[str, ...]:
         """Return that nothing is a success, if it is so."""
@@ -119,8 +111,6 @@ class GymnasiumSettings(AdaptedSettings):
     groups: tuple[tuple[Index, ...], ...] = ()
     """Numbers of the agents of every body, from 0 on, in order; none: each is its own body."""
 
-    factory: ClassVar[str] = f"{__package__}.adapted:gymnasium_world"
-
 
 class PettingZooSettings(AdaptedSettings):
     """An environment of PettingZoo, each of whose agents is a body."""
@@ -129,5 +119,3 @@ class PettingZooSettings(AdaptedSettings):
     id: str
     """Its module, such as ``mpe2/simple_spread_v3``; it has ``parallel_env``, or an ``env`` whose
     agents act in cycles."""
-
-    factory: ClassVar[str] = f"{__package__}.adapted:pettingzoo_world"

@@ -9,15 +9,7 @@ from pydantic import Field, field_validator
 
 from ...core.plugins.scheduled import Names
 from ...core.plugins.settings import NonNegative, Positive, ScenarioSettings, Settings, team_size
-from ..faults.settings import (
-    DISCRIMINATOR,
-    FailureSettings,
-    Reversed,
-    Seized,
-    Stuck,
-    Weak,
-    befalling,
-)
+from ..faults.settings import DISCRIMINATOR, KINDS, FailureSettings, befalling
 from ..state_variables import referred
 
 PERIOD = 0.1
@@ -61,7 +53,8 @@ class JointFailure(FailureSettings):
 if TYPE_CHECKING:
     Failure = JointFailure
 else:
-    _KINDS = befalling(JointFailure, locked=Seized, weak=Weak, reversed=Reversed, stuck=Stuck)
+    _ALIKE = {kind: KINDS[kind] for kind in ("weak", "reversed", "stuck")}
+    _KINDS = befalling(JointFailure, locked=KINDS["seized"], **_ALIKE)
     Failure = Annotated[Union[*_KINDS.values()], DISCRIMINATOR]
 """Any failure's settings, distinguished by `kind`."""
 

@@ -47,8 +47,7 @@ from .comparison import Comparison
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from ...core.interface.acting import Actors
-    from ...core.interface.scenario import Scenario
+    from ...core.interface.scenario import Actors, Scenario
     from ..spec.spec import Spec
     from ..workers.runner import Observer
 

@@ -62,7 +62,9 @@ class _Commands(click.Group):
         command = self.get_command(ctx, args[0])
         if command is None:
             raise SpecError(f"{args[0]}: unknown command; {closest(args[0], COMMANDS)}")
-        return args[0], command, list(complete(command, args[1:]))
+        parts = command.commands if isinstance(command, click.Group) else {}
+        owner = parts.get(args[1], command) if args[1:] else command
+        return args[0], command, list(complete(owner, args[1:]))
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):

@@ -33,7 +33,7 @@ from ...core.evaluators.evaluator import Counts
 from ...core.interface.hierarchy import Hierarchy
 from ...core.interface.scenario import Scenario
 from ...core.learners.td import TDLambdaSettings
-from ...core.rules.settings import RuleBaseSettings
+from ...core.rules.rule_base import RuleBaseSettings
 from ...scenarios.line_up import LineUp, LineUpSettings
 from ...topologies import build, parse
 from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap

@@ -1,13 +1,14 @@
 """Objects in a spec made by Python: put in the words that a TOML file would have for them."""
 
 from collections.abc import Mapping
+from pkgutil import resolve_name
 from typing import Any
 
 from ...core.decision.exploration import EXPLORATIONS
 from ...core.evaluators import EVALUATORS
 from ...core.interface.hierarchy import Hierarchy
 from ...core.learners import LEARNERS
-from ...core.plugins.deferred import located, nx
+from ...core.plugins.deferred import nx
 from ...core.plugins.registry import Registry
 from ...core.plugins.settings import Settings
 from ...scenarios import SCENARIOS
@@ -87,7 +88,7 @@ def _of_settings(settings: Settings, registry: Registry | None) -> Any:
         owner = type(settings)
         outer = owner.__qualname__.rpartition(".")[0]
         # A class's nested Settings stand for the class.
-        thing = located(f"{owner.__module__}:{outer}") if outer else owner
+        thing = resolve_name(f"{owner.__module__}:{outer}") if outer else owner
         table["kind"] = _name(thing, registry)
     return table
 

@@ -9,9 +9,8 @@ from typing import Any
 
 from ...core.agents.loop import StepRecord, control_loop, world_seed
 from ...core.agents.team import Team
-from ...core.interface.acting import Actors
 from ...core.interface.measures import measures_of
-from ...core.interface.scenario import EpisodeRecorder, RecordedScenario
+from ...core.interface.scenario import Actors, EpisodeRecorder, RecordedScenario
 from ..store.durable import TEAM, Recording
 from ..store.schema import EVALUATION, STAGE
 from .arrangement import Arrangement, arrange, teach, transfer

@@ -15,8 +15,7 @@ from ....core.numerics.arrays import FloatArray, IntArray
 from ....core.numerics.compiling import njit
 from ..world import geometry as rows
 from ..world.geometry import LANES, ON_SURFACE, nearest_points
-from .relational import AWAY
-from .variables import STATE_VARIABLES
+from .relational import AWAY, STATE_VARIABLES
 from .view import ARRIVED, CLOSE, KEPT, LEAST, STILL, View
 
 _EXACT = {"contract", "nsz"}
@@ -48,7 +47,7 @@ class Columns:
     Parameters
     ----------
     names
-        Of `COMPILED`.
+        Of `COMPILED`; the columns of others mean nothing.
 
     Examples
     --------
@@ -57,8 +56,8 @@ class Columns:
     """
 
     def __init__(self, names: Sequence[str]) -> None:
-        assert set(names) <= set(COMPILED), f"{list(names)}: not all of them are compiled"
-        self.rows: IntArray = np.array([LANES * COMPILED.index(n) for n in names], dtype=np.int64)
+        places = [COMPILED.index(name) if name in COMPILED else 0 for name in names]
+        self.rows: IntArray = LANES * np.array(places, dtype=np.int64)
         # Of push, contact push, path and face: True or None, see `_relational`.
         self._groups = tuple(
             bool(np.isin(self.rows, group).any()) or None
@@ -67,14 +66,13 @@ class Columns:
 
     def of(self, view: View, robots: Sequence[int]) -> FloatArray:
         """Return the variables ``(len(robots), m, columns)`` of robots in the view's situations."""
-        states: FloatArray = _relational(
+        return _relational(
             np.ascontiguousarray(view.robots.transpose(1, 2, 0)),
             np.ascontiguousarray(view.box.T), np.ascontiguousarray(view.gaps.T),
             view.goal, view.origin, view.before, view.periods, view.outline.edges,
             view.friction_radius,
             np.fromiter(robots, np.int64), self.rows, *self._groups,
         )  # fmt: skip
-        return states
 
 
 @njit(cache=True, fastmath=_EXACT)

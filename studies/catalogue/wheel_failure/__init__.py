@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 
 from ....core.agents.team import Team, of_fuzzy_agents
-from ....core.learners.frozen import FrozenSettings
 from ....core.learners.learner import LearnerSettings
+from ....core.learners.td import FrozenSettings
 from ....core.plugins.deferred import pd
 from ...errors import SpecError
 from ...results.analysis import Analysis, Figures, verdicts

@@ -10,18 +10,16 @@ from nested_agents.core.evaluators.best_response import BestResponse, BestRespon
 from nested_agents.core.evaluators.evaluator import (
     DecisionProblem,
     Deliberation,
+    Pooling,
     Rule,
     ValueOf,
     concerned,
 )
-from nested_agents.core.evaluators.exact import ExactEnumeration
-from nested_agents.core.evaluators.pooled import Pooling
-from nested_agents.core.evaluators.sampling import Sampling, SamplingSettings
+from nested_agents.core.evaluators.exact import ExactEnumeration, Sampling, SamplingSettings
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.interface.spaces import StateSpace, Variable
 from nested_agents.core.numerics.arrays import FloatArray
-from nested_agents.core.rules.rule_base import RuleBase
-from nested_agents.core.rules.settings import RuleBaseSettings
+from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
 
 A = 4
 NEUTRAL = 2
