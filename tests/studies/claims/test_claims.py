@@ -275,6 +275,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "arms",
         "arm-transfer",
         "long-arms",
+        "thousand-arms",
         "tasks",
         "told",
         "costs",
