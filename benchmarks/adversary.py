@@ -8,9 +8,10 @@ Campaigns, each drawn from a seed:
   real workers;
 - *kills of others*: export, report, retry and watch are killed. What they have written is whole or
   not there; the study is as it was, or the same command goes on, with the same end;
-- *flips*: one bit of one file of a finished study is flipped. Commands that read must print what
-  they printed before, or name the file; a run must end with the rows and recordings of the sound
-  study. A file may also be cut short or be a folder. With ``--every-byte`` every byte of a small
+- *flips*: one bit of one file of a finished study is flipped. Commands that read, and Python that
+  loads a trained team, must give what they gave before, or name the file; a run must end with the
+  rows and recordings of the sound study. `explain`, which draws, reads every tenth, and a run every
+  fourth. A file may also be cut short or be a folder. With ``--every-byte`` every byte of a small
   database is tried;
 - *hostile input*: specs, topologies in files and in Python, polygons, mutated or absurd. Each is
   accepted or refused in one line, within seconds;
@@ -42,14 +43,14 @@ from pathlib import Path
 
 from nested_agents.scenarios.box_pushing.world.boxes import BoxSpec
 from nested_agents.studies.api import run_study as studies_run
+from nested_agents.studies.api.study import load
 from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli.main import main as command_line
 from nested_agents.studies.errors import SpecError
+from nested_agents.studies.spec.overlay import dumps
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.spec.toml import dumps
 from nested_agents.studies.store import durable
-from nested_agents.studies.store.running import LOCK
-from nested_agents.studies.store.store import DATABASE, Store
+from nested_agents.studies.store.store import DATABASE, LOCK, Store
 from nested_agents.studies.trials.arrangement import check
 from nested_agents.studies.trials.keeping import open_to_run, pending, spec_of
 from nested_agents.studies.trials.session import run_trial
@@ -60,9 +61,12 @@ from nested_agents.studies.workers.worker import Outcome, RunTrial
 from . import misbehaving
 
 SPEC = Spec.of(
-    {"seeds": 5, "episodes": 2, "steps": 10, "evaluation": 1,
+    {"seeds": 5, "episodes": 2, "steps": 10, "evaluation": 1, "keep_teams": True,
      "sweep": {"preset": ["default", "frozen"]}}
 )  # fmt: skip
+EXPLAIN = "explain"
+TEAM = "na.load(...).team()"
+"""No command: what a user reads in Python."""
 SLOW = 10.0
 """Seconds after which an input counts as one that stalls the program."""
 
@@ -88,18 +92,20 @@ class Adversary:
         self.finish(self.sound)
         self.expected = self.content(self.sound)
         shutil.copytree(self.sound, self.study)
-        self.said = {line: self.command(line) for line in self.lines()}
+        self.said = {line: self.command(line) for line in (*self.lines(), EXPLAIN)}
         self.files = [p for p in sorted(self.sound.rglob("*")) if p.is_file() and p.stat().st_size]
 
     def lines(self) -> list[str]:
         """Return the commands that read."""
         return [
-            "results --format csv", "status", "table --format csv", "compare", "watch --once",
-            "report", "export",
+            "results --format csv", "status", "table --format csv", "compare",
+            "compare --statistics", "watch --once", "report", "export", TEAM,
         ]  # fmt: skip
 
     def command(self, line: str) -> Said:
         """Run a command on the study in this process."""
+        if line == TEAM:
+            return self.team()
         name, *options = line.split()
         out, error = io.StringIO(), io.StringIO()
         if name in ("report", "export"):
@@ -112,7 +118,19 @@ class Adversary:
         text = out.getvalue()
         if name in ("report", "export") and status == 0:
             text += "".join(p.read_text() for p in sorted(written.iterdir()))
+        if name == EXPLAIN and status == 0:
+            text += next(self.study.glob("explain/*/explanation.txt")).read_text()
         return status, text, error.getvalue()
+
+    def team(self) -> Said:
+        """Load the team that was trained first, as a user's script does."""
+        try:
+            with contextlib.redirect_stderr(error := io.StringIO()):
+                _, team = load(self.study).team()
+        except SpecError as refusal:
+            return 2, "", str(refusal)
+        arrays = {name: array.tolist() for name, array in team.arrays().items()}
+        return 0, str(arrays), error.getvalue()
 
     def finish(self, directory: Path) -> list[str]:
         """Run what is left of a study; return what had to be said."""
@@ -164,7 +182,7 @@ class Here:
     def arrivals(
         self, trials: Sequence[Trial], run_trial: RunTrial, started: Callable[[str], None]
     ) -> Generator[Outcome]:
-        """See `nested_agents.studies.workers.arrivals.Workers.arrivals`."""
+        """See `nested_agents.studies.workers.runner.Workers.arrivals`."""
         for trial in trials:
             started(trial.identity)
             time.sleep(0.08)
@@ -245,8 +263,7 @@ def kills_of_others(number: int, rng: random.Random, folder: Path) -> Counter[st
         halves = {path for path, data in _written(place).items() if expected.get(path) != data}
         # What is there whole before the kill is not written over: that is refused.
         is_whole = expected and _written(place) == expected
-        overwrite = ["--overwrite"] if name == "export" and _written(place) else []
-        status = 0 if is_whole else _wait(_child([*command, *overwrite]))
+        status = 0 if is_whole else _wait(_child(command))
         is_equal = adversary.content(place / "study") == adversary.expected
         if halves or status or not is_equal or _written(place) != expected:
             print(f"{name}: {halves}, status {status}, study equal {is_equal}", file=sys.stderr)
@@ -294,11 +311,12 @@ def _kept(directory: Path) -> set[str]:
 
 def flips(number: int, rng: random.Random, folder: Path) -> Counter[str]:
     """Flip bits one by one, read the study, and mend it every fourth time; return what happened."""
+    learning_curve.draw = lambda analysis: {}  # of rows that have been verified; takes most time
     adversary, tally = Adversary(folder, rng), Counter[str]()
     for attempt in range(number):
         tally["flips"] += 1
         path = adversary.damage()
-        lines = adversary.lines()
+        lines = [*adversary.lines(), *([EXPLAIN] if attempt % 10 == 0 else [])]
         for line in lines:
             tally["reads"] += 1
             tally[_read(adversary, line, path)] += 1

@@ -1,15 +1,18 @@
 """Time what a team of any size takes to decide: ``python -m benchmarks.decisions``.
 
-Teams of a preset with drawn weights decide in an episode of box pushing; the processor's time of
-each decision is taken, prediction included, learning and physics not. The least is what the
-arithmetic takes, the median what a machine that others use makes of it. The exponent of the time in
-the number of agents is fitted to teams of at least four robots (eight agents).
+Teams of a preset with drawn weights decide in an episode of box pushing, or as the joints of an
+arm; the processor's time of each decision is taken, prediction included, and beside it that of the
+step of the world: physics, sensing and measures. The least is what the arithmetic takes, the median
+what a machine that others use makes of it. The memory is the greatest of the process so far: begin
+with few. The exponent of the time in the number of agents is fitted to teams of at least eight.
 """
 
 from __future__ import annotations
 
 import argparse
-from time import thread_time
+import resource
+from time import process_time, thread_time
+from typing import Any, NamedTuple
 
 import numpy as np
 from rich.box import SIMPLE
@@ -22,43 +25,76 @@ from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.session import Session
 from nested_agents.studies.trials.trial import trials_of
 
-SIZES = (2, 4, 8, 16, 32, 64)
+ROBOTS = (2, 4, 8, 16, 32, 64)
 WARM = 3
 """Decisions that are not timed: kernels are compiled, memory is taken."""
 
 
-def decisions(preset: str, robots: int, number: int) -> list[float]:
-    """Return the processor's time [s] of so many decisions."""
-    settings = {"preset": preset, "seeds": 1, "scenario": {"robots": robots}}
-    (trial,) = trials_of(Spec.of(settings))
+class Timed(NamedTuple):
+    """What a team took."""
+
+    agents: int
+    built: float
+    """To make scenario and team [s]."""
+    deciding: list[float]
+    """Every decision, with its prediction [s]."""
+    stepping: list[float]
+    """Every step of the world [s]."""
+    memory: float
+    """The greatest of the process so far [MB]."""
+
+
+def timed(settings: dict[str, Any], number: int) -> Timed:
+    """Let a team decide so often."""
+    begun = process_time()
+    (trial,) = trials_of(Spec.of({"seeds": 1, **settings}))
     session = Session(trial)
     scenario, team = session.scenario, of_fuzzy_agents(session.team)
+    built = process_time() - begun
     theta = team.learner.theta
     theta[:] = np.random.default_rng(0).normal(size=theta.shape)
     scenario.reset(world_seed(0, 0), 0)
-    taken = []
+    deciding, stepping = [], []
     for _ in range(WARM + number):
         begun = thread_time()
         actions = team.act(team.predict(scenario))
-        taken.append(thread_time() - begun)
+        decided = thread_time()
         scenario.step(actions)
-    return taken[WARM:]
+        deciding.append(decided - begun)
+        stepping.append(thread_time() - decided)
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    return Timed(len(scenario.agents), built, deciding[WARM:], stepping[WARM:], memory)
 
 
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.decisions", description=__doc__)
     parser.add_argument("--preset", default="default")
-    parser.add_argument("--robots", type=int, nargs="+", default=SIZES, metavar="N")
+    parser.add_argument("--robots", type=int, nargs="+", default=ROBOTS, metavar="N")
+    parser.add_argument("--joints", type=int, nargs="+", default=(), metavar="N", help="arms, too")
+    parser.add_argument("--sweeps", type=int, metavar="N", help="of best responses, of robots")
     parser.add_argument("--number", type=int, default=30, help="decisions timed of each size")
     options = parser.parse_args()
-    table = Table("robots", "agents", "least [ms]", "median [ms]", box=SIMPLE)
+    settings: dict[str, Any] = {"preset": options.preset}
+    boxes = dict(settings)
+    if options.sweeps is not None:
+        evaluator = {"kind": "best-response", "sweeps": options.sweeps}
+        boxes["learner"] = {"decision": {"evaluator": evaluator}}
+    teams = [(f"{n} joints", settings, {"kind": "kinematic-chain", "joints": n})
+             for n in options.joints]  # fmt: skip
+    teams += [(f"{n} robots", boxes, {"robots": n}) for n in options.robots]
+    headings = ("team", "agents", "least [ms]", "median [ms]", "world [ms]", "made [s]", "MB")
+    table = Table(*headings, box=SIMPLE)
     least: dict[int, float] = {}
-    for robots in options.robots:
-        taken = decisions(options.preset, robots, options.number)
-        least[2 * robots] = min(taken)
-        numbers = (f"{1e3 * seconds:.2f}" for seconds in (min(taken), float(np.median(taken))))
-        table.add_row(str(robots), str(2 * robots), *numbers)
+    for name, learner, scenario in teams:
+        taken = timed({**learner, "scenario": scenario}, options.number)
+        if "robots" in name:
+            least[taken.agents] = min(taken.deciding)
+        medians = (float(np.median(times)) for times in (taken.deciding, taken.stepping))
+        numbers = (f"{1e3 * seconds:.2f}" for seconds in (min(taken.deciding), *medians))
+        table.add_row(
+            name, str(taken.agents), *numbers, f"{taken.built:.2f}", f"{taken.memory:.0f}"
+        )
     console = Console(width=80)
     console.print(table)
     large = [n for n in least if n >= 8]

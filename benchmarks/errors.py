@@ -32,8 +32,7 @@ from nested_agents.core.evaluators.evaluator import (
     Evaluator,
     Teammates,
 )
-from nested_agents.core.evaluators.exact import ExactEnumeration
-from nested_agents.core.evaluators.sampling import Sampling, SamplingSettings
+from nested_agents.core.evaluators.exact import ExactEnumeration, Sampling, SamplingSettings
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.numerics.arrays import FloatArray

@@ -89,10 +89,11 @@ def fill(directory: Path, trials: int, episodes: int) -> None:
     with open_to_run(directory, spec, trials, check(spec)) as store:
         store._db.execute("PRAGMA synchronous = OFF")
         for trial in trials:
-            save(store, trial, _made_up(trial, store), total=1.0)
+            save(store, trial, made_up(trial, store), total=1.0)
 
 
-def _made_up(trial: Trial, store: Store) -> TrialResult:
+def made_up(trial: Trial, store: Store) -> TrialResult:
+    """Return random numbers as the result of a trial."""
     rng, measures = np.random.default_rng(trial.seed), store.measures()
     rows = tuple(
         EpisodeRow(

@@ -111,7 +111,7 @@ class Inline:
     def arrivals(
         self, trials: Sequence[Trial], run_trial: RunTrial, started: Callable[[str], None]
     ) -> Generator[Outcome]:
-        """See `nested_agents.studies.workers.arrivals.Workers.arrivals`."""
+        """See `nested_agents.studies.workers.runner.Workers.arrivals`."""
         for trial in trials:
             started(trial.identity)
             yield attempt(run_trial, trial)

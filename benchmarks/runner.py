@@ -30,8 +30,8 @@ from nested_agents.studies.trials.arrangement import check
 from nested_agents.studies.trials.keeping import open_to_run
 from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import Trial, TrialResult, trials_of
-from nested_agents.studies.workers.loky import LokyWorkers
 from nested_agents.studies.workers.runner import run_trials
+from nested_agents.studies.workers.workers import LokyWorkers
 
 TICK = os.sysconf("SC_CLK_TCK")
 

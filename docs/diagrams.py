@@ -15,7 +15,7 @@ from matplotlib.patches import Circle, FancyBboxPatch, Polygon, Wedge
 
 from nested_agents.core.rules.kernels.fuzzy import Partition
 from nested_agents.studies.claims import claims
-from nested_agents.studies.presentation import by_robots
+from nested_agents.studies.presentation import figures
 from nested_agents.studies.presentation.figures import COLOURS, SETTINGS, write
 from nested_agents.studies.results import published
 from nested_agents.studies.results.statistics import Estimate, rate
@@ -234,10 +234,10 @@ def scale() -> Figure:
     axes = figure.subplots()
     for i, (_, points) in enumerate(SUCCESS):
         estimates = [published_rate(table, condition) for table, condition, _ in points]
-        by_robots.draw_line(axes, [n for *_, n in points], estimates, i, len(SUCCESS))
-    by_robots.scale_axis(axes, (2, 4, 8, 16, 32, 64))
+        figures.draw_line(axes, [n for *_, n in points], estimates, i, len(SUCCESS))
+    figures.scale_axis(axes, (2, 4, 8, 16, 32, 64))
     axes.set(xlabel="robots", ylabel="evaluation success", ylim=(-0.03, 1.03))
-    by_robots.name_lines(figure, [label for label, _ in SUCCESS], "bars: 95 % intervals")
+    figures.name_lines(figure, [label for label, _ in SUCCESS], "bars: 95 % intervals")
     return figure
 
 

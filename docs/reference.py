@@ -14,16 +14,16 @@ import nested_agents
 from nested_agents.core.interface.measures import Measure
 from nested_agents.scenarios import SCENARIOS
 from nested_agents.scenarios.adapters.adapted import AdaptedWorld
-from nested_agents.scenarios.box_pushing.states.variables import STATE_VARIABLES
+from nested_agents.scenarios.box_pushing.states.relational import STATE_VARIABLES
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
 from nested_agents.scenarios.kinematic_chain.variables import CHAIN_VARIABLES
 from nested_agents.studies.cli.main import COMMANDS
 from nested_agents.studies.cli.main import nested_agents as program
-from nested_agents.studies.results.numbers import EPISODE_COLUMNS, NUMBERS, TRIAL_COLUMNS
+from nested_agents.studies.results.results import EPISODE_COLUMNS, NUMBERS, TRIAL_COLUMNS
 from nested_agents.studies.spec.keys import tables
+from nested_agents.studies.spec.overlay import dumps
 from nested_agents.studies.spec.presets import PRESETS
-from nested_agents.studies.spec.toml import dumps
 
 BESIDE = {
     "*swept keys*": ("", "a column for every swept key, and `name` if there are overrides"),
@@ -56,16 +56,15 @@ MODULES = {
     "core": ("How agents perceive, predict, decide and learn, and what that costs.", (
         "interface.hierarchy", "interface.spaces", "interface.prediction",
         "interface.scenario", "interface.measures", "agents.team",
-        "agents.rows", "adaptation.mirror", "agents.loop", "decision.settings",
-        "decision.exploration", "rules.kernels.fuzzy", "rules.rule_base", "rules.settings",
-        "learners.learner", "learners.td", "learners.batch", "learners.optimistic",
-        "learners.fmq", "learners.sparse_cooperative", "learners.vdn", "learners.q_learning",
-        "learners.frozen", "evaluators.evaluator", "evaluators.auto", "evaluators.exact",
-        "evaluators.sampling", "evaluators.best_response", "evaluators.coordination",
-        "evaluators.cross_entropy",
+        "adaptation.mirror", "agents.loop", "decision.settings",
+        "decision.exploration", "rules.kernels.fuzzy", "rules.rule_base",
+        "learners.learner", "learners.td", "learners.batch", "learners.one_step",
+        "evaluators.evaluator", "evaluators.auto",
+        "evaluators.exact", "evaluators.best_response",
+        "evaluators.coordination", "evaluators.cross_entropy",
         "coordination.elimination", "coordination.max_plus", "adaptation.self_model",
         "adaptation.calibration", "agents.cost", "plugins.registry", "plugins.plugged",
-        "plugins.settings", "interface.acting", "numerics.streams", "numerics.ties",
+        "plugins.settings", "numerics.streams", "numerics.ties",
         "policies.settings",
         "policies.peer", "policies.inputs",
     )),
@@ -75,11 +74,11 @@ MODULES = {
         "box_pushing.scenario", "box_pushing.environments", "adapters.passing_down",
         "adapters.adapted", "adapters.settings",
         "box_pushing.world.reward", "box_pushing.world.starts", "box_pushing.states.view",
-        "box_pushing.states.variables", "box_pushing.states.state_spaces",
+        "box_pushing.states.relational", "box_pushing.states.state_spaces",
         "box_pushing.prediction.predictors", "box_pushing.world.boxes",
-        "box_pushing.world.robots", "box_pushing.world.failures",
+        "box_pushing.world.robots", "box_pushing.world.world",
         "box_pushing.pictures.rendering", "box_pushing.options.config",
-        "box_pushing.options.points", "box_pushing.options.scenario",
+        "box_pushing.options.pushing", "box_pushing.options.scenario",
         "kinematic_chain.config", "kinematic_chain.scenario",
         "kinematic_chain.view", "kinematic_chain.variables", "matrix_games.games",
         "matrix_games.scenario", "line_up", "faults.settings", "faults.actuators",
@@ -87,7 +86,7 @@ MODULES = {
         "state_variables", "checking.checker", "checking.sensing",
     )),
     "studies": ("What is measured, compared and drawn.", (
-        "api.study", "api.teams", "api.planning", "api.costs", "api.comparison", "api.recovery",
+        "api.study", "api.teams", "api.planning", "cost.table", "api.comparison", "api.recovery",
         "api.run_study", "api.tuning",
         "errors", "spec.spec", "spec.keys", "spec.presets", "trials.trial",
         "trials.arrangement", "trials.session",

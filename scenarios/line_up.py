@@ -85,16 +85,15 @@ class LineUp:
         self.roles = ("cart",) * n_agents
         self.action_set = ActionSet()
         self.state_space = StateSpace("line-up", (DISTANCE, LEAD), n_own=1)
-        self._places: FloatArray = np.zeros(n_agents)
-        self._speeds: FloatArray = np.zeros(n_agents)
-        self._commands: FloatArray = np.zeros(n_agents)
+        LineUp.reset(self, 0)
 
     def reset(self, seed: int | np.random.SeedSequence, episode: int = 0) -> FloatArray:
         """Put the carts at rest, each 0.2 to 1 m from the line on the same side."""
         rng = np.random.default_rng(seed)
         n = len(self.agents)
         self._places = rng.choice([-1.0, 1.0]) * rng.uniform(0.2, 1.0, size=n)
-        self._speeds, self._commands = np.zeros(n), np.zeros(n)
+        self._speeds: FloatArray = np.zeros(n)
+        self._commands: FloatArray = np.zeros(n)
         return self._states()
 
     def step(self, joint_action: IntArray) -> Transition:

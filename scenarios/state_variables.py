@@ -32,21 +32,21 @@ class StateVariable:
     """``function(view, body) -> (m,)``."""
     common: bool = False
     """Whether it is the same for all bodies."""
+    trusted: bool = False
+    """Whether it is a built-in one, whose values are not checked."""
 
     def __call__(self, view: Any, body: int) -> FloatArray:
-        """Return the values ``(m,)`` for a body."""
-        return self.function(view, body)
-
-    def checked(self, view: Any, body: int) -> FloatArray:
-        """Return the values ``(m,)`` of a function that is not known to be sound.
+        """Return the values ``(m,)`` for a body.
 
         Raises
         ------
         ValueError
-            If it returns anything but one finite number per situation.
+            If a function that is not trusted returns anything but a finite number per situation.
         """
-        values: FloatArray = np.asarray(self.function(view, body))
-        name, m = self.variable.name, view.n_situations
+        values = self.function(view, body)
+        if self.trusted:
+            return values
+        values, name, m = np.asarray(values), self.variable.name, view.n_situations
         if values.shape != (m,):
             raise ValueError(
                 f"state variable {name!r}: shape {values.shape}, must be {(m,)}: one value for "
@@ -88,24 +88,32 @@ def guarded(view: Any) -> Any:
     return replace(view, **arrays)
 
 
-def sensed(
-    things: Sequence[StateVariable], trusted: Sequence[bool], view: Any, bodies: Sequence[int]
-) -> FloatArray:
+def sensed(things: Sequence[StateVariable], view: Any, bodies: Sequence[int]) -> FloatArray:
     """Return state variables ``(len(bodies), m, variables)`` of bodies, by the functions alone.
 
-    Those that are the same for all bodies are computed once; what functions that are not trusted
-    return is checked.
+    Those that are the same for all bodies are computed once.
     """
     values = np.empty((len(bodies), view.n_situations, len(things)))
-    safe = view if all(trusted) else guarded(view)
-    for column, (thing, is_trusted) in enumerate(zip(things, trusted, strict=True)):
+    safe = view if all(thing.trusted for thing in things) else guarded(view)
+    for column, thing in enumerate(things):
         for k, body in enumerate(bodies):
-            if k and thing.common:
-                values[k, :, column] = values[0, :, column]
-            elif is_trusted:
-                values[k, :, column] = thing(view, body)
-            else:
-                values[k, :, column] = thing.checked(safe, body)
+            known = k > 0 and thing.common
+            values[k, :, column] = values[0, :, column] if known else thing(safe, body)
+    return values
+
+
+def filled(
+    values: FloatArray, things: Sequence[StateVariable], view: Any, bodies: Sequence[int]
+) -> FloatArray:
+    """Return compiled variables ``(len(bodies), m, variables)`` with those of users filled in.
+
+    Every body is asked, so that a check of the scenario finds what is wrongly called common.
+    """
+    own = [(column, thing) for column, thing in enumerate(things) if not thing.trusted]
+    safe = guarded(view) if own else view
+    for column, thing in own:
+        for k, body in enumerate(bodies):
+            values[k, :, column] = thing(safe, body)
     return values
 
 
@@ -158,7 +166,7 @@ def find_variable(registry: Registry, name: str) -> StateVariable:
             raise ValueError(f"is no state variable, but a {type(thing).__name__}")
     except ValueError as error:
         raise ValueError(f"scenario.state_space: {name!r}: {error}") from None
-    return thing
+    return replace(thing, trusted=name in registry.built_in)
 
 
 def referred(registry: Registry, names: object) -> object:

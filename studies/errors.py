@@ -1,6 +1,7 @@
 """What is wrong with something that the user can mend, in one line to act on."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from decimal import Decimal
 
 LONGEST = 1200
@@ -17,6 +18,15 @@ class SpecError(ValueError):
         # A terminal obeys control characters, and cannot write half of a surrogate pair.
         shown = (c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)
         super().__init__("".join(shown))
+
+
+@contextmanager
+def refused(before: str = "", after: str = "") -> Iterator[None]:
+    """Raise each ValueError of the context as a `SpecError`, with text around its message."""
+    try:
+        yield
+    except ValueError as error:
+        raise SpecError(f"{before}{error}{after}") from None
 
 
 def show(value: object, width: int | None = 60) -> str:

@@ -1,5 +1,7 @@
 """Checks that name the culprit: which agent is unknown, missing or named twice."""
 
+from __future__ import annotations
+
 from collections import Counter
 from collections.abc import Iterable, Sequence
 

@@ -5,6 +5,8 @@ and the same names by body (robot), and returns a networkx DiGraph over all agen
 (superior, subordinate); an agent in no pair stands alone.
 """
 
+from __future__ import annotations
+
 import json
 import tomllib
 import traceback

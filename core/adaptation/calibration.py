@@ -17,10 +17,12 @@ decision little is learned. What drifts is added to P, so that it never falls to
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any, cast
 
 import numpy as np
 
-from ..numerics.arrays import FloatArray
+from ..interface.scenario import EmbodiedScenario, Scenario, Transition
+from ..numerics.arrays import FloatArray, IntArray
 from ..plugins.settings import NonNegative, Positive, Settings
 
 
@@ -72,6 +74,31 @@ class Calibration:
         self._covariance: FloatArray = settings.prior**2 * np.eye(n)
         self._root = np.linalg.cholesky(self._covariance)
         self._units = np.stack([np.ones_like(levers), np.ones_like(levers), levers], axis=1)
+
+    @classmethod
+    def of(cls, settings: CalibrationSettings, scenario: Scenario) -> Calibration | None:
+        """Return that of a scenario's predictor, none if it is not enabled.
+
+        Raises
+        ------
+        ValueError
+            If the predictor has no constants.
+        """
+        if not settings.enabled:
+            return None
+        constants = getattr(scenario, "constants", ())
+        if not isinstance(scenario, EmbodiedScenario) or not constants:
+            raise ValueError(
+                "learner.calibration.enabled: the scenario's predictor has no constants to "
+                "calibrate"
+            )
+        return cls(settings, len(constants), cast(Any, scenario).levers)
+
+    def adapt(self, prediction: Any, joint_action: IntArray, transition: Transition) -> None:
+        """Hold the constants against how what bodies push moved by a joint action, if it did."""
+        twists, n_bodies = transition.twists, len(prediction.groups)
+        if twists is not None and twists[:-n_bodies].any():
+            self.observe(twists, prediction.outcomes(joint_action, self.points))
 
     @property
     def points(self) -> FloatArray:

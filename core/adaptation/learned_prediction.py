@@ -26,7 +26,7 @@ class LearnedPrediction:
     """
 
     def __init__(self, predictor: Any, present: FloatArray) -> None:
-        self._predictor, self._present = predictor, present
+        self._predictor, self.present = predictor, present
         self._reached = predictor.reached(present)
         self._last: tuple[bytes, tuple[FloatArray, FloatArray]] | None = None
         n, a, _ = self._reached.shape
@@ -44,7 +44,7 @@ class LearnedPrediction:
         if self._last is None or self._last[0] != key:
             own = self._reached[np.arange(joint_actions.shape[1]), joint_actions]
             drivers = self._predictor.drivers(own, joint_actions)
-            shared = self._predictor.after(self._present, drivers)
+            shared = self._predictor.after(self.present, drivers)
             self._last = key, (np.ascontiguousarray(own.swapaxes(0, 1)), shared)
         return self._last[1]
 

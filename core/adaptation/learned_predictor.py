@@ -20,7 +20,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from ..interface.scenario import Scenario, groups_of, roles_of
+from ..interface.scenario import Scenario, Transition, groups_of, roles_of
 from ..numerics.arrays import BoolArray, FloatArray, IntArray
 from ..rules.kernels.fuzzy import Partition
 from ..rules.rule_base import RuleBase
@@ -126,6 +126,10 @@ class LearnedPredictor:
     def predict(self, states: FloatArray) -> LearnedPrediction:
         """Predict from states ``(n, d)``."""
         return (TabulatedPrediction if len(self.joint) else LearnedPrediction)(self, states)
+
+    def adapt(self, prediction: Any, joint_action: IntArray, transition: Transition) -> None:
+        """Note what a joint action led to from the states of a prediction, as `observe`."""
+        self.observe(prediction.present, joint_action, transition.states)
 
     def observe(self, before: FloatArray, joint_action: IntArray, after: FloatArray) -> None:
         """Take in what a joint action ``(n,)`` made of states ``(n, d)``."""

@@ -19,14 +19,18 @@ multiplied by that ratio (Birge 1932).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
-from ..numerics.arrays import FloatArray
+from ..interface.scenario import EmbodiedScenario, Scenario, Transition
+from ..numerics.arrays import FloatArray, IntArray
 from ..plugins.settings import Positive, Settings
 
 MEMORY = 100
 """Decisions over which the size of innovations is averaged."""
+KEPT = ("effect", "covariance", "ratio")
+"""What is saved of the filters of a robot."""
 
 
 class SelfModelSettings(Settings):
@@ -44,6 +48,42 @@ class SelfModelSettings(Settings):
     """Squared innovation, in units of its expected square, from which on a change is assumed."""
     inflation: Positive = 1.0
     """Share of the prior covariance that is added then."""
+
+
+class _Filters:
+    """The filters of one robot, of the ``(3, w + 1)`` nominal effect of its wheels."""
+
+    def __init__(self, settings: SelfModelSettings, nominal: FloatArray) -> None:
+        self.settings, self.nominal = settings, np.array(nominal, dtype=float)
+        self.effect = self.nominal.copy()
+        # A turning rate is measured in units of the nominal robot's own turning per wheel speed.
+        self.units = np.array([1.0, 1.0, max(1.0, float(np.abs(nominal[2]).max()))])
+        of_effect, of_constant = settings.prior_effect**2, settings.prior_constant**2
+        self.prior = np.diag([of_effect] * (nominal.shape[1] - 1) + [of_constant])
+        self.covariance = np.stack([self.prior] * 3)
+        # Mean squared innovation of each component in units of the expected square.
+        self.ratio: FloatArray = np.ones(3)
+
+    @property
+    def deviations(self) -> FloatArray:
+        larger = self.units[:, None] * np.sqrt(np.maximum(1.0, self.ratio))[:, None]
+        return larger * np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2))
+
+    def observe(self, speeds: FloatArray, twist: FloatArray) -> None:
+        settings, regressor = self.settings, np.append(speeds, 1.0)
+        noise, effect, covariance = settings.noise**2, self.effect, self.covariance
+        for row, unit in enumerate(self.units):
+            innovation = float(twist[row] - effect[row] @ regressor) / unit
+            carried = covariance[row] @ regressor
+            expected = float(regressor @ carried) + noise
+            self.ratio[row] += (innovation**2 / expected - self.ratio[row]) / MEMORY
+            if innovation**2 > settings.surprise * expected:
+                covariance[row] += settings.inflation * self.prior
+                carried = covariance[row] @ regressor
+                expected = float(regressor @ carried) + noise
+            gain = carried / expected
+            effect[row] += gain * innovation * unit
+            covariance[row] -= np.outer(gain, carried)
 
 
 class SelfModel:
@@ -70,20 +110,12 @@ class SelfModel:
     """
 
     def __init__(self, settings: SelfModelSettings, nominal: Sequence[FloatArray]) -> None:
-        self.settings = settings
-        self._nominal = tuple(np.array(effect, dtype=float) for effect in nominal)
-        self.effects = tuple(effect.copy() for effect in self._nominal)
-        # A turning rate is measured in units of the nominal robot's own turning per wheel speed.
-        self._units = tuple(
-            np.array([1.0, 1.0, max(1.0, float(np.abs(effect[2]).max()))]) for effect in nominal
-        )
-        of_effect, of_constant = settings.prior_effect**2, settings.prior_constant**2
-        self._prior = tuple(
-            np.diag([of_effect] * (effect.shape[1] - 1) + [of_constant]) for effect in nominal
-        )
-        self._covariances = tuple(np.stack([prior] * 3) for prior in self._prior)
-        # Mean squared innovation of each component in units of the expected square.
-        self._ratios = tuple(np.ones(3) for _ in nominal)
+        self._robots = [_Filters(settings, effect) for effect in nominal]
+
+    @property
+    def effects(self) -> tuple[FloatArray, ...]:
+        """Per robot the ``(3, w + 1)`` effect of its wheels, as learned so far."""
+        return tuple(robot.effect for robot in self._robots)
 
     @property
     def deviations(self) -> tuple[FloatArray, ...]:
@@ -91,55 +123,52 @@ class SelfModel:
 
         Those of its filters, times how much larger their innovations are than they expect.
         """
-        return tuple(
-            unit[:, None]
-            * np.sqrt(np.maximum(1.0, ratios))[:, None]
-            * np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
-            for unit, ratios, covariances in zip(
-                self._units, self._ratios, self._covariances, strict=True
-            )
-        )
+        return tuple(robot.deviations for robot in self._robots)
+
+    @classmethod
+    def of(cls, settings: SelfModelSettings, scenario: Scenario) -> SelfModel | None:
+        """Return that of a scenario's bodies, none if it is not enabled.
+
+        Raises
+        ------
+        ValueError
+            If the scenario has no bodies on wheels.
+        """
+        if not settings.enabled:
+            return None
+        if not isinstance(scenario, EmbodiedScenario):
+            raise ValueError("learner.self_model.enabled: the scenario has no bodies on wheels")
+        return cls(settings, scenario.nominal_effects)
+
+    def adapt(self, prediction: Any, joint_action: IntArray, transition: Transition) -> None:
+        """Revise all effects by how the bodies moved by a joint action.
+
+        What contact is predicted to take from the motion is given back: a robot that moves a load
+        is slow, not broken.
+        """
+        if transition.twists is None:
+            return
+        speeds, slips = prediction.commands(joint_action), prediction.slips(joint_action)
+        free = transition.twists[-len(slips) :] - slips
+        for body, group in enumerate(prediction.groups):
+            self.observe(body, speeds[list(group)], free[body])
 
     def observe(self, robot: int, speeds: FloatArray, twist: FloatArray) -> None:
         """Take in one twist ``(3,)`` measured under commanded wheel speeds ``(w,)``."""
-        noise = self.settings.noise**2
-        regressor = np.append(speeds, 1.0)
-        effect, covariances = self.effects[robot], self._covariances[robot]
-        ratios = self._ratios[robot]
-        for row, unit in enumerate(self._units[robot]):
-            innovation = float(twist[row] - effect[row] @ regressor) / unit
-            carried = covariances[row] @ regressor
-            expected = float(regressor @ carried) + noise
-            ratios[row] += (innovation**2 / expected - ratios[row]) / MEMORY
-            if innovation**2 > self.settings.surprise * expected:
-                covariances[row] += self.settings.inflation * self._prior[robot]
-                carried = covariances[row] @ regressor
-                expected = float(regressor @ carried) + noise
-            gain = carried / expected
-            effect[row] += gain * innovation * unit
-            covariances[row] -= np.outer(gain, carried)
+        self._robots[robot].observe(speeds, twist)
 
     def arrays(self) -> dict[str, FloatArray]:
         """Return effects, covariances and ratios of innovations by robot."""
-        return {
-            f"{name}{r}": array
-            for name, arrays in self._remembered.items()
-            for r, array in enumerate(arrays)
-        }
+        robots = range(len(self._robots))
+        return {f"{name}{r}": getattr(self._robots[r], name) for name in KEPT for r in robots}
 
     def restore(self, arrays: Mapping[str, FloatArray]) -> None:
         """Continue from `arrays`."""
-        for name, own in self._remembered.items():
-            for r, array in enumerate(own):
-                array[:] = arrays[f"{name}{r}"]
+        for name, own in self.arrays().items():
+            own[:] = arrays[name]
 
     def continue_from(self, former: SelfModel) -> None:
         """Go on from what another one has learned, if its bodies are built alike; else anew."""
-        if len(self._nominal) == len(former._nominal) and all(
-            map(np.array_equal, self._nominal, former._nominal)
-        ):
+        mine, theirs = ([r.nominal for r in model._robots] for model in (self, former))
+        if len(mine) == len(theirs) and all(map(np.array_equal, mine, theirs)):
             self.restore(former.arrays())
-
-    @property
-    def _remembered(self) -> dict[str, tuple[FloatArray, ...]]:
-        return {"effect": self.effects, "covariance": self._covariances, "ratio": self._ratios}

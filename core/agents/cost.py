@@ -61,8 +61,14 @@ class Problem:
         >>> Problem().nested(range(4))
         2457562500000
         """
-        pairs = sum(self.actions ** (2 * (1 + count)) for count in below)
-        return self.iterations * self.rules * pairs
+        return self.sweep(self.actions ** (1 + count) for count in below)
+
+    def sweep(self, tried: Iterable[int]) -> int:
+        """Return the cost of agents that choose among so many joint actions each (Eq. 18).
+
+        ``L * sum_i |S| * tried_i ** 2``
+        """
+        return self.iterations * self.rules * sum(count**2 for count in tried)
 
     def chain_closed_form(self, n: int) -> int:
         """Return the cost of a chain of n agents as a geometric series (Eq. 19).

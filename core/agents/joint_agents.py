@@ -18,21 +18,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import product
 from typing import Any, Literal, cast
 
 import numpy as np
 
 from ..interface.measures import measures_of
 from ..interface.prediction import Blocks, Prediction
-from ..interface.scenario import (
-    EmbodiedScenario,
-    Scenario,
-    Transition,
-    groups_of,
-    joint_reward,
-    roles_of,
-)
+from ..interface.scenario import EmbodiedScenario, Scenario, Transition, groups_of, roles_of
 from ..interface.spaces import ActionSet, StateSpace, Variable
 from ..numerics.arrays import FloatArray, IntArray
 
@@ -55,18 +47,7 @@ def join_agents(scenario: Scenario, agents: Agents) -> Scenario:
     ValueError
         As `joint_blocks`.
     """
-    if agents == "actuator":
-        return scenario
-    groups, space, n_actions = groups_of(scenario), scenario.state_space, len(scenario.action_set)
-    names, blocks = joint_blocks(scenario.agents, groups, n_actions, agents)
-    if agents == "team":
-        variables = _named(scenario.agents, space.variables)
-        joint = StateSpace(f"joint {space.name}", variables)
-        return JointAgents(scenario, blocks, names, names, joint, whole=True)
-    own = _named((scenario.agents[i].rpartition(".")[2] for i in blocks[0]), space.own)
-    roles = tuple("+".join(roles_of(scenario)[i] for i in block) for block in blocks)
-    joint = StateSpace(f"bodies' {space.name}", (*own, *space.shared), len(own))
-    return JointAgents(scenario, blocks, names, roles, joint)
+    return scenario if agents == "actuator" else JointAgents(scenario, agents)
 
 
 def joint_blocks(
@@ -125,44 +106,42 @@ class JointAgents:
     ----------
     scenario
         The scenario of all agents.
-    blocks
-        The agents that each acts for: consecutive, equally many.
-    agents, roles
-        Names and roles of those who act.
-    state_space
-        Their state variables.
-    whole
-        Whether one acts for all and perceives every variable of each; if not, what the agents of a
-        block share is perceived once.
+    each
+        What there is one agent for. One for the team perceives every variable of each; what the
+        agents of a body share is perceived once.
     """
 
-    def __init__(
-        self,
-        scenario: Scenario,
-        blocks: Sequence[Sequence[int]],
-        agents: Names,
-        roles: Names,
-        state_space: StateSpace,
-        *,
-        whole: bool = False,
-    ) -> None:
-        self.scenario, self.blocks, self.whole = scenario, blocks, whole
-        self.agents, self.roles, self.state_space = agents, roles, state_space
+    def __init__(self, scenario: Scenario, each: Agents) -> None:
+        single, space, groups = scenario.action_set, scenario.state_space, groups_of(scenario)
+        self.agents, self.blocks = joint_blocks(scenario.agents, groups, len(single), each)
+        self.scenario, self.whole, n_block = scenario, each == "team", len(self.blocks[0])
         self.measures = measures_of(scenario)
         self.horizon = getattr(scenario, "horizon", 1)
-        self.groups = tuple((i,) for i in range(len(agents)))
-        single, space = scenario.action_set, scenario.state_space
+        self.groups = tuple((i,) for i in range(len(self.agents)))
+        self._n_each = space.n_variables if self.whole else space.n_own
+        of_block = [scenario.agents[i] for i in self.blocks[0]]
+        if self.whole:
+            self.roles = self.agents
+        else:
+            of_block = [agent.rpartition(".")[2] for agent in of_block]
+            roles = roles_of(scenario)
+            self.roles = tuple("+".join(roles[i] for i in block) for block in self.blocks)
+        own = _named(of_block, space.variables[: self._n_each])
+        self.state_space = StateSpace(
+            f"joint {space.name}" if self.whole else f"bodies' {space.name}",
+            (*own, *space.variables[self._n_each :]),
+            0 if self.whole else len(own),
+        )
         # Row c holds the actions of a block's agents of index c.
-        rows = product(range(len(single)), repeat=len(blocks[0]))
-        self._local = np.array(list(rows), dtype=np.int64)
+        shape = (len(single),) * n_block
+        self._local = np.indices(shape).reshape(n_block, -1).T.copy()
         names = tuple("+".join(single.names[a] for a in row) for row in self._local)
-        neutral = int(np.flatnonzero((self._local == single.neutral).all(axis=1))[0])
+        neutral = int(np.ravel_multi_index((single.neutral,) * n_block, shape))
         zeros = (0.0,) * len(names)
         self.action_set = ActionSet(names, zeros, zeros, neutral)
-        self._n_each = space.n_variables if whole else space.n_own
         if hasattr(scenario, "predict"):
             self.predict = self._predict
-        if not whole and isinstance(scenario, EmbodiedScenario):
+        if not self.whole and isinstance(scenario, EmbodiedScenario):
             for name in OF_BODIES:
                 if hasattr(scenario, name):
                     setattr(self, name, getattr(scenario, name))
@@ -175,7 +154,9 @@ class JointAgents:
     def step(self, joint_action: IntArray) -> Transition:
         """Carry out the actions of those who act."""
         transition = self.scenario.step(self.actions(joint_action))
-        reward = joint_reward(transition.reward, self.blocks)
+        reward = transition.reward
+        if np.ndim(reward):  # each acts for the mean reward of its agents
+            reward = np.array([np.take(reward, block).mean() for block in self.blocks])
         return replace(transition, states=self._states(transition.states), reward=reward)
 
     def _predict(self) -> JointPrediction:

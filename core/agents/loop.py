@@ -14,8 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..interface.acting import Actors
-from ..interface.scenario import Scenario, Transition
+from ..interface.scenario import Actors, Scenario, Transition
 from ..numerics.arrays import FloatArray, IntArray
 
 

@@ -8,7 +8,7 @@ and policies stay paired. How an agent reads what it was not told is the team's 
 """
 
 from collections.abc import Sequence
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.random import Generator
@@ -23,6 +23,23 @@ from ..plugins.settings import Fraction
 STREAM = 2**32 - 2
 """Key of the stream from which failures of messages draw, under the seed of an episode's world;
 failures of a scenario have 0, 1, ..., and sensor noise the key after this."""
+
+
+LOST = -1
+"""What arrives where a message does not."""
+
+
+class Sent(NamedTuple):
+    """What some agents say, of which something fails."""
+
+    actions: IntArray
+    """``(k,)`` what they have decided."""
+    past: Sequence[IntArray]
+    """The same of the decisions before, the last one last."""
+    n_actions: int
+    """Actions of every agent."""
+    rng: Generator
+    """For what is random."""
 
 
 class MessageFailure(Scheduled):
@@ -40,23 +57,9 @@ class MessageFailure(Scheduled):
         rest = "".join(f", {key} {value}" for key, value in written)
         return f"{getattr(self, 'kind', 'failing')}: {', '.join(self.agents)}{rest}"
 
-    def passed(
-        self, actions: IntArray, past: Sequence[IntArray], n_actions: int, rng: Generator
-    ) -> tuple[BoolArray, IntArray]:
-        """Return which of the agents' messages arrive ``(k,)``, and what they say.
-
-        Parameters
-        ----------
-        actions
-            ``(k,)`` what the agents have decided.
-        past
-            The same of the decisions before, the last one last.
-        n_actions
-            Actions of every agent.
-        rng
-            For what is random.
-        """
-        return np.ones(len(actions), dtype=bool), actions
+    def passed(self, sent: Sent) -> IntArray:
+        """Return what arrives ``(k,)``, `LOST` where nothing does."""
+        return sent.actions
 
 
 class LostMessages(MessageFailure):
@@ -66,11 +69,10 @@ class LostMessages(MessageFailure):
     probability: Fraction = 1.0
     """Of each message; 1: the agents are silent."""
 
-    def passed(
-        self, actions: IntArray, past: Sequence[IntArray], n_actions: int, rng: Generator
-    ) -> tuple[BoolArray, IntArray]:
-        """Return which messages are not lost."""
-        return rng.random(len(actions)) >= self.probability, actions
+    def passed(self, sent: Sent) -> IntArray:
+        """Return what is not lost."""
+        arrives = sent.rng.random(len(sent.actions)) >= self.probability
+        return np.where(arrives, sent.actions, LOST)
 
 
 class DelayedMessages(MessageFailure):
@@ -80,12 +82,10 @@ class DelayedMessages(MessageFailure):
     decisions: Annotated[int, Field(ge=1, le=1000)] = 1
     """How many; before as many have been made, nothing is said."""
 
-    def passed(
-        self, actions: IntArray, past: Sequence[IntArray], n_actions: int, rng: Generator
-    ) -> tuple[BoolArray, IntArray]:
+    def passed(self, sent: Sent) -> IntArray:
         """Return what the agents did as many decisions before."""
-        arrive = np.full(len(actions), len(past) >= self.decisions)
-        return arrive, past[-self.decisions] if arrive.any() else actions
+        is_early = len(sent.past) < self.decisions
+        return np.full_like(sent.actions, LOST) if is_early else sent.past[-self.decisions]
 
 
 class NoisyMessages(MessageFailure):
@@ -95,13 +95,11 @@ class NoisyMessages(MessageFailure):
     probability: Fraction = 0.3
     """Of each message."""
 
-    def passed(
-        self, actions: IntArray, past: Sequence[IntArray], n_actions: int, rng: Generator
-    ) -> tuple[BoolArray, IntArray]:
+    def passed(self, sent: Sent) -> IntArray:
         """Return the actions, some of them replaced by random ones."""
-        noise = rng.integers(n_actions, size=len(actions), dtype=np.int64)
-        is_noisy = rng.random(len(actions)) < self.probability
-        return np.ones(len(actions), dtype=bool), np.where(is_noisy, noise, actions)
+        k, rng = len(sent.actions), sent.rng
+        noise = rng.integers(sent.n_actions, size=k, dtype=np.int64)
+        return np.where(rng.random(k) < self.probability, noise, sent.actions)
 
 
 class AbsentAgents(MessageFailure):
@@ -109,11 +107,9 @@ class AbsentAgents(MessageFailure):
 
     kind: Literal["absent"] = "absent"
 
-    def passed(
-        self, actions: IntArray, past: Sequence[IntArray], n_actions: int, rng: Generator
-    ) -> tuple[BoolArray, IntArray]:
+    def passed(self, sent: Sent) -> IntArray:
         """Return that nothing arrives."""
-        return np.zeros(len(actions), dtype=bool), actions
+        return np.full_like(sent.actions, LOST)
 
 
 class ReparentedAgents(MessageFailure):
@@ -164,18 +160,17 @@ class Messages:
         n = len(hierarchy)
         self._failures, self._n_actions = tuple(failures), n_actions
         places = [f"topology.failures[{k}]" for k in range(len(failures))]
-        named = [f.mask(hierarchy.agents, p) for f, p in zip(failures, places, strict=True)]
-        self._masks = named
+        self._masks = [
+            f.mask(hierarchy.agents, place) for f, place in zip(failures, places, strict=True)
+        ]
         self.told: list[IntArray] = [np.array(hierarchy.above(i), dtype=np.int64) for i in range(n)]
         """Per agent those who tell it, if nothing fails."""
         self._told_instead = {
-            k: _reparented(hierarchy, failure, np.flatnonzero(named[k]), places[k])
+            k: _reparented(hierarchy, failure, np.flatnonzero(self._masks[k]), places[k])
             for k, failure in enumerate(failures)
             if isinstance(failure, ReparentedAgents)
         }
-        self._memory = max(
-            [f.decisions for f in failures if isinstance(f, DelayedMessages)], default=0
-        )
+        self._memory = max([getattr(f, "decisions", 0) for f in failures], default=0)
         self.begin(0, 0)
 
     @property
@@ -223,12 +218,11 @@ class Messages:
             senders = self._told_instead[k][agent] if k in self._told_instead else senders
         actions = joint_action[senders]
         for k in self._active:
-            failure, concerned = self._failures[k], np.flatnonzero(self._masks[k][senders])
-            arrive = np.ones(len(senders), dtype=bool)
+            concerned = np.flatnonzero(self._masks[k][senders])
             past = [joint[senders[concerned]] for joint in self._past]
-            arrive[concerned], actions[concerned] = failure.passed(
-                actions[concerned], past, self._n_actions, self._rng
-            )
+            sent = Sent(actions[concerned], past, self._n_actions, self._rng)
+            actions[concerned] = self._failures[k].passed(sent)
+            arrive = actions != LOST
             senders, actions = senders[arrive], actions[arrive]
         return senders, actions
 

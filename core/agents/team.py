@@ -10,23 +10,20 @@ from typing import Any, cast
 import numpy as np
 
 from ..adaptation.calibration import Calibration
-from ..adaptation.learned_predictor import LearnedPredictor
 from ..adaptation.mirror import Mirror
-from ..adaptation.predictors import GivenPredictor, Persistence
+from ..adaptation.predictors import GivenPredictor
 from ..adaptation.self_model import SelfModel
 from ..decision.exploration import Explorer
-from ..evaluators.best_response import BestResponse
 from ..evaluators.evaluator import NOTHING_GIVEN, DecisionProblem, Deliberation, Evaluator
-from ..interface.acting import Actors
 from ..interface.hierarchy import Hierarchy
 from ..interface.prediction import NOT_EXPLORING, Prediction
-from ..interface.scenario import EmbodiedScenario, Scenario, Transition, groups_of
+from ..interface.scenario import Actors, EmbodiedScenario, Scenario, Transition, groups_of, rows_of
 from ..learners import check_prediction
 from ..learners.learner import Learner, LearnerSettings
 from ..numerics.arrays import FloatArray, IntArray
+from ..numerics.streams import set_words, words_of
 from ..numerics.ties import greatest
 from .messages import MessageFailure, Messages
-from .rows import rows_of
 
 
 class Team:
@@ -95,18 +92,22 @@ class Team:
         check_prediction(settings, scenario)
         self.hierarchy, self.action_set = hierarchy, scenario.action_set
         n, n_actions = len(hierarchy), len(scenario.action_set)
-        self.self_model = _self_model_of(scenario, settings)
-        self.calibration = _calibration_of(scenario, settings)
-        self.predictor = _predictor_of(scenario, settings)
+        self.self_model = SelfModel.of(settings.self_model, scenario)
+        self.calibration = Calibration.of(settings.calibration, scenario)
+        self.predictor: Any = _predictor_of(scenario, settings)
+        adapting = ("self_model", "calibration", "predictor")
+        self._adapting: dict[str, Any] = {
+            name: part for name in adapting if hasattr(part := getattr(self, name), "adapt")
+        }
         self.mirror = Mirror.of(scenario) if getattr(settings, "mirrored", False) else None
         self.rows = rows_of(scenario, shared=settings.weights == "role")
         rows = self.rows if self.mirror is None else self.mirror.rows(self.rows)
         self.messages = Messages(hierarchy, failures, n_actions)
         self._values_actions = settings.values_actions
         self._senders = _senders(settings, self.messages, hierarchy)
-        n_told = max(map(len, self._senders), default=0)
+        self._n_told = max(map(len, self._senders), default=0)
         self.space, self.rules = settings.rules_over(
-            scenario.state_space, scenario.action_set, n_told
+            scenario.state_space, scenario.action_set, self._n_told
         )
         self.learner: Learner = settings.build(self.rules, rows)
         self._asked = signature(self.learner.observe).parameters.keys() & {"left", "joint_action"}
@@ -228,14 +229,15 @@ class Team:
         """Return what all decide by one call of the evaluator, None if it takes one for each."""
         exploring = getattr(self.explorer, "exploring", None) if explore else NOT_EXPLORING
         n = len(self.hierarchy)
-        if not isinstance(evaluator, BestResponse) or exploring is None or len(self._hears_all) < n:
+        decide = getattr(evaluator, "decide", None)
+        if decide is None or exploring is None or len(self._hears_all) < n:
             return None
         joint = np.full(n, self.action_set.neutral)
         first = Deliberation(
             self.hierarchy.order[0], joint, prediction, weights, self.seen, self.rng,
             present=self._states,
         )  # fmt: skip
-        return evaluator.decide(first, exploring)
+        return decide(first, exploring)
 
     def _in_order(
         self, evaluator: Evaluator, prediction: Prediction, weights: list[FloatArray], explore: bool
@@ -279,10 +281,9 @@ class Team:
 
     def _with_told(self) -> FloatArray:
         """Return the present states with a column for each action told, as yet that of nobody."""
-        n_told = max(map(len, self._senders), default=0)
-        if not n_told:
+        if not self._n_told:
             return self._states
-        nobody = np.full((len(self._states), n_told), float(len(self.action_set)))
+        nobody = np.full((len(self._states), self._n_told), float(len(self.action_set)))
         return np.hstack([self._states, nobody])
 
     def _given_by(self, agent: int) -> FloatArray:
@@ -293,30 +294,9 @@ class Team:
         return counts / counts.sum(axis=2, keepdims=True)
 
     def adapt(self, prediction: Prediction, joint_action: IntArray, transition: Transition) -> None:
-        """Revise self-model and constants by what `joint_action` did, against what was predicted.
-
-        What contact is predicted to take from the motion is given back to the self-model: a robot
-        that moves a load is slow, not broken. The constants are held against how the load moved.
-        """
-        if isinstance(self.predictor, LearnedPredictor):
-            self.predictor.observe(self._states, joint_action, transition.states)
-        if self.calibration is not None:
-            self._calibrate(prediction, joint_action, transition)
-        if self.self_model is None or transition.twists is None:
-            return
-        embodied = cast(Any, prediction)
-        speeds = embodied.commands(joint_action)
-        slips = embodied.slips(joint_action)
-        free = transition.twists[-len(slips) :] - slips
-        for body, group in enumerate(embodied.groups):
-            self.self_model.observe(body, speeds[list(group)], free[body])
-
-    def _calibrate(self, prediction: Any, joint_action: IntArray, transition: Transition) -> None:
-        twists, n_bodies = transition.twists, len(prediction.groups)
-        if self.calibration is None or twists is None or not twists[:-n_bodies].any():
-            return
-        predicted = prediction.outcomes(joint_action, self.calibration.points)
-        self.calibration.observe(twists, predicted)
+        """Revise what predictions rest on by what `joint_action` did."""
+        for part in self._adapting.values():
+            part.adapt(prediction, joint_action, transition)
 
     def learn(self, transition: Transition) -> None:
         """Take in what a step led to."""
@@ -333,7 +313,7 @@ class Team:
     def end_episode(self) -> None:
         """Learn what is learned after an episode."""
         self._count(self.learner.end_episode())
-        if isinstance(self.predictor, LearnedPredictor):
+        if hasattr(self.predictor, "end_episode"):
             self.predictor.end_episode()
 
     def _count(self, updates: int) -> None:
@@ -360,13 +340,16 @@ class Team:
         ValueError
             If the learner or the exploration knows no way; one line.
         """
-        learner, explorer = self.learner, self.explorer
-        if not hasattr(learner, "continue_from"):
-            raise ValueError(f"learner.kind: {_no_successor(learner)}")
-        if not hasattr(explorer, "continue_from"):
-            raise ValueError(f"learner.exploration.kind: {_no_successor(explorer)}")
-        learner.continue_from(former.learner, rows)
-        explorer.continue_from(former.explorer)
+        for key, part, *given in (
+            ("learner.kind", self.learner, former.learner, rows),
+            ("learner.exploration.kind", self.explorer, former.explorer),
+        ):
+            if not hasattr(part, "continue_from"):
+                raise ValueError(
+                    f"{key}: {type(part).__name__} has no continue_from, by which it would go on "
+                    "with another team"
+                )
+            part.continue_from(*given)
         self.rng.bit_generator.state = former.rng.bit_generator.state
         self.seen = np.stack(
             [former.seen[former.rows == rows[row]].mean(axis=0) for row in self.rows]
@@ -394,13 +377,9 @@ class Team:
 
     def arrays(self) -> dict[str, FloatArray]:
         """Return everything that the team remembers as named arrays."""
-        state = self.rng.bit_generator.state
-        words = [state["state"]["state"], state["state"]["inc"]]
-        generator = [word >> shift & (2**64 - 1) for word in words for shift in (64, 0)]
-        generator += [state["has_uint32"], state["uinteger"]]
         parts = {"learner": self.learner, **self._adapting}
         return {
-            "generator": np.array(generator, dtype=np.uint64),
+            "generator": words_of(self.rng),
             "explorer": self.explorer.memory,
             "seen": self.seen,
             **({"given": self.given} if self.given.size else {}),
@@ -422,13 +401,7 @@ class Team:
                     f"team: saved {name} has shape {arrays[name].shape}, this team's "
                     f"{own[name].shape}"
                 )
-        words = [int(word) for word in arrays["generator"]]
-        self.rng.bit_generator.state = {
-            "bit_generator": "PCG64",
-            "state": {"state": words[0] << 64 | words[1], "inc": words[2] << 64 | words[3]},
-            "has_uint32": words[4],
-            "uinteger": words[5],
-        }
+        set_words(self.rng, arrays["generator"])
         self.explorer.memory[:] = arrays["explorer"]
         self.seen = arrays["seen"].copy()
         if self.given.size:
@@ -436,15 +409,6 @@ class Team:
         for name, part in {"learner": self.learner, **self._adapting}.items():
             its = {k: array for k, array in arrays.items() if k.startswith(f"{name}.")}
             part.restore({k.removeprefix(f"{name}."): array for k, array in its.items()})
-
-    @property
-    def _adapting(self) -> dict[str, Any]:
-        """What adapts beside the learner, by name."""
-        parts = {
-            "self_model": self.self_model, "calibration": self.calibration,
-            "predictor": self.predictor,
-        }  # fmt: skip
-        return {name: part for name, part in parts.items() if hasattr(part, "arrays")}
 
 
 def _senders(
@@ -461,28 +425,7 @@ def _senders(
     return [sorted(senders, key=hierarchy.order.index) for senders in messages.told]
 
 
-def _self_model_of(scenario: Scenario, settings: LearnerSettings) -> SelfModel | None:
-    if not settings.self_model.enabled:
-        return None
-    if not isinstance(scenario, EmbodiedScenario):
-        raise ValueError("learner.self_model.enabled: the scenario has no bodies on wheels")
-    return SelfModel(settings.self_model, scenario.nominal_effects)
-
-
-def _calibration_of(scenario: Scenario, settings: LearnerSettings) -> Calibration | None:
-    if not settings.calibration.enabled:
-        return None
-    constants = getattr(scenario, "constants", ())
-    if not isinstance(scenario, EmbodiedScenario) or not constants:
-        raise ValueError(
-            "learner.calibration.enabled: the scenario's predictor has no constants to calibrate"
-        )
-    return Calibration(settings.calibration, len(constants), cast(Any, scenario).levers)
-
-
-def _predictor_of(
-    scenario: Scenario, settings: LearnerSettings
-) -> LearnedPredictor | Persistence | None:
+def _predictor_of(scenario: Scenario, settings: LearnerSettings) -> Any:
     if isinstance(settings.predictor, GivenPredictor):
         return None
     named = f"learner.predictor.kind = {settings.predictor.kind!r}"
@@ -494,8 +437,7 @@ def _predictor_of(
                 f"learner.{name}.enabled: revises what the scenario predicts, and {named} predicts "
                 "in its place; use 'given'"
             )
-    predictor: LearnedPredictor | Persistence = settings.predictor.build(scenario)
-    return predictor
+    return settings.predictor.build(scenario)
 
 
 def of_fuzzy_agents(team: Actors) -> Team:
@@ -512,7 +454,3 @@ def of_fuzzy_agents(team: Actors) -> Team:
             "rule bases"
         )
     return team
-
-
-def _no_successor(part: object) -> str:
-    return f"{type(part).__name__} has no continue_from, by which it would go on with another team"

@@ -6,6 +6,8 @@ back, each agent takes its best action given those that were eliminated later. T
 ``A ** (1 + width)``; the width depends on the order, which is that of least fill-in (networkx).
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import NamedTuple
 

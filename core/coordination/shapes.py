@@ -1,5 +1,7 @@
 """Shapes of undirected graphs over agents in their order, and what makes hierarchies of graphs."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from itertools import combinations
 from math import isqrt

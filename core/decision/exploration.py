@@ -61,21 +61,18 @@ class BoltzmannExploration(ExplorationSettings):
     """
 
     kind: Literal["boltzmann"] = "boltzmann"
+    factory: ClassVar[str] = f"{__name__}:Boltzmann"
     max_temperature: Positive = 500.0
     """Temperature that is added at first, T_max."""
     decay: NonNegative = 0.006
     """Decay of the temperature per step, s."""
 
-    def build(self, n_agents: int) -> Explorer:
-        """Return the explorer of a team."""
-        return Boltzmann(self)
 
-
-class Boltzmann:
+class Boltzmann(Explorer):
     """Samples the Boltzmann distribution; the clock counts the steps of the whole run."""
 
-    def __init__(self, settings: BoltzmannExploration | PaperExploration) -> None:
-        self.settings: Any = settings
+    def __init__(self, settings: Any, n_agents: int) -> None:
+        self.settings = settings
         self.memory: FloatArray = np.zeros(1)  # t, the steps counted by the clock
 
     @property
@@ -83,9 +80,6 @@ class Boltzmann:
         """T(t) = 1 + T_max exp(-s t)."""
         s = self.settings
         return 1.0 + s.max_temperature * float(np.exp(-s.decay * self.memory[0]))
-
-    def begin_episode(self) -> None:
-        """Go on counting."""
 
     def continue_from(self, former: Boltzmann) -> None:
         """Go on with the clock."""
@@ -108,6 +102,7 @@ class PaperExploration(ExplorationSettings):
     """
 
     kind: Literal["paper"] = "paper"
+    factory: ClassVar[str] = f"{__name__}:EpsilonDecreasingBoltzmann"
     epsilon: Fraction = 1.0
     """Exploration rate at the start; not printed in the paper."""
     max_temperature: Annotated[float, Field(gt=1)] = 100.0
@@ -120,10 +115,6 @@ class PaperExploration(ExplorationSettings):
     """Take the action of greatest probability (Section V), or sample Eq. 14."""
     explore: Literal["uniform", "boltzmann"] = "uniform"
     """How the "random action" of the other case is drawn; not stated in the paper."""
-
-    def build(self, n_agents: int) -> Explorer:
-        """Return the explorer of a team."""
-        return EpsilonDecreasingBoltzmann(self)
 
 
 class EpsilonDecreasingBoltzmann(Boltzmann):
@@ -173,7 +164,7 @@ class BurstExploration(ExplorationSettings):
     """Mean number of decisions for which a random action is repeated."""
 
 
-class Bursts:
+class Bursts(Explorer):
     """Random actions held for a geometric number of decisions, less often in later episodes."""
 
     def __init__(self, settings: BurstExploration, n_agents: int) -> None:
@@ -208,9 +199,6 @@ class Bursts:
     def continue_from(self, former: Bursts) -> None:
         """Go on counting episodes; bursts end with an episode."""
         self.memory[0] = former.memory[0]
-
-    def advance(self) -> None:
-        """Bursts run down in `choose`."""
 
     def choose(self, agent: int, values: FloatArray, rng: np.random.Generator) -> int:
         """Return the held action, start a burst, or take the greatest."""

@@ -15,10 +15,10 @@ EVALUATORS = SettingsRegistry(
     {
         "auto": f"{__name__}.auto:AutoSettings",
         "exact": f"{__name__}.exact:ExactEnumeration",
-        "sampling": f"{__name__}.sampling:SamplingSettings",
+        "sampling": f"{__name__}.exact:SamplingSettings",
         "variable-elimination": f"{__name__}.coordination:VariableEliminationSettings",
         "max-plus": f"{__name__}.coordination:MaxPlusSettings",
-        "best-response": f"{__name__}.best_response:BestResponse",
+        "best-response": f"{__name__}.best_response:BestResponseSettings",
         "cross-entropy": f"{__name__}.cross_entropy:CrossEntropySettings",
     },
     EvaluatorSettings,

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from . import EVALUATORS
 from .evaluator import MOST_JOINT_ACTIONS, DecisionProblem, Evaluator, EvaluatorSettings
-from .sampling import Samples, SamplingSettings
+from .exact import Samples, SamplingSettings
 
 
 class AutoSettings(EvaluatorSettings):

@@ -21,18 +21,39 @@ If the unseen are expected to keep to the plan, an agent plans for all of whom i
 The number of joint actions tried grows linearly with the number of bodies.
 """
 
-from typing import Any, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
+from pydantic import Field
 
 from ..interface.hierarchy import Hierarchy
 from ..interface.prediction import BestResponses, Exploring, Prediction
 from ..numerics.arrays import FloatArray, IntArray
 from ..numerics.ties import greatest
-from .evaluator import Aggregation, DecisionProblem, Deliberation, combinations
+from ..plugins.settings import unwritten
+from .evaluator import (
+    Aggregation,
+    DecisionProblem,
+    Deliberation,
+    EvaluatorSettings,
+    combinations,
+)
 
 CUTS = (0.25, 0.5, 0.75)
 """Where a team is cut in two, as shares of its bodies in the order of decision."""
+
+
+class BestResponseSettings(EvaluatorSettings):
+    """Best responses around a plan for all that are considered."""
+
+    kind: Literal["best-response"] = "best-response"
+    sweeps: Annotated[int, Field(ge=0, le=100), unwritten(1)] = 1
+    """How often every body improves the plan before anything is decided. Where all hear all that is
+    decided, the decisions are a sweep, too: with 0 they take half the time."""
+
+    def build(self, problem: DecisionProblem) -> Aggregation:
+        """Return the evaluator of a team."""
+        return BestResponse(problem, self.sweeps)
 
 
 class _Known(NamedTuple):
@@ -52,7 +73,14 @@ class _Known(NamedTuple):
 
 
 class BestResponse(Aggregation):
-    """Plans for other agents by one sweep of best responses.
+    """Plans for other agents by sweeps of best responses.
+
+    Parameters
+    ----------
+    problem
+        What all decisions have in common.
+    sweeps
+        How many.
 
     Raises
     ------
@@ -63,8 +91,9 @@ class BestResponse(Aggregation):
 
     plans = True
 
-    def __init__(self, problem: DecisionProblem) -> None:
+    def __init__(self, problem: DecisionProblem, sweeps: int = 1) -> None:
         super().__init__(problem)
+        self._sweeps = sweeps
         why = "best-response plans for 'best-response' only"
         self.require("teammates", "best-response", why)
         hierarchy, groups = problem.hierarchy, problem.groups
@@ -135,7 +164,7 @@ class BestResponse(Aggregation):
         """
         prediction: Any = first.prediction
         by_team = self.problem.rule == "value" and self.problem.value_of == "team"
-        one_plan = {*self._planner} == {first.agent} and self._widest == 1
+        one_plan = {*self._planner} == {first.agent} and self._widest == self._sweeps == 1
         if not (by_team and one_plan and hasattr(prediction, "best_responses")):
             return None
         respond: BestResponses | None = prediction.best_responses(self.rules)
@@ -196,7 +225,7 @@ class BestResponse(Aggregation):
         for i in free:
             bodies.setdefault(self._group_of[i], []).append(i)
         plan, value = self._started(deliberation, free), None
-        for body, members in bodies.items():
+        for body, members in self._sweeps * list(bodies.items()):
             worths = self._valued(deliberation, plan, tuple(members), value)
             # Told apart in agent order, even where the agents of a body decide in another.
             whole = len(members) == len(self.problem.groups[body])

@@ -86,30 +86,26 @@ class CrossEntropy(Aggregation):
             plans = (draws >= ladder).sum(axis=3)
             if best is not None:
                 plans[0] = best
-            found = np.zeros(s.samples)
-            self._follow(deliberation.agent, prediction, plans, np.arange(s.samples), found)
-            elite = plans[np.argsort(-found, kind="stable")[:n_elite]]
+            worths = self._worths(deliberation.agent, prediction, plans)
+            elite = plans[np.argsort(-worths, kind="stable")[:n_elite]]
             best = elite[0]
             seen = (elite[..., None] == np.arange(self.n_actions)).mean(axis=0)
             probabilities = s.smoothing / self.n_actions + (1.0 - s.smoothing) * seen
         assert best is not None
         return best[0]
 
-    def _follow(
-        self,
-        agent: int,
-        prediction: Any,
-        plans: IntArray,
-        rows: IntArray,
-        found: FloatArray,
-        step: int = 0,
-    ) -> None:
-        """Add to `found` ``(samples,)`` what some rows of the plans are paid from a step on."""
-        tried, which = np.unique(plans[rows, step], axis=0, return_inverse=True)
-        which = which.reshape(-1)
-        self.count(agent, len(tried))
-        found[rows] += self.problem.discount**step * prediction.rewards(tried)[which]
-        if step + 1 < self.settings.horizon:
-            for k, joint_action in enumerate(tried):
-                onward = prediction.after(joint_action)
-                self._follow(agent, onward, plans, rows[which == k], found, step + 1)
+    def _worths(self, agent: int, prediction: Any, plans: IntArray) -> FloatArray:
+        """Return what plans ``(samples, horizon, n)`` are paid, predicted once where they agree."""
+        worths = np.zeros(len(plans))
+        waiting = [(prediction, np.arange(len(plans)), 0)]
+        while waiting:
+            seen, rows, step = waiting.pop()
+            tried, which = np.unique(plans[rows, step], axis=0, return_inverse=True)
+            which = which.reshape(-1)
+            self.count(agent, len(tried))
+            worths[rows] += self.problem.discount**step * seen.rewards(tried)[which]
+            if step + 1 < self.settings.horizon:
+                waiting += [
+                    (seen.after(j), rows[which == k], step + 1) for k, j in enumerate(tried)
+                ]
+        return worths

@@ -1,4 +1,10 @@
-"""What an evaluator is and what it is asked, and what those share that try joint actions."""
+"""What an evaluator is and what it is asked, and what those share that try joint actions.
+
+In the mean value of several agents each thing that they share is valued once. A rule base is a sum
+of terms. What a term of common variables is worth to all agents is what it is worth to one that has
+the sum of their consequent weights; likewise for the agents of one body and the variables that they
+share. So the mean of many agents costs little more than the value of a few.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -7,11 +13,63 @@ from typing import Any, ClassVar, Literal, NamedTuple, Protocol
 import numpy as np
 
 from ..interface.hierarchy import Hierarchy
-from ..interface.prediction import Prediction
+from ..interface.prediction import Prediction, states_by_group
 from ..numerics.arrays import FloatArray, IntArray
 from ..plugins.settings import PartSettings
 from ..rules.rule_base import RuleBase
-from .pooled import Pooled, Pooling
+
+
+class Pooled(NamedTuple):
+    """The consequent weights of k agents of b bodies, summed where they see the same."""
+
+    weights: tuple[FloatArray, FloatArray, FloatArray]
+    """Of the agents ``(k, n_rules)``, of their bodies ``(b, n_rules)``, of all ``(1, n_rules)``."""
+    agents: IntArray
+    """``(k,)`` which agents they are."""
+    bodies: IntArray
+    """``(b,)`` which bodies they are."""
+    firsts: IntArray
+    """``(b + 1,)`` the first agent of every body among them, and k."""
+
+
+class Pooling:
+    """Means of the values of agents.
+
+    Parameters
+    ----------
+    rules
+        The agents' rule base.
+    groups
+        Agents by body: their shared variables are the same.
+    """
+
+    def __init__(self, rules: RuleBase, groups: tuple[tuple[int, ...], ...]) -> None:
+        self._rules, self._groups = rules, groups
+        self._body_of = np.array([g for g, group in enumerate(groups) for _ in group])
+        sharing = [rules.shared_by(term) for term in rules.terms]
+        own, body, common = (
+            np.array([t for t, by in enumerate(sharing) if by == kind], dtype=np.int64)
+            for kind in ("agent", "body", "all")
+        )
+        self._kinds = own, body, common
+
+    def pooled(self, weights: Sequence[FloatArray], agents: IntArray) -> Pooled:
+        """Return the weights of some agents in agent order; `weights` are those of all agents."""
+        theta = np.array([weights[i] for i in agents], dtype=float)
+        bodies, firsts = np.unique(self._body_of[agents], return_index=True)
+        summed = np.add.reduceat(theta, firsts, axis=0), theta.sum(axis=0)[None]
+        return Pooled((theta, *summed), agents, bodies, np.append(firsts, len(agents)))
+
+    def mean(self, pooled: Pooled, prediction: Prediction, joint_actions: IntArray) -> FloatArray:
+        """Return the mean value ``(m,)`` of the pooled agents after joint actions ``(m, n)``."""
+        own, shared = states_by_group(prediction, joint_actions, self._groups, self._rules.n_own)
+        if len(pooled.bodies) < len(shared):
+            shared = shared[pooled.bodies]
+        total = self._rules.total(
+            pooled.weights, pooled.agents, pooled.firsts, self._kinds, own, shared
+        )
+        return total / len(pooled.agents)
+
 
 Rule = Literal["value", "reward", "reward-and-value"]
 """By what a joint action is valued."""
@@ -142,14 +200,6 @@ def combinations(agents: tuple[int, ...], n_actions: int) -> IntArray:
     return np.ascontiguousarray(grid.T, dtype=np.int64)
 
 
-def probabilities_of(frequencies: FloatArray, below: tuple[int, ...]) -> FloatArray:
-    """Return the probability ``(A ** k,)`` of each joint action of the k agents below."""
-    probabilities = np.ones(1)
-    for agent in below:
-        probabilities = np.multiply.outer(probabilities, frequencies[agent]).ravel()
-    return probabilities / probabilities.sum()
-
-
 def concerned(hierarchy: Hierarchy, value_of: ValueOf) -> list[IntArray]:
     """Return, for every agent, the agents whose values decide what it does, in agent order.
 
@@ -241,7 +291,7 @@ class Aggregation:
             self._last = weights, concerned, self._pooling.pooled(weights, concerned)
         return self._last[2]
 
-    def by_states(self, deliberation: Deliberation, tried: IntArray) -> FloatArray:
+    def worths(self, deliberation: Deliberation, tried: IntArray) -> FloatArray:
         """Value ``(A, m)`` each own action with each of the joint actions `tried` ``(m, k)``."""
         agent, a = deliberation.agent, self.n_actions
         joint = np.tile(deliberation.joint_action, (a * len(tried), 1))
@@ -257,11 +307,24 @@ class Aggregation:
             return rewards()
         return rewards() + self.problem.discount * values()
 
-    def aggregate(self, values: FloatArray, probabilities: FloatArray | None) -> FloatArray:
-        """Return per row ``(A, m)`` the maximum, mean or weighted mean, by the teammate model.
+    def aggregate(
+        self, deliberation: Deliberation, tried: IntArray, probabilities: FloatArray | None
+    ) -> FloatArray:
+        """Return the maximum, mean or weighted mean ``(A,)`` of worths, by the teammate model.
 
-        Probabilities are ``(m,)``, or ``(A, m)`` where they depend on the own action.
+        Parameters
+        ----------
+        deliberation
+            Whose.
+        tried
+            ``(m, k)`` joint actions of the agents below.
+        probabilities
+            Of these ``(m,)``, or ``(A, m)`` where they depend on the own action; none: equal ones.
         """
+        if self.indifferent(deliberation):
+            self.count(deliberation.agent, self.n_actions * len(tried))
+            return np.zeros(self.n_actions)
+        values = self.worths(deliberation, tried)
         if self.problem.teammates == "best-response":
             return values.max(axis=1)
         if probabilities is not None and probabilities.ndim == 2:

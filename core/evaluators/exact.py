@@ -1,12 +1,25 @@
-"""Every joint action of the agents below."""
+"""Every joint action of the agents below, or a random sample of them."""
 
-from typing import Any
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
+from pydantic import Field
 
 from ..numerics.arrays import FloatArray, IntArray
 from ..rules.kernels.enumeration import Tried
-from .evaluator import Aggregation, DecisionProblem, Deliberation, combinations, probabilities_of
+from .evaluator import Aggregation, DecisionProblem, Deliberation, EvaluatorSettings, combinations
+
+TABLES = ("blocks", "reward_table")
+"""What predictions have that know what all joint actions lead to."""
+Samples = Annotated[int, Field(ge=1, le=1_000_000)]
+
+
+def probabilities_of(frequencies: FloatArray, below: tuple[int, ...]) -> FloatArray:
+    """Return the probability ``(A ** k,)`` of each joint action of the k agents below."""
+    probabilities = np.ones(1)
+    for agent in below:
+        probabilities = np.multiply.outer(probabilities, frequencies[agent]).ravel()
+    return probabilities / probabilities.sum()
 
 
 class ExactEnumeration(Aggregation):
@@ -46,10 +59,9 @@ class ExactEnumeration(Aggregation):
         """Return the value ``(A,)`` of each action of the deciding agent."""
         agent, problem = deliberation.agent, self.problem
         prediction: Any = deliberation.prediction
-        tabulated = bool(self._tried) and hasattr(prediction, "blocks")
-        own = len(self.concerned[agent]) == 1
         conditional = problem.teammates == "conditional"
-        if tabulated and own and problem.rule == "value" and not conditional:
+        own_value = problem.rule == "value" and len(self.concerned[agent]) == 1
+        if own_value and not conditional and self._tried and hasattr(prediction, "blocks"):
             tried = self._tried[agent]
             self.count(agent, tried[0].size)
             empirical = problem.teammates == "empirical"
@@ -60,20 +72,18 @@ class ExactEnumeration(Aggregation):
                 deliberation.joint_action,
                 deliberation.frequencies if empirical else self._expected,
             )
-        below, combined = self.hierarchy.below(agent), self._below[agent]
-        if self.indifferent(deliberation):
-            self.count(agent, self.n_actions * len(combined))
-            return np.zeros(self.n_actions)
-        probabilities = None
+        below, probabilities = self.hierarchy.below(agent), None
         if problem.teammates == "empirical":
             probabilities = probabilities_of(deliberation.frequencies, below)
         elif conditional:
             probabilities = np.stack([probabilities_of(rows, below) for rows in deliberation.given])
-        if tabulated and hasattr(prediction, "reward_table"):
-            table = self._by_tables(deliberation)
-        else:
-            table = self.by_states(deliberation, combined)
-        return self.aggregate(table, probabilities)
+        return self.aggregate(deliberation, self._below[agent], probabilities)
+
+    def worths(self, deliberation: Deliberation, tried: IntArray) -> FloatArray:
+        """Value each own action with each of the joint actions below, from tables if there are."""
+        if self._tried and all(hasattr(deliberation.prediction, name) for name in TABLES):
+            return self._by_tables(deliberation)
+        return super().worths(deliberation, tried)
 
     def _by_tables(self, deliberation: Deliberation) -> FloatArray:
         """Value ``(A, m)`` each own action with each joint action below, by anything."""
@@ -100,3 +110,53 @@ class ExactEnumeration(Aggregation):
             ]
             self._means = of, np.mean(values, axis=0)
         return self._means[1]
+
+
+class SamplingSettings(EvaluatorSettings):
+    """Try a random sample of the joint actions of the agents below."""
+
+    kind: Literal["sampling"] = "sampling"
+    factory: ClassVar[str] = f"{__name__}:Sampling"
+    samples: Samples = 64
+    """Joint actions of the agents below that are tried with each own action."""
+
+
+class Sampling(Aggregation):
+    """Tries a random sample of the joint actions below, the same ones for every own action.
+
+    Drawn with equal probability, or from the empirical frequencies if these are the teammate model
+    (then the plain mean estimates the weighted one). With no more joint actions than samples, all
+    are tried.
+
+    Raises
+    ------
+    ValueError
+        If the teammate model is conditional on the own action.
+    """
+
+    def __init__(self, settings: SamplingSettings, problem: DecisionProblem) -> None:
+        super().__init__(problem)
+        if problem.teammates == "conditional":
+            raise ValueError(
+                "learner.decision.teammates = 'conditional': sampling evaluates best-response, "
+                "uniform, empirical; use exact"
+            )
+        self.samples = settings.samples
+
+    def values(self, deliberation: Deliberation) -> FloatArray:
+        """Return the value ``(A,)`` of each action of the deciding agent."""
+        below, a = self.hierarchy.below(deliberation.agent), self.n_actions
+        frequencies, rng = deliberation.frequencies, deliberation.rng
+        empirical = self.problem.teammates == "empirical"
+        probabilities = None
+        if a ** len(below) <= self.samples:
+            tried = combinations(below, a)
+            if empirical:
+                probabilities = probabilities_of(frequencies, below)
+        elif empirical:
+            ladder = frequencies[list(below)].cumsum(axis=1)[:, :-1]
+            draws = rng.random((self.samples, len(below), 1))
+            tried = (draws >= ladder).sum(axis=2)
+        else:
+            tried = rng.integers(a, size=(self.samples, len(below)))
+        return self.aggregate(deliberation, tried, probabilities)

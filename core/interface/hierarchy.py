@@ -22,6 +22,8 @@ actions of the other, as if it were below, and neither is told what the other do
 joint-action learners (everybody is everybody's neighbour) and coordination graphs (few are).
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterable, Sequence
 from typing import Annotated, Any, Literal
 
@@ -29,6 +31,8 @@ from pydantic import AfterValidator
 
 from ..plugins.deferred import nx
 
+ARROW, LINE = "{} -> {}", "{} - {}"
+"""How a superior and its subordinate are written, and two neighbours."""
 WHERE = ("body", "next", "farther")
 """In which body another agent is: in the same one, in the next one, or farther away."""
 
@@ -104,8 +108,8 @@ class Hierarchy:
                 f"hierarchy: considers = {considers!r}: neighbours consider each other; without "
                 "neighbours use independent"
             )
-        _check_edges(edges, agents, _arrow, "superior")
-        _check_edges([tuple(sorted(pair)) for pair in sides], agents, _line, "neighbour")
+        _check_edges(edges, agents, ARROW, "superior")
+        _check_edges([tuple(sorted(pair)) for pair in sides], agents, LINE, "neighbour")
         index = {name: i for i, name in enumerate(agents)}
         graph = nx.DiGraph()
         graph.add_nodes_from(range(len(agents)))
@@ -123,7 +127,7 @@ class Hierarchy:
         beside: list[set[int]] = [set() for _ in agents]
         for a, b in self.neighbours:
             if nx.has_path(graph, a, b) or nx.has_path(graph, b, a):
-                pair = _line((agents[a], agents[b]))
+                pair = LINE.format(agents[a], agents[b])
                 raise ValueError(f"hierarchy: neighbours {pair} are superior and subordinate, too")
             beside[a].add(b)
             beside[b].add(a)
@@ -148,8 +152,8 @@ class Hierarchy:
         return len(self.agents)
 
     def __repr__(self) -> str:
-        pairs = [_arrow((self.agents[a], self.agents[b])) for a, b in self.edges]
-        pairs += [_line((self.agents[a], self.agents[b])) for a, b in self.neighbours]
+        pairs = [ARROW.format(self.agents[a], self.agents[b]) for a, b in self.edges]
+        pairs += [LINE.format(self.agents[a], self.agents[b]) for a, b in self.neighbours]
         named = ", ".join(pairs)
         return f"Hierarchy({len(self)} agents: {named or 'no edges'})"
 
@@ -191,30 +195,18 @@ RELATIONS: dict[str, Callable[[nx.DiGraph, int], Iterable[int]]] = {
 
 
 def _check_edges(
-    edges: Sequence[tuple[str, ...]],
-    agents: tuple[str, ...],
-    shown: Callable[[tuple[str, ...]], str],
-    kind: str,
+    edges: Sequence[tuple[str, ...]], agents: tuple[str, ...], form: str, kind: str
 ) -> None:
-    """Refuse an edge of an unknown agent, to itself, or given twice."""
     known, seen = set(agents), set()
     for edge in edges:
         for name in edge:
             if name not in known:
                 raise ValueError(
-                    f"hierarchy: edge {shown(edge)} names unknown agent {name!r}, known: "
+                    f"hierarchy: edge {form.format(*edge)} names unknown agent {name!r}, known: "
                     f"{', '.join(agents)}"
                 )
         if edge[0] == edge[1]:
             raise ValueError(f"hierarchy: agent {edge[0]!r} cannot be its own {kind}")
         if edge in seen:
-            raise ValueError(f"hierarchy: edge {shown(edge)} is given more than once")
+            raise ValueError(f"hierarchy: edge {form.format(*edge)} is given more than once")
         seen.add(edge)
-
-
-def _arrow(edge: tuple[str, ...]) -> str:
-    return f"{edge[0]} -> {edge[1]}"
-
-
-def _line(edge: tuple[str, ...]) -> str:
-    return f"{edge[0]} - {edge[1]}"

@@ -16,10 +16,6 @@ import numpy as np
 from ..numerics.arrays import FloatArray, IntArray
 
 
-def _no_rows() -> IntArray:
-    return np.zeros(0, dtype=np.int64)
-
-
 @dataclass(frozen=True)
 class Blocks:
     """Next states of one agent for all joint actions, in their two blocks.
@@ -37,10 +33,10 @@ class Blocks:
     divisor: int
     """``A`` to the power of the number of agents behind the group: the robot-action index of
     joint-action index ``c`` is ``c // divisor % A ** w``."""
-    own_rows: IntArray = field(default_factory=_no_rows)
+    own_rows: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     """``(A ** w,)`` the row of `own` of every robot-action index, where several lead to one; empty:
     each has its row."""
-    shared_rows: IntArray = field(default_factory=_no_rows)
+    shared_rows: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     """``(A ** n,)`` the row of `shared` of every joint-action index; empty: each has its row."""
     alone: bool = False
     """Whether own variables are those that the group would reach alone, which is an approximation
@@ -119,8 +115,7 @@ def states_by_group(
     """Return the own variables ``(n, m, n_own)`` and the shared ones ``(G, m, d - n_own)``."""
     own_way = getattr(prediction, "states_by_group", None)
     if own_way is not None:
-        parts: tuple[FloatArray, FloatArray] = own_way(joint_actions)
-        return parts
+        return own_way(joint_actions)
     each = range(joint_actions.shape[1])
     states = np.stack([prediction.states(i, joint_actions) for i in each])
     return states[:, :, :n_own], states[[group[0] for group in groups], :, n_own:]

@@ -186,21 +186,7 @@ def can_draw(scenario: Scenario) -> bool:
 def groups_of(scenario: Scenario) -> tuple[tuple[int, ...], ...]:
     """Return the agents by body, consecutive; of a scenario without ``groups``, each alone."""
     single = tuple((i,) for i in range(len(scenario.agents)))
-    groups: tuple[tuple[int, ...], ...] = getattr(scenario, "groups", single)
-    return groups
-
-
-def joint_reward(reward: float | FloatArray, groups: Sequence[Sequence[int]]) -> float | FloatArray:
-    """Return the reward of those who act for groups of agents: the mean of each group's rewards.
-
-    Examples
-    --------
-    >>> joint_reward(0.5, [(0, 1)]), joint_reward(np.array([1.0, 3.0, 5.0]), [(0, 1), (2,)])
-    (0.5, array([2., 5.]))
-    """
-    if np.ndim(reward) == 0:
-        return reward
-    return np.array([np.asarray(reward)[list(group)].mean() for group in groups])
+    return getattr(scenario, "groups", single)
 
 
 def roles_of(scenario: Scenario) -> tuple[str, ...]:
@@ -208,5 +194,103 @@ def roles_of(scenario: Scenario) -> tuple[str, ...]:
 
     Of a scenario without ``roles``, every agent has its own.
     """
-    roles: tuple[str, ...] = getattr(scenario, "roles", tuple(scenario.agents))
-    return roles
+    return getattr(scenario, "roles", tuple(scenario.agents))
+
+
+def rows_of(scenario: Scenario, *, shared: bool) -> IntArray:
+    """Return the row of weights of every agent ``(n,)``: its own, or that of its role.
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace
+    >>> three = SimpleNamespace(agents=("a.left", "a.right", "b.left"), roles=("l", "r", "l"))
+    >>> rows_of(three, shared=True).tolist(), rows_of(three, shared=False).tolist()
+    ([0, 1, 0], [0, 1, 2])
+    """
+    owners = roles_of(scenario) if shared else tuple(scenario.agents)
+    names = list(dict.fromkeys(owners))
+    return np.array([names.index(owner) for owner in owners])
+
+
+def carried_rows(former: Scenario, scenario: Scenario, *, shared: bool) -> IntArray:
+    """Return the row of weights of a scenario's team that each row of another's goes on from.
+
+    Parameters
+    ----------
+    former, scenario
+        The scenario that was learned in, and the one that follows.
+    shared
+        Whether weights are those of roles; if not, the agents must be the same.
+
+    Returns
+    -------
+    IntArray
+        ``(n_rows,)`` rows of the weights of `former`.
+
+    Raises
+    ------
+    ValueError
+        If state space, actions, or whose weights there are differ; one line.
+
+    Examples
+    --------
+    >>> from nested_agents.scenarios.line_up import LineUpSettings
+    >>> one, three = (LineUpSettings(carts=carts).build() for carts in (1, 3))
+    >>> carried_rows(one, three, shared=True).tolist()
+    [0]
+    """
+    trained, acting = (
+        f"{len(s.agents)} agents over {s.state_space.name!r}" for s in (former, scenario)
+    )
+    problem = f"a team trained with {trained} cannot act with {acting}"
+    if former.state_space != scenario.state_space:
+        raise ValueError(f"{problem}: the state spaces differ")
+    if former.action_set != scenario.action_set:
+        raise ValueError(f"{problem}: the actions differ")
+    owners, others = (
+        list(dict.fromkeys(roles_of(s) if shared else s.agents)) for s in (former, scenario)
+    )
+    if set(owners) != set(others):
+        raise ValueError(
+            f"{problem}: their roles are {', '.join(owners)}, and {', '.join(others)}"
+            if shared
+            else f"{problem}: learner.weights = 'own'; with 'role', agents of a role share theirs"
+        )
+    return np.array([owners.index(owner) for owner in others])
+
+
+class Actors(Protocol):
+    """Those who act in a scenario: a hierarchy of fuzzy agents, or a learner that trains by itself.
+
+    Their calls come in this order: `begin_episode`, `predict`, `check`, and at every step `act`,
+    `adapt`, `predict`, `learn`; then `end_episode`. Where nothing is learned, only `predict`,
+    `check` and `act` come, without `explore`. Those who have ``begin_world(seed, episode)`` hear of
+    every world that begins, learned in or not: they have failures that follow from its seed.
+    """
+
+    rng: np.random.Generator
+    """Source of all that is random in what they do."""
+
+    def begin_episode(self) -> None:
+        """Note that an episode begins."""
+
+    def predict(self, scenario: Scenario, states: FloatArray) -> Any:
+        """Return what they decide by, in the scenario's present state, of states ``(n, d)``."""
+
+    def check(self, prediction: Any) -> None:
+        """Refuse what they cannot decide by with a ValueError of one line."""
+
+    def act(self, prediction: Any, *, explore: bool = True) -> IntArray:
+        """Return a joint action ``(n,)``; without `explore` the best that they know."""
+
+    def adapt(self, prediction: Any, joint_action: IntArray, transition: Transition) -> None:
+        """Revise what predictions rest on."""
+
+    def learn(self, transition: Transition) -> None:
+        """Take in what a step led to."""
+
+    def end_episode(self) -> None:
+        """Learn what is learned after an episode."""
+
+    def arrays(self) -> dict[str, FloatArray]:
+        """Return what they have learned."""

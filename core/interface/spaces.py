@@ -149,6 +149,12 @@ class StateSpace:
         return low, high - low
 
     @property
+    def bounds(self) -> FloatArray:
+        """Between which states lie ``(d, 2)``: those of periodic variables within their period."""
+        any_ = (-np.inf, np.inf)
+        return np.array([(v.low, v.high) if v.periodic else any_ for v in self.variables])
+
+    @property
     def n_variables(self) -> int:
         """Number of state variables d."""
         return len(self.variables)

@@ -9,7 +9,7 @@ Agents that share weights share the regression: the experience of all of them is
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -26,11 +26,14 @@ REWARD_SCALE = 100.0
 """Rewards are of the order of 0.01; the ridge weighs against rewards times this."""
 MOST_RULES = 4096
 """Of one agent: more make normal equations that take too long to be solved densely."""
+Function = Callable[[FloatArray], FloatArray]
 
 
-class ReplaySettings(LearnerSettings):
-    """What learners share that regress on all experience, after every episode and during it."""
+class BatchTDSettings(LearnerSettings):
+    """Batch TD(lambda): towards what followed, regressing on all experience."""
 
+    kind: Literal["batch-td"] = "batch-td"
+    factory: ClassVar[str] = f"{__name__}:BatchTD"
     ridge: Positive = 10.0
     """Weight of the squared consequents against squared errors of rewards scaled by 100: larger, if
     values are jagged; smaller, if they are flat."""
@@ -43,15 +46,17 @@ class ReplaySettings(LearnerSettings):
     """Decisions of an episode after which is regressed without waiting for its end."""
     mirrored: bool = False
     """Whether what the mirror image of the team would have met is experience as well."""
-
-
-class BatchTDSettings(ReplaySettings):
-    """Batch TD(lambda): towards what followed."""
-
-    kind: Literal["batch-td"] = "batch-td"
-    factory: ClassVar[str] = f"{__name__}:BatchTD"
     trace_decay: Fraction = 0.0
     """Trace decay lambda: 0 bootstraps from the next state, 1 sums the rewards of an episode."""
+
+
+def solver(gram: FloatArray) -> Function:
+    """Return what solves ``gram theta = moment`` for theta, the matrix being factored once."""
+    from scipy.linalg import cho_factor
+    from scipy.linalg.lapack import dpotrs  # `cho_solve` without what that does around it
+
+    factor, lower = cho_factor(gram, check_finite=False)
+    return lambda moment: dpotrs(factor, moment, lower)[0]
 
 
 class Earlier(NamedTuple):
@@ -118,31 +123,39 @@ class BatchTD:
             self._follower[-1] = CUT_OFF
 
     def _regress(self) -> int:
-        from scipy.linalg import cho_factor
-        from scipy.linalg.lapack import dpotrs  # `cho_solve` without what that does around it
-
+        """Return how many weights have changed: all of them."""
         self._extend()
         s = self.settings
-        for row, (active, strengths) in enumerate(self._active):
+        for row, (taken, strengths) in enumerate(self._active):
             rewards, follower = self._outcomes(row)
             rewards = REWARD_SCALE * rewards
-            known = (follower != CUT_OFF).astype(float)
+            weights, values_of, solve = self._equations(row, (follower != CUT_OFF).astype(float))
             low, high = np.array([rewards.min(), rewards.max()]) / (1.0 - s.discount)
-            gram = s.ridge * np.eye(self.rules.n_rules)
-            regression.add_gram(gram, active, strengths, known)
-            factor, lower = cho_factor(gram, check_finite=False)
             theta = self.theta[row].astype(float) * REWARD_SCALE
             for _ in range(s.regression_iterations):
-                values = regression.row_values(theta, active, strengths)
                 returns = regression.lambda_returns(
-                    values, rewards, follower, s.discount, s.trace_decay
+                    values_of(theta), rewards, follower, s.discount, s.trace_decay
                 )
-                targets = known * np.clip(returns, low, high)
-                moment = regression.moment(active, strengths, targets, self.rules.n_rules)
-                theta, _ = dpotrs(factor, moment, lower)
+                targets = weights * np.clip(returns, low, high)
+                theta = solve(regression.moment(taken, strengths, targets, theta.size))
             change = theta / REWARD_SCALE - self.theta[row]
             self.theta[row] += s.target_averaging_rate * change
         return self.theta.size
+
+    def _equations(self, row: int, known: FloatArray) -> tuple[FloatArray, Function, Function]:
+        """Return the weights ``(N,)`` of after-states, and how their values and theta follow.
+
+        Parameters
+        ----------
+        row
+            Whose.
+        known
+            ``(N,)`` 1 for after-states of which it is known what followed, 0 for others.
+        """
+        active, strengths = self._active[row]
+        gram = self.settings.ridge * np.eye(self.rules.n_rules)
+        regression.add_gram(gram, active, strengths, known)
+        return known, lambda theta: regression.row_values(theta, active, strengths), solver(gram)
 
     def _extend(self) -> None:
         """Find the active rules of the after-states that are new since the last regression."""

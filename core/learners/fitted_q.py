@@ -31,9 +31,8 @@ from ..plugins.plugged import Plugged
 from ..plugins.settings import Positive
 from ..rules.kernels import regression
 from ..rules.kernels.fuzzy import Partition
-from ..rules.kernels.regression import CUT_OFF
 from ..rules.rule_base import RuleBase
-from .batch import REWARD_SCALE, BatchTD
+from .batch import BatchTD, Function, solver
 from .learner import LearnerSettings
 
 NOBODY = "nobody"
@@ -54,6 +53,7 @@ class FittedQSettings(LearnerSettings):
     """Share of the way that the weights go towards the last regression's."""
     interval: Annotated[int, Field(ge=1)] = 1_000_000
     """Decisions of an episode after which is regressed without waiting for its end."""
+    trace_decay: ClassVar[float] = 0.0
     forgetting: Annotated[float, Field(ge=0, lt=1)] = 0.0
     """Share of its weight that experience loses from regression to regression: what it was worth to
     act so depends on what the others did then."""
@@ -132,8 +132,7 @@ class FittedQ(BatchTD):
         self.counts.joint_actions += self._n_actions
         self.counts.rule_evaluations += len(deliberation.own_weights)
         weights = deliberation.own_weights.reshape(-1, self._n_actions)
-        values: FloatArray = strengths[0] @ weights[active[0]]
-        return values
+        return strengths[0] @ weights[active[0]]
 
     def observe(  # type: ignore[override]  # what is asked for by name is given
         self,
@@ -152,34 +151,24 @@ class FittedQ(BatchTD):
         active, strengths = self._known.active(states[:, :-1])
         return active * self._n_actions + states[:, -1:].astype(np.int64), strengths
 
-    def _regress(self) -> int:
-        from scipy.linalg import cho_factor
-        from scipy.linalg.lapack import dpotrs
+    def _equations(self, row: int, known: FloatArray) -> tuple[FloatArray, Function, Function]:
+        """As in batch TD, action by action; a state is worth its best action."""
+        (taken, strengths), n_actions = self._active[row], self._n_actions
+        active, ridge = taken // n_actions, self.settings.ridge * np.eye(self._known.n_rules)
+        gram, weights = self._sums(row, known)
+        solvers = [solver(own + ridge) for own in gram]
 
-        self._extend()
-        s, n_actions = self.settings, self._n_actions
-        for row, (taken, strengths) in enumerate(self._active):
-            active = taken // n_actions
-            rewards, follower = self._outcomes(row)
-            rewards = REWARD_SCALE * rewards
-            gram, weights = self._sums(row, (follower != CUT_OFF).astype(float))
-            ridge = s.ridge * np.eye(self._known.n_rules)
-            factors = [cho_factor(own + ridge, check_finite=False) for own in gram]
-            low, high = np.array([rewards.min(), rewards.max()]) / (1.0 - s.discount)
-            theta = self.theta[row].astype(float).reshape(-1, n_actions) * REWARD_SCALE
-            for _ in range(s.regression_iterations):
-                columns = np.ascontiguousarray(theta.T)
-                each = [regression.row_values(own, active, strengths) for own in columns]
-                best = np.max(each, axis=0)
-                returns = regression.lambda_returns(best, rewards, follower, s.discount, 0.0)
-                targets = weights * np.clip(returns, low, high)
-                moment = regression.moment(taken, strengths, targets, theta.size)
-                columns = moment.reshape(-1, n_actions).T
-                solved = zip(factors, columns, strict=True)
-                theta = np.stack([dpotrs(f[0], own, f[1])[0] for f, own in solved], axis=1)
-            change = theta.ravel() / REWARD_SCALE - self.theta[row]
-            self.theta[row] += s.target_averaging_rate * change
-        return self.theta.size
+        def values_of(theta: FloatArray) -> FloatArray:
+            columns = np.ascontiguousarray(theta.reshape(-1, n_actions).T)
+            return np.max(
+                [regression.row_values(own, active, strengths) for own in columns], axis=0
+            )
+
+        def solve(moment: FloatArray) -> FloatArray:
+            columns = zip(solvers, moment.reshape(-1, n_actions).T, strict=True)
+            return np.stack([solve_one(own) for solve_one, own in columns], axis=1).ravel()
+
+        return weights, values_of, solve
 
     def _sums(self, row: int, known: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the sums of phi phi' ``(A, k, k)`` of a row, and the weights ``(N,)`` in them.

@@ -14,8 +14,7 @@ from ..interface.spaces import ActionSet, StateSpace
 from ..numerics.arrays import FloatArray
 from ..plugins.plugged import Plugged
 from ..plugins.settings import PartSettings, unwritten
-from ..rules.rule_base import RuleBase
-from ..rules.settings import RuleBaseSettings
+from ..rules.rule_base import RuleBase, RuleBaseSettings
 
 
 class Learner(Protocol):

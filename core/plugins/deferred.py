@@ -37,17 +37,4 @@ else:
     nx, pd = Deferred("networkx"), Deferred("pandas")
     optimize, special, stats = map(Deferred, ("scipy.optimize", "scipy.special", "scipy.stats"))
 
-__all__ = ["Deferred", "located", "nx", "optimize", "pd", "special", "stats"]
-
-
-def located(place: str) -> Any:
-    """Return what ``"package.module:Name"`` names; without a name, the module.
-
-    >>> located("math:pi")
-    3.141592653589793
-    """
-    module, _, attribute = place.partition(":")
-    value: Any = import_module(module)
-    for part in filter(None, attribute.split(".")):
-        value = getattr(value, part)
-    return value
+__all__ = ["Deferred", "nx", "optimize", "pd", "special", "stats"]

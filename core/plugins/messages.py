@@ -75,6 +75,7 @@ def rule(message: str) -> str:
     message = re.sub(r"^\w+ should have (.*) after validation", r"must have \1", message)
     return (
         message.replace("a valid ", "a ")
+        .replace("Field required", "must have all keys that it needs")
         .replace("less than or equal to", "at most")
         .replace("greater than or equal to", "at least")
     )

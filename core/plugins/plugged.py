@@ -2,19 +2,23 @@
 
 What has settings is known to a registry by its *settings model*, whose method `build` makes the
 thing. A class with a nested ``Settings`` stands for the model that builds it; a function for one
-whose fields are its annotated keyword-only parameters.
+whose fields are its annotated keyword-only parameters, documented as its docstring does.
 """
 
+import re
 from collections.abc import Callable, Mapping
-from inspect import isfunction, signature
-from typing import Any, Literal, cast
+from inspect import getdoc, isfunction, signature
+from typing import Annotated, Any, Literal, cast
 
-from pydantic import create_model
+from pydantic import Field, create_model
 from pydantic_core import PydanticCustomError, core_schema
 
 from . import sources
 from .registry import Registry
 from .settings import Settings, tuples
+
+MEANING = re.compile(r"^(\w+)\n((?:    .*\n?)+)", re.MULTILINE)
+"""A parameter in a docstring: its name, and what is said of it, indented."""
 
 
 class SettingsRegistry(Registry):
@@ -113,11 +117,14 @@ class SettingsRegistry(Registry):
                     raise ValueError(f"{self.kind} {name!r}: {error}{lacks}") from None
                 try:
                     return thing(*given, **named)
-                except (ValueError, OSError):  # its own words
+                except OSError:
                     raise
                 except Exception as error:
-                    raised = f"{sources.format_error(error)}{sources.place(error)}"
-                    raise ValueError(f"{self.kind} {name!r} raises {raised}") from error
+                    where = sources.place(error)
+                    raised = f"{self.kind} {name!r} raises {sources.format_error(error)}"
+                    if isinstance(error, ValueError):  # its own words
+                        raised = f"{sources.message(error)}{',' if where else ''}"
+                    raise ValueError(f"{raised}{where}") from error
 
             model.build = build  # type: ignore[attr-defined]
         return cast(type[Settings], model)
@@ -134,15 +141,20 @@ class SettingsRegistry(Registry):
 
 
 def _parameters(thing: Any) -> dict[str, Any]:
-    """Return type and default of each annotated keyword-only parameter of a function, by name."""
+    """Return type and default of each annotated keyword-only parameter of a function, by name.
+
+    What the section "Parameters" of its docstring, in the form of numpydoc, says of each goes with
+    the type.
+    """
     if not isfunction(thing):
         return {}
+    section = getdoc(thing) or ""
+    meanings = dict(MEANING.findall(section.partition("Parameters\n----------\n")[2]))
     fields: dict[str, Any] = {}
-    for p in signature(thing).parameters.values():
+    for p in signature(thing, eval_str=True).parameters.values():
         if p.kind is p.KEYWORD_ONLY and p.annotation is not p.empty:
-            is_text = isinstance(p.annotation, str)  # as postponed annotations are
-            type_ = eval(p.annotation, thing.__globals__) if is_text else p.annotation
-            fields[p.name] = type_, ... if p.default is p.empty else p.default
+            of_type = cast(Any, Annotated)[p.annotation, Field(description=meanings.get(p.name))]
+            fields[p.name] = of_type, ... if p.default is p.empty else p.default
     return fields
 
 

@@ -14,10 +14,10 @@ import os
 import sys
 from collections.abc import Mapping
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any
 
 from . import sources
-from .deferred import located
 from .messages import closest
 
 
@@ -97,7 +97,7 @@ class Registry:
         if place is None:
             raise ValueError(f"{closest(name, self.names())}, or one of your own as file.py:NAME")
         try:
-            return located(place)
+            return resolve_name(place)
         except Exception as error:
             if name in self.built_in:
                 raise

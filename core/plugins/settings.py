@@ -6,11 +6,11 @@ ranges when it is built; every field is documented beside it, with its unit.
 
 from collections.abc import Mapping
 from decimal import Decimal
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
-from .deferred import located
 from .messages import one_line
 
 NonNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -22,33 +22,38 @@ MOST_BYTES, MOST_SECONDS = 10**9, 5
 """What a worker may hold, and a decision of the whole team take."""
 
 
-def check_team(agents: int, seconds_per_pair: float) -> None:
-    """Refuse a team that would be too large by an estimate, before anything is allocated.
+def team_size(seconds_per_pair: float, agents: int = 1) -> AfterValidator:
+    """Return what refuses a team that is too large by an estimate, before anything is allocated.
 
     A worker holds 28 bytes for every pair of agents, and 0.2 GB without them, as measured with
     chains of up to 4,096 agents (``python -m benchmarks.decisions``).
 
     Parameters
     ----------
-    agents
-        How many there would be.
     seconds_per_pair
-        What a decision is estimated to take, over the square of their number [s].
+        What a decision is estimated to take, over the square of the number of agents [s].
+    agents
+        How many agents each of those has that are counted.
 
     Examples
     --------
-    >>> check_team(10_000, 5e-9)
+    >>> team_size(5e-9).func(10_000)
     Traceback (most recent call last):
     ValueError: a worker would hold 3 GB, and a decision take 0.5 s, by estimate, allowed up to
     1 GB and 5 s
     """
-    pairs = Decimal(agents) ** 2  # of numbers too large for floats, too
-    held, seconds = 2 * 10**8 + 28 * pairs, Decimal(seconds_per_pair) * pairs
-    if held > MOST_BYTES or seconds > MOST_SECONDS:
-        raise ValueError(
-            f"a worker would hold {held / 10**9:.2g} GB, and a decision take {seconds:.2g} s, by "
-            f"estimate, allowed up to {MOST_BYTES // 10**9} GB and {MOST_SECONDS} s"
-        )
+
+    def check(number: int) -> int:
+        pairs = Decimal(agents * number) ** 2  # of numbers too large for floats, too
+        held, seconds = 2 * 10**8 + 28 * pairs, Decimal(seconds_per_pair) * pairs
+        if held > MOST_BYTES or seconds > MOST_SECONDS:
+            raise ValueError(
+                f"a worker would hold {held / 10**9:.2g} GB, and a decision take {seconds:.2g} s, "
+                f"by estimate, allowed up to {MOST_BYTES // 10**9} GB and {MOST_SECONDS} s"
+            )
+        return number
+
+    return AfterValidator(check)
 
 
 def unwritten(default: Any) -> Any:
@@ -137,7 +142,7 @@ class PartSettings(Settings):
         """
         if not self.factory:
             raise TypeError(f"{type(self).__name__} {self.kind!r} says not how it is built")
-        return located(self.factory)(self, *given)
+        return resolve_name(self.factory)(self, *given)
 
 
 class ScenarioSettings(PartSettings):

@@ -154,14 +154,11 @@ class Sources:
         if path.exists() and not path.is_file():
             raise ValueError(f"{name}: is no file")
         try:
-            with path.open("rb") as file:
-                content = file.read(MOST_BYTES + 1)
+            if path.stat().st_size > MOST_BYTES:
+                raise ValueError(f"{name}: is larger than allowed, {MOST_BYTES} bytes")
+            text = path.read_text(encoding="utf-8-sig")
         except OSError as error:
             raise ValueError(f"{name}: {error.strerror or error}") from None
-        if len(content) > MOST_BYTES:
-            raise ValueError(f"{name}: is larger than allowed, {MOST_BYTES} bytes")
-        try:
-            text = content.decode("utf-8-sig").replace("\r\n", "\n")
         except UnicodeDecodeError:
             raise ValueError(f"{name}: is not UTF-8 text") from None
         for other in imported(text) - {"nested_agents"} if name.endswith(".py") else ():

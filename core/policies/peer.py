@@ -5,7 +5,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from ..interface.scenario import Scenario, Transition
+from ..interface.scenario import Actors, Scenario
 from ..numerics.arrays import FloatArray, IntArray
 
 
@@ -20,12 +20,13 @@ class Seen:
 
     def states(self, agent: int, joint_actions: IntArray) -> FloatArray:
         """Return the next states ``(m, d)`` of `agent` as the scenario predicts them."""
-        predicted: FloatArray = cast(Any, self.scenario).predict().states(agent, joint_actions)
-        return predicted
+        return cast(Any, self.scenario).predict().states(agent, joint_actions)
 
 
-class Peer:
+class Peer(Actors):
     """A learner that acts for all agents by what it sees; inherit it, and add what it learns.
+
+    Without more it predicts, refuses, revises and learns nothing.
 
     Parameters
     ----------
@@ -36,24 +37,9 @@ class Peer:
     def __init__(self, seed: np.random.SeedSequence) -> None:
         self.rng = np.random.Generator(np.random.PCG64(seed))
 
-    def begin_episode(self) -> None:
-        """Note that an episode begins."""
-
     def predict(self, scenario: Scenario, states: FloatArray) -> Seen:
         """Return the present states: nothing is predicted unless asked, and it costs nothing."""
         return Seen(states, scenario)
-
-    def check(self, prediction: Seen) -> None:
-        """Refuse nothing."""
-
-    def adapt(self, prediction: Seen, joint_action: IntArray, transition: Transition) -> None:
-        """Revise nothing: nothing was predicted."""
-
-    def learn(self, transition: Transition) -> None:
-        """Take in what a step led to."""
-
-    def end_episode(self) -> None:
-        """Note that an episode has ended."""
 
     def arrays(self) -> dict[str, FloatArray]:
         """Return what has been learned, if anything."""

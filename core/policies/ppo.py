@@ -21,12 +21,10 @@ from stable_baselines3 import PPO
 from ..interface.hierarchy import Hierarchy
 from ..interface.scenario import Scenario, Transition, roles_of
 from ..numerics.arrays import FloatArray, IntArray
-from .inputs import Inputs, RewardScale
-from .networks import Layers, drawing_from, prepare, weights_of
-from .passing import Passing
+from .inputs import Inputs, Passing, RewardScale
+from .networks import Layers, SplitPolicy, drawing_from, prepare, weights_of
 from .peer import Peer, Seen
 from .settings import MultiAgentPPOSettings, PolicyGradientSettings, PPOSettings
-from .split_policy import SplitPolicy
 
 
 class ActorCritic:

@@ -16,20 +16,40 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import combinations
 from math import prod
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import Field
 
 from ..interface.prediction import Blocks
 from ..interface.spaces import StateSpace
 from ..numerics.arrays import FloatArray, IntArray
-from .kernels.compact import active_compact, each_compact, td_compact, total_compact
+from ..plugins.settings import Positive, Settings
+from .kernels.compact import active_compact, each_compact, total_compact
 from .kernels.dense import values_dense
 from .kernels.enumeration import Tried, enumerate_dense, enumerate_looked_up
-from .kernels.few_states import each_dense, td_dense
 from .kernels.fuzzy import Partition
 from .kernels.layout import layout, unpack
-from .settings import RuleBaseSettings
+from .kernels.updates import each_dense
+
+
+class RuleBaseSettings(Settings):
+    """The fuzzy rule base that every agent holds (Section IV-B)."""
+
+    membership: Literal["triangular", "sigmoid"] = "triangular"
+    """Shape of the membership functions; the paper's are differences of sigmoids (Eq. 6)."""
+    memberships: Annotated[int, Field(ge=2, le=15)] | None = None
+    """Membership functions per variable, spread evenly; none: the state space's own centres."""
+    steepness: Positive = 8.0
+    """Sigmoid slope times the distance of neighbouring centres (c_j of Eq. 6, dimensionless)."""
+    order: Annotated[int, Field(ge=1, le=12)] | Literal["full"] = 1
+    """Variables per rule: 1 sums one-variable rule bases, d or ``full`` is the paper's product of
+    all variables. 2 where what one variable is worth depends on another; it takes more episodes."""
+    products: tuple[tuple[str, ...], ...] = ()
+    """Further products of variables by name, summed to those of `order`."""
+    precision: Literal["float64", "float32"] = "float64"
+    """Precision of the consequent weights and traces; float32 halves memory and traffic."""
+
 
 MOST_RULES = 2**63 - 1
 """Rules that can be numbered."""
@@ -97,8 +117,6 @@ class RuleBase:
         self.dtype = np.dtype(dtype)
         self.compact = self.partitions[0].membership == "triangular"
         self._enumerate = enumerate_looked_up if self.compact else enumerate_dense
-        # One TD(lambda) update of all agents, see `td_dense`, given the layout; shapes are trusted.
-        self.td_update = td_compact if self.compact else td_dense
 
     @classmethod
     def build(cls, space: StateSpace, settings: RuleBaseSettings) -> RuleBase:

@@ -1,13 +1,15 @@
 """The agents of a foreign environment: one for every number of its players' actions."""
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from gymnasium.spaces import Box, Discrete, MultiDiscrete
+from gymnasium.spaces import Box, Discrete
 
 from ...core.interface.spaces import ActionSet
 from ...core.numerics.arrays import FloatArray, IntArray
+from ..faults.action_scales import limits_of
 
 
 class Actuators:
@@ -21,23 +23,35 @@ class Actuators:
         Of each dimension of a Box.
     neutral
         Index of the neutral action; None: the level nearest to 0, or the first discrete action.
+    bodies
+        The agents of each body of an only player; none: each is its own. Of several players each
+        is a body.
 
     Attributes
     ----------
-    names
+    names, roles
         Of the agents.
     groups
-        Agents by player.
+        Agents by body.
+    players
+        Whose each body is.
     action_set
         Of every agent, the actions of the one that has most.
 
     Raises
     ------
     ValueError
-        If actions are of other kinds, unbounded or mixed; one line.
+        If actions are of other kinds, unbounded or mixed, or bodies do not hold all agents; one
+        line.
     """
 
-    def __init__(self, spaces: Mapping[str, Any], levels: int, neutral: int | None) -> None:
+    def __init__(
+        self,
+        spaces: Mapping[str, Any],
+        levels: int,
+        neutral: int | None,
+        bodies: Sequence[Sequence[int]] = (),
+    ) -> None:
         self._spaces = spaces
         tables = {player: _commands(player, space, levels) for player, space in spaces.items()}
         if len({isinstance(space, Box) for space in spaces.values()}) > 1:
@@ -48,13 +62,32 @@ class Actuators:
             raise ValueError("actions: agents have 1 each, allowed: at least 2")
         # An agent with fewer actions has them again from the first on.
         self._commanded = np.array([np.resize(row, n_actions) for row in rows])
-        self.groups: tuple[tuple[int, ...], ...] = ()
         self.names: tuple[str, ...] = ()
+        self.groups: tuple[tuple[int, ...], ...] = ()
         for player, table in tables.items():
             first = len(self.names)
             self.groups += (tuple(range(first, first + len(table))),)
             self.names += tuple(_names(player, len(table)))
+        self._spans = [slice(group[0], group[-1] + 1) for group in self.groups]
+        self.roles = tuple(re.sub(r"_?\d+(?=$|[.])", "", name, count=1) for name in self.names)
+        self.players = list(spaces)
+        if len(spaces) == 1:
+            self._embody(bodies)
         self.action_set = self._action_set(neutral)
+
+    def _embody(self, bodies: Sequence[Sequence[int]]) -> None:
+        """Make the agents of an only player those of bodies."""
+        singles = tuple((i,) for i in range(len(self.names)))
+        if bodies and [(i,) for body in bodies for i in body] != [*singles]:
+            raise ValueError(
+                f"scenario.groups = {[list(body) for body in bodies]}: must hold the numbers 0 to "
+                f"{len(singles) - 1} of the agents once each, in order"
+            )
+        if bodies:
+            named = enumerate(bodies, 1)
+            self.names = tuple(f"body{b}.{k + 1}" for b, body in named for k in range(len(body)))
+        self.groups = tuple(map(tuple, bodies)) or singles
+        self.roles, self.players = self.names, self.players * len(self.groups)
 
     def _action_set(self, neutral: int | None) -> ActionSet:
         is_continuous = isinstance(next(iter(self._spaces.values())), Box)
@@ -74,27 +107,19 @@ class Actuators:
     def commands(self, joint_action: IntArray) -> dict[str, Any]:
         """Return the players' actions for a joint action ``(n,)``."""
         commanded = self._commanded[np.arange(len(joint_action)), joint_action]
-        given = {}
-        for (player, space), group in zip(self._spaces.items(), self.groups, strict=True):
-            own = commanded[group[0] : group[-1] + 1]
-            is_one = isinstance(space, Discrete)
+        given: dict[str, Any] = {}
+        for (player, space), span in zip(self._spaces.items(), self._spans, strict=True):
+            own, is_one = commanded[span], isinstance(space, Discrete)
             given[player] = int(own[0]) if is_one else own.reshape(space.shape).astype(space.dtype)
         return given
 
 
 def _commands(player: str, space: Any, levels: int) -> Sequence[FloatArray]:
     """Return what each of a player's agents may command, a row for each."""
-    if isinstance(space, Discrete):
-        return [space.start + np.arange(space.n, dtype=float)]
-    if isinstance(space, MultiDiscrete):
-        ends = zip(space.start.ravel(), space.nvec.ravel(), strict=True)
-        return [start + np.arange(n, dtype=float) for start, n in ends]
-    of = f" of {player}" if player else ""
-    if not isinstance(space, Box):
-        raise ValueError(f"actions{of}: {space}, allowed Box, Discrete or MultiDiscrete")
-    if not space.is_bounded():
-        raise ValueError(f"actions{of}: {space} has no bounds; wrap it in RescaleAction")
-    return list(np.linspace(space.low.ravel(), space.high.ravel(), levels, dtype=float).T)
+    low, high = limits_of(space, f"actions of {player}" if player else "actions")
+    if isinstance(space, Box):
+        return list(np.linspace(low, high, levels, dtype=float).T)
+    return [np.arange(first, last + 1, dtype=float) for first, last in zip(low, high, strict=True)]
 
 
 def _names(player: str, count: int) -> list[str]:

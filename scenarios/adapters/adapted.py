@@ -8,12 +8,11 @@ again to be drawn.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Mapping
 from copy import copy
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -28,15 +27,7 @@ from .actuators import Actuators
 from .copies import copies_of, fault_of_copies
 from .observations import Perception
 from .settings import AdaptedSettings, GymnasiumSettings, PettingZooSettings
-from .simulators import (
-    GymnasiumSimulator,
-    Make,
-    Played,
-    Simulator,
-    make_gymnasium,
-    make_pettingzoo,
-    parallel_simulator,
-)
+from .simulators import Make, Played, Simulator, make_by_id, simulator_of
 
 EPISODES, STEPS = 10, 200
 """Random episodes from which unknown ranges are taken, and the most steps of each."""
@@ -80,14 +71,18 @@ class AdaptedWorld:
     recorded = ("joint_action",)
     repeats = True
 
-    def __init__(self, settings: AdaptedSettings, make: Make) -> None:
-        survey = surveyed(settings, make)
+    def __init__(self, settings: AdaptedSettings, make: Make = make_by_id) -> None:
+        try:
+            self._actuators, self._perception = surveyed(settings, make)
+        except ValueError:  # says what does not fit
+            raise
+        except Exception as error:  # an environment may be anybody's
+            which = f"scenario.id = {settings.id!r}:" if settings.id else "the environment"
+            raise ValueError(f"{which} cannot be played, {format_error(error)}") from None
         self.settings, self._make, self._simulator = settings, make, make(settings, None)
-        self._actuators, self._perception = survey.actuators, survey.perception
-        self.agents, self.action_set = survey.agents, self._actuators.action_set
-        self.groups = survey.groups
+        self.agents, self.roles = self._actuators.names, self._actuators.roles
+        self.groups, self.action_set = self._actuators.groups, self._actuators.action_set
         self._body = np.repeat(np.arange(len(self.groups)), [len(group) for group in self.groups])
-        self.roles = survey.roles
         self.state_space = StateSpace(
             "observed", self._perception.variables, common=self._perception.common
         )
@@ -113,12 +108,14 @@ class AdaptedWorld:
         played = self.play(self._simulator, joint_action)
         self._last = np.array(joint_action)
         self._states = self.states_of(played.observations)
-        mean = float(np.mean(list(played.rewards.values())))
+        paid = np.array(list(played.rewards.values()))
+        mean = float(paid.mean())
         self._return += mean
-        info, reward = {**self.measure(), "env_reward": mean}, self.reward(played)
+        is_joint = self.settings.rewards == "joint" or len(paid) == 1
         return Transition(
-            self._states, reward, played.terminated, played.truncated, info, absorbing=False
-        )
+            self._states, mean if is_joint else paid[self._body], played.terminated,
+            played.truncated, {**self.measure(), "env_reward": mean}, absorbing=False,
+        )  # fmt: skip
 
     def measure(self) -> Mapping[str, Any]:
         """Return the last joint action, and whether the present state is a success."""
@@ -143,13 +140,6 @@ class AdaptedWorld:
     def states_of(self, observations: Mapping[str, Any]) -> FloatArray:
         """Return the states ``(n, d)`` of all agents."""
         return self._perception.states(observations)[self._body]
-
-    def reward(self, played: Played) -> float | FloatArray:
-        """Return the reward of all agents, or each one's ``(n,)``."""
-        paid = np.array(list(played.rewards.values()))
-        if self.settings.rewards == "joint" or len(paid) == 1:
-            return float(paid.mean())
-        return paid[self._body]
 
     def _predict(self) -> CopiedPrediction:
         """Predict from the present state."""
@@ -226,18 +216,8 @@ class CopiedPrediction:
         return self._played[key]
 
 
-class Survey(NamedTuple):
-    """What is known of an environment before it is played."""
-
-    actuators: Actuators
-    perception: Perception
-    agents: tuple[str, ...]
-    roles: tuple[str, ...]
-    groups: tuple[tuple[int, ...], ...]
-
-
 @lru_cache(maxsize=32)
-def surveyed(settings: AdaptedSettings, make: Make) -> Survey:
+def surveyed(settings: AdaptedSettings, make: Make) -> tuple[Actuators, Perception]:
     """Return what is found of an environment once, the same in every process.
 
     Raises
@@ -246,37 +226,18 @@ def surveyed(settings: AdaptedSettings, make: Make) -> Survey:
         If the settings do not fit the environment, or it cannot be adapted or copied; one line.
     """
     simulator = make(settings, None)
-    actuators = Actuators(simulator.action_spaces, settings.actions, settings.neutral)
-    agents, groups, players = actuators.names, actuators.groups, list(simulator.players)
-    roles = tuple(re.sub(r"_?\d+(?=$|[.])", "", name, count=1) for name in agents)
-    if len(players) == 1:
-        agents, groups = _bodies(getattr(settings, "groups", ()), agents)
-        roles, players = agents, players * len(groups)
+    bodies = getattr(settings, "groups", ())
+    actuators = Actuators(simulator.action_spaces, settings.actions, settings.neutral, bodies)
     met = partial(_met, simulator, actuators)
-    perception = Perception(settings, simulator.observation_spaces, players, met)
+    perception = Perception(settings, simulator.observation_spaces, actuators.players, met)
     if settings.predictor == "copy":
-        neutral: IntArray = np.full(len(agents), actuators.action_set.neutral)
+        neutral: IntArray = np.full(len(actuators.names), actuators.action_set.neutral)
         if fault := fault_of_copies(simulator, actuators.commands(neutral)):
             raise ValueError(
                 f"scenario.predictor = 'copy': the environment cannot be copied, {fault}; use "
                 "'none' with learner.predictor.kind = 'learned', or one that needs no prediction"
             )
-    return Survey(actuators, perception, agents, roles, groups)
-
-
-def _bodies(
-    chosen: tuple[tuple[int, ...], ...], agents: tuple[str, ...]
-) -> tuple[tuple[str, ...], tuple[tuple[int, ...], ...]]:
-    """Return the agents' names and these by body, each alone where nothing else is said."""
-    if not chosen:
-        return agents, tuple((i,) for i in range(len(agents)))
-    if [i for group in chosen for i in group] != list(range(len(agents))):
-        raise ValueError(
-            f"scenario.groups = {[list(group) for group in chosen]}: must hold the numbers 0 to "
-            f"{len(agents) - 1} of the agents once each, in order"
-        )
-    names = (f"body{b + 1}.{k + 1}" for b, group in enumerate(chosen) for k in range(len(group)))
-    return tuple(names), chosen
+    return actuators, perception
 
 
 def _met(simulator: Simulator, actuators: Actuators, numbers_of: Any) -> FloatArray:
@@ -294,16 +255,6 @@ def _met(simulator: Simulator, actuators: Actuators, numbers_of: Any) -> FloatAr
             if played.terminated or played.truncated:
                 break
     return np.array([np.min(numbers, axis=(0, 1)), np.max(numbers, axis=(0, 1))])
-
-
-def gymnasium_world(settings: GymnasiumSettings) -> AdaptedWorld:
-    """Return an environment that Gymnasium knows, as a scenario."""
-    return AdaptedWorld(settings, make_gymnasium)
-
-
-def pettingzoo_world(settings: PettingZooSettings) -> AdaptedWorld:
-    """Return an environment of a module of PettingZoo, as a scenario."""
-    return AdaptedWorld(settings, make_pettingzoo)
 
 
 def from_gymnasium(
@@ -328,7 +279,7 @@ def from_gymnasium(
     >>> from_gymnasium(gymnasium.make("Pendulum-v1"), actions=3).action_set.names
     ('-2', '0', '2')
     """
-    return AdaptedWorld(GymnasiumSettings(id="", **keys), _maker(env, GymnasiumSimulator))
+    return AdaptedWorld(GymnasiumSettings(id="", **keys), _maker(env))
 
 
 def from_pettingzoo(env: Any, **keys: Any) -> AdaptedWorld:
@@ -347,13 +298,13 @@ def from_pettingzoo(env: Any, **keys: Any) -> AdaptedWorld:
     ValueError
         As `AdaptedWorld`.
     """
-    return AdaptedWorld(PettingZooSettings(id="", **keys), _maker(env, parallel_simulator))
+    return AdaptedWorld(PettingZooSettings(id="", **keys), _maker(env))
 
 
-def _maker(env: Any, simulator: Callable[[Any], Simulator]) -> Make:
+def _maker(env: Any) -> Make:
     def make(settings: AdaptedSettings, render_mode: str | None) -> Simulator:
         if not callable(env):
-            return simulator(env)
-        return simulator(env() if render_mode is None else env(render_mode=render_mode))
+            return simulator_of(env)
+        return simulator_of(env() if render_mode is None else env(render_mode=render_mode))
 
     return make

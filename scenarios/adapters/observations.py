@@ -93,26 +93,30 @@ class Perception:
         self._players = [list(spaces).index(player) for player in bodies]
         every = [bounds_of(player, space) for player, space in spaces.items()]
         self._bounds = min(every, key=len)
-        self._count = min(bounds.shape[1] for bounds in every)
+        self._lengths = [bounds.shape[1] for bounds in every]
+        self._count = min(self._lengths)
         self._names = names_of(next(iter(spaces.values())))[: self._count]
-        if not settings.variables and any(bounds.shape[1] > self._count for bounds in every):
+        if not settings.variables and max(self._lengths) > self._count:
             raise ValueError(
                 "scenario.variables: players observe differently many numbers, say which to take"
             )
-        chosen: dict[str, Any] = {**settings.variables, **settings.angles}
         # Where variables are in what bodies observe: one row, of angles cosine and sine two.
-        places = {name: self._find(name, entries) for name, entries in chosen.items()}
+        angles = {name: self._find(name, entries) for name, entries in settings.angles.items()}
+        places = {name: self._find(name, entries) for name, entries in settings.variables.items()}
         if not settings.variables:
-            used = {int(i) for rows in places.values() for i in rows.ravel()}
+            used = {int(i) for rows in angles.values() for i in rows.ravel()}
             left = [i for i in range(self._count) if i not in used]
-            places = {self._names[i]: np.full((1, len(bodies)), i) for i in left} | places
-        named = [("ranges", name) for name in settings.ranges]
-        named += [("success", name) for name in settings.success if name != "return"]
-        for key, name in named:
-            if name not in places:
-                known = ", ".join(places)
-                raise ValueError(f"scenario.{key}.{name}: no state variable, known: {known}")
+            places = {self._names[i]: np.full((1, len(bodies)), i) for i in left}
+        for name in angles.keys() & places.keys():
+            raise ValueError(f"scenario.angles.{name}: another state variable has this name")
+        places |= angles
         self.variables = tuple(self._described(settings, places, cache(partial(met, self.numbers))))
+        names = [variable.name for variable in self.variables]
+        for key, given in (("ranges", settings.ranges), ("success", settings.success)):
+            for name in given:
+                if name not in names and (key, name) != ("success", "return"):
+                    known = ", ".join(names)
+                    raise ValueError(f"scenario.{key}.{name}: no state variable, known: {known}")
         if not self.variables:
             raise ValueError("observations: none of their numbers changes in random episodes")
         kept = [places[variable.name] for variable in self.variables]
@@ -135,9 +139,10 @@ class Perception:
         each = entries if isinstance(entries, tuple) else (entries,) * n
         known: list[str | int] = [*self._names, *range(self._count)]
         if len(each) != n or not set(each) <= set(known):
+            key = f"{'angles' if name in self._angles else 'variables'}.{name}"
             raise ValueError(
-                f"scenario: variable {name!r} = {entries}: must be a number of the observation, 0 "
-                f"to {self._count - 1} or {', '.join(self._names)}, or a list of one for each of "
+                f"scenario.{key} = {entries}: must be a number of the observation, 0 to "
+                f"{self._count - 1} or {', '.join(self._names)}, or a list of one for each of "
                 f"{n} bodies"
             )
         return np.array([[known.index(entry) % self._count for entry in each]], dtype=np.int64)
@@ -169,9 +174,11 @@ class Perception:
     def numbers(self, observations: Mapping[str, Any]) -> FloatArray:
         """Return the numbers ``(players, k)`` of what players observe."""
         rows: list[Any] = []
-        for player, space in self._spaces.items():
+        for (player, space), length in zip(self._spaces.items(), self._lengths, strict=True):
             seen = observations[player]
             rows.append([seen] if isinstance(space, Discrete) else flatten(space, seen))
+            if len(rows[-1]) != length:
+                raise ValueError(f"observed are {len(rows[-1])} numbers, of {space}")
         return np.array([row[: self._count] for row in rows], dtype=np.float64)
 
     def states(self, observations: Mapping[str, Any]) -> FloatArray:

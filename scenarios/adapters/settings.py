@@ -3,21 +3,12 @@
 Reading them needs no simulator; it is imported when a world is built.
 """
 
-import json
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, Self
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, model_validator
 
 from ...core.plugins.settings import ScenarioSettings, Settings
-
-
-class FrozenTable(dict[str, Any]):
-    """A table that nobody changes, so that settings which hold it can be compared and hashed."""
-
-    def __hash__(self) -> int:  # type: ignore[override]
-        return hash(json.dumps(self, sort_keys=True, default=repr))
-
 
 Range = Annotated[tuple[float, float], AfterValidator(lambda ends: _ordered(ends))]
 Index = Annotated[int, Field(ge=0)]
@@ -33,6 +24,14 @@ def _ordered(ends: tuple[float, float]) -> tuple[float, float]:
     return ends
 
 
+def _measurable(success: dict[str, Any]) -> dict[str, Any]:
+    for name, ends in success.items():
+        if isinstance(ends, tuple) == (name == "return"):
+            needed = "a number, the least" if name == "return" else "a range"
+            raise ValueError(f"{name} must be {needed}")
+    return success
+
+
 class Direction(Settings):
     """An angle that an observation tells by its cosine and sine."""
 
@@ -41,16 +40,20 @@ class Direction(Settings):
     sin: Entries
     """Where the sine is."""
 
-    def __hash__(self) -> int:
-        return hash((self.cos, self.sin))
+    @model_validator(mode="after")
+    def _two(self) -> Self:
+        if self.cos == self.sin:
+            raise ValueError("cos and sin must be two numbers of the observation")
+        return self
 
 
 class AdaptedSettings(ScenarioSettings):
     """What the worlds of Gymnasium and PettingZoo have in common."""
 
+    factory: ClassVar[str] = f"{__package__}.adapted:AdaptedWorld"
     id: str = ""
     """Which environment."""
-    options: Annotated[dict[str, Any], AfterValidator(FrozenTable)] = FrozenTable()
+    options: dict[str, Any] = Field(default_factory=dict)
     """What the environment is made with, by name."""
     actions: Annotated[int, Field(ge=2, le=99)] = 5
     """Levels, evenly spaced over its range, of each dimension of a continuous action; each is an
@@ -59,29 +62,34 @@ class AdaptedSettings(ScenarioSettings):
     neutral: Index | None = None
     """The action that an agent is taken to do where nothing is known of it; none: the level nearest
     to 0, of discrete actions the first."""
-    hold: Annotated[int, Field(ge=1)] = 1
+    hold: Annotated[int, Field(ge=1, le=10_000)] = 1
     """Steps of the environment for which a decision is held; their rewards are added."""
     predictor: Literal["none", "copy"] = "none"
     """What predicts: nothing, or copies of the simulator, which are stepped for every joint action
     that is tried. A copy knows the simulator exactly, its random numbers too."""
-    horizon: Annotated[int, Field(ge=1)] = 1
+    horizon: Annotated[int, Field(ge=1, le=10_000)] = 1
     """Decisions that copies look ahead, the joint action being held; the reward predicted is the
     mean of theirs."""
-    variables: Annotated[dict[str, Entries], AfterValidator(FrozenTable)] = FrozenTable()
+    variables: dict[str, Entries] = Field(default_factory=dict)
     """State variables by name: which number of the observation each is, one for all bodies or a
     list of one for each. None: all that `angles` leaves and that change, called o0, o1 and so on,
     or those of a Dict by its keys: ``height``, ``position0``, ``position1``."""
-    angles: Annotated[dict[str, Entries | Direction], AfterValidator(FrozenTable)] = FrozenTable()
+    angles: dict[str, Entries | Direction] = Field(default_factory=dict)
     """State variables that are angles [rad], whose ends are the same point: where the observation
     has them, or their ``cos`` and ``sin``."""
-    ranges: Annotated[dict[str, Range], AfterValidator(FrozenTable)] = FrozenTable()
+    ranges: dict[str, Range] = Field(default_factory=dict)
     """Ranges of state variables; of others they are those of the environment, and where it has
     none, what random episodes meet."""
     rewards: Literal["joint", "own"] = "joint"
     """Whether all agents receive the mean reward, or those of each body its own."""
-    success: Annotated[dict[str, float | Range], AfterValidator(FrozenTable)] = FrozenTable()
+    success: Annotated[dict[str, float | Range], AfterValidator(_measurable)] = Field(
+        default_factory=dict
+    )
     """When an episode is a success: the least ``return``, and ranges of state variables in which
     all agents are at the end. None: never."""
+
+    def __hash__(self) -> int:
+        return hash(repr(self))  # tables have no hash of their own
 
     def warnings(self) -> tuple[str, ...]:
         """Return that nothing is a success, if it is so."""
@@ -103,8 +111,6 @@ class GymnasiumSettings(AdaptedSettings):
     groups: tuple[tuple[Index, ...], ...] = ()
     """Numbers of the agents of every body, from 0 on, in order; none: each is its own body."""
 
-    factory: ClassVar[str] = f"{__package__}.adapted:gymnasium_world"
-
 
 class PettingZooSettings(AdaptedSettings):
     """An environment of PettingZoo, each of whose agents is a body."""
@@ -113,5 +119,3 @@ class PettingZooSettings(AdaptedSettings):
     id: str
     """Its module, such as ``mpe2/simple_spread_v3``; it has ``parallel_env``, or an ``env`` whose
     agents act in cycles."""
-
-    factory: ClassVar[str] = f"{__package__}.adapted:pettingzoo_world"

@@ -13,7 +13,7 @@ from pettingzoo import AECEnv
 from pettingzoo.utils.conversions import aec_to_parallel
 
 from ...core.plugins.sources import format_error
-from .settings import AdaptedSettings
+from .settings import AdaptedSettings, GymnasiumSettings
 
 
 class Played(NamedTuple):
@@ -90,23 +90,8 @@ Make = Callable[[AdaptedSettings, str | None], Simulator]
 """Makes a simulator of settings that renders in a mode of its environment, or does not."""
 
 
-def make_gymnasium(settings: AdaptedSettings, render_mode: str | None) -> Simulator:
-    """Return the simulator of an environment that Gymnasium knows.
-
-    Raises
-    ------
-    ValueError
-        If it cannot be made; one line.
-    """
-    given = {"render_mode": render_mode, "disable_env_checker": True, **settings.options}
-    try:
-        return GymnasiumSimulator(gymnasium.make(settings.id, **given))
-    except Exception as error:  # an environment may be anybody's
-        raise ValueError(_not_made(settings.id, error)) from None
-
-
-def make_pettingzoo(settings: AdaptedSettings, render_mode: str | None) -> Simulator:
-    """Return the simulator of an environment that a module makes.
+def make_by_id(settings: AdaptedSettings, render_mode: str | None) -> Simulator:
+    """Return the simulator of an environment that Gymnasium knows, or a module of PettingZoo makes.
 
     Raises
     ------
@@ -114,33 +99,31 @@ def make_pettingzoo(settings: AdaptedSettings, render_mode: str | None) -> Simul
         If it cannot be made; one line.
     """
     rendering = {} if render_mode is None else {"render_mode": render_mode}
+    options = {**settings.options, **rendering}
     try:
+        if isinstance(settings, GymnasiumSettings):
+            return simulator_of(gymnasium.make(settings.id, disable_env_checker=True, **options))
         module: Any = import_module(settings.id.replace("/", "."))
-        make = getattr(module, "parallel_env", None) or module.env
-        return parallel_simulator(make(**settings.options, **rendering))
+        return simulator_of((getattr(module, "parallel_env", None) or module.env)(**options))
     except Exception as error:  # an environment may be anybody's
-        raise ValueError(_not_made(settings.id, error)) from None
+        is_missing = isinstance(error, ImportError | gymnasium.error.DependencyNotInstalled)
+        extras = ", extras of nested-agents are mpe and mujoco" if is_missing else ""
+        problem = f"cannot be made, {format_error(error)}{extras}"
+        raise ValueError(f"scenario.id = {settings.id!r}: {problem}") from None
 
 
-def parallel_simulator(env: Any) -> Simulator:
-    """Return the simulator of an environment of PettingZoo, parallel or not.
+def simulator_of(env: Any) -> Simulator:
+    """Return the simulator of an environment of Gymnasium, or of PettingZoo, parallel or not.
 
     Raises
     ------
     ValueError
         If its agents do not act in cycles, as those of board games.
     """
+    if not hasattr(env, "possible_agents"):
+        return GymnasiumSimulator(env)
     if not isinstance(env, AECEnv):
         return ParallelSimulator(env)
     if not env.metadata.get("is_parallelizable", False):
         raise ValueError("its agents act in turns, allowed: those that act at the same time")
     return ParallelSimulator(aec_to_parallel(env))
-
-
-def _not_made(id_: str, error: Exception) -> str:
-    extras = ", extras of nested-agents are mpe and mujoco" if _is_missing(error) else ""
-    return f"scenario.id = {id_!r}: cannot be made, {format_error(error)}{extras}"
-
-
-def _is_missing(error: Exception) -> bool:
-    return isinstance(error, ImportError | gymnasium.error.DependencyNotInstalled)

@@ -1,15 +1,20 @@
-"""The settings of box pushing, as they stand in the ``[scenario]`` table of a spec."""
+"""The settings of box pushing, as they stand in the ``[scenario]`` table of a spec.
 
-from collections.abc import Mapping
+Sizes that are surely wrong are named with the unit in which they were probably given. The world is
+one of robots that stand on a table: centimetres and hundreds of grams. A box of 300 m is no error,
+for the physics holds, but it was hardly intended.
+"""
+
+from collections.abc import Iterator, Mapping
+from math import pi
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from ...core.plugins.settings import Positive, ScenarioSettings, check_team
+from ...core.plugins.settings import Positive, ScenarioSettings, team_size
 from ..state_variables import referred
 from .prediction.settings import BeliefSettings
-from .states.variables import STATE_VARIABLES
-from .world import units
+from .states.relational import STATE_VARIABLES
 from .world.settings import (
     CONTROL_PERIOD,
     BoxSettings,
@@ -21,12 +26,21 @@ from .world.settings import (
     label,
 )
 
+LARGEST_BOX, LARGEST_RADIUS, LARGEST_REACH = 20.0, 1.0, 5.0
+"""Beyond these a size was hardly intended [m]."""
+HEAVIEST = 50.0
+"""The same of masses [kg]."""
+FASTEST = 10.0
+"""The same of wheel speeds [m/s]."""
+NEAREST_GOAL = 1e-4
+"""A tolerance below this is hardly intended [m]."""
+
 
 class BoxTaskSettings(ScenarioSettings):
     """Robots, box, task and servo layer: what all scenarios of box pushing have in common."""
 
     player: ClassVar[str] = f"{__package__}.pictures.player"
-    robots: Annotated[int, Field(ge=1)] = 2
+    robots: Annotated[int, Field(ge=1), team_size(7.5e-7, agents=2)] = 2
     """Number of robots, as many as memory and time allow by estimate."""
     robot: str | RobotSettings = "e-puck"
     """Robot by name, or a table that describes one."""
@@ -52,12 +66,6 @@ class BoxTaskSettings(ScenarioSettings):
     orientation_tolerance: Positive | None = None
     """Orientation error that still counts as reached [rad]; none: any."""
 
-    @field_validator("robots")
-    @classmethod
-    def _fits(cls, robots: int) -> int:
-        check_team(2 * robots, 7.5e-7)
-        return robots
-
     def warnings(self) -> tuple[str, ...]:
         """Return sizes that are probably given in another unit, a line each.
 
@@ -66,7 +74,7 @@ class BoxTaskSettings(ScenarioSettings):
         >>> BoxPushingSettings(infrared={"reach": 60.0}).warnings()
         ('scenario.infrared.reach = 60 m: perhaps meant in mm, 0.06 m',)
         """
-        return tuple(units.warnings(self))
+        return tuple(_warnings(self))
 
     @property
     def period(self) -> float:
@@ -119,3 +127,37 @@ class BoxPushingSettings(BoxTaskSettings):
         learn sooner if all left wheels share theirs, and all right wheels.
         """
         return {"learner": {"weights": "own"}} if preset == "default" and self.robots <= 2 else {}
+
+
+def _warnings(settings: Any) -> Iterator[str]:
+    """Yield a line for every size of `BoxTaskSettings` that is probably given in another unit."""
+    box, robot = settings.box, settings.robot
+    if not isinstance(box, str):
+        width = max(max(axis) - min(axis) for axis in zip(*box.vertices, strict=True))
+        yield from _length("box.vertices", width, LARGEST_BOX)
+    if not isinstance(robot, str):
+        yield from _length("robot.radius", robot.radius, LARGEST_RADIUS)
+        if robot.max_speed > FASTEST:
+            yield _suggest_unit("robot.max_speed", robot.max_speed, "m/s", "mm/s", 1e-3)
+    for name, body in (("box", box), ("robot", robot)):
+        if not isinstance(body, str) and body.mass > HEAVIEST:
+            yield _suggest_unit(f"{name}.mass", body.mass, "kg", "g", 1e-3)
+    yield from _length("infrared.reach", settings.infrared.reach, LARGEST_REACH)
+    yield from _length("tolerance", settings.tolerance, LARGEST_BOX)
+    if settings.tolerance < NEAREST_GOAL:
+        problem = f"{settings.tolerance:g} m: hardly any episode will reach the goal"
+        yield f"scenario.tolerance = {problem}"
+    if settings.orientation_tolerance is not None and settings.orientation_tolerance > pi:
+        angle = settings.orientation_tolerance
+        yield _suggest_unit("orientation_tolerance", angle, "rad", "degrees", pi / 180.0)
+
+
+def _length(key: str, value: float, most: float) -> Iterator[str]:
+    if value > most:
+        unit, factor = ("mm", 1e-3) if value * 1e-2 > most / 10.0 else ("cm", 1e-2)
+        yield _suggest_unit(key, value, "m", unit, factor)
+
+
+def _suggest_unit(key: str, value: float, unit: str, other: str, factor: float) -> str:
+    problem = f"{value:g} {unit}: perhaps meant in {other}, {value * factor:.3g} {unit}"
+    return f"scenario.{key} = {problem}"

@@ -2,9 +2,9 @@
 
 Three views of one scenario: `WheelsEnv` (every wheel an agent), `RobotsEnv` (every robot an agent)
 and `BoxPushingEnv` (one agent for all). Observations are the states of the paper's agents, what
-wheels of a robot share being given once; bounds are those that physics keeps, infinite where robots
-may leave for good. An agent gets the mean reward of its wheels. Episodes end when the box is at the
-goal (terminated), when it is beyond the arena or after `steps` steps (truncated).
+wheels of a robot share being given once; only angles have bounds. An agent gets the mean reward of
+its wheels. Episodes end when the box is at the goal (terminated), when it is farther away than the
+termination radius or after `steps` steps (truncated).
 
 Importing this module registers ``NestedAgents/BoxPushing-v0`` with Gymnasium::
 
@@ -51,7 +51,7 @@ class Seat:
         self, scenario: BoxPushing, wheels: Sequence[int], *, by_wheel: bool = False
     ) -> None:
         self.wheels = list(wheels)
-        space, bounds = scenario.state_space, scenario.bounds
+        space = scenario.state_space
         d, own = space.n_variables, space.n_own
         places: list[int] = []
         for group in scenario.groups:
@@ -61,7 +61,7 @@ class Seat:
         if by_wheel:
             places = [wheel * d + i for wheel in self.wheels for i in range(d)]
         self.places: IntArray = np.reshape(places, (len(self.wheels), d) if by_wheel else -1)
-        low, high = np.moveaxis(bounds[self.places % d].astype(np.float32), -1, 0)
+        low, high = np.moveaxis(space.bounds[self.places % d].astype(np.float32), -1, 0)
         self.observation_space = Box(low, high, dtype=np.float32)
         actions = len(scenario.action_set)
         self.action_space = (
@@ -70,8 +70,7 @@ class Seat:
 
     def observe(self, states: FloatArray) -> FloatArray:
         """Return the observation in the states ``(n, d)`` of all wheels."""
-        seen: FloatArray = states.ravel()[self.places].astype(np.float32)
-        return seen
+        return states.ravel()[self.places].astype(np.float32)
 
     def paid(self, reward: float | FloatArray) -> float:
         """Return the mean reward of the wheels; `reward` is one, or ``(n,)`` of all wheels."""

@@ -28,13 +28,12 @@ from .prediction.situation import Premises, Situation
 from .states.state_spaces import state_space_for
 from .states.view import View
 from .world.boxes import box_for, growth
-from .world.failures import WheelFailures
 from .world.geometry import wrap
 from .world.reward import Task, reward
 from .world.robots import nominal_effect, robot_for
 from .world.settings import CONTROL_PERIOD
 from .world.starts import place
-from .world.world import World, WorldState
+from .world.world import WheelFailures, World
 
 if TYPE_CHECKING:
     from .pictures.policy import Policy
@@ -97,12 +96,10 @@ class BoxPushing:
         similar = settings.scaling == "similar"
         self._unit = growth(settings.box, settings.robots) if similar else 1.0
         robots = [self.robot] * settings.robots
-        # Whether they fit is better known now than in the middle of a study.
-        place(settings.start, np.random.default_rng(0), robots, self.box)
         wheels = len(self.robot.wheels)
-        self.groups = tuple(
-            tuple(range(r * wheels, (r + 1) * wheels)) for r in range(settings.robots)
-        )
+        every = np.arange(settings.robots * wheels).reshape(-1, wheels)
+        self.groups = tuple(map(tuple, every.tolist()))
+        self._body = np.repeat(np.arange(settings.robots), wheels)
         self.agents = tuple(
             f"robot{r + 1}.{name}"
             for r in range(settings.robots)
@@ -133,28 +130,8 @@ class BoxPushing:
             settings.prediction_horizon * CONTROL_PERIOD,
         )  # fmt: skip
         self.horizon = max(1, round(settings.prediction_horizon / settings.action_repeat))
-        self._goal: FloatArray = np.zeros(3)
-        self._sensing = np.random.default_rng(0)  # until reset
-        self._speeds: FloatArray = np.zeros(len(self.agents))
-        self._step = 0
-        self._saved: WorldState | None = None
-
-    @property
-    def bounds(self) -> FloatArray:
-        """What the state variables cannot leave, ``(d, 2)``; infinite where there is no limit."""
-        depth = self.robot.radius + self.box.reach
-        limits = []
-        for variable in self.state_space.variables:
-            if variable.periodic:
-                limits.append((variable.low, variable.high))
-            elif self._space.is_own(variable.name):
-                limits.append((-np.inf, np.inf))
-            elif variable.unit == "m/s":
-                limits.append((-self.robot.max_speed, self.robot.max_speed))
-            else:
-                low = -depth if variable.name.endswith("gap") else 0.0
-                limits.append((-np.inf if variable.low < 0.0 else low, np.inf))
-        return np.array(limits)
+        # Whether the robots fit is better known now than in the middle of a study.
+        BoxPushing.reset(self, 0)
 
     def partners(self) -> tuple[int, ...]:
         """Return for every wheel the one opposite on its robot, or itself if it is in the middle.
@@ -185,7 +162,7 @@ class BoxPushing:
             self.settings.start, rng, [self.robot] * self.settings.robots, self.box, self._unit
         )
         self.world.place(robots, box)
-        self._speeds = np.zeros(len(self.agents))
+        self._speeds: FloatArray = np.zeros(len(self.agents))
         self._step = 0
         self._failures.begin(seed, episode)
         self.world.set_grip(self._failures.grip)
@@ -220,7 +197,7 @@ class BoxPushing:
         )[0]
         paid: float | FloatArray = float(gained[0])
         if self.settings.reward.of == "robot":
-            paid = np.repeat(gained, [len(group) for group in self.groups])
+            paid = gained[self._body]
         sensed = perf_counter()
         if terminated:
             # Does the box come to rest within the tolerance when all wheels stop?
@@ -338,10 +315,5 @@ class BoxPushing:
             poses[None], world.box_pose[None], world.gaps[None], self._goal, origin, 1.0,
             self.box.outline, self.box.friction_radius,
         )  # fmt: skip
-        n_own, shared = self._space.space.n_own, self._space.sensed(view, range(len(poses)))
-        states = np.empty((len(self.agents), self._space.space.n_variables))
-        for r, group in enumerate(self.groups):
-            for agent in group:
-                own = self._space.own(poses[r : r + 1], self._speeds[agent : agent + 1], self._goal)
-                states[agent, :n_own], states[agent, n_own:] = own[0], shared[r, 0]
-        return states
+        own = self._space.own(poses[self._body], self._speeds, self._goal)
+        return np.hstack([own, self._space.sensed(view, range(len(poses)))[self._body, 0]])

@@ -6,12 +6,12 @@ What is said of variables is held against what is met (see `variables`). Predict
 against each other (see `predictions`), and, of scenarios that can be predicted exactly, against
 what is then sensed (see `sensing`); of others it is shown by how much they are off. What a scenario
 need not have, such as measures or tables, is checked where it is there. A further check is one
-function and one line in `CHECKS`; it returns what is wrong, in one line, or nothing, and notes what
-it could not check. What a scenario raises is what is wrong with it.
+function and one line in `CHECKS`; it yields what is wrong, a line each, of which the first counts,
+and notes what it could not check. What a scenario raises is what is wrong with it.
 """
 
 import random
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import product, zip_longest
 from pathlib import Path
 from traceback import extract_tb
@@ -20,16 +20,9 @@ from typing import Any
 import numpy as np
 
 from ...core.interface.scenario import RecordedScenario, Scenario, groups_of, lacking, roles_of
-from ...core.numerics.arrays import FloatArray
-from .frames import Examination, Frame, at, bits, difference, fields, measured, opening
-from .predictions import (
-    MOST_JOINT_ACTIONS,
-    fault_of_prediction,
-    fault_of_sharing,
-    has_tables,
-    too_many,
-)
-from .sensing import Findings, fault_of_sensing, met_variables, predicted_steps
+from .frames import Examination, Frame, at, bits, differences, fields, measured, opening
+from .predictions import faults_of_prediction, faults_of_sharing, has_tables, too_many
+from .sensing import Findings, faults_of_sensing, met_variables, predicted_steps
 
 STEPS = 5
 """Steps after which measurements are looked at, and predictions."""
@@ -83,7 +76,7 @@ def check_scenario(
     examination = Examination(factory, steps, tuple(seeds), tuple(episodes))
     for name, check in CHECKS.items():
         try:
-            fault = check(examination)
+            fault = next(check(examination), None)
         except (Exception, SystemExit) as error:
             fault = _raised(error)
         if fault is not None:
@@ -103,41 +96,40 @@ def _raised(error: BaseException) -> str:
     return f"{type(error).__name__} in {place}: {' '.join(str(error).split())}"
 
 
-def _form(of: Examination) -> str | None:
+def _form(of: Examination) -> Iterator[str]:
     """Check names, groups, shapes and types."""
     scenario: Any = of.factory()
     if problem := lacking(scenario):
-        return problem
+        yield problem
     n, d = len(scenario.agents), scenario.state_space.n_variables
     if not n or len(set(scenario.agents)) != n:
-        return f"agents {scenario.agents} must be at least one, of different names"
+        yield f"agents {scenario.agents} must be at least one, of different names"
     groups, roles = groups_of(scenario), roles_of(scenario)
     if [i for group in groups for i in group] != list(range(n)):
-        return f"groups {groups} must hold the {n} agents once each, in order"
+        yield f"groups {groups} must hold the {n} agents once each, in order"
     if len(roles) != n:
-        return f"roles {roles} must be one for each of the {n} agents"
+        yield f"roles {roles} must be one for each of the {n} agents"
     for step, frame in enumerate(of.play(scenario, of.seeds[0], of.episodes[0])):
         for name, shapes in (("states", [(n, d)]), ("reward", [(), (n,)]))[: step + 1]:
             value = np.asarray(frame[name])
             if value.shape not in shapes or value.dtype.kind not in "biuf":
                 allowed = " or ".join(map(str, shapes))
-                return f"{name} of shape {value.shape} {at(step)}, must be numbers of {allowed}"
+                yield f"{name} of shape {value.shape} {at(step)}, must be numbers of {allowed}"
         if step and not all(isinstance(frame[e], bool) for e in ("terminated", "truncated")):
-            return f"terminated and truncated must be bool, {at(step)} they are not"
+            yield f"terminated and truncated must be bool, {at(step)} they are not"
         twists = frame.get("twists")
         shape = (len(groups), 3) if twists is None else np.shape(twists)
         if shape[1:] != (3,) or shape[0] < len(groups):
-            return f"twists of shape {shape} {at(step)}, must be (bodies >= {len(groups)}, 3)"
-    return None
+            yield f"twists of shape {shape} {at(step)}, must be (bodies >= {len(groups)}, 3)"
 
 
-def _measures(of: Examination) -> str | None:
+def _measures(of: Examination) -> Iterator[str]:
     """Check that what a scenario declares to be measured and recorded is there."""
     scenario: Any = of.factory()
     measures = tuple(getattr(scenario, "measures", ()))
     names = [measure.name for measure in measures]
     if len(set(names)) != len(names):
-        return f"names {names} must be distinct"
+        yield f"names {names} must be distinct"
     opening(scenario, of.seeds[0], of.episodes[0])
     kept = scenario.recorded if isinstance(scenario, RecordedScenario) else ()
     for step, action in enumerate(of.actions(scenario, of.seeds[0])[:STEPS], 1):
@@ -146,81 +138,65 @@ def _measures(of: Examination) -> str | None:
         for measure in measures:
             source = measure.source
             if source != "terminated" and source not in info:
-                return f"{measure.name}: info has no {source!r} {at(step)}, has {', '.join(info)}"
+                yield f"{measure.name}: info has no {source!r} {at(step)}, has {', '.join(info)}"
             if source != "terminated" and np.ndim(info[source]):
-                return f"{measure.name}: info[{source!r}] must be one number"
+                yield f"{measure.name}: info[{source!r}] must be one number"
         for name in kept:
             if name not in info or name not in told:
-                return (
-                    f"recorded is {name!r}, which {'measure' if name in info else 'info'} has not"
-                )
+                lacking_it = "measure" if name in info else "info"
+                yield f"recorded is {name!r}, which {lacking_it} has not"
             if bits(info[name]) != bits(told[name]):
-                return f"recorded is {name!r}, of which info and measure differ {at(step)}"
+                yield f"recorded is {name!r}, of which info and measure differ {at(step)}"
         if transition.terminated or transition.truncated:
             break
-    return None
 
 
-def _values(of: Examination) -> str | None:
+def _values(of: Examination) -> Iterator[str]:
     """Check that numbers are finite, variables within bounds, and alike where they are shared."""
     for seed, episode in product(of.seeds, of.episodes):
         scenario = of.factory()
         for step, frame in enumerate(of.play(scenario, seed, episode)):
-            fault = _not_finite(frame) or _out_of_bounds(scenario, np.asarray(frame["states"]))
-            fault = fault or fault_of_sharing(scenario, np.asarray(frame["states"]))
-            if fault is not None:
-                return f"{fault} {at(step)} of seed {seed}"
+            for fault in _wrong_values(scenario, frame):
+                yield f"{fault} {at(step)} of seed {seed}"
     roles = roles_of(of.factory())
     if len(set(roles)) < len(roles):
         of.unchecked["roles"] = "whether agents of one role are alike is not seen from outside"
-    return None
 
 
-def _not_finite(frame: Frame) -> str | None:
+def _wrong_values(scenario: Scenario, frame: Frame) -> Iterator[str]:
+    """Yield what is not finite, leaves the ``bounds`` of its scenario, or is not shared."""
     for name, value in frame.items():
         array = np.asarray(value)
         if array.dtype.kind == "f" and not np.isfinite(array).all():
-            return f"{name} is not finite"
-    return None
+            yield f"{name} is not finite"
+    states, variables = np.asarray(frame["states"]), scenario.state_space.variables
+    low, high = np.array(getattr(scenario, "bounds", scenario.state_space.bounds)).T
+    for _, i in np.argwhere((states < low) | (states > high)):
+        yield f"{variables[i].name} leaves [{low[i]}, {high[i]}]"
+    yield from faults_of_sharing(scenario, states)
 
 
-def _out_of_bounds(scenario: Scenario, states: FloatArray) -> str | None:
-    """Return which variable leaves its period, or the ``bounds`` of a scenario that has them."""
-    variables = scenario.state_space.variables
-    limits = [(v.low, v.high) if v.periodic else (-np.inf, np.inf) for v in variables]
-    low, high = np.array(getattr(scenario, "bounds", limits)).T
-    outside = np.argwhere((states < low) | (states > high))
-    if not len(outside):
-        return None
-    i = outside[0, 1]
-    return f"{variables[i].name} leaves [{low[i]}, {high[i]}]"
-
-
-def _repeats(of: Examination) -> str | None:
+def _repeats(of: Examination) -> Iterator[str]:
     """Check that equal seeds give equal bits, also in an instance that has played before."""
     used = of.factory()
     for seed, episode in product(of.seeds, of.episodes):
         first = list(of.play(of.factory(), seed, episode))
-        again = difference(first, of.play(of.factory(), seed, episode))
-        if again is not None:
-            return f"two runs with seed {seed} differ {again}"
+        again = of.play(of.factory(), seed, episode)
+        yield from differences(first, again, f"two runs with seed {seed} differ")
         list(of.play(used, of.seeds[-1], of.episodes[0]))
-        again = difference(first, of.play(used, seed, episode))
-        if again is not None:
-            return f"seed {seed} after another episode differs {again}"
-    return None
+        again = of.play(used, seed, episode)
+        yield from differences(first, again, f"seed {seed} after another episode differs")
 
 
-def _varies(of: Examination) -> str | None:
+def _varies(of: Examination) -> Iterator[str]:
     """Check that different seeds give different worlds."""
     actions = of.actions(of.factory(), of.seeds[0])
     runs = [list(of.play(of.factory(), seed, of.episodes[0], actions)) for seed in of.seeds]
-    if any(difference(runs[0], run) for run in runs[1:]):
-        return None
-    return f"seeds {', '.join(map(str, of.seeds))} give one and the same episode"
+    if not any(any(differences(runs[0], run)) for run in runs[1:]):
+        yield f"seeds {', '.join(map(str, of.seeds))} give one and the same episode"
 
 
-def _keeps_apart(of: Examination) -> str | None:
+def _keeps_apart(of: Examination) -> Iterator[str]:
     """Check that two instances played in turns do not notice each other."""
     seeds = of.seeds[:2]
     for episode in of.episodes:
@@ -228,42 +204,36 @@ def _keeps_apart(of: Examination) -> str | None:
         in_turns = zip(*zip_longest(*runs), strict=True)
         for seed, frames in zip(seeds, in_turns, strict=True):
             alone = of.play(of.factory(), seed, episode)
-            here = difference(alone, [frame for frame in frames if frame is not None])
-            if here is not None:
-                return f"an instance with seed {seed} played in turns with another differs {here}"
-    return None
+            words = f"an instance with seed {seed} played in turns with another differs"
+            yield from differences(alone, filter(None, frames), words)
 
 
-def _only_looks(of: Examination) -> str | None:
+def _only_looks(of: Examination) -> Iterator[str]:
     """Check that predicting and measuring change nothing."""
     for seed, episode in product(of.seeds, of.episodes):
-        silent = list(of.play(of.factory(), seed, episode))
-        here = difference(silent, of.play(of.factory(), seed, episode, predicting=True))
-        if here is not None:
-            return f"an episode in which predictions are asked for differs {here}"
-    return None
+        silent = of.play(of.factory(), seed, episode)
+        asked = of.play(of.factory(), seed, episode, predicting=True)
+        words = "an episode in which predictions are asked for differs"
+        yield from differences(list(silent), asked, words)
 
 
-def _predicts(of: Examination) -> str | None:
+def _predicts(of: Examination) -> Iterator[str]:
     """Check that predictions have their shapes, are finite, and that their tables agree."""
     scenario: Any = of.factory()
     rng = np.random.default_rng(of.seeds[0])
     if not hasattr(scenario, "predict"):
         of.unchecked["predictions"] = "the scenario has no method predict"
-        return None
+        return
     opening(scenario, of.seeds[0], of.episodes[0])
     actions = of.actions(scenario, of.seeds[0])
     for action in actions[:STEPS]:
-        fault = fault_of_prediction(scenario, actions, rng)
-        if fault is not None:
-            return fault
+        yield from faults_of_prediction(scenario, actions, rng)
         scenario.step(action)
-    if has_tables(scenario.predict()) and too_many(scenario):
-        of.unchecked["tables"] = f"more than {MOST_JOINT_ACTIONS:,} joint actions"
-    return None
+    if has_tables(scenario.predict()) and (why := too_many(scenario)):
+        of.unchecked["tables"] = why
 
 
-def _senses(of: Examination) -> str | None:
+def _senses(of: Examination) -> Iterator[str]:
     """Check that variables mean the same in sensing and prediction, where that can be checked."""
     for seed, episode in product(of.seeds, of.episodes):
         scenario: Any = of.factory()
@@ -271,28 +241,26 @@ def _senses(of: Examination) -> str | None:
             of.unchecked["sensed and predicted"] = (
                 "without with_exact_prediction, predictions may be off; see their errors"
             )
-            return None
+            return
         exact, actions = scenario.with_exact_prediction(), of.actions(scenario, seed)
-        fault = fault_of_sensing(exact, predicted_steps(exact, seed, episode, actions))
-        if fault is not None:
-            return f"{fault} of seed {seed}"
-    return None
+        for fault in faults_of_sensing(exact, predicted_steps(exact, seed, episode, actions)):
+            yield f"{fault} of seed {seed}"
 
 
-def _leaves_alone(of: Examination) -> str | None:
+def _leaves_alone(of: Examination) -> Iterator[str]:
     """Check that returned arrays stay as they are, and seeds and actions, too."""
     scenario = of.factory()
     seed = np.random.SeedSequence(of.seeds[0])
     given: list[tuple[str, Any, Any]] = []
     states = scenario.reset(seed, of.episodes[0])
     if seed.n_children_spawned:
-        return "reset spawns from the seed it is given, so that using it twice gives two worlds"
+        yield "reset spawns from the seed it is given, so that using it twice gives two worlds"
     given.append(("states at the start", states, np.array(states)))
     for step, action in enumerate(of.actions(scenario, of.seeds[0])):
         joint = action.copy()
         transition = scenario.step(joint)
         if not np.array_equal(joint, action):
-            return f"step changes the joint action it is given, {at(step + 1)}"
+            yield f"step changes the joint action it is given, {at(step + 1)}"
         for name, value in fields(transition):
             if isinstance(value, np.ndarray):
                 given.append((f"{name} {at(step + 1)}", value, value.copy()))
@@ -300,11 +268,10 @@ def _leaves_alone(of: Examination) -> str | None:
             break
     for name, now, then in given:
         if bits(now) != bits(then):
-            return f"{name}: the returned array was changed later"
-    return None
+            yield f"{name}: the returned array was changed later"
 
 
-def _keeps_off_globals(of: Examination) -> str | None:
+def _keeps_off_globals(of: Examination) -> Iterator[str]:
     """Check that the global random numbers of Python and NumPy are neither drawn nor set."""
     before = random.getstate(), np.random.get_state()  # noqa: NPY002
     try:
@@ -320,10 +287,11 @@ def _keeps_off_globals(of: Examination) -> str | None:
     finally:
         random.setstate(before[0])
         np.random.set_state(before[1])  # noqa: NPY002
-    return f"the global state of {' and '.join(changed)} is changed" if changed else None
+    if changed:
+        yield f"the global state of {' and '.join(changed)} is changed"
 
 
-CHECKS: dict[str, Callable[[Examination], str | None]] = {
+CHECKS: dict[str, Callable[[Examination], Iterator[str]]] = {
     "form": _form,
     "measures": _measures,
     "values": _values,

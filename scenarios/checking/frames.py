@@ -96,25 +96,20 @@ def fields(transition: Transition) -> Iterator[tuple[str, Any]]:
     return _flat({name: getattr(transition, name) for name in FIELDS})
 
 
-def difference(expected: Iterable[Frame], actual: Iterable[Frame], first: int = 0) -> str | None:
-    """Return from which step on two runs differ and in what, or None if in no bit.
-
-    Parameters
-    ----------
-    expected, actual
-        The frames of the two runs.
-    first
-        Number of the first frame; 0 is the start of an episode.
-    """
-    for step, (one, other) in enumerate(zip_longest(expected, actual), first):
+def differences(
+    expected: Iterable[Frame], actual: Iterable[Frame], words: str = "they differ"
+) -> Iterator[str]:
+    """Yield at which step the frames of two runs differ and in what, after words for it."""
+    for step, (one, other) in enumerate(zip_longest(expected, actual)):
+        here = f"{words} {at(step)}:"
         if one is None or other is None:
-            return f"{at(step)}: one of them has ended"
-        if one.keys() != other.keys():
-            return f"{at(step)}: one of them has no {min(one.keys() ^ other.keys())}"
-        for name in one:
-            if bits(one[name]) != bits(other[name]):
-                return f"{at(step)}: {name}{_contrast(one[name], other[name])}"
-    return None
+            yield f"{here} one of them has ended"
+        elif one.keys() != other.keys():
+            yield f"{here} one of them has no {min(one.keys() ^ other.keys())}"
+        else:
+            for name in one:
+                if bits(one[name]) != bits(other[name]):
+                    yield f"{here} {name}{_contrast(one[name], other[name])}"
 
 
 def bits(value: Any) -> tuple[Any, ...]:

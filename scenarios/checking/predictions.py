@@ -8,6 +8,7 @@ tables over all joint actions, `blocks` and `reward_table`. Compiled kernels rea
 looking at their sizes: a row too few is read from somewhere else in memory.
 """
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -24,10 +25,10 @@ CLOSE = 1e-9
 """Difference of predicted numbers, relative to 1 or to their size, that rounding may make."""
 
 
-def fault_of_prediction(
+def faults_of_prediction(
     scenario: Any, joint_actions: IntArray, rng: np.random.Generator
-) -> str | None:
-    """Return what is wrong with what a scenario predicts from its present state, or None.
+) -> Iterator[str]:
+    """Yield what is wrong with what a scenario predicts from its present state.
 
     Parameters
     ----------
@@ -39,19 +40,20 @@ def fault_of_prediction(
         Draws the joint actions for which tables are compared, where there are many.
     """
     prediction, given = scenario.predict(), joint_actions.copy()
-    fault = _misformed(scenario, prediction, joint_actions)
+    faults = [*_misformed(scenario, prediction, joint_actions)]
     if not np.array_equal(joint_actions, given):
-        return "the joint actions that are to be predicted are changed"
-    if fault is not None:
-        return fault
+        yield "the joint actions that are to be predicted are changed"
+    yield from faults
     states = np.array([prediction.states(i, given) for i in range(len(scenario.agents))])
     for i in range(len(states)):
         if differs(scenario, prediction.states(i, given[-1:])[0], states[i, -1]).any():
-            return f"states of agent {i} after a joint action depend on those predicted with it"
-    fault = fault_of_sharing(scenario, states) or _wrong_groups(scenario, prediction, given, states)
+            yield f"states of agent {i} after a joint action depend on those predicted with it"
+    yield from faults_of_sharing(scenario, states)
+    yield from _wrong_groups(scenario, prediction, given, states)
     if has_tables(prediction):
-        return fault or _wrong_tables(scenario, prediction, rng)
-    return fault or _own_variable_moved(scenario, prediction, given, rng)
+        yield from _wrong_tables(scenario, prediction, rng)
+    else:
+        yield from _own_variable_moved(scenario, prediction, given, rng)
 
 
 def has_tables(prediction: Any) -> bool:
@@ -59,13 +61,14 @@ def has_tables(prediction: Any) -> bool:
     return hasattr(prediction, "blocks") and hasattr(prediction, "reward_table")
 
 
-def too_many(scenario: Scenario) -> bool:
-    """Return whether a scenario has more joint actions than tables are asked for."""
-    return len(scenario.action_set) ** len(scenario.agents) > MOST_JOINT_ACTIONS
+def too_many(scenario: Scenario) -> str:
+    """Return that a scenario has more joint actions than tables are asked for, if it has."""
+    count = len(scenario.action_set) ** len(scenario.agents)
+    return f"more than {MOST_JOINT_ACTIONS:,} joint actions" if count > MOST_JOINT_ACTIONS else ""
 
 
-def _misformed(scenario: Scenario, prediction: Any, joint_actions: IntArray) -> str | None:
-    """Return what is predicted in a wrong shape, or is not finite."""
+def _misformed(scenario: Scenario, prediction: Any, joint_actions: IntArray) -> Iterator[str]:
+    """Yield what is predicted in a wrong shape, or is not finite."""
     n, m, d = len(scenario.agents), len(joint_actions), scenario.state_space.n_variables
     groups, n_own = groups_of(scenario), scenario.state_space.n_own
     wanted: dict[str, tuple[Any, tuple[int, ...]]] = {
@@ -78,101 +81,89 @@ def _misformed(scenario: Scenario, prediction: Any, joint_actions: IntArray) -> 
         wanted["rewards"] = prediction.rewards(joint_actions), (m,)
     for name, (value, shape) in wanted.items():
         if np.shape(value) != shape:
-            return f"predicted {name} of shape {np.shape(value)}, must be {shape}"
+            yield f"predicted {name} of shape {np.shape(value)}, must be {shape}"
         if not np.isfinite(value).all():
-            return f"predicted {name} are not finite"
-    return None
+            yield f"predicted {name} are not finite"
 
 
 def _wrong_groups(
     scenario: Scenario, prediction: Any, joint_actions: IntArray, states: FloatArray
-) -> str | None:
-    """Return where the prediction of all agents at once differs from that of each."""
+) -> Iterator[str]:
+    """Yield where the prediction of all agents at once differs from that of each."""
     groups = groups_of(scenario)
     own, shared = states_by_group(prediction, joint_actions, groups, scenario.state_space.n_own)
     body = np.repeat(np.arange(len(groups)), [len(group) for group in groups])
     wrong = differs(scenario, np.concatenate([own, shared[body]], axis=2), states)
-    if not wrong.any():
-        return None
-    agent, _, j = np.argwhere(wrong)[0]
-    name = scenario.state_space.variables[j].name
-    return f"states_by_group and states differ in {name} of agent {agent}"
+    for agent, _, j in np.argwhere(wrong):
+        name = scenario.state_space.variables[j].name
+        yield f"states_by_group and states differ in {name} of agent {agent}"
 
 
-def _wrong_tables(scenario: Scenario, prediction: Any, rng: np.random.Generator) -> str | None:
-    """Return where the tables differ from the prediction, whose states are taken to be right."""
+def _wrong_tables(scenario: Scenario, prediction: Any, rng: np.random.Generator) -> Iterator[str]:
+    """Yield where the tables differ from the prediction, whose states are taken to be right."""
     n, n_actions = len(scenario.agents), len(scenario.action_set)
     count = n_actions**n
     if too_many(scenario):
-        return None
+        return
     indices: IntArray = np.arange(count)
     if count > SAMPLED:
         indices = np.sort(rng.choice(count, SAMPLED, replace=False))
     joint_actions = np.stack(np.unravel_index(indices, (n_actions,) * n), axis=-1)
-    behind = n
     for group in groups_of(scenario):
-        behind -= len(group)
+        divisor = n_actions ** (n - 1 - group[-1])
         for agent in group:
-            blocks, divisor = prediction.blocks(agent), n_actions**behind
+            blocks, which = prediction.blocks(agent), f"blocks of agent {agent}:"
             if blocks.divisor != divisor:
-                return f"blocks of agent {agent}: divisor = {blocks.divisor}, must be {divisor}"
-            fault = _misshapen(blocks, n_actions ** len(group), count, scenario)
-            if fault is not None:
-                return f"blocks of agent {agent}: {fault}"
+                yield f"{which} divisor = {blocks.divisor}, must be {divisor}"
+            for fault in _misshapen(blocks, n_actions ** len(group), count, scenario):
+                yield f"{which} {fault}"
             expected, actual = prediction.states(agent, joint_actions), blocks.states(indices)
             wrong = differs(scenario, actual, np.asarray(expected))
             if blocks.alone:
                 wrong[:, : scenario.state_space.n_own] = False
-            if wrong.any():
-                row, j = np.argwhere(wrong)[0]
-                return (
-                    f"blocks of agent {agent}: {scenario.state_space.variables[j].name} = "
-                    f"{actual[row, j]:.6g} after joint action {joint_actions[row].tolist()}, "
+            for row, j in np.argwhere(wrong):
+                yield (
+                    f"{which} {scenario.state_space.variables[j].name} = {actual[row, j]:.6g} "
+                    f"after joint action {joint_actions[row].tolist()}, "
                     f"states has {expected[row, j]:.6g}"
                 )
-    return _wrong_rewards(prediction, indices, joint_actions, count)
+    if hasattr(prediction, "rewards"):
+        yield from _wrong_rewards(prediction, indices, joint_actions, count)
 
 
-def _misshapen(blocks: Blocks, n_own_rows: int, count: int, scenario: Scenario) -> str | None:
-    """Return what would have a kernel read the wrong row, or none."""
+def _misshapen(blocks: Blocks, n_own_rows: int, count: int, scenario: Scenario) -> Iterator[str]:
+    """Yield what would have a kernel read the wrong row, or none."""
     n_own, d = scenario.state_space.n_own, scenario.state_space.n_variables
     for name, table, rows, width, n_rows in (
         ("own", blocks.own, blocks.own_rows, n_own, n_own_rows),
         ("shared", blocks.shared, blocks.shared_rows, d - n_own, count),
     ):
         if np.shape(table)[1:] != (width,) or not len(table):
-            return f"{name} of shape {np.shape(table)}, must be (rows, {width})"
+            yield f"{name} of shape {np.shape(table)}, must be (rows, {width})"
         if not np.isfinite(table).all():
-            return f"{name} is not finite"
+            yield f"{name} is not finite"
         nothing = name == "own" and not width and len(table) == 1
         if not len(rows) and len(table) != n_rows and not nothing:
-            return f"{name} has {len(table)} rows and no {name}_rows, must have {n_rows} rows"
+            yield f"{name} has {len(table)} rows and no {name}_rows, must have {n_rows} rows"
         if len(rows) and len(rows) != n_rows:
-            return f"{name}_rows has {len(rows)} entries, must have {n_rows}"
+            yield f"{name}_rows has {len(rows)} entries, must have {n_rows}"
         if len(rows) and not 0 <= rows.min() <= rows.max() < len(table):
-            return (
-                f"{name}_rows names rows {rows.min()} to {rows.max()}, {name} has {len(table)} rows"
-            )
-    return None
+            named = f"{name}_rows names rows {rows.min()} to {rows.max()}"
+            yield f"{named}, {name} has {len(table)} rows"
 
 
 def _wrong_rewards(
     prediction: Any, indices: IntArray, joint_actions: IntArray, count: int
-) -> str | None:
-    if not hasattr(prediction, "rewards"):
-        return None
+) -> Iterator[str]:
     table, expected = prediction.reward_table(), np.asarray(prediction.rewards(joint_actions))
     if np.shape(table) != (count,):
-        return f"reward_table of shape {np.shape(table)}, must be {(count,)}"
+        yield f"reward_table of shape {np.shape(table)}, must be {(count,)}"
     actual = np.asarray(table)[indices]
-    wrong = ~is_close(actual - expected, expected)
-    if not wrong.any():
-        return None
-    row = wrong.argmax()
-    return (
-        f"reward_table: {actual[row]:.6g} after joint action {joint_actions[row].tolist()}, "
-        f"rewards has {expected[row]:.6g}"
-    )
+    for row in np.flatnonzero(~is_close(actual - expected, expected)):
+        yield (
+            f"reward_table: {actual[row]:.6g} after joint action {joint_actions[row].tolist()}, "
+            f"rewards has {expected[row]:.6g}"
+        )
 
 
 def apart(scenario: Scenario, states: FloatArray, others: FloatArray) -> FloatArray:
@@ -192,12 +183,11 @@ def is_close(differences: FloatArray, expected: FloatArray) -> Any:
 
 def differs(scenario: Scenario, states: FloatArray, expected: FloatArray) -> BoolArray:
     """Return which numbers of states ``(..., d)`` differ beyond rounding."""
-    wrong: BoolArray = ~is_close(apart(scenario, np.asarray(states), expected), expected)
-    return wrong
+    return ~is_close(apart(scenario, np.asarray(states), expected), expected)
 
 
-def fault_of_sharing(scenario: Scenario, states: FloatArray) -> str | None:
-    """Return which variable agents are said to share and do not, in states ``(n, ..., d)``.
+def faults_of_sharing(scenario: Scenario, states: FloatArray) -> Iterator[str]:
+    """Yield which variable agents are said to share and do not, in states ``(n, ..., d)``.
 
     Agents of a group share all that is not their own, and all agents what is ``common``.
     """
@@ -207,20 +197,18 @@ def fault_of_sharing(scenario: Scenario, states: FloatArray) -> str | None:
     for agents, claimed, claim in [*shared, (range(len(states)), space.common, "common")]:
         first, columns = agents[0], [names.index(name) for name in claimed]
         wrong = differs(scenario, states[list(agents)], states[[first]])[..., columns]
-        if wrong.any():
-            where = tuple(np.argwhere(wrong)[0])
-            i, here = agents[where[0]], (*where[1:-1], columns[where[-1]])
-            return (
+        for member, *where, column in np.argwhere(wrong):
+            i, here = agents[member], (*where, columns[column])
+            yield (
                 f"{names[here[-1]]}, said to be {claim}, is {states[i][here]:.6g} of agent {i} and "
                 f"{states[first][here]:.6g} of agent {first}"
             )
-    return None
 
 
 def _own_variable_moved(
     scenario: Scenario, prediction: Any, joint_actions: IntArray, rng: np.random.Generator
-) -> str | None:
-    """Return which own variable is predicted to change by what other groups do, or None.
+) -> Iterator[str]:
+    """Yield which own variable is predicted to change by what other groups do.
 
     Predicted are joint actions ``(m, n)``, and then the same with other actions of the others.
     """
@@ -232,10 +220,8 @@ def _own_variable_moved(
         for agent in group:
             before, after = (prediction.states(agent, a) for a in (joint_actions, changed))
             moved = differs(scenario, after, before)[:, : space.n_own].any(axis=0)
-            if moved.any():
-                name = space.variables[int(moved.argmax())].name
-                return (
-                    f"{name} of agent {agent} changes with the actions of others, n_own = "
-                    f"{space.n_own} says it does not"
+            for j in np.flatnonzero(moved):
+                yield (
+                    f"{space.variables[j].name} of agent {agent} changes with the actions of "
+                    f"others, n_own = {space.n_own} says it does not"
                 )
-    return None

@@ -98,8 +98,8 @@ def _with_reward(states: FloatArray | list[FloatArray], reward: float) -> FloatA
     return np.column_stack([np.asarray(states), np.full(len(states), reward)])
 
 
-def fault_of_sensing(scenario: Scenario, steps: FloatArray) -> str | None:
-    """Return which variable is not sensed as it was predicted, or None.
+def faults_of_sensing(scenario: Scenario, steps: FloatArray) -> Iterator[str]:
+    """Yield which variable is not sensed as it was predicted, step by step the farthest off.
 
     Parameters
     ----------
@@ -112,15 +112,12 @@ def fault_of_sensing(scenario: Scenario, steps: FloatArray) -> str | None:
     _, predicted, after = np.moveaxis(steps[..., : len(variables)], 1, 0)
     allowed = TOLERANCE * np.array([variable.high - variable.low for variable in variables])
     off = np.abs(apart(scenario, after, predicted)) / allowed
-    late = (off > 1).any(axis=(1, 2))
-    if not late.any():
-        return None
-    step = int(late.argmax())
-    i, j = np.unravel_index(off[step].argmax(), off[step].shape)
-    return (
-        f"{variables[j].name} of agent {i} is {after[step, i, j]:.6g}, predicted "
-        f"{predicted[step, i, j]:.6g}, {at(step + 1)}"
-    )
+    for step in np.flatnonzero((off > 1).any(axis=(1, 2))):
+        i, j = np.unravel_index(off[step].argmax(), off[step].shape)
+        yield (
+            f"{variables[j].name} of agent {i} is {after[step, i, j]:.6g}, predicted "
+            f"{predicted[step, i, j]:.6g}, {at(int(step) + 1)}"
+        )
 
 
 def met_variables(scenario: Scenario, steps: FloatArray) -> tuple[MetVariable, ...]:

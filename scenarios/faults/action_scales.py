@@ -15,6 +15,25 @@ from gymnasium.spaces import Box, Discrete, MultiDiscrete
 from ...core.numerics.arrays import BoolArray, FloatArray
 
 
+def limits_of(space: gymnasium.Space[Any], name: str) -> tuple[FloatArray, FloatArray]:
+    """Return the least and greatest value ``(k,)`` of each entry of a space's actions.
+
+    Raises
+    ------
+    ValueError
+        If the space, called by its name, is of another kind or is not bounded; one line.
+    """
+    if isinstance(space, Box) and space.is_bounded():
+        return space.low.ravel(), space.high.ravel()
+    if isinstance(space, Discrete | MultiDiscrete):
+        counts = space.n if isinstance(space, Discrete) else space.nvec
+        return np.ravel(space.start), np.ravel(space.start) + np.ravel(counts) - 1
+    raise ValueError(
+        f"{name}: {space}, allowed: Box, Discrete or MultiDiscrete, of finite bounds; where it has "
+        "none, wrap it in RescaleAction or ClipAction"
+    )
+
+
 class ActionScale:
     """The actuators that an action space has, each with its scale.
 
@@ -50,19 +69,7 @@ class ActionScale:
         self, space: gymnasium.Space[Any], rest: Any = None, name: str = "action space"
     ) -> None:
         self.space = space
-        if isinstance(space, Box):
-            self._low, self._high = (b.ravel().astype(float) for b in (space.low, space.high))
-            if not np.isfinite([self._low, self._high]).all():
-                raise ValueError(
-                    f"{name} = {space}: faults need finite bounds; "
-                    "gymnasium.wrappers.RescaleAction or ClipAction gives them"
-                )
-        elif isinstance(space, Discrete | MultiDiscrete):
-            counts = space.n if isinstance(space, Discrete) else space.nvec
-            self._low = np.ravel(space.start).astype(float)
-            self._high = self._low + np.ravel(counts) - 1.0
-        else:
-            raise ValueError(f"{name} = {space}: allowed: Box, Discrete, MultiDiscrete")
+        self._low, self._high = (ends.astype(float) for ends in limits_of(space, name))
         if rest is None:
             has_zero = isinstance(space, Box) & (self._low <= 0) & (self._high >= 0)
             self._rest = np.where(has_zero, 0.0, (self._low + self._high) / 2)

@@ -14,7 +14,7 @@ import numpy as np
 
 from .action_scales import ActionScale
 from .actuators import ActuatorFault
-from .schedule import Failures
+from .settings import Failures
 
 Commands = Literal["effort", "velocity", "position"]
 """What actions command."""

@@ -8,22 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Union
 from pydantic import Field, field_validator
 
 from ...core.plugins.scheduled import Names
-from ...core.plugins.settings import (
-    NonNegative,
-    Positive,
-    ScenarioSettings,
-    Settings,
-    check_team,
-)
-from ..faults.settings import (
-    DISCRIMINATOR,
-    FailureSettings,
-    Reversed,
-    Seized,
-    Stuck,
-    Weak,
-    befalling,
-)
+from ...core.plugins.settings import NonNegative, Positive, ScenarioSettings, Settings, team_size
+from ..faults.settings import DISCRIMINATOR, KINDS, FailureSettings, befalling
 from ..state_variables import referred
 
 PERIOD = 0.1
@@ -67,7 +53,8 @@ class JointFailure(FailureSettings):
 if TYPE_CHECKING:
     Failure = JointFailure
 else:
-    _KINDS = befalling(JointFailure, locked=Seized, weak=Weak, reversed=Reversed, stuck=Stuck)
+    _ALIKE = {kind: KINDS[kind] for kind in ("weak", "reversed", "stuck")}
+    _KINDS = befalling(JointFailure, locked=KINDS["seized"], **_ALIKE)
     Failure = Annotated[Union[*_KINDS.values()], DISCRIMINATOR]
 """Any failure's settings, distinguished by `kind`."""
 
@@ -77,7 +64,7 @@ class KinematicChainSettings(ScenarioSettings):
 
     kind: Literal["kinematic-chain"] = "kinematic-chain"
     factory: ClassVar[str] = f"{__package__}.scenario:KinematicChain"
-    joints: Annotated[int, Field(ge=2)] = 4
+    joints: Annotated[int, Field(ge=2), team_size(1e-8)] = 4
     """Number of joints, an agent each, as many as memory and time allow by estimate."""
     joint_limit: Annotated[float, Field(gt=0, le=3.141592653589793)] | None = None
     """Greatest angle of every joint but the base, either way [rad]; none: links pass each other."""
@@ -101,12 +88,6 @@ class KinematicChainSettings(ScenarioSettings):
     """Distance of the tip from the goal that counts as reached [m]."""
     most_decisions: Annotated[int, Field(ge=1, le=1_000_000)] = 150
     """Decisions after which an episode is broken off."""
-
-    @field_validator("joints")
-    @classmethod
-    def _fits(cls, joints: int) -> int:
-        check_team(joints, 1e-8)
-        return joints
 
     @field_validator("state_space", mode="before")
     @classmethod

@@ -22,12 +22,11 @@ from ...core.interface.scenario import Transition
 from ...core.interface.spaces import ActionSet
 from ...core.numerics.arrays import FloatArray, IntArray
 from ...core.rules.rule_base import RuleBase
-from ..faults.schedule import Failures
+from ..faults.settings import Failures
 from .config import PERIOD, REACH, KinematicChainSettings
-from .kinematics import ends_of, postures_of
 from .responses import Options, respond
 from .variables import ChainStates
-from .view import ChainView
+from .view import ChainView, ends_of, postures_of
 
 MEASURES = (
     SUCCESS,
@@ -86,10 +85,7 @@ class KinematicChain:
         self._failures = Failures(settings.failures, self.agents, self._limits)
         # What an informed prediction knows of the next step, while the others tell of the last.
         self._known = Failures(settings.failures, self.agents, self._limits)
-        self._goal: FloatArray = np.zeros(2)
-        self._angles: FloatArray = np.zeros(n)
-        self._speeds: FloatArray = np.zeros(n)
-        self._step = 0
+        KinematicChain.reset(self, 0)
 
     def partners(self) -> tuple[int, ...]:
         """Return for every joint the one in whose place it stands in the mirror: itself."""
@@ -104,7 +100,8 @@ class KinematicChain:
         rng, n = np.random.default_rng(seed), len(self.agents)
         bend = min(MOST_BEND, 3.0 * np.sqrt(2.0 / n), self.settings.joint_limit or np.inf)
         self._angles = np.append(rng.uniform(-np.pi, np.pi), rng.uniform(-bend, bend, n - 1))
-        self._speeds, self._step = np.zeros(n), 0
+        self._speeds: FloatArray = np.zeros(n)
+        self._step = 0
         tip = self._places()[-1]
         while True:
             radius = np.sqrt(rng.uniform(GOAL_RADII[0] ** 2, GOAL_RADII[1] ** 2))
@@ -199,8 +196,7 @@ class KinematicChain:
 
     def _places(self) -> FloatArray:
         """Return joints and tip ``(n + 1, 2)`` [m]."""
-        places: FloatArray = postures_of(self._angles[None], self.length)[0]
-        return places
+        return postures_of(self._angles[None], self.length)[0]
 
     def _distance(self) -> float:
         return float(np.hypot(*(self._goal - self._places()[-1])))
@@ -331,10 +327,7 @@ class ChainPrediction:
             approaches,
         )
         places = ends_of(self.angles + self.turns[self._joints, plan], self.arm.length)
-        joint: IntArray = respond(
-            places, self.goal, self.before, plan.copy(), order, options, exploring, rng
-        )
-        return joint
+        return respond(places, self.goal, self.before, plan.copy(), order, options, exploring, rng)
 
     def commands(self, joint_action: IntArray) -> FloatArray:
         """Return the joint speeds ``(n,)`` that a joint action ``(n,)`` would command [rad/s]."""

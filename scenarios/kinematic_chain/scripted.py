@@ -26,8 +26,8 @@ from pydantic import Field
 from ...core.evaluators import EvaluatorSettings
 from ...core.evaluators.evaluator import Counts, DecisionProblem, Deliberation
 from ...core.numerics.arrays import FloatArray, IntArray
-from .kinematics import ends_of, jacobian_of
 from .scenario import ChainPrediction
+from .view import ends_of, jacobian_of
 
 
 class _Scripted(ABC):
@@ -54,8 +54,7 @@ class _Scripted(ABC):
         turns[above] = prediction.turns[above, deliberation.joint_action[above]]
         places = ends_of(prediction.angles + turns, prediction.arm.length)
         wanted = self._wanted(prediction, agent, above, places)
-        values: FloatArray = -np.abs(prediction.turns[agent] - wanted)
-        return values
+        return -np.abs(prediction.turns[agent] - wanted)
 
     @abstractmethod
     def _wanted(

@@ -9,22 +9,108 @@ a spec names it ``"mine.py:height"``::
     @state_variable("m", -1.0, 1.0)
     def height(view: ChainView, joint: int):
         return view.places[:, joint, 1]
+
+The built-in ones tell where the goal is, seen from a joint. Each is a function of a view and a
+joint, in NumPy: the definition, and the test oracle of the
+compiled `columns`, which serve sensing and prediction.
 """
 
 from collections.abc import Sequence
+from math import pi
 
 import numpy as np
 
 from ...core.interface.spaces import Variable
 from ...core.numerics.arrays import FloatArray
+from ...core.numerics.compiling import njit
 from ...core.plugins.registry import Registry
-from ..state_variables import find_variable, guarded, space_of
-from .kernels import COMPILED, columns
+from ..state_variables import filled, find_variable, space_of, state_variable
 from .view import ChainView
 
-_PLACE = "nested_agents.scenarios.kinematic_chain.relational"
+BEARINGS = (-2.4, -1.2, -0.4, -0.1, 0.1, 0.4, 1.2, 2.4)
+DISTANCES = (0.0, 0.02, 0.05, 0.1, 0.2, 0.4, 0.8, 1.2, 2.0)
+APPROACHES = (-0.2, -0.06, -0.01, 0.0, 0.01, 0.06, 0.2)
+COMPILED = ("bearing", "distance", "approach", "angle", "lever", "excess")
+"""The built-in variables; a row of -1 is the joint's speed."""
+BEARING, DISTANCE, APPROACH, ANGLE, LEVER, EXCESS = range(len(COMPILED))
 
-CHAIN_VARIABLES = Registry("chain variable", {name: f"{_PLACE}:{name}" for name in COMPILED})
+
+@state_variable("rad", -pi, pi, periodic=True, centres=BEARINGS, mirrored="opposite")
+def bearing(view: ChainView, joint: int) -> FloatArray:
+    """Angle at the joint from the tip to the goal: by how much it would have to turn."""
+    x, y = (view.tip - view.places[:, joint]).T
+    ahead, aside = (view.goal - view.places[:, joint]).T
+    return np.arctan2(x * aside - y * ahead, x * ahead + y * aside)
+
+
+@state_variable("m", 0.0, 2.0, centres=DISTANCES, common=True, mirrored="same")
+def distance(view: ChainView, joint: int) -> FloatArray:
+    """Distance of the tip from the goal."""
+    return view.distance
+
+
+@state_variable("m", -0.2, 0.2, centres=APPROACHES, common=True, mirrored="same")
+def approach(view: ChainView, joint: int) -> FloatArray:
+    """How much nearer the tip has come in the decision."""
+    return view.approach
+
+
+@state_variable("rad", -pi, pi, centres=(-2.5, -1.25, 0.0, 1.25, 2.5), mirrored="opposite")
+def angle(view: ChainView, joint: int) -> FloatArray:
+    """Angle of the joint, which matters where joints have limits; of the base within a turn."""
+    return (view.angles[:, joint] + pi) % (2.0 * pi) - pi
+
+
+@state_variable("m", 0.0, 1.0, mirrored="same")
+def lever(view: ChainView, joint: int) -> FloatArray:
+    """Distance of the tip from the joint."""
+    return np.hypot(*(view.tip - view.places[:, joint]).T)
+
+
+@state_variable("m", -1.0, 1.0, centres=(-0.5, -0.2, -0.05, 0.0, 0.05, 0.2, 0.5), mirrored="same")
+def excess(view: ChainView, joint: int) -> FloatArray:
+    """By how much the goal is farther from the joint than the tip: whether to stretch or fold."""
+    return np.hypot(*(view.goal - view.places[:, joint]).T) - lever(view, joint)
+
+
+@njit(cache=True)
+def columns(places, angles, speeds, goal, before, first, count, rows):  # type: ignore[no-untyped-def]
+    """Return the variables ``(count, m, len(rows))`` of joints from `first` on.
+
+    Parameters are those of a `ChainView`; `rows` are indices of `COMPILED`. Columns of others stay
+    zero.
+    """
+    m, tip = len(places), places.shape[1] - 1
+    states = np.zeros((count, m, len(rows)))
+    for k in range(m):
+        tx, ty = places[k, tip, 0], places[k, tip, 1]
+        away = np.hypot(goal[0] - tx, goal[1] - ty)
+        for i in range(count):
+            joint = first + i
+            x, y = tx - places[k, joint, 0], ty - places[k, joint, 1]
+            ahead, aside = goal[0] - places[k, joint, 0], goal[1] - places[k, joint, 1]
+            for column in range(len(rows)):
+                row = rows[column]
+                if row == -1:
+                    states[i, k, column] = speeds[k, joint]
+                elif row == BEARING:
+                    cross, along = x * aside - y * ahead, x * ahead + y * aside
+                    states[i, k, column] = np.arctan2(cross, along)
+                elif row == DISTANCE:
+                    states[i, k, column] = away
+                elif row == APPROACH:
+                    states[i, k, column] = before - away
+                elif row == ANGLE:
+                    turned = angles[k, joint] + pi
+                    states[i, k, column] = turned - 2.0 * pi * np.floor(turned / (2.0 * pi)) - pi
+                elif row == LEVER:
+                    states[i, k, column] = np.hypot(x, y)
+                elif row == EXCESS:
+                    states[i, k, column] = np.hypot(ahead, aside) - np.hypot(x, y)
+    return states
+
+
+CHAIN_VARIABLES = Registry("chain variable", {name: f"{__name__}:{name}" for name in COMPILED})
 """State variables by the name that specs use."""
 
 SPEEDS = (-1.0, -0.5, 0.0, 0.5, 1.0)
@@ -48,13 +134,8 @@ class ChainStates:
     """
 
     def __init__(self, names: Sequence[str]) -> None:
-        things = [find_variable(CHAIN_VARIABLES, name) for name in names]
-        self.space = space_of("+".join(names), SPEED, things)
-        self._own = [
-            (column, thing)
-            for column, (name, thing) in enumerate(zip(names, things, strict=True), 1)
-            if name not in COMPILED
-        ]
+        self._things = [find_variable(CHAIN_VARIABLES, name) for name in names]
+        self.space = space_of("+".join(names), SPEED, self._things)
         # Beyond the last of the compiled columns: the column is none of these.
         rows = [COMPILED.index(name) if name in COMPILED else len(COMPILED) for name in names]
         self._rows = np.array([-1, *rows])
@@ -64,9 +145,5 @@ class ChainStates:
         states: FloatArray = columns(
             view.places, view.angles, view.speeds, view.goal, view.before, first, count, self._rows
         )
-        if self._own:
-            safe = guarded(view)
-            for column, thing in self._own:
-                for i in range(count):
-                    states[i, :, column] = thing.checked(safe, first + i)
+        filled(states[:, :, 1:], self._things, view, range(first, first + count))
         return states

@@ -22,9 +22,18 @@ from math import isfinite
 
 import numpy as np
 
+from ...core.interface.measures import SUCCESS, Measure
 from ...core.numerics.arrays import FloatArray
 from ...core.plugins.messages import closest
 
+OF_OPTIMA = (
+    Measure(SUCCESS.name, SUCCESS.title, source="optimal", better="higher", is_rate=True),
+    Measure(
+        "optimal_plays", "optimal plays", source="optimal", gathering="mean", better="higher",
+        least=0.0, greatest=1.0,
+    ),
+)  # fmt: skip
+"""What is measured of any game: success is that the last play of an episode was optimal."""
 CLIMBING = ((11, -30, 0), (-30, 7, 6), (0, 0, 5))
 PARTIALLY_STOCHASTIC = ((11, -30, 0), (-30, (14, 0), 6), (0, 0, 5))
 STOCHASTIC = (

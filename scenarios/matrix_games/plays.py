@@ -20,10 +20,8 @@ from ...core.agents.loop import EpisodeSummary
 from ...core.agents.team import Team
 from ...core.decision.exploration import Boltzmann, EpsilonDecreasingBoltzmann
 from ...core.evaluators.exact import ExactEnumeration
-from ...core.learners.fmq import FMQ
-from ...core.learners.frozen import Frozen
-from ...core.learners.optimistic import OptimisticTD
-from ...core.learners.td import TDLambda
+from ...core.learners.one_step import FMQ, OptimisticTD
+from ...core.learners.td import Frozen, TDLambda
 from ...core.numerics.arrays import FloatArray, IntArray
 from .kernel import DECREASING, GREEDY, SAMPLED, Deciding, Exploring, Learning, play
 

@@ -17,26 +17,17 @@ from pydantic import AfterValidator, Field
 
 from ...core.agents.loop import EpisodeSummary
 from ...core.agents.team import Team
-from ...core.interface.measures import SUCCESS, Measure
+from ...core.interface.measures import Measure
 from ...core.interface.scenario import Transition
 from ...core.interface.spaces import ActionSet, StateSpace, choice
 from ...core.numerics.arrays import FloatArray, IntArray
 from ...core.plugins.settings import ScenarioSettings
-from .games import of_two, optimal, payoffs_of
+from .games import OF_OPTIMA, of_two, optimal, payoffs_of
 
 MOST_ACTIONS = 26
 """Actions of an agent, which are called by letters."""
 
-OPTIMAL_PLAYS = "optimal_plays"
-MEASURES = (
-    Measure(SUCCESS.name, SUCCESS.title, source="optimal", better="higher", is_rate=True),
-    Measure(
-        OPTIMAL_PLAYS, "optimal plays", source="optimal", gathering="mean", better="higher",
-        least=0.0, greatest=1.0,
-    ),
-    Measure("payoff", "mean payoff", gathering="mean", better="higher"),
-)  # fmt: skip
-"""Success is that the last play of an episode was optimal."""
+MEASURES = (*OF_OPTIMA, Measure("payoff", "mean payoff", gathering="mean", better="higher"))
 
 
 def _known(game: str) -> str:
@@ -169,8 +160,7 @@ class MatrixGamePrediction:
 
     def rewards(self, joint_actions: IntArray) -> FloatArray:
         """Return the expected payoffs ``(m,)`` of joint actions ``(m, n)``; for planners."""
-        expected: FloatArray = self._game.payoffs.mean(axis=0)[tuple(joint_actions.T)]
-        return expected
+        return self._game.payoffs.mean(axis=0)[tuple(joint_actions.T)]
 
 
 def _state_space(

@@ -23,26 +23,22 @@ from pydantic import Field
 
 from ...core.coordination.elimination import Elimination
 from ...core.coordination.shapes import Shape, shaped
-from ...core.interface.measures import SUCCESS, Measure
+from ...core.interface.measures import Measure
 from ...core.interface.scenario import Transition
 from ...core.interface.spaces import ActionSet, StateSpace, Variable, choice
 from ...core.numerics.arrays import FloatArray, IntArray
 from ...core.plugins.deferred import nx
 from ...core.plugins.settings import NonNegative, ScenarioSettings
+from .games import OF_OPTIMA
 
 PLAY = Variable("play", "1", 0.0, 1.0, centres=(0.0, 1.0))
 """What those see who see nothing: 0 always."""
 MEASURES = (
-    Measure(SUCCESS.name, SUCCESS.title, source="optimal", better="higher", is_rate=True),
-    Measure(
-        "optimal_plays", "optimal plays", source="optimal", gathering="mean", better="higher",
-        least=0.0, greatest=1.0,
-    ),
+    *OF_OPTIMA,
     Measure(
         "share_of_best", "payoff over the best", gathering="mean", better="higher", greatest=1.0
     ),
-)  # fmt: skip
-"""Success is that the last play of an episode was optimal."""
+)
 
 
 class TeamGameSettings(ScenarioSettings):
@@ -116,8 +112,7 @@ class Polymatrix(Game):
         """Return the mean over the edges."""
         edges = np.arange(len(self._tables))
         both = joint_actions[:, self._first], joint_actions[:, self._second]
-        mean: FloatArray = self._tables[edges, *both].mean(axis=1)
-        return mean
+        return self._tables[edges, *both].mean(axis=1)
 
 
 class Permutation(Game):
@@ -143,8 +138,7 @@ class Landmarks(Game):
         """Return the share of landmarks that are taken, less the cost of the mean distance."""
         n = len(self.seen)
         far = self.seen[np.arange(n), joint_actions].mean(axis=1)
-        paid: FloatArray = distinct(joint_actions) / n - self._cost * far
-        return paid
+        return distinct(joint_actions) / n - self._cost * far
 
     def is_optimal(self, joint_action: IntArray) -> bool:
         """Return whether every landmark is taken, by whomever."""
@@ -166,8 +160,7 @@ def distinct(joint_actions: IntArray) -> IntArray:
     >>> distinct(np.array([[0, 1, 2], [1, 1, 0]])).tolist()
     [3, 2]
     """
-    different: IntArray = 1 + (np.diff(np.sort(joint_actions, axis=1), axis=1) > 0).sum(axis=1)
-    return different
+    return 1 + (np.diff(np.sort(joint_actions, axis=1), axis=1) > 0).sum(axis=1)
 
 
 class TeamGame:

@@ -7,7 +7,6 @@ from functools import cached_property
 from html import escape
 from typing import TYPE_CHECKING
 
-from ..presentation.profiles import draw
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.aggregates import Aggregates, aggregate
 from ..results.comparison import Difference
@@ -57,7 +56,9 @@ class Comparison:
 
     def figure(self) -> Figure:
         """Return performance profiles, and the interquartile mean by episode of training."""
-        return draw(self.statistics)
+        from ..presentation.figures import draw_profiles  # matplotlib takes its time
+
+        return draw_profiles(self.statistics)
 
     def __str__(self) -> str:
         return "\n".join([str(self.table), "", *self.verdicts])

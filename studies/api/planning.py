@@ -1,12 +1,14 @@
 """What a study will take and what it can find, before anything is spent on it.
 
-Two episodes of every condition are trained, and one is evaluated, to see what a step takes, on a
-seed that no study reports. Deciding and simulating take a time per step. Learning may take one per
-step, too, and one per step kept so far: a regression over all of training grows with the square of
-its length. A worker has to start, too, to load or compile what each condition needs, and to build
-each trial: that is measured here once.
+Episodes of every condition are tried for a while, to see what a step takes and after how many they
+end, on a seed that no study reports. Deciding and simulating take a time per step. Learning may
+take one per step, too, and one per step kept so far: a regression over all of training grows with
+the square of its length. A process has to start, too, to load or compile what each condition needs,
+and to build each trial: that is measured once. All of this is processor time; the time of the clock
+that it comes to depends on what else the machine does, which is seen while planning.
 """
 
+import os
 import resource
 import subprocess
 import sys
@@ -16,15 +18,16 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from textwrap import wrap
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...core.numerics.arrays import FloatArray, IntArray
 from ...core.plugins.deferred import optimize
 from ..errors import SpecError
 from ..presentation.words import count, duration
+from ..results.analysis import WIDTH, power_text
 from ..results.power import SMALLEST, USUAL_DEVIATION
-from ..results.verdicts import WIDTH, power_text
 from ..spec.outline import StudyOutline
 from ..spec.spec import Spec
 from ..trials.session import Session, run_trial
@@ -35,53 +38,36 @@ from .run_study import examine
 
 SEED = 10_000
 """Of the trials that are tried out."""
+TRIED = 1.0
+"""Processor time [s] for which episodes of training are tried of every condition."""
 EPISODES = 2
-"""Tried of every condition; one that is cut short goes before them, in which code is compiled."""
-QUICK = 0.25
-"""Share of the steps tried that an episode takes if the goal is reached sooner by the trained."""
-FASTER, SLOWER = 0.5, 2.5
-"""By what a machine is faster or slower than when it was tried: others use it, caches are cold."""
-WORKER = f"import {Session.__module__}, matplotlib.pyplot"
-"""What is imported by a worker, and at the end for the figures."""
+"""That are tried at least, of training and of every evaluation."""
+QUICK, LONG = 0.25, 2.0
+"""Steps of the other episodes, from and to, as a fraction of the mean and of the longest tried
+last."""
+FASTER, SLOWER = 0.7, 2.2
+"""By what the time of another process, and other seeds, differ from what was tried."""
+KEEPING = np.array([0.02, 0.15])
+"""Seconds to hand out a trial and to keep it, from and to: a disk takes longer than a processor."""
+STARTS = 5
+"""Starts of a process that a run takes: the command's own, its workers', which start together, and
+as much as three more for the store, the tables and the figures."""
+START = f"import {Session.__module__}, matplotlib.pyplot"
+"""What a process imports."""
+
+Range = tuple[float, float]
+"""From and to."""
 
 
-@dataclass(frozen=True)
-class Pace:
-    """What the trials of a condition take."""
+class Tried(NamedTuple):
+    """What a condition takes, by one of its trials."""
 
-    acting: float
-    """Seconds of a step of evaluation."""
-    learning: float
-    """Seconds that a step of training takes more: for each of the episode that has ended."""
-    regression: float
-    """The same for every step that is kept by then."""
-    bytes: tuple[float, float]
-    """What the team holds [bytes], and how much more for every step of training."""
-    building: float = 0.0
-    """Seconds to build a trial's world and team."""
-    loading: float = 0.0
-    """Seconds to import, load and compile what the first step needs, once a process."""
-    early: float = QUICK
-    """Share of its steps that an episode takes if it ends early: `QUICK` of what was tried."""
-
-    def seconds(self, steps: float, training: Sequence[int], evaluation: float) -> float:
-        """Return the time of a trial whose episodes take so many steps.
-
-        Parameters
-        ----------
-        steps
-            Of an episode of training.
-        training
-            Episodes of training, stage by stage.
-        evaluation
-            Steps of all evaluations together.
-        """
-        acting = self.acting * (steps * sum(training) + evaluation)
-        learning = sum(
-            self.learning * steps * n + self.regression * steps**2 * n * (n + 1) / 2
-            for n in training
-        )
-        return self.building + acting + learning
+    seconds: FloatArray
+    """Processor time [s] of a trial, from and to."""
+    loading: float
+    """Processor time [s] to import, load and compile what the first step needs, once a process."""
+    memory: float
+    """What the team holds in the end [bytes]."""
 
 
 @dataclass(frozen=True)
@@ -94,9 +80,9 @@ class Plan:
     """How many there are."""
     processes: int
     """How many run at a time."""
-    seconds: tuple[float, float] | None
-    """Time of the whole study [s], from and to: from `QUICK` of the steps of episodes tried on a
-    machine that is `FASTER` to all that they may have on one that is `SLOWER`."""
+    seconds: Range | None
+    """Time of the whole study [s], from and to: by how early episodes end that were not tried, and
+    by what else this machine does."""
     memory: float | None
     """Of all processes together [bytes], about."""
     comparisons: int
@@ -182,60 +168,93 @@ def plan(
     )  # fmt: skip
 
 
-def _taken(
-    spec: Spec, trials: Sequence[Trial], processes: int
-) -> tuple[tuple[float, float], float]:
+def _taken(spec: Spec, trials: Sequence[Trial], processes: int) -> tuple[Range, float]:
     """Return the time of a study [s], from and to, and its memory [bytes]."""
-    quick = slow = longest = loaded = largest = 0.0
-    # This process, a worker, and the figures.
-    started = 3 * _seconds(lambda: subprocess.run([sys.executable, "-c", WORKER], check=True))
+    begin, used = time.perf_counter(), _used()
+    subprocess.run([sys.executable, "-c", START], check=True)
+    started = STARTS * (_used() - used)
     with spec.sources.active():
-        for trial in trials[: len(spec.conditions())]:
-            training = [*(stage.episodes for stage in trial.curriculum), trial.episodes]
-            evaluations = trial.evaluation * (1 + len(trial.evaluations))
-            pace = paced(trial)
-            evaluated = evaluations * (trial.evaluation_steps or trial.steps)
-            most = pace.seconds(trial.steps, training, evaluated)
-            quick += pace.seconds(pace.early * trial.steps, training, pace.early * evaluated)
-            slow += most
-            longest, loaded = max(longest, most), loaded + pace.loading
-            held, more = pace.bytes
-            largest = max(largest, held + more * trial.steps * sum(training))
-    each = len(spec.seeds) / processes
+        tried = [try_out(trial) for trial in trials[: len(spec.conditions())]]
+    loading = sum(each.loading for each in tried)  # less, if what was compiled here is kept
+    each_seed = np.sum([one.seconds / processes + KEEPING for one in tried], axis=0)
+    quick, slow = len(spec.seeds) * each_seed
     # Processes that have no trial left wait for the last one.
-    seconds = started + quick * each, started + loaded + slow * each + longest
-    return (FASTER * seconds[0], SLOWER * seconds[1]), processes * (_resident() + largest)
+    slow += (1 - 1 / processes) * max(each.seconds[1] for each in tried)
+    busy = max((time.perf_counter() - begin) / (_used() - used), 1.0)
+    least, most = FASTER * busy**0.5, SLOWER * busy  # others may stop, or not
+    memory = _resident() + max(each.memory for each in tried)
+    seconds = least * (started + quick), most * (started + loading + slow)
+    return (float(seconds[0]), float(seconds[1])), processes * memory
 
 
-def paced(trial: Trial) -> Pace:
-    """Return what a condition's trials take, by trying one of them out."""
-    alone = replace(
-        trial, seed=SEED, episodes=EPISODES, evaluation=1, curriculum=(), evaluations=()
-    )
+def try_out(trial: Trial) -> Tried:
+    """Return what the trials of a condition take."""
+    alone = replace(trial, seed=SEED, curriculum=(), evaluation=min(trial.evaluation, EPISODES))
     brief = replace(alone, episodes=1, steps=2, evaluation_steps=None)
     loading, building = _seconds(partial(run_trial, brief)), _seconds(partial(Session, alone))
     session = Session(alone)
-    held = _bytes(session)
-    taken = [_seconds(partial(session.train, 1, k)) for k in range(EPISODES)]
-    evaluated = _seconds(session.evaluate)
-    *trained, evaluation = (float(row.steps) for row in session.result().rows)
-    steps, acting = np.array(trained), evaluated / evaluation
-    # An episode of T steps takes T (a + b N) to learn from, N being the steps kept by its end.
+    held, taken = _bytes(session), list[float]()
+    while (k := len(taken)) < min(EPISODES, trial.episodes) or (
+        k < trial.episodes and sum(taken) < TRIED
+    ):
+        taken.append(_seconds(partial(session.train, 1, k)))
+    own, others = _seconds(session.evaluate), _seconds(session.run_other_evaluations)
+    lengths: dict[str, list[float]] = {}
+    for row in session.result().rows:
+        lengths.setdefault(row.phase, []).append(float(row.steps))
+    steps, most = np.array(lengths.pop("training")), trial.evaluation_steps or trial.steps
+    acting = own / sum(lengths.get("evaluation", [1.0]))
+    evaluated = (own + others) / max(sum(map(sum, lengths.values())), 1.0)
+    evaluating = evaluated * sum((_others(each, most) for each in lengths.values()), np.zeros(2))
+    episodes = np.array([*(stage.episodes for stage in trial.curriculum), trial.episodes])
+    left = episodes.sum() - k
+    mean = (steps.sum() + left * _others(steps[k // 2 :], trial.steps)) / episodes.sum()
+    learning = learned(steps, np.array(taken) - acting * steps, mean, episodes)
+    seconds = building + acting * mean * episodes.sum() + learning
+    kept = mean[1] * episodes.sum() / steps.sum()
+    memory = held + kept * max(_bytes(session) - held, 0.0)
+    return Tried(seconds + trial.evaluation * evaluating, loading, memory)
+
+
+def learned(
+    steps: FloatArray, taken: FloatArray, mean: FloatArray, episodes: IntArray
+) -> FloatArray:
+    """Return the processor time [s] to learn from all episodes of a trial.
+
+    An episode of T steps takes T (a + b N) to learn from, N being the steps kept by its end.
+
+    Parameters
+    ----------
+    steps, taken
+        Of the episodes that were tried: their steps, and the time that was learned from them [s].
+    mean
+        Mean steps of an episode; several possible ones.
+    episodes
+        How many there are in every stage of training.
+    """
     (per_step, per_kept), _ = optimize.nnls(
-        np.stack([steps, steps * np.cumsum(steps)], axis=1),
-        np.maximum(np.array(taken) - acting * steps, 0.0),
+        np.stack([steps, steps * np.cumsum(steps)], axis=1), np.maximum(taken, 0.0)
     )
-    more = max(_bytes(session) - held, 0.0) / steps.sum()
-    early = QUICK * min(evaluation, float(steps.mean())) / trial.steps
-    return Pace(
-        acting, float(per_step), float(per_kept), (held, float(more)), building, loading, early
-    )
+    kept = mean * (episodes * (episodes + 1)).sum() / 2
+    total: FloatArray = mean * (per_step * episodes.sum() + per_kept * kept)
+    return total
+
+
+def _others(tried: Sequence[float] | FloatArray, most: int) -> FloatArray:
+    """Return the mean steps of episodes that were not tried, from and to."""
+    return np.array([QUICK * np.mean(tried), min(most, LONG * max(tried))])
+
+
+def _used() -> float:
+    """Return the processor time of this process and of those that it has waited for [s]."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
 
 
 def _seconds(call: Callable[[], object]) -> float:
-    begin = time.perf_counter()
+    begin = time.process_time()
     call()
-    return time.perf_counter() - begin
+    return time.process_time() - begin
 
 
 def _bytes(session: Session) -> float:

@@ -15,9 +15,9 @@ from ..store.store import Store
 from ..trials.arrangement import check
 from ..trials.keeping import open_to_run, pending
 from ..trials.trial import Trial, trials_of
-from ..workers.runner import Observer, run_trials
+from ..workers.runner import Backend, Observer, run_trials
 from ..workers.worker import RunTrial
-from ..workers.workers import Backend, start_workers
+from ..workers.workers import start_workers
 
 
 @contextmanager

@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...core.interface.measures import SUCCESS
+from ...core.plugins.deferred import pd
 from ...core.plugins.messages import closest
 from ...core.plugins.sources import Sources
 from ..catalogue.study import analysed, drawn, load_study
@@ -31,24 +32,22 @@ from ..presentation.progress import Terminal
 from ..presentation.tables import SummaryTable, tabulate
 from ..presentation.words import count
 from ..results import published
+from ..results.analysis import power_text
 from ..results.contrasts import contrasts
 from ..results.power import SMALLEST, USUAL_DEVIATION
 from ..results.results import Results, read
 from ..results.selection import chosen, together
-from ..results.verdicts import power_text
 from ..spec.outline import StudyOutline, other_spec, sources_of
 from ..store import durable
 from ..store.store import Store
-from ..workers.workers import Backend
+from ..workers.runner import Backend
 from . import replay
 from .comparison import Comparison
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-    from pandas import DataFrame
 
-    from ...core.interface.acting import Actors
-    from ...core.interface.scenario import Scenario
+    from ...core.interface.scenario import Actors, Scenario
     from ..spec.spec import Spec
     from ..workers.runner import Observer
 
@@ -82,7 +81,7 @@ class StudyResults:
         return self.results.conditions
 
     @property
-    def trials(self) -> DataFrame:
+    def trials(self) -> pd.DataFrame:
         """One row per trial: its state, seconds [s] and numbers of the whole trial.
 
         What its columns are stands in ``trials.attrs["columns"]``.
@@ -90,7 +89,7 @@ class StudyResults:
         return self.results.trials
 
     @property
-    def episodes(self) -> DataFrame:
+    def episodes(self) -> pd.DataFrame:
         """One row per episode, counted from 0, and a column per measure.
 
         What its columns are, and their units, stands in ``episodes.attrs["columns"]``.

@@ -7,8 +7,9 @@ from functools import partial
 from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from ...core.plugins.deferred import pd
 from ...core.plugins.sources import Sources
 from ..errors import SpecError, show
 from ..presentation.progress import Terminal
@@ -28,9 +29,6 @@ from ..workers.worker import Outcome
 from ..workers.workers import start_workers
 from .study import Place, StudyResults, load
 
-if TYPE_CHECKING:
-    from pandas import DataFrame
-
 
 def reevaluate(
     study: StudyResults | Place,
@@ -39,7 +37,7 @@ def reevaluate(
     *,
     jobs: int | None = None,
     observer: Observer | None = None,
-) -> DataFrame:
+) -> pd.DataFrame:
     """Evaluate the trained teams of a study under other topologies and ways to decide.
 
     Every team acts with its weights on the worlds of its own evaluation, and begins with the random

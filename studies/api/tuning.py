@@ -20,14 +20,12 @@ from ..errors import SpecError, show
 from ..presentation.progress import Terminal
 from ..presentation.words import count
 from ..results.results import Results, read
-from ..spec.overlay import TomlTable, nested, overlay
+from ..spec.overlay import TomlTable, dumps, nested, overlay
 from ..spec.spec import Spec
-from ..spec.toml import dumps
 from ..store import durable
 from ..trials.arrangement import check
 from ..trials.trial import Trial, trials_of
-from ..workers.runner import Observer
-from ..workers.workers import Backend
+from ..workers.runner import Backend, Observer
 from .run_study import run_study
 from .study import StudyResults, load
 
@@ -143,11 +141,11 @@ def tune(
         If there is nothing to tune, or it cannot be run; one line says why.
     """
     spec, out = Spec.read(spec, study=Path(out)), Path(out)
-    _check(spec, trials, seeds, first_seed)
+    _check(spec, trials, seeds, first_seed, draw)
     points = _sampled(spec, trials, draw)
     study = _study(spec, points, range(first_seed, first_seed + seeds))
     everything, planned = trials_of(study), dict[str, Trial]()
-    observer = _Rungs() if progress else Observer()
+    observer = Terminal() if progress else Observer()
     names = list(points)
     for n_configurations, n_seeds in rungs(len(points), seeds):
         names = names[:n_configurations]
@@ -188,12 +186,13 @@ def rungs(configurations: int, seeds: int) -> Iterator[tuple[int, int]]:
     yield configurations, seeds
 
 
-def _check(spec: Spec, trials: int, seeds: int, first_seed: int) -> None:
-    for name, value, least in (
-        ("trials", trials, 2), ("seeds", seeds, 2), ("first-seed", first_seed, FIRST_SEED)
+def _check(spec: Spec, trials: int, seeds: int, first_seed: int, draw: int) -> None:
+    for name, value, allowed in (
+        ("trials", trials, range(2, 10_001)), ("seeds", seeds, range(2, 10_001)),
+        ("first-seed", first_seed, range(FIRST_SEED, 10**9)), ("draw", draw, range(10**9)),
     ):  # fmt: skip
-        if value < least:
-            raise SpecError(f"--{name} {value}: must be at least {least}")
+        if value not in allowed:
+            raise SpecError(f"--{name} {value}: allowed {allowed[0]:,} to {allowed[-1]:,}")
     if spec.sweep or spec.overrides:
         raise SpecError("sweep, overrides: must be absent, tune takes a spec of one condition")
     if spec.evaluation < 1:
@@ -286,19 +285,3 @@ def _table(results: Results, points: Mapping[str, Point], seeds: Iterable[int]) 
     values = pd.DataFrame(list(points.values()), dtype=object)
     table = lines.astype({"seeds": int}).join(values).astype(object)
     return table.sort_values(list(means), ascending=False, ignore_index=True)
-
-
-class _Rungs(Terminal):
-    """Shows how each rung goes; what is said of a study is said once."""
-
-    def __init__(self) -> None:
-        self._said: set[str] = set()
-
-    def announce(self, spec: Spec, directory: Path, processes: int) -> None:
-        """Rungs are announced by their size."""
-
-    def note(self, line: str) -> None:
-        """Say it, if it has not been said."""
-        if line not in self._said:
-            self._said.add(line)
-            super().note(line)

@@ -13,15 +13,12 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Protocol, cast
 
-from ..errors import SpecError
-from ..results.analysis import Analysis
+from ..errors import SpecError, refused
+from ..results.analysis import Analysis, Figures, identity_lines
 from ..results.results import Results
-from ..results.verdicts import identity_lines
 from ..spec.studies import STUDIES
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from ..spec.spec import Spec
     from ..trials.trial import Trial, TrialResult
 
@@ -43,7 +40,7 @@ class Study(Protocol):
         which may be missing.
         """
 
-    def draw(self, analysis: Any) -> dict[str, Figure]:
+    def draw(self, analysis: Any) -> Figures:
         """Return the figures of an analysis by name."""
 
 
@@ -55,10 +52,8 @@ def load_study(name: str) -> Study:
     SpecError
         If there is none, it may not be run, or lacks a function that studies have; one line.
     """
-    try:
+    with refused(f"study = {name!r}: "):
         entry = STUDIES.find(name)
-    except ValueError as error:
-        raise SpecError(f"study = {name!r}: {error}") from None
     study = entry() if isinstance(entry, type) else entry
     missing = [part for part in PARTS if not callable(getattr(study, part, None))]
     if missing:
@@ -79,6 +74,12 @@ def check_evaluated(spec: Spec) -> None:
         raise SpecError(
             f"evaluation = 0: {spec.study} compares evaluation success, needs 1 or more"
         )
+
+
+def check_evaluations(spec: Spec, example: str) -> None:
+    """Raise `SpecError` unless trained teams are evaluated otherwise, too, as in an `example`."""
+    if not spec.evaluations:
+        raise SpecError(f"evaluations: missing; {spec.study} needs one at least, as {example}")
 
 
 def check_rule_bases(spec: Spec, why: str) -> None:
@@ -142,7 +143,7 @@ def published_part(name: str, results: Results) -> Results:
     )
 
 
-def drawn(study: Study, analysis: Any) -> dict[str, Figure]:
+def drawn(study: Study, analysis: Any) -> Figures:
     """Return the figures of an analysis by name, as all figures look; none of an empty table."""
     from ..presentation.figures import styled  # matplotlib takes its time
 

@@ -6,24 +6,18 @@ interval over seeds, or None where the results have not what it takes.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ...core.agents.cost import Problem
+from ...core.plugins.deferred import pd
 from ..catalogue.shapes import ratios_of
 from ..catalogue.wheel_failure import courses_of
-from ..results.comparison import (
-    aligned,
-    difference,
-    of_shared_seeds,
-    order_tests,
-    paired_difference,
-    ratio,
-)
+from ..results.comparison import BySeed, difference, order_tests, paired_difference, ratio, shared
 from ..results.results import Results
-from ..results.sizes import Sizes
 from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate
-from ..results.summary import EVALUATED
+from ..results.summary import EVALUATED, Sizes
 from ..store.schema import EVALUATION
 
 CONTACT = "contact_fraction"
@@ -60,17 +54,13 @@ def learned(results: Results, name: str = "", known: Sequence[str] = UNREWARDED)
 
     Of the condition of a `name`; without, of that by which claims are judged.
     """
-
-    def outcomes(r: Results, condition: str) -> np.ndarray:
-        return r.success(condition)[:, LAST]
-
     controls = [c for c in known if results.has(c, "training")]
     condition = name or learner_of(results)
     if not results.has(condition, "training") or not controls:
         return None
-    best = max(controls, key=lambda c: float(outcomes(results, c).mean()))
-    note = f"against {best}"
-    return _compare(results, condition, best, outcomes, difference, "training", note=note)
+    best = max(controls, key=lambda c: float(results.success(c)[:, LAST].mean()))
+    own, base = (results.by_seed(c, "training").iloc[:, LAST] for c in (condition, best))
+    return _paired(own, base, difference, f"against {best}")
 
 
 def learner_of(results: Results) -> str:
@@ -80,11 +70,11 @@ def learner_of(results: Results) -> str:
 
 def sooner_than_planned(results: Results) -> Measured | None:
     """Measure the learner's decisions in an evaluation episode over the planner's, by seed."""
-
-    def share(own: np.ndarray, base: np.ndarray) -> Estimate:
-        return bootstrap(own / base, bounds=NOT_NEGATIVE)
-
-    return _compare(results, learner_of(results), PLANNER, _evaluation_steps, share)
+    learner = learner_of(results)
+    if not all(results.has(c, "evaluation") for c in (learner, PLANNER)):
+        return None
+    own, base = (results.means(c, "evaluation", "steps") for c in (learner, PLANNER))
+    return _paired(own, base, lambda a, b: bootstrap(a / b, bounds=NOT_NEGATIVE))
 
 
 def success(
@@ -106,15 +96,14 @@ def contact_gained(results: Results) -> Measured | None:
 
     That of any agent grows in training, since fewer and fewer actions are random.
     """
-
-    def gained(r: Results, name: str) -> np.ndarray:
-        contact = r.values(name, CONTACT)
-        return np.asarray(contact[:, LAST].mean(axis=1) - contact[:, FIRST].mean(axis=1))
-
-    def more(own: np.ndarray, base: np.ndarray) -> Estimate:
-        return bootstrap(own - base)
-
-    return _compare(results, learner_of(results), PLANNER, gained, more, "training", CONTACT)
+    gained = []
+    for condition in (learner_of(results), PLANNER):
+        if not results.has(condition, "training", CONTACT):
+            return None
+        contact = results.values(condition, CONTACT)
+        more = contact[:, LAST].mean(axis=1) - contact[:, FIRST].mean(axis=1)
+        gained.append(pd.Series(more, results.seeds(condition)))
+    return _paired(gained[0], gained[1], lambda own, base: bootstrap(own - base))
 
 
 def cost_error(results: Results) -> Measured:
@@ -167,11 +156,7 @@ def gained_by_edges(results: Results, edges: str, less: str) -> Measured | None:
     pairs = [(of[edges], of[less]) for of in by_game.values() if {edges, less} <= of.keys()]
     if not pairs:
         return None
-    every = [condition for pair in pairs for condition in pair]
-    success_of = of_shared_seeds(
-        [results.seeds(condition) for condition in every],
-        [results.success(condition, "evaluation").mean(axis=1) for condition in every],
-    )
+    success_of = shared([results.means(c, "evaluation") for pair in pairs for c in pair])
     own, other = np.mean(success_of[::2], axis=0), np.mean(success_of[1::2], axis=0)
     return Measured(paired_difference(own, other, of_rates=True), len(own)) if len(own) else None
 
@@ -206,9 +191,8 @@ def lost_without(results: Results, evaluation: str) -> Measured | None:
     ]
     if not cases:
         return None
-    seeds = [results.seeds(condition) for condition in cases]
     whole, part = (
-        np.hstack(of_shared_seeds(seeds, [results.success(c, phase) for c in cases]))
+        np.hstack(shared([results.by_seed(c, phase) for c in cases]))
         for phase in ("evaluation", other)
     )
     return Measured(difference(whole, part), len(whole), note=f"{len(cases)} sizes")
@@ -241,40 +225,22 @@ def success_by_size(results: Results) -> Measured | None:
     by_size = {n: [c for c in own if results.has(c, "evaluation")] for n, own in every.items()}
     if len(by_size) < 2 or not all(by_size.values()):
         return None
-    fewest, most = (
-        max(by_size[number], key=lambda c: float(_evaluation_success(results, c).mean()))
-        for number in (min(by_size), max(by_size))
+    most, fewest = (
+        max(
+            (results.by_seed(c, "evaluation") for c in by_size[number]),
+            key=lambda success: float(success.to_numpy().mean()),
+        )
+        for number in (max(by_size), min(by_size))
     )
-    note = f"{max(by_size)} against {sizes.shown(min(by_size))}"
-    return _compare(results, most, fewest, _evaluation_success, ratio, note=note)
+    return _paired(most, fewest, ratio, f"{max(by_size)} against {sizes.shown(min(by_size))}")
 
 
-def _compare(
-    results: Results,
-    condition: str,
-    reference: str,
-    values: Callable[[Results, str], np.ndarray],
-    estimate: Callable[[np.ndarray, np.ndarray], Estimate],
-    phase: str = "evaluation",
-    measure: str = "",
-    note: str = "",
+def _paired(
+    own: BySeed, base: BySeed, estimate: Callable[[Any, Any], Estimate], note: str = ""
 ) -> Measured | None:
-    """Return an estimate from the values of a condition and a reference, seed by seed.
-
-    None unless both have the measure in the episodes of the phase, for a seed in common.
-    """
-    if not all(results.has(c, phase, measure) for c in (condition, reference)):
-        return None
-    base, own = aligned(results, (reference, condition), values)
-    return Measured(estimate(own, base), len(own), note=note) if len(own) else None
-
-
-def _evaluation_steps(results: Results, condition: str) -> np.ndarray:
-    return np.asarray(results.values(condition, "steps", "evaluation").mean(axis=1))
-
-
-def _evaluation_success(results: Results, condition: str) -> np.ndarray:
-    return results.success(condition, "evaluation")
+    """Return an estimate from values and those of a reference; None if they share no seed."""
+    values = shared([own, base])
+    return Measured(estimate(*values), len(values[0]), note=note) if len(values[0]) else None
 
 
 FAULTS = ("4 wheels, seized", "4 wheels, reversed")
@@ -305,4 +271,8 @@ def worst_shape(results: Results, condition: str = "") -> Measured | None:
 
 def without_model(results: Results) -> Measured | None:
     """Measure evaluation success where the box is predicted not to move, over the default's."""
-    return _compare(results, "static predictor", "default", _evaluation_success, ratio)
+    conditions = "static predictor", "default"
+    if not all(results.has(c, "evaluation") for c in conditions):
+        return None
+    own, base = (results.by_seed(c, "evaluation") for c in conditions)
+    return _paired(own, base, ratio)

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from shutil import get_terminal_size
 from textwrap import fill
 from typing import TYPE_CHECKING
@@ -23,7 +22,7 @@ def print_table(table: SummaryTable, legend: Sequence[str] | None = None) -> Non
     """Print estimates by condition, each over its 95 % interval, and its legend or another one."""
     from rich.console import Console
 
-    from ..presentation.terminal_tables import print_rows
+    from ..presentation.tables import print_rows
 
     if table.rows:
         print_rows(table.titles, table.rows, Console())
@@ -40,9 +39,7 @@ def print_study(study: StudyResults, columns: Sequence[str] = ()) -> None:
             print(line)
 
 
-def show_results(
-    study: StudyResults, formats: Sequence[str] = (), *, with_replays: bool = False
-) -> int:
+def show_results(study: StudyResults, formats: Sequence[str] = ()) -> int:
     """Print the table of a study that has been run, draw its figures, say where everything is.
 
     Parameters
@@ -51,8 +48,6 @@ def show_results(
         What has been run.
     formats
         Of the figures; none: PNG and SVG.
-    with_replays
-        Whether to draw replays of the first condition's first seed, too.
 
     Returns
     -------
@@ -65,14 +60,11 @@ def show_results(
     from ..presentation.words import count
 
     directory = study.directory
-    replays = list(_replays(study)) if with_replays and not study.failed else []
     print_study(study)
     folder = directory / "figures"
     folder.mkdir(exist_ok=True)
     drawn = figures.save(study.figures, folder, formats or figures.USUAL)
     print("", *(f"figure  {path}" for path in drawn), sep="\n")
-    for path in replays:
-        print(f"replay  {path}")
     if study.unlearned:
         names = listed(study.unlearned, 3)
         print_wrapped(
@@ -85,21 +77,3 @@ def show_results(
     if study.failed:
         say(f"{count(len(study.failed), 'trial')} failed: nested-agents status {directory}")
     return 1 if study.failed else 0
-
-
-def _replays(study: StudyResults) -> Iterator[Path]:
-    """Draw once what is recorded of the first trial, if its scenario knows how."""
-    from ..errors import SpecError
-    from ..presentation.progress import say
-
-    folder = study.directory / "replay"
-    folder.mkdir(exist_ok=True)
-    for name in ("first", "last") if study.outline.episodes > 1 else ("last",):
-        path = folder / f"{name}-episode.gif"
-        try:
-            if not path.exists():
-                study.replay(episode=name, path=path)
-        except SpecError as error:
-            say(str(error))
-            return
-        yield path

@@ -5,7 +5,6 @@ Statuses: 0 done, 1 a trial failed, 2 something the user can mend (one line on s
 module of that name in `commands`, which offers a click command called ``command``.
 """
 
-import codecs
 import os
 import sys
 import warnings
@@ -63,7 +62,9 @@ class _Commands(click.Group):
         command = self.get_command(ctx, args[0])
         if command is None:
             raise SpecError(f"{args[0]}: unknown command; {closest(args[0], COMMANDS)}")
-        return args[0], command, list(complete(command, args[1:]))
+        parts = command.commands if isinstance(command, click.Group) else {}
+        owner = parts.get(args[1], command) if args[1:] else command
+        return args[0], command, list(complete(owner, args[1:]))
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
@@ -87,7 +88,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     warnings.filterwarnings("ignore", message=r"Glyph .* missing from font")
     for stream in (sys.stdout, sys.stderr):
         if getattr(stream, "errors", None) == "strict":
-            stream.reconfigure(errors=PLAIN)  # type: ignore[union-attr]
+            stream.reconfigure(errors="replace")  # type: ignore[union-attr]
     return run_to_status(PROGRAM, lambda: _run(arguments or ["--help"]))
 
 
@@ -106,7 +107,11 @@ def run_to_status(program: str, run: Callable[[], int]) -> int:
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
         message = f"{where}{error.strerror or error}"
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as error:
+        from ...core.plugins.sources import place
+
+        if where := place(error):  # in code of a file of the user, or raised by it
+            print(f"{program}: interrupted{where}", file=sys.stderr)
         return 130
     print(f"{program}: error: {' '.join(message.split())}", file=sys.stderr)
     return 2
@@ -129,15 +134,3 @@ def _run(arguments: list[str]) -> int:
         raise SpecError(
             f"code of a file that the spec names calls sys.exit({error.code})"
         ) from None
-
-
-def _plain(error: UnicodeError) -> tuple[str, int]:
-    """Return what stands for characters that a terminal has not, such as dashes."""
-    assert isinstance(error, UnicodeEncodeError)
-    signs = error.object[error.start : error.end]
-    return "".join("-" if sign in "–—−" else "?" for sign in signs), error.end
-
-
-PLAIN = "nested-agents-plain"
-"""Name of the way in which text is written where it cannot be encoded."""
-codecs.register_error(PLAIN, _plain)

@@ -7,13 +7,15 @@ state a step. What they share is the number of joint actions that every agent tr
 In a coordination graph agents try joint actions of themselves and their neighbours, and decide by
 variable elimination, whose own operations are timed, but not counted.
 
+Some ways to decide stand in place of a topology, see `WAYS`: they try few of all joint actions.
+
 Counting and timing use the line-up scenario, whose prediction costs next to nothing, and sigmoid
 membership functions, with which every rule does fire.
 """
 
 import re
 import tracemalloc
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import astuple, dataclass
 from fractions import Fraction
 from functools import cache
@@ -25,15 +27,15 @@ from ...core.agents.joint_agents import join_agents
 from ...core.agents.loop import control_loop, policy_seed
 from ...core.agents.team import Team
 from ...core.decision.settings import Decision
-from ...core.evaluators.coordination import VariableEliminationSettings
+from ...core.evaluators.best_response import CUTS
+from ...core.evaluators.coordination import MaxPlusSettings
 from ...core.evaluators.evaluator import Counts
 from ...core.interface.hierarchy import Hierarchy
 from ...core.interface.scenario import Scenario
 from ...core.learners.td import TDLambdaSettings
-from ...core.rules.settings import RuleBaseSettings
+from ...core.rules.rule_base import RuleBaseSettings
 from ...scenarios.line_up import LineUp, LineUpSettings
 from ...topologies import build, parse
-from ...topologies.view import team_of
 from ..results.statistics import NOT_NEGATIVE, Estimate, bootstrap
 
 SINGLE_AGENT = "single-agent"
@@ -48,10 +50,26 @@ LEARNER = TDLambdaSettings(
     decision=Decision(rule="value", evaluator="exact"),
 )
 """The learner that is counted and timed: the paper's, over the two variables of line-up."""
-COORDINATED = LEARNER.model_copy(
-    update={"decision": Decision(evaluator=VariableEliminationSettings())}
-)
-"""The same that decides by variable elimination, on coordination graphs."""
+
+
+def _around_a_plan(n: int, actions: int) -> list[int]:
+    cuts = {round(share * n) for share in CUTS} - {0, n}
+    starts = actions + len(cuts) * actions * (actions - 1)
+    return [starts + (n + 1) * actions] + [actions] * (n - 1)
+
+
+WAYS: dict[str, tuple[str, Callable[[int, int], list[int]] | None]] = {
+    # The first agent of a chain plans for all and hands its plan down.
+    "best-response": ("chain", _around_a_plan),
+    "max-plus": ("coordination-graph", None),
+    # Forward passes without a prediction: an agent values its actions, or draws one.
+    "fitted-q": ("chain", lambda n, actions: [actions] * n),
+    "hierarchy-ppo": ("chain", lambda n, actions: [1] * n),
+}
+"""Ways to decide that stand in place of a topology: that by which they are told, and how many joint
+actions each of n agents tries that has so many actions; none: all of those that it considers."""
+PASSES = ("fitted-q", "hierarchy-ppo")
+"""Those of them that are not counted and timed."""
 MOST_OPERATIONS = 4 * 10**8
 """Rule evaluations a step beyond which nothing is measured: about a second a step."""
 LEAST_SECONDS, MOST_TIMES = 0.3, 100
@@ -95,6 +113,8 @@ class CostRow:
     formula: Counts | None = None
     """What a step of the whole team comes to by the formulas, if it was to be measured."""
     measured: StepCost | None = None
+    network: tuple[int, int] | None = None
+    """If asked for, messages of a decision, and how many of them follow one another."""
 
     @property
     def ratio(self) -> Fraction | None:
@@ -103,9 +123,15 @@ class CostRow:
 
 
 def cost_rows(
-    topologies: Sequence[str], agents: Sequence[int], problem: Problem, repeats: int = 0
+    topologies: Sequence[str],
+    agents: Sequence[int],
+    problem: Problem,
+    repeats: int = 0,
+    network: bool = False,
 ) -> Iterator[CostRow]:
     """Yield the cost of every topology for every number of agents, measured `repeats` times.
+
+    With `network` the messages of a decision are counted, too.
 
     Raises
     ------
@@ -121,18 +147,47 @@ def cost_rows(
         if labels.count(label) > 1:
             raise ValueError(f"topology = {label!r} more than once; name each: LABEL={text}")
         for n in agents:
-            below = None if text == SINGLE_AGENT else agents_below(text, n)
-            is_one = below is not None and is_chain(below)
+            is_one = text not in {SINGLE_AGENT, *WAYS} and is_chain(agents_below(text, n))
+            tried = None if text == SINGLE_AGENT else joint_actions(text, n, problem.actions)
             yield CostRow(
                 agents=n,
                 topology=label,
-                nested_exact=None if below is None else problem.nested(below),
+                nested_exact=None if tried is None else problem.sweep(tried),
                 nested_closed_form=problem.chain_closed_form(n) if is_one else None,
                 nested_asymptotic=problem.chain_asymptotic(n) if is_one else None,
                 single_agent=problem.single_agent(n),
                 formula=step_formula(text, n) if repeats else None,
                 measured=measure(text, n, repeats) if repeats else None,
+                network=messages(text, n) if network else None,
             )
+
+
+def joint_actions(text: str, n: int, actions: int) -> list[int]:
+    """Return how many joint actions each of n agents tries in a decision."""
+    topology, tried = WAYS.get(text, (text, None))
+    if tried is not None:
+        return tried(n, actions)
+    return [actions ** (1 + below) for below in agents_below(topology, n)]
+
+
+def messages(text: str, n: int) -> tuple[int, int]:
+    """Return how many messages a decision of n agents takes, and how many follow one another.
+
+    A single agent hears all others and tells them. In a chain everybody is told by all above. To
+    eliminate variables each hands a table to the next, and hears what is best; by max-plus
+    neighbours tell each other in every round, of which are at most 100.
+    """
+    if text == SINGLE_AGENT:
+        return 2 * (n - 1), 2 * (n > 1)
+    hierarchy = _hierarchy(WAYS.get(text, (text,))[0], n)
+    if not hierarchy.neighbours:
+        return hierarchy.messages, hierarchy.depth - 1
+    rounds = MaxPlusSettings().rounds
+    return (rounds * hierarchy.messages, rounds) if text == "max-plus" else (2 * n - 2, 2 * n - 2)
+
+
+def _hierarchy(text: str, n: int) -> Hierarchy:
+    return build(text, [f"agent{i + 1}" for i in range(n)], pairs(n))
 
 
 def agents_below(text: str, n: int) -> Sequence[int]:
@@ -145,7 +200,7 @@ def agents_below(text: str, n: int) -> Sequence[int]:
     """
     if text in ("chain", "chain:reversed", "chain:interleaved"):
         return range(n)  # a thousand hierarchies of a thousand agents take their time
-    return below_counts(build(text, team_of(n)[0], pairs(n)))
+    return below_counts(_hierarchy(text, n))
 
 
 def pairs(n: int) -> tuple[tuple[int, ...], ...]:
@@ -163,13 +218,13 @@ def step_formula(text: str, n: int) -> Counts:
     """Return what a step of the running system comes to by the formulas, for the whole team."""
     if text == SINGLE_AGENT:
         return Counts(PAPER.actions**n, (PAPER.actions * RULES) ** n, RULES**n)
-    joint = PAPER.decision(agents_below(text, n))
+    joint = sum(joint_actions(text, n, PAPER.actions))
     return Counts(joint, joint * RULES, n * RULES)
 
 
 def measure(text: str, n: int, repeats: int = 1) -> StepCost | None:
     """Count and time a step of n agents; none where it would take too long or too much memory."""
-    if step_formula(text, n).rule_evaluations > MOST_OPERATIONS:
+    if text in PASSES or step_formula(text, n).rule_evaluations > MOST_OPERATIONS:
         return None
     learner, scenario, hierarchy = _arrange(text, LineUpSettings(carts=n).build())
     _warm_up()
@@ -212,8 +267,10 @@ def _arrange(text: str, line_up: LineUp) -> tuple[TDLambdaSettings, Scenario, Hi
         base = LEARNER.rule_base.model_copy(update={"order": 2 * n})
         learner = LEARNER.model_copy(update={"rule_base": base})
         return learner, scenario, Hierarchy(scenario.agents, [])
-    settings = parse(text)
-    learner = COORDINATED if settings.kind == "coordination-graph" else LEARNER
+    settings = parse(WAYS.get(text, (text,))[0])
+    usual = "variable-elimination" if settings.kind == "coordination-graph" else "exact"
+    decision = Decision(rule="value", evaluator=text if text in WAYS else usual)
+    learner = LEARNER.model_copy(update={"decision": decision})
     return learner, line_up, build(settings, line_up.agents, pairs(n))
 
 

@@ -24,10 +24,10 @@ Points = Sequence[tuple[int, float]]
 def draw(rows: Sequence[CostRow], path: Path) -> None:
     """Write the figure: SVG, PNG or PDF by the suffix of `path`.
 
-    The first panel holds the formulas. If anything was measured, the others hold rule evaluations
-    per step (lines by formula, markers counted) and time per step (markers timed, lines the
-    formula's growth through the last of them). Values are drawn by their logarithms, for no
-    floating-point number holds those of many agents.
+    The first panel holds the formulas, their logarithms on a logarithmic scale. If anything was
+    measured, the others hold rule evaluations per step (lines by formula, markers counted) and time
+    per step (markers timed, lines the formula's growth through the last of them). Values are drawn
+    by their logarithms, for no floating-point number holds those of many agents.
 
     Raises
     ------
@@ -43,15 +43,19 @@ def draw(rows: Sequence[CostRow], path: Path) -> None:
     single = [(n, _log10(cost)) for n, cost in {r.agents: r.single_agent for r in rows}.items()]
     with figures.styled():
         columns = 3 if measured else 1
-        figure, (all_axes,) = figures.panels(1, columns, (3.2 * columns + 0.6, 3.9))
+        figure, (all_axes,) = figures.panels(1, columns, (3.2 * columns + 0.6, 4.2))
         all_axes[0].plot(*zip(*single, strict=True), "--", color="black")
         for index, own in enumerate(series.values()):
             _draw_series(all_axes, own, index)
         for axes, title in zip(all_axes, TITLES, strict=False):
             axes.set_title(title, loc="left")
             axes.set_xlabel("agents n")
-            axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
-            axes.yaxis.set_major_locator(MaxNLocator(integer=True, nbins=7))
+            axes.set_xscale("log", base=2)
+            axes.xaxis.set_major_formatter(FuncFormatter(lambda n, _: f"{n:g}"))
+            if axes is all_axes[0]:
+                axes.set_yscale("log")  # the single agent's exponents have four digits
+            else:
+                axes.yaxis.set_major_locator(MaxNLocator(integer=True, nbins=7))
             axes.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"$10^{{{y:g}}}$"))
             axes.grid(alpha=0.25)
         add_legend(figure, _handles(list(series), measured), ncols=columns + (columns > 1))

@@ -6,16 +6,19 @@ A ratio beyond 2 ** 53, where floating-point numbers lie farther apart, is round
 import io
 import json
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from fractions import Fraction
+from html import escape
 from typing import Any, Literal
 
+from ...core.agents.cost import Problem
 from ...core.plugins.deferred import pd
 from ...topologies.view import aligned, readable
-from ..presentation.csv_text import write_csv
+from ..presentation.row_formats import write_csv
 from ..presentation.tables import in_latex
-from .cost import PAPER, RULES, CostRow
+from .cost import PAPER, RULES, CostRow, cost_rows
 
 Form = Literal["table", "json", "csv", "latex"]
 
@@ -29,6 +32,8 @@ FORMULAS = (
 """Columns by name, with their heading."""
 MEASURED = ("formula", "counted", "rules valued", "updates", "ms", "MB")
 """Headings of what was measured per step."""
+NETWORK = ("messages", "in turn", "1 ms", "10 ms", "1 ms*", "10 ms*")
+"""Headings of messages, and of the seconds that a decision waits for them."""
 OF_THE_PAPER = PAPER.chain_closed_form(4)
 """Operations of four agents by Eq. 19, with the paper's |S|, |A| and L."""
 COUNTS = ("joint_actions", "rule_evaluations", "weight_updates")
@@ -72,6 +77,8 @@ def _record(row: CostRow) -> dict[str, Any]:
     record["nested_asymptotic"] = None if asymptotic is None else round(asymptotic)
     if row.ratio is not None:
         record["ratio"] = float(row.ratio) if row.ratio < 2**53 else round(row.ratio)
+    if row.network is not None:
+        record["messages"], record["messages_in_turn"] = row.network
     for what, counts in (("_formula", row.formula), ("", row.measured and row.measured.counted)):
         if counts is not None:
             record |= {f"{name}{what}_per_step": getattr(counts, name) for name in COUNTS}
@@ -98,21 +105,35 @@ def _all_digits() -> Iterator[None]:
 
 
 def _cells(rows: Sequence[CostRow]) -> list[list[list[str]]]:
-    """Return the formulas line by line, headings first; then, if asked, what was measured."""
-    tables = [[["n", "topology", *titles]] for titles in (dict(FORMULAS).values(), MEASURED)]
-    for row in rows:
-        formulas = [scientific(getattr(row, name)) for name, _ in FORMULAS]
-        for table, cells in zip(tables, (formulas, _measured_cells(row)), strict=True):
-            table.append([str(row.agents), row.topology, *cells])
-    return tables[: 1 + any(row.formula is not None for row in rows)]
+    """Return the formulas line by line, headings first; then what was measured, and messages."""
+    return [
+        [["n", "topology", *titles], *([str(r.agents), r.topology, *cells(r)] for r in rows)]
+        for titles, asked, cells in (
+            (dict(FORMULAS).values(), True, _formula_cells),
+            (MEASURED, any(row.formula is not None for row in rows), _measured_cells),
+            (NETWORK, any(row.network is not None for row in rows), _network_cells),
+        )
+        if asked
+    ]
+
+
+def _formula_cells(row: CostRow) -> list[str]:
+    return [scientific(getattr(row, name)) for name, _ in FORMULAS]
+
+
+def _network_cells(row: CostRow) -> list[str]:
+    assert row.network is not None
+    waits = (_amount(1e-3 * ms * count) for count in reversed(row.network) for ms in (1, 10))
+    return [*(f"{count:,}" for count in row.network), *waits]
 
 
 def _table(rows: Sequence[CostRow]) -> str:
-    formulas, *measured = _cells(rows)
+    formulas, *others = _cells(rows)
     lines = [*aligned(formulas, "><>>>>>"), ""]
     lines.append("Operations: nested by Eq. 18, chains by Eq. 19 and 21; single agent by Eq. 23.")
     if any(row.agents == 4 and row.nested_closed_form == OF_THE_PAPER for row in rows):
         lines.append("The paper prints 2.45e12 (nested) and 1.1e27 (single agent) for n = 4.")
+    measured = [cells for cells in others if cells[0][2] != NETWORK[0]]
     for cells in measured:
         same = [row.formula == row.measured.counted for row in rows if row.measured is not None]
         lines += ["", f"Per step of the running system (line-up scenario, |A| = 4, |S| = {RULES}):"]
@@ -123,6 +144,11 @@ def _table(rows: Sequence[CostRow]) -> str:
             lines += [f"±: a 95 % interval of the mean of {most} repeats, each with a new team;"]
         lines += ["-: not measured, beyond a second or so a step."]
         lines += [f"All counts equal the formulas in {sum(same)} of {len(same)} rows."] * bool(same)
+    for cells in others[len(measured) :]:
+        lines += ["", "Messages of a decision, and how long it waits for them [s]:", ""]
+        lines += [*aligned(cells, "><>>>>>>"), ""]
+        lines += ["in turn: how many follow one another, others going at once, of 1 or 10 ms each;"]
+        lines += ["*: on a channel that carries one message at a time."]
     return "\n".join(lines)
 
 
@@ -161,3 +187,71 @@ def _latex_cell(text: str) -> str:
     if e:
         return rf"${mantissa}\times 10^{{{int(power)}}}$"
     return mantissa.replace(",", r"\,").replace("±", r"$\pm$")
+
+
+MOST_REPEATS = 1000
+"""A repeat takes a third of a second or more."""
+
+
+@dataclass(frozen=True)
+class CostTable:
+    """Costs, a row for every topology and number of agents; printed or shown by a notebook."""
+
+    rows: tuple[CostRow, ...]
+    """The costs as exact integers."""
+
+    @property
+    def csv(self) -> str:
+        """The table as CSV, with every digit."""
+        return written(self.rows, "csv")
+
+    @property
+    def latex(self) -> str:
+        """The table for LaTeX, with the package booktabs."""
+        return written(self.rows, "latex")
+
+    def __str__(self) -> str:
+        return written(self.rows, "table")
+
+    __repr__ = __str__
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(str(self))}</pre>"
+
+
+def cost_table(
+    topologies: Sequence[str] = ("chain",),
+    agents: Iterable[int] = (4,),
+    problem: Problem = PAPER,
+    *,
+    measured: bool = False,
+    repeats: int = 1,
+    network: bool = False,
+) -> CostTable:
+    """Return what hierarchies cost, by Eq. 18-23 and, if asked, measured.
+
+    Parameters
+    ----------
+    topologies
+        As in a spec, or ``label=topology`` with a label of one's own; ``single-agent``, or ways to
+        decide: ``best-response``, ``max-plus``, ``fitted-q``, ``hierarchy-ppo``.
+    agents
+        Numbers of agents.
+    problem
+        Rules and actions of an agent, and steps of an episode; those of the paper unless given.
+    measured
+        Whether to count and time steps of the running system, too.
+    repeats
+        How often steps are timed, each with a new team; from two on the time has an interval.
+    network
+        Whether to count the messages of a decision, and how many of them follow one another.
+
+    Raises
+    ------
+    ValueError
+        If a topology or a number is refused; one line.
+    """
+    if not 1 <= repeats <= MOST_REPEATS:
+        raise ValueError(f"repeats = {repeats}, allowed: 1 to {MOST_REPEATS}")
+    times = repeats if measured else 0
+    return CostTable(tuple(cost_rows(topologies, list(agents), problem, times, network)))

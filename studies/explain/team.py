@@ -12,24 +12,46 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 from rich.console import Console
 from rich.progress import track
 
+from ...core.adaptation.learned_predictor import LearnedPredictor
+from ...core.adaptation.self_model import SelfModel
+from ...core.agents.loop import world_seed
 from ...core.agents.team import Team, of_fuzzy_agents
 from ...core.interface.scenario import Scenario
 from ...core.interface.spaces import Variable
+from ...core.numerics.arrays import FloatArray
 from ...core.rules.rule_base import RuleBase
-from ..errors import SpecError
+from ...scenarios.checking.predictions import apart
+from ..errors import SpecError, refused
 from ..store.durable import TEAM
 from ..store.schema import STAGE, columns
 from ..store.store import Store
-from ..trials.session import Session
+from ..trials.session import EVALUATION_WORLDS, Session
 from ..trials.trial import Trial
 from . import rules as explain_rules
-from .body import Bodies
-from .predictor import errors_of
 from .rules import Parts
+
+Effects = tuple[FloatArray, ...]
+
+
+@dataclass
+class Bodies:
+    """What the bodies were believed to be at some moments."""
+
+    moments: dict[str, Effects]
+    """Effects of all bodies by moment: ``built``, perhaps ``before`` the first failure, ``after``
+    all training."""
+    deviations: Effects
+    """Standard deviations of the last of them, as the self-model has them."""
+
+    def note(self, moment: str, model: SelfModel) -> None:
+        """Note what is believed now."""
+        self.moments[moment] = tuple(effect.copy() for effect in model.effects)
+        self.deviations = model.deviations
 
 
 @dataclass(frozen=True)
@@ -98,11 +120,9 @@ def _policy(trial: Trial, team: Team, scenario: Any) -> Any:
 
 def _trained(store: Store, trial: Trial) -> tuple[Team, Scenario, Bodies | None]:
     arrays = store.recording(trial.identity, TEAM) if trial.keep_teams else None
-    try:
+    with refused(f"{store.directory}: "):  # a file that settings name may not be what it was
         session = Session(trial)
         team = of_fuzzy_agents(session.team)
-    except ValueError as error:  # a file that settings name is not what it was
-        raise SpecError(f"{store.directory}: {error}") from None
     model, bodies = team.self_model, None
     if model is not None:
         bodies = Bodies({}, ())
@@ -159,3 +179,62 @@ def folder_of(directory: Path, trial: Trial, conditions: Sequence[str]) -> Path:
     at = list(conditions).index(trial.condition)
     name = names[at] if names.count(names[at]) == 1 and names[at] else f"condition{at + 1}"
     return directory / "explain" / f"{name}-seed{trial.seed}"
+
+
+EPISODES, DECISIONS = 10, 30
+"""What is played: worlds of the evaluation, and predictions of each."""
+
+
+def errors_of(team: Team, scenario: Any, seed: int) -> pd.DataFrame | None:
+    """Return root mean square errors by variable, or None if nothing is predicted by experience.
+
+    The team acts by what it has learned. Each decision is held for as long as predictions look
+    ahead. The given predictor stands beside, if there is one that looks as far.
+
+    Parameters
+    ----------
+    team, scenario
+        Trained; both are modified.
+    seed
+        Of the trial.
+    """
+    predictor = team.predictor
+    if not isinstance(predictor, LearnedPredictor):
+        return None
+    horizon, neutral = predictor.horizon, scenario.action_set.neutral
+    given = hasattr(scenario, "predict") and getattr(scenario, "horizon", 1) == horizon
+    errors: dict[str, list[Any]] = {
+        "learned": [],
+        "as it is": [],
+        **({"given": []} if given else {}),
+    }
+    for episode in range(EVALUATION_WORLDS, EVALUATION_WORLDS + EPISODES):
+        world = world_seed(seed, episode)
+        states, over = scenario.reset(world, episode), False
+        team.begin_world(world, episode)
+        for _ in range(DECISIONS):
+            prediction = team.predict(scenario, states)
+            joint = team.act(prediction, explore=False)
+            guesses = {"as it is": states, "learned": _states(prediction, joint)}
+            if given:
+                guesses["given"] = _states(scenario.predict(), joint)
+            held = np.full_like(joint, neutral) if scenario.state_space.n_own else joint
+            for action in [joint, *[held] * (horizon - 1)]:
+                transition = scenario.step(action)
+                over = transition.terminated or transition.truncated
+                if over:
+                    break
+            states = np.array(transition.states)
+            if over:
+                break
+            for name in errors:
+                errors[name].append(apart(scenario, states, guesses[name]))
+    index = [variable.name for variable in scenario.state_space.variables]
+    roots = {name: np.sqrt(np.square(e).mean(axis=(0, 1))) for name, e in errors.items() if e}
+    return pd.DataFrame(roots, index=index)
+
+
+def _states(prediction: Any, joint_action: Any) -> Any:
+    """Return the states ``(n, d)`` that a joint action is predicted to lead to."""
+    each = range(len(joint_action))
+    return np.array([prediction.states(i, joint_action[None])[0] for i in each])

@@ -1,15 +1,21 @@
-"""The explanation of a trained team as text of 80 columns."""
+"""The explanation of a trained team: text of 80 columns, and figures."""
 
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from textwrap import fill
 
 import jinja2
 import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import MultipleLocator
 
-from . import body as explain_body
+from ...core.agents.joint_agents import body_of
+from ...core.plugins.deferred import pd
+from ..presentation import figures
+from ..presentation.figures import add_legend, look, marker
 from . import rules as explain_rules
-from .rules import percent
-from .team import Explanation
+from .rules import WIDTH, exponent, percent
+from .team import Bodies, Explanation
 
 MOST_AGENTS = 8
 """Agents whose rules are printed; the file holds those of all."""
@@ -43,8 +49,8 @@ def text(explained: Explanation, agents: int | None = None) -> str:
         power=explain_rules.exponent(parts),
         rules=explain_rules.table(explained.rules, variables, names, parts[: len(names)]),
         more=len(explained.agents) - len(names),
-        verdicts=list(explain_body.verdicts(bodies, explained.actuators)) if bodies else (),
-        effects=explain_body.table(bodies, explained.actuators) if bodies else "",
+        verdicts=list(verdicts(bodies, explained.actuators)) if bodies else (),
+        effects=effects_table(bodies, explained.actuators) if bodies else "",
         errors="" if explained.errors is None else explained.errors.to_string(float_format="%.3g"),
     )
     # Tables of pandas fill the last column with spaces.
@@ -55,3 +61,117 @@ def _wrapped(sentence: str) -> str:
     # A number stays with its percent sign.
     sentence = " ".join(sentence.split()).replace(" %", "\u00a0%")
     return fill(sentence, 79).replace("\u00a0", " ") + "\n"
+
+
+ROWS = ("ahead", "left", "turning")
+"""The rows of an effect [m/s, m/s, rad/s], per unit of commanded speed."""
+LEAST_CHANGE = 0.25
+"""A smaller change of an actuator's drive is not spoken of."""
+
+
+def effects_table(bodies: Bodies, actuators: Sequence[str]) -> str:
+    """Return the effects of every body's actuators, row by row and moment by moment."""
+    rows = {}
+    for r, own in enumerate(by_body(bodies, actuators)):
+        names = [*(name.rpartition(".")[2] for name in own), "constant"]
+        for i, row in enumerate(ROWS):
+            for moment, effects in bodies.moments.items():
+                rows[body_of(own[0]), row, moment] = pd.Series(effects[r][i], names)
+    frame = pd.DataFrame(rows).T
+    moving = frame.groupby(level=[0, 1]).transform("any").any(axis=1)  # a joint can but turn
+    text: str = frame[moving].to_string(line_width=WIDTH, float_format="{:+.2f}".format)
+    return text
+
+
+def verdicts(bodies: Bodies, actuators: Sequence[str]) -> Iterator[str]:
+    """Yield, for every actuator whose drive is not what it was built with, what it is taken for.
+
+    Its drive is the part of its effect that is along the one it was built with; a change within
+    two of its standard deviations is called uncertain.
+    """
+    built, last = bodies.moments["built"], bodies.moments["after"]
+    for r, names in enumerate(by_body(bodies, actuators)):
+        # A turning rate counts as the speed of an actuator that is built to turn most.
+        unit = np.array([1.0, 1.0, 1.0 / max(1.0, float(np.abs(built[r][2]).max()))]) ** 2
+        for actuator, name in enumerate(names):
+            own = unit * built[r][:, actuator]
+            length = float(own @ built[r][:, actuator])
+            left = float(own @ last[r][:, actuator]) / length
+            around = float(np.sqrt(own**2 @ bodies.deviations[r][:, actuator] ** 2)) / length
+            if abs(left - 1.0) > LEAST_CHANGE:
+                doubt = "" if abs(left - 1.0) > 2.0 * around else "; uncertain"
+                share = f"{left:+.2f} ± {around:.2f} of its drive"
+                yield f"{name}: {share}, {_like(left)}{doubt}"
+
+
+def by_body(bodies: Bodies, actuators: Sequence[str]) -> Iterator[Sequence[str]]:
+    """Yield the names of every body's actuators."""
+    first = 0
+    for effect in bodies.moments["built"]:
+        yield actuators[first : first + effect.shape[1] - 1]
+        first += effect.shape[1] - 1
+
+
+def _like(left: float) -> str:
+    if left < -LEAST_CHANGE:
+        return "as if it were reversed"
+    if left <= LEAST_CHANGE:
+        return "as if it did not drive"
+    return "as if it were weak" if left < 1.0 else "more than it was built for"
+
+
+MOST_LINES = 8
+"""Agents in one figure of functions."""
+
+
+def draw(explained: Explanation) -> dict[str, Figure]:
+    """Return all figures that there is something for, by name."""
+    with figures.styled():
+        return dict(_figures(explained))
+
+
+def _figures(explained: Explanation) -> Iterator[tuple[str, Figure]]:
+    if any(p.variance > 0 for p in explained.parts):
+        blocks = range(0, len(explained.agents), MOST_LINES)
+        for number, first in enumerate(blocks, 1):
+            name = "functions" if len(blocks) == 1 else f"functions-{number}"
+            yield name, _functions(explained, slice(first, first + MOST_LINES))
+    if not isinstance(explained.policy, str):
+        yield "policy", explained.policy.figure()
+
+
+def _functions(explained: Explanation, block: slice) -> Figure:
+    d = len(explained.variables)
+    figure, panels = figures.grid(d, 4, (2.45, 2.2), (0.0, 0.7), sharey=True)
+    panels = panels.ravel()
+    power = exponent(explained.parts)
+    names, parts = explained.agents[block], explained.parts[block]
+    bodies = list(dict.fromkeys(name.partition(".")[0] for name in names))
+    for j, (variable, partition) in enumerate(
+        zip(explained.variables, explained.rules.partitions, strict=True)
+    ):
+        axes, turn = panels[j], 180 / np.pi if variable.unit == "rad" else 1.0
+        low, high = (min(partition.centres), max(partition.centres))
+        if variable.periodic:
+            low, high = variable.low, variable.high
+        if variable.unit == "rad":
+            axes.xaxis.set_major_locator(MultipleLocator(90))
+        x = np.union1d(np.linspace(low, high, 401), partition.centres)
+        strengths = partition.strengths(x)
+        for name, part in zip(names, parts, strict=True):
+            body = name.partition(".")[0]
+            member = [n for n in names if n.partition(".")[0] == body].index(name)
+            number = bodies.index(body)
+            style = look(number) | {"ls": look(member)["ls"], "marker": marker(number), "ms": 3}
+            at = np.searchsorted(x, partition.centres).tolist()
+            y = 10.0**power * strengths @ part.singles[j]
+            axes.plot(turn * x, y, lw=1.4, markevery=at, label=name, **style)
+        share = float(np.mean([p.share(p.singles[j]) for p in parts]))
+        unit = {"rad": " [°]", "1": ""}.get(variable.unit, f" [{variable.unit}]")
+        axes.set_title(f"{variable.name}{unit}, {percent(share)}", loc="left")
+        axes.axhline(0.0, color="#cccccc", lw=0.8, zorder=0)
+    scale = rf" [$\times 10^{{{-power}}}$]" if power else ""
+    figure.supylabel(f"adds to f{scale}", fontsize=9)
+    title = "markers: rules, less their mean; in the titles the share of the variance of f"
+    add_legend(figure, panels[0].get_lines()[: len(names)], title)
+    return figure

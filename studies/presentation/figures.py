@@ -10,10 +10,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 from numpy.typing import ArrayLike
 
-from ..results.statistics import Estimate
+from ..results.aggregates import Aggregates
+from ..results.comparison import Difference
+from ..results.paired_tests import LEVEL
+from ..results.statistics import Estimate, stacked
 from ..store.durable import replacing
 
 SUFFIXES = (".svg", ".png", ".pdf")
@@ -137,6 +140,12 @@ def add_legend(figure: Figure, handles: Sequence[Line2D], title: str = "", ncols
     )  # fmt: skip
 
 
+def name_curves(figure: Figure, labels: Sequence[str], title: str = "", **look_of: Any) -> None:
+    """Name the curves above the panels, as many beside each other as there is room for."""
+    handles = [handle(label, **look(i), lw=1.6, **look_of) for i, label in enumerate(labels)]
+    add_legend(figure, handles, title, ncols=max(1, 90 // (max(map(len, labels)) + 8)))
+
+
 def save(figures: Mapping[str, Figure], folder: Path, formats: Sequence[str] = USUAL) -> list[Path]:
     """Write figures into an existing folder, by their names; return the paths.
 
@@ -179,3 +188,125 @@ def check_suffix(path: Path) -> None:
     """Refuse a path that `write` does not take, before anything is computed for it."""
     if path.suffix not in SUFFIXES:
         raise ValueError(f"{path}: suffix must be .svg, .png or .pdf")
+
+
+CHARACTERS = 15
+"""Of a legend that have room in an inch."""
+APART = 0.06
+"""How far neighbouring lines stand apart, in doublings of the number of robots."""
+
+
+def style(index: int) -> dict[str, Any]:
+    """Return how a line looks: lines differ in colour, marker and dashes."""
+    return look(index) | {"marker": marker(index), "markersize": 4, "linewidth": 1.2}
+
+
+def draw_line(
+    axes: Axes, robots: Sequence[int], estimates: Sequence[Estimate], index: int, lines: int
+) -> None:
+    """Draw estimates with their intervals: line `index` of so many lines, beside the others."""
+    beside = 2.0 ** (APART * (index - (lines - 1) / 2))
+    places = [beside * n for n in robots]
+    all_of_them = stacked(estimates)
+    axes.vlines(places, all_of_them.low, all_of_them.high, color=look(index)["color"], lw=1.2)
+    axes.plot(places, all_of_them.value, **style(index))
+
+
+def scale_axis(axes: Axes, robots: Sequence[int]) -> None:
+    """Let the horizontal axis be the logarithm of the number of robots."""
+    axes.set_xscale("log", base=2)
+    axes.set_xticks(robots, [str(n) for n in robots])
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.grid(alpha=0.25)
+
+
+def name_lines(figure: Figure, labels: Sequence[str], title: str) -> None:
+    """Name the lines above the panels, as many beside each other as there is room for."""
+    handles = [handle(label, **style(i)) for i, label in enumerate(labels)]
+    room = int(CHARACTERS * figure.get_figwidth() // (max(map(len, labels)) + 6))
+    add_legend(figure, handles, title, ncols=max(1, min(4, room)))
+
+
+def draw_forest(
+    compared: Mapping[str, Sequence[Difference]], unit: str, null: float = 0.0
+) -> Figure | None:
+    """Return a figure of panels side by side, sorted by the last one; None if there are none.
+
+    Points are means over seeds, bars their 95 % intervals. Full points differ significantly from
+    the null (p < .05, adjusted), hollow ones do not.
+
+    Parameters
+    ----------
+    compared
+        By title the lines of a panel, one per condition; all panels hold the same conditions.
+    unit
+        Label of the axis.
+    null
+        Where the line of no difference stands.
+    """
+    compared = {title: lines for title, lines in compared.items() if lines}
+    if not compared:
+        return None
+    *_, last = compared.values()
+    ranked = sorted(last, key=lambda line: float(line.estimate.value))
+    names = [line.condition for line in ranked]
+    width = 1.2 + 0.065 * max(map(len, names)) + 2.6 * len(compared)
+    # No narrower than the legend.
+    size = (max(width, 6.6), 1.5 + 0.25 * len(names))
+    figure, all_axes = panels(1, len(compared), size, sharey=True)
+    for axes, (title, lines) in zip(all_axes[0], compared.items(), strict=True):
+        _forest_panel(axes, lines, names, null)
+        axes.set_title(title, loc="left")
+        axes.set_xlabel(unit)
+    name_rows(all_axes[0, 0], names)
+    _forest_legend(figure, [line for lines in compared.values() for line in lines])
+    return figure
+
+
+def _forest_panel(
+    axes: Axes, lines: Sequence[Difference], names: Sequence[str], null: float
+) -> None:
+    axes.axvline(null, color="#888888", linewidth=0.8)
+    for line in lines:
+        colour = COLOURS[0] if line.estimate.value >= null else COLOURS[1]
+        face = colour if line.p < LEVEL else "white"
+        row = names.index(line.condition)
+        draw_row(axes, row, line.estimate, colour, markerfacecolor=face, markersize=5)
+    axes.grid(axis="x", alpha=0.25)
+
+
+def _forest_legend(figure: Figure, lines: Sequence[Difference]) -> None:
+    filled = {
+        "significantly different (adjusted p < .05)": "#444444",
+        "no significant difference": "white",
+    }
+    handles = [
+        handle(text, marker="o", ls="", color="#444444", markerfacecolor=face)
+        for text, face in filled.items()
+    ]
+    handles += [
+        handle(f"{word} than the reference", color=colour, linewidth=1.5)
+        for colour, word in zip(COLOURS, ("higher", "lower"), strict=False)
+    ]
+    seeds = sorted({line.seeds for line in lines})
+    counted = f"{seeds[0]}" if len(seeds) == 1 else f"{seeds[0]} to {seeds[-1]}"
+    add_legend(figure, handles, f"means over {counted} seeds, bars: 95 % intervals", ncols=2)
+
+
+def draw_profiles(aggregates: Aggregates) -> Figure:
+    """Return the figure: share of runs above each score, interquartile mean by episode."""
+    names = [line.condition for line in aggregates.table]
+    with styled():
+        figure, axes = panels(1, 1 + bool(aggregates.curves), (7.2, 2.9))
+        profiles, *efficiency = axes[0]
+        for index, profile in enumerate(aggregates.profiles.values()):
+            draw_curve(profiles, aggregates.thresholds, profile, index)
+        profiles.set(xlabel=f"score: {aggregates.title}", title="share of runs that score more")
+        as_rates(profiles)
+        for own in efficiency:
+            for index, curve in enumerate(aggregates.curves.values()):
+                draw_curve(own, range(len(curve.value)), curve, index)
+            own.set(title="interquartile mean, training")
+            as_episodes(own)
+        name_curves(figure, names)
+    return figure

@@ -26,20 +26,25 @@ def say(line: str) -> None:
 
 
 class Terminal(Observer):
-    """Shows on standard error how a study goes."""
+    """Shows on standard error how a study goes; what is noted more than once is said once."""
+
+    def __init__(self) -> None:
+        self._noted: set[str] = set()
 
     def announce(self, spec: Spec, directory: Path, processes: int) -> None:
         """Say what is about to be run."""
         conditions, seeds = len(spec.conditions()), len(spec.seeds)
-        say(
+        self.note(
             f"{spec.study}: {count(conditions, 'condition')} x {count(seeds, 'seed')}, "
             f"{StudyOutline.of(spec).lengths} of up to {count(spec.steps, 'step')}, "
             f"{count(processes, 'process', 'es')}, kept in {directory}"
         )
 
     def note(self, line: str) -> None:
-        """Say it."""
-        say(line)
+        """Say it, if it has not been said."""
+        if line not in self._noted:
+            self._noted.add(line)
+            say(line)
 
     def follow(self, outcomes: Iterable[Outcome], total: int, done: int) -> None:
         """Show how many of `total` trials are done, which have failed, and how long is left."""

@@ -6,21 +6,19 @@ the condition's label says already, the swept keys, is left to CSV and JSON.
 
 from __future__ import annotations
 
+import csv
 import io
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from shutil import get_terminal_size
-from typing import TYPE_CHECKING, Any, Literal, TextIO
+from typing import Any, Literal, TextIO
 
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
 from ...core.interface.measures import Measure
-from .csv_text import rows_of, write_frame
-
-if TYPE_CHECKING:
-    from pandas import DataFrame
+from ...core.plugins.deferred import pd
 
 Format = Literal["table", "csv", "json"]
 
@@ -29,14 +27,16 @@ FORMATS = {"seed": "d", "episode": "d", "steps": "d", "return": ".4g"}
 MISSING = "–"
 
 
-def write_rows(frame: DataFrame, measures: Sequence[Measure], form: Format, file: TextIO) -> None:
+def write_rows(
+    frame: pd.DataFrame, measures: Sequence[Measure], form: Format, file: TextIO
+) -> None:
     """Write a frame of episodes, some of whose columns are those of `measures`.
 
     CSV and JSON hold every digit, so equal results are equal bytes. Truth values are 0 and 1 in
     CSV, true and false in JSON.
     """
     if form == "csv":
-        write_frame(file, frame)
+        file.write(in_csv(frame))
     elif form == "json":
         names = list(frame.columns)
         lines = [json.dumps(dict(zip(names, row, strict=True))) for row in rows_of(frame)]
@@ -50,7 +50,7 @@ def write_rows(frame: DataFrame, measures: Sequence[Measure], form: Format, file
         file.write(text.getvalue())
 
 
-def _table(frame: DataFrame, measures: dict[str, Measure]) -> Table:
+def _table(frame: pd.DataFrame, measures: dict[str, Measure]) -> Table:
     """Return the rows of one condition; no word and no number is broken if there is any room."""
     table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, header_style="")
     shown = [name for name in frame.columns if name in FORMATS or name in measures]
@@ -64,7 +64,7 @@ def _table(frame: DataFrame, measures: dict[str, Measure]) -> Table:
     return table
 
 
-def _cells(column: DataFrame, measure: Measure | None) -> list[str]:
+def _cells(column: pd.DataFrame, measure: Measure | None) -> list[str]:
     """Return the values of a column as text."""
     values = [value for (value,) in rows_of(column)]
     form = FORMATS[column.columns[0]] if measure is None else _format(measure, values)
@@ -79,3 +79,46 @@ def _format(measure: Measure, values: Sequence[Any]) -> str:
     if largest >= 1000.0:
         return ".4g"
     return ".2f" if measure.unit == "1" else ".3f"
+
+
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
+"""With what a spreadsheet's formula begins, if the spaces before it are left out."""
+
+
+def write_csv(file: TextIO, names: Iterable[str], rows: Iterable[Sequence[Any]]) -> None:
+    """Write a header and rows; None becomes an empty cell."""
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow(map(harmless, names))
+    writer.writerows(map(harmless, row) for row in rows)
+
+
+def in_csv(frame: pd.DataFrame) -> str:
+    """Return a frame with a header; truth values are 0 and 1, what is missing is an empty cell."""
+    file = io.StringIO()
+    write_csv(file, frame.columns, rows_of(frame))
+    return file.getvalue()
+
+
+def rows_of(frame: pd.DataFrame) -> Iterator[tuple[Any, ...]]:
+    """Yield the rows of a frame as values of Python's own types; None is what is missing."""
+    values: Any = frame.astype(object).where(frame.notna(), None)
+    yield from values.itertuples(index=False, name=None)
+
+
+def harmless(value: Any) -> Any:
+    """Return a value as it may stand in a spreadsheet, a truth value as 0 or 1.
+
+    Examples
+    --------
+    >>> [harmless(value) for value in ("=1+1", "@SUM(A1)", "-0.5", -0.5, "chain", None)]
+    ["'=1+1", "'@SUM(A1)", '-0.5', -0.5, 'chain', None]
+    """
+    if isinstance(value, bool):
+        return int(value)
+    if not isinstance(value, str) or not value.lstrip(" \n").startswith(FORMULA):
+        return value
+    try:
+        float(value)
+    except ValueError:
+        return f"'{value}"
+    return value

@@ -5,26 +5,26 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
-from typing import TYPE_CHECKING
+from functools import cached_property
+from html import escape as in_html
+from typing import Any, NamedTuple
 
 import numpy as np
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
 
 from ...core.plugins.deferred import pd
 from ...core.plugins.messages import near
 from ..errors import SpecError
-from ..results.statistics import FEW, Estimate
-from ..results.summary import Summary
-from .cells import Cell, Row, ends
-from .csv_text import write_csv
-from .terminal_tables import text_of
+from ..results.statistics import FEW, Estimate, exactly
+from ..results.summary import Summary, between, two_figures
+from .row_formats import in_csv
 from .words import count
-
-if TYPE_CHECKING:
-    from pandas import DataFrame
 
 MATHS_SPACE = r"\;"
 NOTHING = "no trial has finished"
+UNKNOWN = exactly(np.nan)
 
 
 @dataclass(frozen=True)
@@ -33,13 +33,8 @@ class SummaryTable:
 
     titles: tuple[str, ...]
     """Headings of the estimates."""
-    rows: tuple[Row, ...]
-    """Its lines."""
-    csv: str
-    """The whole table as CSV."""
-    markdown: str
-    """The whole table in Markdown. Printed, it is as on a terminal of 80 columns; a notebook shows
-    it as HTML."""
+    lines: tuple[Summary, ...]
+    """Its lines. Printed, it is as on a terminal of 80 columns; a notebook shows it as HTML."""
 
     def __str__(self) -> str:
         table = [text_of(self.titles, self.rows), ""] if self.rows else []
@@ -60,13 +55,43 @@ class SummaryTable:
             return ""
         return f"Intervals of fewer than {FEW} seeds: Student's (short if skewed), rates Wilson's."
 
+    @cached_property
+    def rows(self) -> tuple[Row, ...]:
+        """Its lines as text."""
+        rows = []
+        for line in self.lines:
+            estimates = (line.estimates.get(title) for title in self.titles)
+            cells = tuple(None if e is None else Cell.of(e) for e in estimates)
+            rows.append((line.condition, line.seeds, cells))
+        return tuple(rows)
+
+    @property
+    def csv(self) -> str:
+        """The whole table as CSV, with every digit."""
+        columns: dict[str, Any] = {"condition": [line.condition for line in self.lines]}
+        columns["seeds"] = [line.seeds for line in self.lines]
+        for title in self.titles:
+            estimates = (line.estimates.get(title, UNKNOWN) for line in self.lines)
+            parts = zip(*map(ends, estimates), strict=True)
+            columns |= zip((title, f"{title} low", f"{title} high"), parts, strict=True)
+        return in_csv(pd.DataFrame(columns))
+
+    @property
+    def markdown(self) -> str:
+        """The whole table in Markdown."""
+        lines = [["condition", "seeds", *self.titles], ["---"] * (2 + len(self.titles))]
+        for condition, seeds, cells in self.rows:
+            lines.append([condition, str(seeds), *(c.bracketed(" ") if c else "" for c in cells)])
+        escaped = [[text.replace("|", r"\|") for text in line] for line in lines]
+        return "".join(f"| {' | '.join(line)} |\n" for line in escaped)
+
     @property
     def html(self) -> str:
         """The table as HTML."""
         cells = [[c.bracketed(" ") if c else "" for c in row] for *_, row in self.rows]
         index = [f"{condition}, {count(seeds, 'seed')}" for condition, seeds, _ in self.rows]
         table = pd.DataFrame(cells, index, self.titles).to_html(border=0)
-        return f"{table}<p><small>{escape(' '.join(self.legend))}</small></p>"
+        return f"{table}<p><small>{in_html(' '.join(self.legend))}</small></p>"
 
     @property
     def latex(self) -> str:
@@ -104,42 +129,10 @@ def tabulate(lines: Sequence[Summary], columns: Sequence[str] = ()) -> SummaryTa
             has = f"it has {', '.join(map(repr, titles)) or 'none'}"
             hint = f"{near(column, titles)} {has}".lstrip()
             raise SpecError(f"columns: the table has no {column!r}; {hint}")
-    titles = tuple(columns) or titles
-    rows = tuple(
-        (s.condition, s.seeds, tuple(_cell(s.estimates.get(title)) for title in titles))
-        for s in lines
-    )
-    return SummaryTable(titles, rows, _csv(lines, titles), _markdown(titles, rows))
+    return SummaryTable(tuple(columns) or titles, tuple(lines))
 
 
-def _cell(estimate: Estimate | None) -> Cell | None:
-    return None if estimate is None else Cell.of(estimate)
-
-
-def _csv(lines: Sequence[Summary], titles: Sequence[str]) -> str:
-    file = io.StringIO()
-    heads = [f"{title}{end}" for title in titles for end in ("", " low", " high")]
-    rows = []
-    for line in lines:
-        values: list[object] = [line.condition, line.seeds]
-        for title in titles:
-            estimate = line.estimates.get(title)
-            numbers = (np.nan,) * 3 if estimate is None else ends(estimate)
-            values += ["" if np.isnan(value) else repr(value) for value in numbers]
-        rows.append(values)
-    write_csv(file, ["condition", "seeds", *heads], rows)
-    return file.getvalue()
-
-
-def _markdown(titles: Sequence[str], rows: Sequence[Row]) -> str:
-    lines = [["condition", "seeds", *titles], ["---"] * (2 + len(titles))]
-    for condition, seeds, cells in rows:
-        lines.append([condition, str(seeds), *(c.bracketed(" ") if c else "" for c in cells)])
-    escaped = [[text.replace("|", r"\|") for text in line] for line in lines]
-    return "".join(f"| {' | '.join(line)} |\n" for line in escaped)
-
-
-def in_latex(frame: DataFrame, names: str, columns: str, note: str = "") -> str:
+def in_latex(frame: pd.DataFrame, names: str, columns: str, note: str = "") -> str:
     """Return a frame of LaTeX as a table of booktabs, a line after the other.
 
     Parameters
@@ -163,3 +156,89 @@ def in_latex(frame: DataFrame, names: str, columns: str, note: str = "") -> str:
 def _protected(text: str) -> str:
     """Return escaped text that is no option of the line before, and whose > any font shows."""
     return "{}" * text.startswith(("[", "*")) + text.replace(">", "$>$")
+
+
+class Cell(NamedTuple):
+    """An estimate as text: its value, and the bounds of its interval, if they are known."""
+
+    value: str
+    bounds: tuple[str, str] | None
+
+    @classmethod
+    def of(cls, estimate: Estimate) -> Cell:
+        """Return the cell of an estimate."""
+        value, low, high = map(two_figures, ends(estimate))
+        return cls(value, None if np.isnan(estimate.low) else (low, high))
+
+    @property
+    def interval(self) -> str:
+        """The interval; nothing if it is not known."""
+        return between(*self.bounds) if self.bounds else ""
+
+    def bracketed(self, space: str) -> str:
+        """Return the value and, if it is known, its interval in brackets."""
+        return f"{self.value}{space}[{', '.join(self.bounds)}]" if self.bounds else self.value
+
+
+Row = tuple[str, int, tuple[Cell | None, ...]]
+"""Condition, number of seeds, and a cell per title; none where there is no estimate."""
+
+
+def ends(estimate: Estimate) -> tuple[float, float, float]:
+    """Return value and ends of the interval of an estimate of no dimension."""
+    return float(estimate.value), float(estimate.low), float(estimate.high)
+
+
+LABEL = 24
+"""What a condition's label may be broken to, if there is no room for all of it [characters]."""
+
+
+def print_rows(titles: Sequence[str], rows: Sequence[Row], console: Console) -> None:
+    """Print estimates by condition, each over its 95 % interval.
+
+    Columns that do not fit side by side without breaking a word follow below, as a further table.
+    """
+    for block in _blocks(titles, rows, console.width):
+        table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, header_style="bold")
+        table.add_column("", overflow="fold")
+        for i, width in block.items():
+            table.add_column(escape(titles[i]), justify="right", overflow="fold", width=width)
+        for condition, seeds, cells in rows:
+            shown = (cells[i] for i in block)
+            table.add_row(
+                f"{escape(condition)}\n[dim]{count(seeds, 'seed')}[/]",
+                *(f"{c.value}\n[dim]{c.interval or '–'}[/]" if c else "" for c in shown),
+            )
+        console.print(table)
+        console.print()
+
+
+def text_of(titles: Sequence[str], rows: Sequence[Row], width: int = 80) -> str:
+    """Return what `print_rows` prints, without colours."""
+    file = io.StringIO()
+    print_rows(titles, rows, Console(file=file, width=width, color_system=None))
+    lines = file.getvalue().splitlines()
+    return "\n".join(line.rstrip() for line in lines).rstrip()
+
+
+def _blocks(titles: Sequence[str], rows: Sequence[Row], width: int) -> list[dict[int, int]]:
+    """Return which columns stand side by side, and how wide each is: in as few blocks as fit.
+
+    Where titles fit in one line there is one block; otherwise they are broken between words.
+    """
+    label = max(max(len(c), len(count(seeds, "seed"))) for c, seeds, _ in rows)
+    texts = [
+        [text for _, _, row in rows if (c := row[i]) for text in (c.value, c.interval)]
+        for i in range(len(titles))
+    ]
+    pairs = list(zip(titles, texts, strict=True))
+    whole = [max(map(len, [title, *of_cells])) for title, of_cells in pairs]
+    if label + sum(1 + wide for wide in whole) <= width:
+        return [dict(enumerate(whole))]
+    broken = [max(map(len, [*title.split(), *of_cells])) for title, of_cells in pairs]
+    n, label = len(broken), min(label, LABEL)
+    for many in range(n, 0, -1):
+        blocks = [{i: broken[i] for i in range(k, min(k + many, n))} for k in range(0, n, many)]
+        if all(label + sum(1 + wide for wide in block.values()) <= width for block in blocks):
+            break
+    return blocks

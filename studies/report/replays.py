@@ -15,12 +15,13 @@ from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import Any, NamedTuple
 
-from ...core.plugins.deferred import located
 from ...scenarios import SCENARIOS
 from ..errors import SpecError
 from ..presentation.words import count
+from ..results.results import read
 from ..store.durable import NotRecordedError, Recording
 from ..store.store import Planned, Store
 from ..trials.keeping import spec_of
@@ -161,11 +162,11 @@ def _scene_of(recording: Recording) -> tuple[Any, dict[str, Any]]:
 def _players() -> tuple[Any, ...]:
     """Return the players of the built-in scenarios."""
     models: list[Any] = [SCENARIOS.model(name) for name in SCENARIOS.built_in]
-    return tuple(map(located, dict.fromkeys(m.player for m in models if m.player)))
+    return tuple(map(resolve_name, dict.fromkeys(m.player for m in models if m.player)))
 
 
 def _reached(store: Store) -> Mapping[tuple[str, int, int], bool]:
     """Return whether each training episode reached the goal, by condition, seed and number."""
-    names, rows = store.rows("training")
-    at = [names.index(name) for name in ("condition", "seed", "episode", "success")]
-    return {(row[at[0]], row[at[1]], row[at[2]]): bool(row[at[3]]) for row in rows}
+    training = read(store).episodes.query("phase == 'training'")
+    success: Any = training.set_index(["condition", "seed", "episode"])["success"]
+    return dict(success.astype(bool))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ...core.plugins.deferred import pd
 from .paired_tests import LEVEL, Friedman, friedman, holm, paired_permutation
 from .results import Results
 from .statistics import Estimate, bootstrap, rate
@@ -38,22 +40,6 @@ class Difference:
     sample: Array = field(repr=False, compare=False)
     """The differences of single seeds ``(n_seeds,)``."""
 
-    @classmethod
-    def of(
-        cls, condition: str, measure: str, own: Array, base: Array, estimate: Estimate
-    ) -> Difference:
-        """Test paired values ``(n_seeds,)`` of a condition and the reference; p is not adjusted."""
-        raw = paired_permutation(own, base)
-        return cls(condition, measure, len(own), estimate, raw, raw, own - base)
-
-    @classmethod
-    def between(
-        cls, condition: str, measure: str, own: Array, base: Array, *, of_rates: bool
-    ) -> Difference:
-        """Estimate and test the mean difference of paired values ``(n_seeds,)``."""
-        estimate = paired_difference(own, base, of_rates=of_rates)
-        return cls.of(condition, measure, own, base, estimate)
-
     @property
     def shown(self) -> str:
         """Value, interval, p as it is and adjusted, as text."""
@@ -74,53 +60,48 @@ def _p(value: float, name: str = "p ") -> str:
     return f"{name}{'= ' if name else ''}{value:.2g}"
 
 
+BySeed: TypeAlias = "pd.Series | pd.DataFrame"
+"""Values with their seeds as index."""
+Pair = tuple[str, str, BySeed, BySeed]
+"""What is compared, by which measure, and the values of it and of its reference, by seed."""
+
+
+def differences(
+    groups: Mapping[str, Iterable[Pair]], *, of_rates: bool = True
+) -> dict[str, tuple[Difference, ...]]:
+    """Compare conditions with their references; p is adjusted over all groups by Holm's method.
+
+    Parameters
+    ----------
+    groups
+        What is compared, by a name of what it has in common. Pairs that share fewer than two seeds
+        are left out.
+    of_rates
+        Whether values are rates.
+    """
+    made = []
+    for group, pairs in groups.items():
+        for condition, measure, *values in pairs:
+            own, base = shared(values)
+            if len(own) >= 2:
+                estimate = paired_difference(own, base, of_rates=of_rates)
+                made.append((group, compare_pairs(condition, measure, own, base, estimate)))
+    all_of_them = list(zip(made, adjusted([d for _, d in made]), strict=True))
+    return {g: tuple(d for (group, _), d in all_of_them if group == g) for g in groups}
+
+
+def compare_pairs(
+    condition: str, measure: str, own: Array, base: Array, estimate: Estimate
+) -> Difference:
+    """Return what is estimated of paired values ``(n_seeds,)``; its p is not adjusted."""
+    raw = paired_permutation(own, base)
+    return Difference(condition, measure, len(own), estimate, raw, raw, own - base)
+
+
 def adjusted(differences: Sequence[Difference]) -> tuple[Difference, ...]:
     """Return differences with p adjusted over all of them by Holm's method."""
     ps = holm([d.raw for d in differences])
     return tuple(replace(d, p=float(p)) for d, p in zip(differences, ps, strict=True))
-
-
-def mean_success(phase: str) -> Callable[[Results, str], Array]:
-    """Return what gives the success rate of each seed of a condition ``(n_seeds,)`` in a phase."""
-    return lambda results, condition: results.success(condition, phase).mean(axis=1)
-
-
-def differences(
-    results: Results,
-    pairs: Sequence[tuple[str, str, str]],
-    measures: Mapping[str, Callable[[Results, str], ArrayLike]],
-    *,
-    of_rates: bool = True,
-) -> tuple[Difference, ...]:
-    """Compare conditions with their references by some measures at once.
-
-    Parameters
-    ----------
-    results
-        Of the study.
-    pairs
-        What a comparison is called, the condition's label and the reference's. Those that share
-        fewer than two seeds are left out.
-    measures
-        By title, what gives the values ``(n_seeds,)`` of a condition.
-    of_rates
-        Whether these are rates.
-    """
-    made = []
-    for title, values in measures.items():
-        for name, condition, reference in pairs:
-            own, base = aligned(results, (condition, reference), values)
-            if len(base) >= 2:
-                made.append(Difference.between(name, title, own, base, of_rates=of_rates))
-    return adjusted(made)
-
-
-def with_first(
-    conditions: Sequence[str], names: Sequence[str] | None = None
-) -> list[tuple[str, str, str]]:
-    """Return the pairs of all other conditions with the first one, see `differences`."""
-    named = zip(conditions if names is None else names, conditions, strict=True)
-    return [(name, condition, conditions[0]) for name, condition in named][1:]
 
 
 def paired_difference(own: Array, base: Array, *, of_rates: bool) -> Estimate:
@@ -134,29 +115,18 @@ def paired_difference(own: Array, base: Array, *, of_rates: bool) -> Estimate:
     return bootstrap(own - base, bounds=(-1.0, 1.0) if of_rates else (-np.inf, np.inf))
 
 
-def aligned(
-    results: Results, conditions: Sequence[str], values: Callable[[Results, str], ArrayLike]
-) -> list[Array]:
-    """Return the values ``(n_seeds, ...)`` of conditions for the seeds that all of them have."""
-    seeds = [results.seeds(condition) for condition in conditions]
-    if not all(seeds):
-        return [np.zeros(0) for _ in conditions]
-    return of_shared_seeds(seeds, [values(results, condition) for condition in conditions])
-
-
-def of_shared_seeds(seeds: Sequence[Sequence[int]], values: Sequence[ArrayLike]) -> list[Array]:
-    """Return what all have in common, of values ``(n_seeds, ...)`` and the seeds that they are of.
+def shared(values: Sequence[BySeed]) -> list[Array]:
+    """Return values ``(n_seeds, ...)`` of the seeds that all have, of those by seed.
 
     Examples
     --------
-    >>> of_shared_seeds([(0, 1, 2), (2, 1)], [[0.0, 0.1, 0.2], [1.2, 1.1]])
+    >>> shared([pd.Series([0.0, 0.1, 0.2], [0, 1, 2]), pd.Series([1.2, 1.1], [2, 1])])
     [array([0.1, 0.2]), array([1.1, 1.2])]
     """
-    shared = [seed for seed in seeds[0] if all(seed in own for own in seeds)]
-    return [
-        np.asarray(of)[[own.index(seed) for seed in shared]]
-        for own, of in zip(seeds, values, strict=True)
-    ]
+    seeds = values[0].index
+    for other in values:
+        seeds = seeds.intersection(other.index, sort=False)
+    return [own.loc[seeds].to_numpy() for own in values]
 
 
 def difference(first: ArrayLike, second: ArrayLike, level: float = 0.95) -> Estimate:
@@ -247,7 +217,8 @@ def order_tests(results: Results) -> tuple[OrderTest, ...]:
     conditions = results.of_phase("training")
     made = []
     for title, phase in phases_of(results).items() if len(conditions) > 1 else ():
-        values = np.stack(aligned(results, conditions, mean_success(phase)), axis=1)
+        means = [results.means(condition, phase) for condition in conditions]
+        values = np.stack(shared(means), axis=1)
         if len(values) >= 2:
             made.append((title, len(conditions), len(values), friedman(values)))
     ps = holm([test.p for *_, test in made])

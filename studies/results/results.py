@@ -6,10 +6,12 @@ unit and meaning stand in ``frame.attrs["columns"]`` by its name.
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,10 +21,6 @@ from ...core.plugins.deferred import pd
 from ..store.reading import NamesAndRows
 from ..store.schema import EVALUATION
 from ..store.store import Store
-from .numbers import EPISODE_COLUMNS, NUMBERS, TRIAL_COLUMNS
-
-if TYPE_CHECKING:
-    from pandas import DataFrame
 
 Array = NDArray[Any]
 
@@ -36,10 +34,10 @@ DONE = "done"
 class Results:
     """The frames of a study, or of several together, and arrays of what they hold."""
 
-    episodes: DataFrame
+    episodes: pd.DataFrame
     """A row for each episode of the finished trials, by condition in the order of the spec, seed,
     phase and number of the episode; a column for each swept key and measure."""
-    trials: DataFrame
+    trials: pd.DataFrame
     """A row for each trial, failed ones included: its state, the seconds of its parts, and the
     numbers of `TrialResult.numbers` and `TrialResult.usage` by their names."""
     phases: tuple[str, ...] = ()
@@ -104,6 +102,14 @@ class Results:
         """Return the `values` of success."""
         return self.values(condition, SUCCESS.name, phase)
 
+    def by_seed(self, condition: str, phase: str, measure: str = SUCCESS.name) -> pd.DataFrame:
+        """Return the `values`: a row for each seed, a column for each episode."""
+        return pd.DataFrame(self.values(condition, measure, phase), self.seeds(condition))
+
+    def means(self, condition: str, phase: str, measure: str = SUCCESS.name) -> pd.Series:
+        """Return the means of `values` by seed."""
+        return pd.Series(self.values(condition, measure, phase).mean(axis=1), self.seeds(condition))
+
     def other_evaluations(self, condition: str) -> dict[str, str]:
         """Return the phases of a condition's evaluations beside its own, by their names."""
         return {
@@ -131,7 +137,7 @@ class Results:
         return dict(self.episodes.groupby(["phase", "condition"], sort=False).indices)
 
     @cached_property
-    def _finished(self) -> dict[str, DataFrame]:
+    def _finished(self) -> dict[str, pd.DataFrame]:
         done = self.trials[self.trials["state"] == DONE]
         return dict(iter(done.groupby("condition", sort=False)))
 
@@ -161,14 +167,14 @@ def read(store: Store) -> Results:
     )
 
 
-def _frame(table: NamesAndRows) -> DataFrame:
+def _frame(table: NamesAndRows) -> pd.DataFrame:
     names, rows = table
     return pd.DataFrame(list(rows), columns=names)
 
 
 def assemble(
-    episodes: Sequence[DataFrame],
-    trials: Sequence[DataFrame],
+    episodes: Sequence[pd.DataFrame],
+    trials: Sequence[pd.DataFrame],
     phases: Iterable[str],
     columns: Mapping[str, Mapping[str, Any]],
     measures: tuple[Measure, ...],
@@ -199,13 +205,13 @@ def assemble(
     )
 
 
-def _joined(frames: Sequence[DataFrame], names: Sequence[str]) -> DataFrame:
+def _joined(frames: Sequence[pd.DataFrame], names: Sequence[str]) -> pd.DataFrame:
     """Return frames below each other, with columns of these names first."""
     whole = pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=[*names])
     return whole.reindex(columns=[*names, *(n for n in whole.columns if n not in names)])
 
 
-def _describe(frame: DataFrame, known: Mapping[str, tuple[str, str]]) -> None:
+def _describe(frame: pd.DataFrame, known: Mapping[str, tuple[str, str]]) -> None:
     of_studies = "1", "a number of the study's own"
     frame.attrs["columns"] = {
         name: dict(zip(("unit", "meaning"), known.get(name, of_studies), strict=True))
@@ -263,12 +269,9 @@ def select(results: Results, keep: NDArray[np.bool_]) -> Results:
     trials = results.trials[keep].reset_index(drop=True)
     chosen = pd.MultiIndex.from_frame(trials[keys])
     episodes = results.episodes[pd.MultiIndex.from_frame(results.episodes[keys]).isin(chosen)]
-    left = set(trials["condition"])
-    columns = {c: row for c, row in results.columns.items() if c in left}
-    return Results(
-        episodes.reset_index(drop=True), trials, results.phases, columns, results.measures,
-        results.usage,
-    )  # fmt: skip
+    columns = {c: results.columns[c] for c in results.columns if c in set(trials["condition"])}
+    episodes = episodes.reset_index(drop=True)
+    return replace(results, episodes=episodes, trials=trials, columns=columns)
 
 
 def join(
@@ -288,7 +291,7 @@ def join(
     columns, measures
         Of the whole, see `Results`.
     """
-    frames: dict[str, list[DataFrame]] = {"episodes": [], "trials": []}
+    frames: dict[str, list[pd.DataFrame]] = {"episodes": [], "trials": []}
     for part, new in zip(parts, labels, strict=True):
         for name, kept in frames.items():
             frame = getattr(part, name)
@@ -301,3 +304,31 @@ def join(
     phases = dict.fromkeys(phase for part in parts for phase in part.phases)
     usage = (name for part in parts for name in part.usage)
     return assemble(frames["episodes"], frames["trials"], phases, columns, measures, usage)
+
+
+_TABLES = tomllib.loads(Path(__file__).with_name("columns.toml").read_text(encoding="utf-8"))
+EPISODE_COLUMNS, TRIAL_COLUMNS, NUMBERS = (
+    {name: (unit, meaning) for name, (unit, meaning) in table.items()} for table in _TABLES.values()
+)
+"""Unit and meaning by name: of the columns of episodes that every scenario has, of those of trials,
+and of numbers of whole trials."""
+
+_TITLES = {"decision_median": "decision", "decision_99": "99th percentile of decisions"}
+"""Headings of numbers that are shown in milliseconds."""
+
+
+def shown(name: str) -> tuple[Measure, float]:
+    """Return how a number is shown, and by what it is multiplied for that.
+
+    Examples
+    --------
+    >>> measure, factor = shown("decision_median")
+    >>> measure.unit, factor
+    ('ms', 1000.0)
+    >>> shown("messages")[0].unit
+    '1'
+    """
+    if name in _TITLES:
+        return Measure(name, _TITLES[name], "ms", better="lower", least=0.0), 1e3
+    unit = "s" if name.startswith("seconds.") else "1"
+    return Measure(name, name, NUMBERS[name][0] if name in NUMBERS else unit), 1.0

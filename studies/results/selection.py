@@ -9,7 +9,7 @@ from ...core.plugins.deferred import pd
 from ..errors import SpecError
 from ..spec.labels import label
 from ..spec.overlay import flat
-from ..trials.measures import joined as joined_measures
+from ..trials.episodes import joined as joined_measures
 from .results import Results, join, select
 
 DIRECTORY = "directory"

@@ -3,6 +3,10 @@
 Every override by name is crossed with its own sweep and with the spec's; without overrides the
 spec's tables alone are. Layers, each over the one before: the defaults of the settings, the preset,
 what the scenario lays over it, the spec's tables, the override's tables, the point of the sweeps.
+
+A curriculum is what a team is trained on before the scenario of its condition. A stage of it is a
+number of episodes in a scenario, described by changes of the condition's own: what a sweep or an
+override says of it holds in the stages, too, unless they say otherwise.
 """
 
 from __future__ import annotations
@@ -11,9 +15,9 @@ import itertools
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, cast
+from typing import Annotated, Any, NamedTuple, cast
 
-from pydantic import Field, ValidationError
+from pydantic import AfterValidator, Field, ValidationError
 
 from ...core.agents.joint_agents import Agents, join_agents
 from ...core.interface.hierarchy import Hierarchy
@@ -26,14 +30,60 @@ from ...core.plugins.settings import ScenarioSettings, Settings, tuples, unwritt
 from ...scenarios import DEFAULT, SCENARIOS
 from ...topologies import build
 from ...topologies.config import Topology, parse
-from ..errors import SpecError, show
-from .curriculum import Curriculum, Name, Stage, StageSettings
+from ..errors import SpecError, refused, show
 from .labels import label, scalar
 from .overlay import TomlTable, nested, overlay
 from .presets import PRESETS
 from .refused import explain
 
 SECTIONS = ("scenario", "topology", "learner")
+
+
+Length = Annotated[int, Field(ge=1, le=1_000_000)]
+"""A number of episodes, or of steps."""
+
+
+def _printable(name: str) -> str:
+    if not name.strip() or not name.isprintable():
+        raise ValueError("must be a name that can be printed")
+    return name
+
+
+Name = Annotated[str, AfterValidator(_printable)]
+"""How users call something of theirs."""
+
+
+class StageSettings(Settings):
+    """A stage of a curriculum, as it stands in a spec."""
+
+    name: Name
+    """How its episodes are called."""
+    episodes: Length
+    """Training episodes in it."""
+    scenario: Mapping[str, Any] = Field(default_factory=dict)
+    """Laid over the condition's scenario."""
+
+
+def _distinct(stages: tuple[StageSettings, ...]) -> tuple[StageSettings, ...]:
+    if len({stage.name for stage in stages}) < len(stages):
+        raise ValueError("must be stages of distinct names")
+    return stages
+
+
+Curriculum = Annotated[tuple[StageSettings, ...], AfterValidator(_distinct)]
+"""Stages in the order in which they are trained."""
+
+
+class Stage(NamedTuple):
+    """A stage of a curriculum, resolved for a condition."""
+
+    name: str
+    episodes: int
+    scenario: ScenarioSettings
+
+    def table(self) -> dict[str, Any]:
+        """Return it as a table, fit for JSON."""
+        return {**self._asdict(), "scenario": self.scenario.model_dump(mode="json")}
 
 
 class ConditionSettings(Settings):
@@ -299,7 +349,5 @@ def section(name: str, value: object) -> TomlTable:
     if not is_topology or not isinstance(value, str):
         allowed = "a name or a table" if is_topology else "a table"
         raise SpecError(f"{name} = {show(value)}: must be {allowed}")
-    try:
+    with refused(name.removesuffix("topology")):
         return parse(value).model_dump()
-    except ValueError as error:
-        raise SpecError(f"{name.removesuffix('topology')}{error}") from None

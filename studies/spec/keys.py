@@ -19,8 +19,7 @@ from typing_extensions import TypeAliasType
 
 from ...core.plugins.messages import near
 from ...core.plugins.settings import Settings
-from .conditions import ConditionSettings, Override
-from .curriculum import StageSettings
+from .conditions import ConditionSettings, Override, StageSettings
 from .overlay import models_of, registry_of
 from .presets import PRESETS
 from .spec import Spec

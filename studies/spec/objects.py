@@ -1,18 +1,19 @@
 """Objects in a spec made by Python: put in the words that a TOML file would have for them."""
 
 from collections.abc import Mapping
+from pkgutil import resolve_name
 from typing import Any
 
 from ...core.decision.exploration import EXPLORATIONS
 from ...core.evaluators import EVALUATORS
 from ...core.interface.hierarchy import Hierarchy
 from ...core.learners import LEARNERS
-from ...core.plugins.deferred import located, nx
+from ...core.plugins.deferred import nx
 from ...core.plugins.registry import Registry
 from ...core.plugins.settings import Settings
 from ...scenarios import SCENARIOS
 from ...topologies import TOPOLOGIES
-from ..errors import SpecError
+from ..errors import SpecError, refused
 from .studies import STUDIES
 
 REGISTRIES: dict[str, Registry] = {
@@ -42,7 +43,9 @@ def plain(value: Any, key: str = "") -> Any:
         If an object is defined in no file, so that no worker could ever find it.
     """
     if isinstance(value, Mapping):
-        return {k: plain(v, key if k == "kind" else str(k)) for k, v in value.items()}
+        table = {k: plain(v, key if k == "kind" else str(k)) for k, v in value.items()}
+        kind = table.get("kind")
+        return table | kind if isinstance(kind, dict) else table
     if isinstance(value, list | tuple):
         return type(value)(plain(v, key) for v in value)
     registry = REGISTRIES.get(key.rpartition(".")[2])
@@ -85,13 +88,11 @@ def _of_settings(settings: Settings, registry: Registry | None) -> Any:
         owner = type(settings)
         outer = owner.__qualname__.rpartition(".")[0]
         # A class's nested Settings stand for the class.
-        thing = located(f"{owner.__module__}:{outer}") if outer else owner
+        thing = resolve_name(f"{owner.__module__}:{outer}") if outer else owner
         table["kind"] = _name(thing, registry)
     return table
 
 
 def _name(thing: Any, registry: Registry) -> str:
-    try:
+    with refused(f"{registry.kind}: "):
         return registry.reference_to(thing)
-    except ValueError as error:
-        raise SpecError(f"{registry.kind}: {error}") from None

@@ -18,7 +18,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field, PrivateAttr, ValidationError, field_validator
+from pydantic import Field, PrivateAttr, ValidationError, ValidationInfo, field_validator
 
 from ...core.agents.joint_agents import Agents
 from ...core.learners import LearnerSettings
@@ -26,9 +26,19 @@ from ...core.plugins.messages import closest
 from ...core.plugins.settings import Settings, tuples
 from ...core.plugins.sources import Sources, is_reference, named
 from ...topologies.checks import listed
-from ..errors import SpecError, show
-from .conditions import SECTIONS, Condition, Override, below, grid, layer_of, section
-from .curriculum import Curriculum, Length, Name
+from ..errors import SpecError, refused, show
+from .conditions import (
+    SECTIONS,
+    Condition,
+    Curriculum,
+    Length,
+    Name,
+    Override,
+    below,
+    grid,
+    layer_of,
+    section,
+)
 from .objects import plain
 from .overlay import TomlTable, assignment, flat, overlay
 from .presets import PRESETS
@@ -100,20 +110,15 @@ class Spec(Settings):
     _conditions: tuple[Condition, ...] = PrivateAttr(default=())
     _sources: Sources = PrivateAttr(default_factory=Sources)
 
-    @field_validator("study")
+    @field_validator("study", "preset")
     @classmethod
-    def _known(cls, value: str) -> str:
-        if is_reference(value):
+    def _known(cls, value: str, info: ValidationInfo) -> str:
+        is_study = info.field_name == "study"
+        known = STUDIES.names() if is_study else PRESETS
+        if is_study and is_reference(value):
             STUDIES.find(value)
-        elif value not in STUDIES.names():
-            raise ValueError(closest(value, STUDIES.names()))
-        return value
-
-    @field_validator("preset")
-    @classmethod
-    def _preset(cls, value: str) -> str:
-        if value not in PRESETS:
-            raise ValueError(closest(value, PRESETS))
+        elif value not in known:
+            raise ValueError(closest(value, known))
         return value
 
     @field_validator("seeds", mode="before")
@@ -240,10 +245,8 @@ class Spec(Settings):
         except RecursionError:
             raise SpecError(f"{source}: is nested too deeply") from None
         for change in changes:
-            try:
+            with refused(f"--set {change}: "):
                 table = _changed(table, assignment(change))
-            except ValueError as error:
-                raise SpecError(f"--set {change}: {error}") from None
         return cls.of(table, Sources(folder, study=study))
 
     def conditions(self) -> tuple[Condition, ...]:

@@ -13,7 +13,10 @@ The view `results` is made for other tools::
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
+import json
+import os
 import sqlite3
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -26,7 +29,6 @@ from . import database, durable, integrity
 from .database import DATABASE, SPEC_FILE
 from .durable import Recording
 from .reading import Reading
-from .running import LOCK
 from .schema import SECONDS, Noted, Planned, prepare, trial_checksums
 
 __all__ = ["DATABASE", "SPEC_FILE", "Noted", "Planned", "Store", "locked"]
@@ -217,3 +219,74 @@ def _take(lock: TextIO, directory: Path) -> None:
         except OSError:
             time.sleep(wait)
     raise SpecError(f"{directory}: another process is writing there")
+
+
+LOCK = ".lock"
+MARK = "running.json"
+
+
+class Running(contextlib.AbstractContextManager["Running"]):
+    """Keeps the mark while its context lasts.
+
+    Parameters
+    ----------
+    directory
+        Of the study, whose lock this process holds.
+    processes
+        How many trials run at a time.
+    """
+
+    def __init__(self, directory: Path, processes: int) -> None:
+        self._path = directory / MARK
+        self._processes = processes
+        self._begun: dict[str, float] = {}
+
+    def __exit__(self, *_: object) -> None:
+        self._begun.clear()
+        self._write()
+
+    def begin(self, identity: str) -> None:
+        """Note that a trial has been handed to a worker."""
+        self._begun[identity] = time.time()
+        self._write()
+
+    def end(self, identity: str) -> None:
+        """Note that a trial has come back."""
+        self._begun.pop(identity, None)
+        self._write()
+
+    def _write(self) -> None:
+        temporary = self._path.with_name(f".{MARK}.new")
+        # Not worth an fsync, nor an error if the disk is full.
+        with contextlib.suppress(OSError):
+            temporary.write_text(json.dumps({"processes": self._processes, "begun": self._begun}))
+            os.replace(temporary, self._path)
+
+
+def look(directory: Path) -> tuple[int, dict[str, float]] | None:
+    """Return what is running in the directory of a study; None if nothing is.
+
+    Returns
+    -------
+    tuple
+        How many trials run at a time, and by identity how long each has been running so far [s].
+    """
+    if not _locked(directory / LOCK):
+        return None
+    try:
+        mark, now = json.loads((directory / MARK).read_text()), time.time()
+        seconds = {identity: max(now - begun, 0.0) for identity, begun in mark["begun"].items()}
+        return mark["processes"], seconds
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return 1, {}  # begins or ends just now
+
+
+def _locked(path: Path) -> bool:
+    try:
+        with open(path) as lock:
+            fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    return False

@@ -13,18 +13,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ...core.agents.loop import policy_seed
-from ...core.agents.rows import carried_rows
 from ...core.agents.team import Team, of_fuzzy_agents
-from ...core.interface.acting import Actors
 from ...core.interface.measures import Measure, measures_of
-from ...core.interface.scenario import Scenario, lacking
+from ...core.interface.scenario import Actors, Scenario, carried_rows, lacking
 from ...core.learners import LearnerSettings, TeamSettings, check_prediction
 from ...core.numerics.arrays import IntArray
 from ...core.plugins.sources import format_error, place
 from ..errors import SpecError
-from ..spec.conditions import Condition, ConditionSettings
-from ..spec.curriculum import Stage
-from .measures import joined
+from ..spec.conditions import Condition, ConditionSettings, Stage
+from .episodes import joined
 
 if TYPE_CHECKING:
     from ..spec.spec import Spec

@@ -14,16 +14,15 @@ from ...core.plugins.sources import FOLDER, Sources, kept_name
 from ..errors import SpecError, show
 from ..spec.labels import aliases
 from ..spec.outline import sources_of
-from ..spec.overlay import flat
+from ..spec.overlay import dumps, flat
 from ..spec.spec import Spec
-from ..spec.toml import dumps
 from ..store import integrity
 from ..store.database import DATABASE, SPEC_FILE
 from ..store.reading import Reading
 from ..store.schema import Noted
 from ..store.store import Store, locked
 from . import code
-from .measures import column_of
+from .episodes import column_of
 from .trial import AS_IN_SPEC, Trial, trials_of
 
 SAME = (*AS_IN_SPEC, "evaluations")

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from time import perf_counter
 from typing import Any
 
 from ...core.agents.loop import StepRecord, control_loop, world_seed
 from ...core.agents.team import Team
-from ...core.interface.acting import Actors
-from ...core.interface.measures import Measure, measures_of
-from ...core.interface.scenario import EpisodeRecorder, RecordedScenario
+from ...core.interface.measures import measures_of
+from ...core.interface.scenario import Actors, EpisodeRecorder, RecordedScenario
 from ..store.durable import TEAM, Recording
 from ..store.schema import EVALUATION, STAGE
 from .arrangement import Arrangement, arrange, teach, transfer
-from .episodes import EpisodeMeter, EpisodeRow, Stopwatch
-from .measures import joined
+from .episodes import EpisodeMeter, EpisodeRow, Stopwatch, joined
 from .trial import Trial, TrialResult
 
 EVALUATION_WORLDS = 10**6
@@ -98,35 +96,41 @@ class Session:
         trial's own team, the episodes of `Trial.recorded`. Every step is shown to `observe`.
         """
         self._go_through_curriculum()
-        is_recorded = (
-            team is None
-            and isinstance(self.world, RecordedScenario)
-            and len(self.world.recorded) > 0
-        )
-        kept = self.trial.recorded if is_recorded else {}
-        acting = self.team if team is None else team
-        there, steps_each = self._own._replace(team=acting), self.trial.steps
-        whole = observe is None and not kept
-        if whole and self._at_once(there, episodes, first, steps_each, phase):
+        is_recorded = isinstance(self.world, RecordedScenario) and len(self.world.recorded) > 0
+        kept = self.trial.recorded if team is None and is_recorded else {}
+        there = self._own if team is None else self._own._replace(team=team)
+        loop: dict[str, Any] = {
+            "episodes": episodes,
+            "steps": self.trial.steps,
+            "first_episode": first,
+        }
+        if observe is None and not kept and self._at_once(there, phase, **loop):
             return
-        steps = control_loop(
-            self.scenario, acting, episodes=episodes,
-            steps=steps_each, seed=self.trial.seed, first_episode=first,
-        )  # fmt: skip
-        for record in self._measured(steps, phase, measures_of(self.world), observe):
-            if record.episode in kept:
-                if record.step == 0:
-                    recorder = EpisodeRecorder(_opened(self.trial, record.episode))
-                recorder.add(record.transition)
-                if record.last:
-                    recording = recorder.recording()
-                    if isinstance(acting, Team) and acting.messages.fail:
-                        failing = acting.messages.failing(record.episode, record.step + 2)
-                        recording["messages_fail"] = failing
-                    self._recordings[kept[record.episode]] = recording
-            if team is None:
-                self._watch.add(record)
-                self.deciding.append(record.deciding)
+        own: list[Observer] = [self._time] if team is None else []
+        own += [self._record] if kept else []
+        self._run(there, phase, [*own, observe], **loop)
+
+    def _time(self, record: StepRecord) -> None:
+        """Sum up what the parts of a step took."""
+        self._watch.add(record)
+        self.deciding.append(record.deciding)
+
+    def _record(self, record: StepRecord) -> None:
+        """Record a step if it is of an episode of `Trial.recorded`."""
+        name = self.trial.recorded.get(record.episode)
+        if name is None:
+            return
+        if record.step == 0:  # no record holds what there was before
+            scenario = self.trial.settings.scenario.build()
+            scenario.reset(world_seed(self.trial.seed, record.episode), record.episode)
+            self._recorder = EpisodeRecorder(scenario)
+        self._recorder.add(record.transition)
+        if record.last:
+            recording = self._recorder.recording()
+            if isinstance(self.team, Team) and self.team.messages.fail:
+                failing = self.team.messages.failing(record.episode, record.step + 2)
+                recording["messages_fail"] = failing
+            self._recordings[name] = recording
 
     def evaluate(self, observe: Observer | None = None, phase: str = "evaluation") -> None:
         """Let the team act greedily on worlds of no training, and show every step to `observe`.
@@ -155,6 +159,14 @@ class Session:
             self._evaluate(there, f"{EVALUATION}{name}", (observers or {}).get(name))
             rng.state = state
 
+    def finish(
+        self, numbers: Mapping[str, float] | None = None, usage: Mapping[str, float] | None = None
+    ) -> TrialResult:
+        """Evaluate the team, also in the trial's `evaluations`; return the `result`."""
+        self.evaluate()
+        self.run_other_evaluations()
+        return self.result(numbers, usage)
+
     def _keep_team(self) -> None:
         if self.trial.keep_teams:
             arrays = self.team.arrays()
@@ -169,51 +181,42 @@ class Session:
         done = 0
         for stage, there in teach(self._own, trial.settings, stages, trial.seed):
             self._note_measures(there)
-            steps = control_loop(
-                there.scenario, there.team, episodes=stage.episodes, steps=trial.steps,
-                seed=trial.seed, first_world=CURRICULUM_WORLDS + done,
+            self._run(
+                there, f"{STAGE}{stage.name}", counted_from=-done, episodes=stage.episodes,
+                steps=trial.steps, first_world=CURRICULUM_WORLDS + done,
             )  # fmt: skip
-            measures = measures_of(there.world)
-            for _ in self._measured(steps, f"{STAGE}{stage.name}", measures, first=-done):
-                pass
             done += stage.episodes
 
     def _evaluate(
         self, there: Arrangement, phase: str, observe: Observer | None, *, explore: bool = False
     ) -> None:
-        episodes = self.trial.evaluation
-        most = self.trial.evaluation_steps or self.trial.steps
-        if observe is None and self._at_once(
-            there, episodes, EVALUATION_WORLDS, most, phase, learn=False
-        ):
+        loop: dict[str, Any] = {
+            "episodes": self.trial.evaluation,
+            "first_episode": EVALUATION_WORLDS,
+        }
+        loop["steps"] = self.trial.evaluation_steps or self.trial.steps
+        if observe is None and self._at_once(there, phase, **loop, learn=False):
             return
-        steps = control_loop(
-            there.scenario, there.team, episodes=episodes,
-            steps=most, seed=self.trial.seed, first_episode=EVALUATION_WORLDS,
-            learn=False, explore=explore,
-        )  # fmt: skip
-        measures = measures_of(there.world)
-        for _ in self._measured(steps, phase, measures, observe, EVALUATION_WORLDS):
-            pass
+        self._run(there, phase, [observe], EVALUATION_WORLDS, **loop, learn=False, explore=explore)
 
-    def _measured(
+    def _run(
         self,
-        steps: Iterator[StepRecord],
+        there: Arrangement,
         phase: str,
-        measures: Sequence[Measure],
-        observe: Observer | None = None,
-        first: int = 0,
-    ) -> Iterator[StepRecord]:
-        """Yield the steps of episodes, show them to `observe`, and keep the row of each episode.
+        observers: Sequence[Observer | None] = (),
+        counted_from: int = 0,
+        **loop: Any,
+    ) -> None:
+        """Run a `control_loop`, show its steps to observers, and keep the row of each episode.
 
-        The number of an episode in its row is counted from `first`.
+        The number of an episode in its row is counted from `counted_from`.
         """
-        for record in steps:
+        measures = measures_of(there.world)
+        for record in control_loop(there.scenario, there.team, seed=self.trial.seed, **loop):
             if record.step == 0:
-                meter = EpisodeMeter(phase, record.episode - first, measures)
+                meter = EpisodeMeter(phase, record.episode - counted_from, measures)
             meter.add(record.transition)
-            yield record
-            if observe is not None:
+            for observe in filter(None, observers):
                 observe(record)
             if record.last:
                 self._rows.append(meter.row())
@@ -221,18 +224,18 @@ class Session:
     def _at_once(
         self,
         there: Arrangement,
-        episodes: int,
-        first: int,
-        steps: int,
         phase: str,
         *,
+        episodes: int,
+        steps: int,
+        first_episode: int,
         learn: bool = True,
     ) -> bool:
         """Run whole episodes compiled and keep their rows, or return that it cannot be done."""
         scenario = there.scenario
         if not hasattr(scenario, "run_episode") or not isinstance(there.team, Team):
             return False
-        for episode in range(first, first + episodes):
+        for episode in range(first_episode, first_episode + episodes):
             begin = perf_counter()
             seed = world_seed(self.trial.seed, episode)
             summary = scenario.run_episode(there.team, seed, episode, steps, learn=learn)
@@ -242,7 +245,7 @@ class Session:
                 spent = perf_counter() - begin
                 self._watch.seconds["decision"] += spent
                 self.deciding += [spent / summary.steps] * summary.steps
-            number = episode if learn else episode - first
+            number = episode if learn else episode - first_episode
             row = EpisodeRow(phase, number, summary.steps, summary.measures, summary.return_)
             self._rows.append(row)
         return True
@@ -266,13 +269,4 @@ def run_trial(trial: Trial) -> TrialResult:
     """
     session = Session(trial)
     session.train(trial.episodes)
-    session.evaluate()
-    session.run_other_evaluations()
-    return session.result()
-
-
-def _opened(trial: Trial, episode: int) -> RecordedScenario:
-    """Return a like of a trial's scenario before an episode's first step, which no record holds."""
-    scenario = trial.settings.scenario.build()
-    scenario.reset(world_seed(trial.seed, episode), episode)
-    return scenario
+    return session.finish()

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ...core.interface.measures import Measure
 from ...core.interface.scenario import Scenario
 from ...core.plugins.sources import Sources, named
-from ..spec.conditions import ConditionSettings
-from ..spec.curriculum import Stage
+from ..spec.conditions import ConditionSettings, Stage
 from ..spec.labels import lengths
 from ..store.durable import Recording
 from ..store.schema import RESULTS_VERSION, Planned

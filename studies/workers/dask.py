@@ -18,9 +18,16 @@ from distributed.comm.core import CommClosedError
 
 from ..errors import SpecError
 from ..trials.trial import Trial
-from .arrivals import Workers
-from .interrupts import ignore_interrupts
-from .worker import ONE_THREAD, Outcome, RunTrial, UnlikeWorkerError, attempt_alike, versions
+from .runner import Workers
+from .worker import (
+    ONE_THREAD,
+    Outcome,
+    RunTrial,
+    UnlikeWorkerError,
+    attempt_alike,
+    ignore_interrupts,
+    versions,
+)
 
 CONNECT = 10.0
 """How long to try to reach a scheduler [s]."""

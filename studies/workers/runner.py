@@ -5,21 +5,23 @@ A trial whose worker died is run again when the others are done, alone, up to `A
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import closing
+from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING
+from queue import Empty, SimpleQueue
+from typing import TYPE_CHECKING, Any, Literal
 
-from ..store.running import Running
-from ..store.store import Store
-from .arrivals import Workers
-from .interrupts import undisturbed
-from .worker import Outcome, RunTrial
+from ..store.store import Running, Store
+from .worker import Outcome, RunTrial, ignore_interrupts, undisturbed
 
 if TYPE_CHECKING:
     from ..spec.spec import Spec
     from ..trials.trial import Trial, TrialResult
 
+Backend = Literal["loky", "dask"]
+"""``loky``: processes of this machine. ``dask``: workers of a Dask cluster."""
 ATTEMPTS = 2
 """How often a trial is run alone whose worker has died."""
 
@@ -108,3 +110,68 @@ def save(store: Store, trial: Trial, result: TrialResult, total: float) -> None:
         trial.planned, [row.flat(names) for row in result.rows],
         {**result.seconds, "total": total}, numbers, result.recordings,
     )  # fmt: skip
+
+
+POLL = 1.0
+"""How often to look for workers while no trial finishes [s]."""
+
+
+class Workers(ABC):
+    """Processes that run trials; what their backends have in common."""
+
+    @property
+    @abstractmethod
+    def processes(self) -> int:
+        """How many trials run at a time."""
+
+    @abstractmethod
+    def submit(self, run_trial: RunTrial, trial: Trial) -> Any:
+        """Hand a trial to a worker that is free, and return its future."""
+
+    @abstractmethod
+    def fetch(self, future: Any, trial: Trial) -> Outcome | None:
+        """Return what became of a trial whose future is done; None if it runs once more."""
+
+    @abstractmethod
+    def stop(self, futures: Sequence[Any]) -> None:
+        """End the trials that are running."""
+
+    def arrivals(
+        self, trials: Sequence[Trial], run_trial: RunTrial, started: Callable[[str], None]
+    ) -> Generator[Outcome]:
+        """Run trials and yield what becomes of each, in whatever order; closing stops them.
+
+        Parameters
+        ----------
+        trials
+            The trials.
+        run_trial
+            Runs one of them; a module-level function, since workers import it by name.
+        started
+            Called with the identity of each trial when it is handed to a worker.
+        """
+        waiting, left = iter(trials), len(trials)
+        running: dict[Any, Trial] = {}
+        finished: SimpleQueue[Any] = SimpleQueue()
+        try:
+            while left:
+                for trial in islice(waiting, max(self.processes - len(running), 0)):
+                    with ignore_interrupts():
+                        future = self.submit(run_trial, trial)
+                    running[future] = trial
+                    started(trial.identity)
+                    future.add_done_callback(finished.put)
+                try:
+                    future = finished.get(timeout=POLL)
+                except Empty:
+                    continue
+                outcome = self.fetch(future, running[future])
+                if outcome is None:
+                    future.add_done_callback(finished.put)
+                    continue
+                del running[future]
+                left -= 1
+                yield outcome
+        finally:
+            if running:
+                self.stop(list(running))

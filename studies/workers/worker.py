@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import os
+import signal
 import threading
 import time
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from platform import python_version
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 if TYPE_CHECKING:
     from ..trials.trial import Trial, TrialResult
-
 
 POLL = 0.5
 """How often a worker looks whether its parent is still there [s]."""
@@ -142,3 +143,32 @@ def installed(package: str) -> str:
     from importlib.metadata import version
 
     return version(package)
+
+
+@contextmanager
+def undisturbed() -> Iterator[None]:
+    """Put off Ctrl-C until what is being kept is kept."""
+    pressed: list[int] = []
+    with _handling(lambda number, _: pressed.append(number)):
+        yield
+    if pressed:
+        raise KeyboardInterrupt
+
+
+@contextmanager
+def ignore_interrupts() -> Iterator[None]:
+    """Ignore Ctrl-C, as the processes started meanwhile will do for ever: it is for the parent."""
+    with _handling(signal.SIG_IGN):
+        yield
+
+
+@contextmanager
+def _handling(handler: Any) -> Iterator[None]:
+    if threading.current_thread() is not threading.main_thread():
+        yield  # Python tells the main thread only, and lets no other change that
+        return
+    usual = signal.signal(signal.SIGINT, handler)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, usual)

@@ -9,7 +9,7 @@ import pytest
 from nested_agents.studies.catalogue.study import load_study
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.presentation.tables import tabulate
-from nested_agents.studies.report import words
+from nested_agents.studies.report import page as words
 from nested_agents.studies.results.results import read
 from nested_agents.studies.spec.outline import StudyOutline
 from nested_agents.studies.spec.spec import Spec

@@ -15,6 +15,7 @@ COLUMNS = ("success, 4", "success, 12", "evaluation success", "decisions", "CPU 
 PREDICTORS = ("success, 2", "success, 6", "evaluation success", "decisions")
 SAMPLED = "success, sampled actions"
 ARM = ("success, 4", "success, 12", "evaluation success", SAMPLED, "decisions", "CPU [s]")
+EDGES = ("evaluation success", "messages")
 LONG = ("success, 4", "success, 40", "success, 120", *COLUMNS[2:])
 
 
@@ -23,6 +24,7 @@ LONG = ("success, 4", "success, 40", "success, 120", *COLUMNS[2:])
     [
         ("peers-arm", ARM),
         ("peers-boxes", COLUMNS),
+        ("fit-games-ppo", EDGES),
         ("peers-one-robot", COLUMNS),
         ("peers-four-robots", COLUMNS),
         ("peers-100", LONG),

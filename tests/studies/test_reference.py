@@ -9,7 +9,7 @@ import pytest
 import nested_agents as na
 from nested_agents.studies.api.run_study import run_study
 from nested_agents.studies.cli.main import COMMANDS
-from nested_agents.studies.results.numbers import NUMBERS
+from nested_agents.studies.results.results import NUMBERS
 from nested_agents.studies.spec.keys import tables
 from nested_agents.studies.spec.spec import Spec
 

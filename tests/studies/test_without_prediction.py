@@ -8,7 +8,7 @@ import pytest
 from nested_agents.core.agents.joint_agents import join_agents
 from nested_agents.core.agents.loop import control_loop, policy_seed
 from nested_agents.core.agents.team import Team
-from nested_agents.core.learners.frozen import FrozenSettings
+from nested_agents.core.learners.td import FrozenSettings
 from nested_agents.core.policies.settings import DQNSettings
 from nested_agents.scenarios.checking.checker import CHECKS, check_scenario
 from nested_agents.scenarios.line_up import LineUp, LineUpSettings

@@ -10,7 +10,7 @@ from ...numerics.arrays import FloatArray, IntArray
 from ...numerics.compiling import njit
 from .layout import Layout, Packed, unpack
 from .strengths import all_strengths, pair, strengths_room
-from .updates import advance
+from .updates import advance, values_of_two
 
 
 @njit(cache=True)
@@ -179,17 +179,6 @@ def _add_lines(theta, which: IntArray, states, rows: IntArray, skipped: int, lay
 
 
 @njit(cache=True)
-def _products(which: IntArray, lay: Layout) -> IntArray:
-    """Return the terms among these that are of several variables."""
-    kept, n_kept = np.empty(len(which), np.int64), 0
-    for t in which:
-        if lay.lengths[t] > 1:
-            kept[n_kept] = t
-            n_kept += 1
-    return kept[:n_kept]
-
-
-@njit(cache=True)
 def total_compact(  # type: ignore[no-untyped-def]
     weights, agents: IntArray, firsts: IntArray, kinds, own: FloatArray, shared: FloatArray,
     packed: Packed,
@@ -220,9 +209,9 @@ def total_compact(  # type: ignore[no-untyped-def]
     _add_lines(of_agents, of_own, own, agents, 0, lay, mine)
     _add_lines(of_bodies, of_body, shared, bodies, n_own, lay, theirs)
     _add_lines(of_all, of_common, shared, bodies, n_own, lay, total)
-    of_own, of_body, of_common = (
-        _products(of_own, lay), _products(of_body, lay), _products(of_common, lay),
-    )  # fmt: skip
+    of_own = of_own[lay.lengths[of_own] > 1]
+    of_body = of_body[lay.lengths[of_body] > 1]
+    of_common = of_common[lay.lengths[of_common] > 1]
     # A call takes a microsecond, as long as the lines of an agent.
     for b in range(len(shared) if len(of_own) + len(of_body) > 0 else 0):
         for i in range(firsts[b], firsts[b + 1]):
@@ -236,28 +225,55 @@ def total_compact(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def td_compact(  # type: ignore[no-untyped-def]
+def td_update(  # type: ignore[no-untyped-def]
     theta, rows: IntArray, trace, reach, states: FloatArray, entered: FloatArray,
     rewards: FloatArray, discount: float, step_size: float, lengths: FloatArray, decay: float,
     packed: Packed,
 ) -> None:  # fmt: skip
-    """Do what `core.rules.kernels.few_states.td_dense` does, triangular partitions."""
+    """Make one TD update of every agent (Eq. 7, 12, 13), any partitions.
+
+    Parameters
+    ----------
+    theta
+        ``(n_rows, n_rules)`` consequent weights, modified.
+    rows
+        ``(n,)`` the row of theta of every agent.
+    trace
+        ``(n, n_rules)`` eligibility traces, modified.
+    reach
+        ``(n, parts of all rows)``, see `core.rules.kernels.updates.advance`, modified.
+    states, entered
+        ``(n, d)`` the previous states of the agents and those that followed.
+    rewards, discount
+        ``(n,)`` received in the previous states; weight of what follows, 0 if they were terminal.
+    step_size, lengths
+        Step size, and ``(n,)`` what it is divided by for every agent.
+    decay
+        Discount times trace decay.
+    packed
+        Layout of the rule base.
+    """
     lay = unpack(packed)
-    strengths, spare = strengths_room(lay)
+    one, spare = strengths_room(lay)
+    two = np.empty_like(one)
     functions, room, _ = _room(lay)
     for i in range(len(states)):
-        ahead = _value(theta[rows[i]], entered[i], lay, functions, room)
-        now = _value(theta[rows[i]], states[i], lay, functions, room)
-        all_strengths(states[i], lay, strengths, spare)
+        all_strengths(states[i], lay, one, spare)
+        if lay.sigmoid:
+            all_strengths(entered[i], lay, two, spare)
+            now, ahead = values_of_two(theta[rows[i]], one, two, lay)
+        else:
+            now = _value(theta[rows[i]], states[i], lay, functions, room)
+            ahead = _value(theta[rows[i]], entered[i], lay, functions, room)
         step = step_size * (rewards[i] + discount * ahead - now) / lengths[i]
-        advance(theta[rows[i]], trace[i], reach[i], strengths, decay, step, lay)
+        advance(theta[rows[i]], trace[i], reach[i], one, decay, step, lay)
 
 
 @njit(cache=True)
 def active_compact(states: FloatArray, packed: Packed) -> tuple[IntArray, FloatArray]:
     """Return the active rules ``(m, k)`` and their strengths ``(m, k)``, triangular partitions."""
     lay = unpack(packed)
-    rules = np.empty((len(states), lay.n_active), np.int64)
+    rules = np.empty((len(states), lay.n_active), np.int32)  # of all experience they are kept
     strengths = np.empty((len(states), lay.n_active))
     (lows, highs, shares), (numbers, products), _ = _room(lay)
     for s in range(len(states)):

@@ -4,7 +4,7 @@ A term of a rule base is a tensor theta with one axis per variable. Its value at
 left when every axis has been contracted with the firing strengths of its variable. Own axes come
 first, for every own block that occurs at once (`contract`): the last of them is contracted with
 each of its *levels*, the few distinct values that it takes, the others with each own block. The
-shared axes follow in `core.rules.kernels.folding`.
+shared axes follow in `core.rules.kernels.dense`.
 
 Innermost loops count without sign: an index that could be negative would be checked at every turn.
 Where five functions to a variable are spelled out, it is for the paper's case.

@@ -1,14 +1,95 @@
-"""Values where every membership function may be active."""
+"""Values where every membership function may be active.
+
+The own axes of a term are contracted in `contraction`, then its shared axes here, for many
+situations side by side.
+"""
 
 import numpy as np
 
 from ...numerics.arrays import FloatArray, IntArray
 from ...numerics.compiling import njit
 from .contraction import contract, total_width
-from .folding import fold
 from .layout import Layout, Packed, unpack
-from .pairs import pairs
 from .strengths import LANES, many_strengths
+
+_FAST = {"reassoc", "contract"}
+
+
+@njit(cache=True, fastmath=_FAST)
+def _fold_weights(weights, start, size, m, strengths, out, lanes) -> None:  # type: ignore[no-untyped-def]
+    """Contract the last axis of weights that are the same in all lanes."""
+    for i in range(size // m):
+        at = start + i * m
+        # The plain loop makes a decision take .99 to 1.07 times as long (paired, 5^7, n = 4).
+        if m == 5:
+            a, b, c = weights[at], weights[at + 1], weights[at + 2]
+            d, e = weights[at + 3], weights[at + 4]
+            for k in range(np.uint64(lanes)):
+                out[i, k] = (
+                    (a * strengths[0, k] + b * strengths[1, k])
+                    + (c * strengths[2, k] + d * strengths[3, k])
+                    + e * strengths[4, k]
+                )
+            continue
+        for k in range(np.uint64(lanes)):
+            out[i, k] = weights[at] * strengths[0, k]
+        for s in range(1, m):
+            for k in range(np.uint64(lanes)):
+                out[i, k] += weights[at + s] * strengths[s, k]
+
+
+@njit(cache=True, fastmath=_FAST)
+def _fold_rows(rows, size, m, strengths, out, lanes) -> None:  # type: ignore[no-untyped-def]
+    """Contract the last axis of `size` rows of lanes."""
+    for i in range(size // m):
+        at = i * m
+        for k in range(np.uint64(lanes)):
+            out[i, k] = rows[at, k] * strengths[0, k]
+        for s in range(1, m):
+            for k in range(np.uint64(lanes)):
+                out[i, k] += rows[at + s, k] * strengths[s, k]
+
+
+@njit(cache=True)
+def fold(partial, strengths, lay: Layout, one, two, out, wanted) -> None:  # type: ignore[no-untyped-def]
+    """Contract what `contract` left for one own block with shared blocks side by side.
+
+    Parameters
+    ----------
+    partial
+        ``(total_width,)`` weights of the shared rules.
+    strengths
+        ``(d - n_own, most memberships, lanes)`` of the shared variables.
+    lay
+        Layout of the rule base.
+    one, two
+        Scratch, ``(largest shared size, lanes)``.
+    out
+        ``(lanes,)`` the values.
+    wanted
+        How many of them are wanted.
+    """
+    lanes = (wanted + 7) // 8 * 8  # whole vectors
+    out[:] = 0.0
+    start = 0
+    for t in range(len(lay.lengths)):
+        size, first = lay.shared_sizes[t], lay.own_lengths[t]
+        v = lay.lengths[t] - 1
+        if first > v:
+            out += partial[start]
+        else:
+            j = lay.terms[t, v]
+            _fold_weights(partial, start, size, lay.counts[j], strengths[j - lay.n_own], one, lanes)
+            left = size // lay.counts[j]
+            while v > first:
+                v -= 1
+                j = lay.terms[t, v]
+                _fold_rows(one, left, lay.counts[j], strengths[j - lay.n_own], two, lanes)
+                one, two = two, one
+                left //= lay.counts[j]
+            out += one[0]
+        start += size
+
 
 CHUNK = 64
 """States whose own blocks are compared with each other."""
@@ -65,6 +146,46 @@ def values_dense(theta: FloatArray, states: FloatArray, packed: Packed) -> Float
                 first[s] += 1
         out[begin : begin + CHUNK] = folded(theta, (own, first, shared, none, 1), every, lay)
     return out
+
+
+@njit(cache=True)
+def pairs(tables, indices):  # type: ignore[no-untyped-def]
+    """Sort joint-action indices by the blocks that they lead to.
+
+    Parameters
+    ----------
+    tables
+        Own blocks and their rows, shared blocks and theirs, and the divisor, as in `Blocks`.
+    indices
+        ``(m,)`` joint-action indices.
+
+    Returns
+    -------
+    used
+        ``(b,)`` rows of `own` that occur.
+    slot_of, row_of
+        ``(m,)`` index into `used`, and row of `shared`, of every index.
+    wanted
+        ``(b, R)`` which pairs occur.
+    """
+    own, own_rows, shared, shared_rows, divisor = tables
+    n_local = len(own_rows) if len(own_rows) else len(own)
+    slots, used = np.full(len(own), -1), np.empty(len(own), np.int64)
+    slot_of, row_of = np.empty(len(indices), np.int32), np.empty(len(indices), np.int32)
+    count = 0
+    for c in range(len(indices)):
+        local = indices[c] // divisor % n_local
+        at = own_rows[local] if len(own_rows) else local
+        if slots[at] < 0:
+            slots[at] = count
+            used[count] = at
+            count += 1
+        slot_of[c] = slots[at]
+        row_of[c] = shared_rows[indices[c]] if len(shared_rows) else indices[c]
+    wanted = np.zeros((count, len(shared)), np.bool_)
+    for c in range(len(indices)):
+        wanted[slot_of[c], row_of[c]] = True
+    return used[:count], slot_of, row_of, wanted
 
 
 @njit(cache=True)

@@ -86,7 +86,7 @@ def enumerate_looked_up(theta, tables, tried, joint_action, probabilities, packe
     theta
         ``(n_rules,)`` the agent's consequent weights.
     tables
-        Where joint actions lead, see `core.rules.kernels.pairs.pairs`.
+        Where joint actions lead, see `core.rules.kernels.dense.pairs`.
     tried
         Which joint actions, see `Tried`.
     joint_action

@@ -1,4 +1,7 @@
-"""Changes of consequent weights and traces along feature vectors."""
+"""Changes of consequent weights and traces along feature vectors.
+
+For any partitions also values of few states of every agent.
+"""
 
 import numpy as np
 
@@ -89,3 +92,80 @@ def add_features(  # type: ignore[no-untyped-def]
                 at = lay.offsets[t] + r * columns
                 for c in range(columns):
                     target[rows[i], at + c] += weights[i] * own[r] * shared[c]
+
+
+@njit(cache=True, fastmath={"reassoc", "contract"})
+def _sums(rows, one, two, first, second, tops, parts, least):  # type: ignore[no-untyped-def]
+    """Return ``heads @ rows @ tail`` for two pairs of heads and tails ``(one, first), ...``.
+
+    `tops` ``(2, outer)`` bound m heads each, `parts` ``(2, q)`` every q-th part of the tails.
+    """
+    outer, m, columns = rows.shape
+    width, bounds = columns // parts.shape[1], np.empty(parts.shape[1])
+    f = g = 0.0
+    for p in range(outer):
+        at = p * m
+        for i in range(len(bounds)):
+            bounds[i] = max(tops[0, p] * parts[0, i], tops[1, p] * parts[1, i])
+        begin, end = hull(bounds, 0, len(bounds), least)
+        # The plain loop makes an update take 1.0 to 1.1 times as long (paired, 5^7 rules, n = 4).
+        if m == 5:
+            a, b, c, d, e = one[at], one[at + 1], one[at + 2], one[at + 3], one[at + 4]
+            u, v, w, x, y = two[at], two[at + 1], two[at + 2], two[at + 3], two[at + 4]
+            for k in range(np.uint64(begin * width), np.uint64(end * width)):
+                q, r, s = rows[p, 0, k], rows[p, 1, k], rows[p, 2, k]
+                t, z = rows[p, 3, k], rows[p, 4, k]
+                f += ((a * q + b * r) + (c * s + d * t) + e * z) * first[k]
+                g += ((u * q + v * r) + (w * s + x * t) + y * z) * second[k]
+            continue
+        for s in range(m):
+            for k in range(columns):
+                f += one[at + s] * rows[p, s, k] * first[k]
+                g += two[at + s] * rows[p, s, k] * second[k]
+    return f, g
+
+
+@njit(cache=True)
+def values_of_two(theta, one, two, lay: Layout) -> tuple[float, float]:  # type: ignore[no-untyped-def]
+    """Return f of two states given their strengths; theta is read once."""
+    f = g = 0.0
+    for t in range(len(lay.lengths)):
+        begin, end, rows = lay.offsets[t], lay.offsets[t + 1], lay.row_sizes[t]
+        split, last = lay.row_lengths[t], lay.lengths[t]
+        m = lay.counts[lay.terms[t, split - 1]] if split else 1
+        columns = (end - begin) // rows
+        heads, tails = np.empty((2, rows), theta.dtype), np.empty((2, columns), theta.dtype)
+        product_of(t, 0, split, lay, one, heads[0])
+        product_of(t, 0, split, lay, two, heads[1])
+        product_of(t, split, last, lay, one, tails[0])
+        product_of(t, split, last, lay, two, tails[1])
+        parts = np.empty((2, lay.part_sizes[t]))
+        product_of(t, split, lay.part_lengths[t], lay, one, parts[0])
+        product_of(t, split, lay.part_lengths[t], lay, two, parts[1])
+        tops = np.empty((2, rows // m))
+        product_of(t, 0, max(0, split - 1), lay, one, tops[0])
+        product_of(t, 0, max(0, split - 1), lay, two, tops[1])
+        slab = theta[begin:end].reshape(rows // m, m, columns)
+        more = _sums(slab, heads[0], heads[1], tails[0], tails[1], tops, parts, negligible(theta))
+        f, g = f + more[0], g + more[1]
+    return f, g
+
+
+@njit(cache=True)
+def each_dense(theta: FloatArray, states: FloatArray, packed: Packed) -> FloatArray:
+    """Return f ``(n, s)`` of states ``(n, s, d)``, each by its own row of theta ``(n, n_rules)``.
+
+    Theta is read once for every two states.
+    """
+    lay = unpack(packed)
+    n, s, _ = states.shape
+    out = np.empty((n, s))
+    one, room = strengths_room(lay)
+    two = np.empty_like(one)
+    for i in range(n):
+        for k in range(0, s, 2):
+            other = min(k + 1, s - 1)
+            all_strengths(states[i, k], lay, one, room)
+            all_strengths(states[i, other], lay, two, room)
+            out[i, k], out[i, other] = values_of_two(theta[i], one, two, lay)
+    return out

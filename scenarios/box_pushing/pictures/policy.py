@@ -20,7 +20,6 @@ from shapely.geometry import Point, Polygon
 from ....core.agents.team import Team
 from ....core.numerics.arrays import FloatArray
 from ..prediction.prediction import BoxPrediction
-from ..prediction.situation import Situation
 from ..world.boxes import BoxSpec
 from ..world.geometry import surface, wrap
 from ..world.settings import RobotSettings
@@ -162,27 +161,17 @@ def policy_of(
     for robot in range(min(len(poses), MOST_ROBOTS)):
         others = np.delete(poses, robot, axis=0) - at
         points = _grid(box, robots[robot].radius, others)
-        moved = [_moved(team, prediction, situation, poses, robot, p + at) for p in points]
-        ways, turns = (np.array(column) for column in zip(*moved, strict=True))
-        fields.append(Field(robot, points, ways, turns, others[:, :2]))
+        moved = []
+        for point in points:
+            placed = poses.copy()
+            placed[robot] = point + at
+            seen = replace(situation, robots=placed)
+            here = BoxPrediction(seen, prediction.model, prediction.premises)
+            view = here.poses(team.act(here, explore=False)[None])
+            moved.append(view.robots[0, robot] - placed[robot])
+        ways, turns = np.split(np.array(moved), [2], axis=1)
+        fields.append(Field(robot, points, ways, wrap(turns[:, 0]), others[:, :2]))
     return Policy(tuple(fields), box, robots[0])
-
-
-def _moved(
-    team: Team,
-    prediction: BoxPrediction,
-    situation: Situation,
-    robots: FloatArray,
-    robot: int,
-    pose: FloatArray,
-) -> tuple[FloatArray, float]:
-    """Return way and turn after the team's decision with a robot at a pose."""
-    placed = robots.copy()
-    placed[robot] = pose
-    here = BoxPrediction(replace(situation, robots=placed), prediction.model, prediction.premises)
-    view = here.poses(team.act(here, explore=False)[None])
-    after = view.robots[0, robot]
-    return (after - pose)[:2], float(wrap(after[2:] - pose[2:])[0])
 
 
 def _behind(at: FloatArray, box: BoxSpec, robots: list[RobotSettings], start: str) -> FloatArray:

@@ -23,10 +23,9 @@ import numpy as np
 from ....core.numerics.arrays import FloatArray, IntArray
 from ..states.view import View
 from ..world.boxes import BoxSpec
-from ..world.failures import WheelFailures
 from ..world.robots import compliance
 from ..world.settings import CONTROL_PERIOD, RobotSettings
-from ..world.world import World, WorldState
+from ..world.world import WheelFailures, World, WorldState
 from .prediction import BoxPrediction
 from .push import PushModel
 from .settings import BeliefSettings

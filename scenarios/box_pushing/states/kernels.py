@@ -15,11 +15,14 @@ from ....core.numerics.arrays import FloatArray, IntArray
 from ....core.numerics.compiling import njit
 from ..world import geometry as rows
 from ..world.geometry import LANES, ON_SURFACE, nearest_points
-from .relational import AWAY
-from .variables import STATE_VARIABLES
+from .relational import AWAY, STATE_VARIABLES
 from .view import ARRIVED, CLOSE, KEPT, LEAST, STILL, View
 
 _EXACT = {"contract", "nsz"}
+
+IN_ORDER = 64
+"""So many robots are added up one by one for each of them, as published results were; of more, each
+is taken off the sum of all."""
 
 COMPILED = tuple(STATE_VARIABLES.built_in)
 """The built-in variables that are computed here, each in a row of scratch of its own."""
@@ -44,7 +47,7 @@ class Columns:
     Parameters
     ----------
     names
-        Of `COMPILED`.
+        Of `COMPILED`; the columns of others mean nothing.
 
     Examples
     --------
@@ -53,8 +56,8 @@ class Columns:
     """
 
     def __init__(self, names: Sequence[str]) -> None:
-        assert set(names) <= set(COMPILED), f"{list(names)}: not all of them are compiled"
-        self.rows: IntArray = np.array([LANES * COMPILED.index(n) for n in names], dtype=np.int64)
+        places = [COMPILED.index(name) if name in COMPILED else 0 for name in names]
+        self.rows: IntArray = LANES * np.array(places, dtype=np.int64)
         # Of push, contact push, path and face: True or None, see `_relational`.
         self._groups = tuple(
             bool(np.isin(self.rows, group).any()) or None
@@ -63,14 +66,13 @@ class Columns:
 
     def of(self, view: View, robots: Sequence[int]) -> FloatArray:
         """Return the variables ``(len(robots), m, columns)`` of robots in the view's situations."""
-        states: FloatArray = _relational(
+        return _relational(
             np.ascontiguousarray(view.robots.transpose(1, 2, 0)),
             np.ascontiguousarray(view.box.T), np.ascontiguousarray(view.gaps.T),
             view.goal, view.origin, view.before, view.periods, view.outline.edges,
             view.friction_radius,
-            np.array(robots), self.rows, *self._groups,
+            np.fromiter(robots, np.int64), self.rows, *self._groups,
         )  # fmt: skip
-        return states
 
 
 @njit(cache=True, fastmath=_EXACT)
@@ -130,40 +132,21 @@ def _of_box(box, goal, before, periods, first, count, work):  # type: ignore[no-
 
 
 @njit(cache=True, fastmath=_EXACT)
-def _of_push(robots, box, goal, first, count, work):  # type: ignore[no-untyped-def]
-    """Write where the robots' middle would push the box, and its cross-track error."""
-    n = len(robots)
-    for k in range(count):
-        work[_X + k] = work[_Y + k] = 0.0
-    for r in range(n):
-        x, y = robots[r, 0, first : first + count], robots[r, 1, first : first + count]
-        for k in range(count):
-            work[_X + k] += x[k]
-            work[_Y + k] += y[k]
-    for k in range(count):
-        work[_WEIGHT + k] = n
-    _of_middle(box, goal, first, count, work, PUSH, CROSS_TRACK)
+def _of_middle(robots, gaps, touching, box, goal, first, count, work, push, cross_track):  # type: ignore[no-untyped-def]
+    """Write into two rows where the robots' middle would push the box, and its cross-track error.
 
-
-@njit(cache=True, fastmath=_EXACT)
-def _of_contact_push(robots, gaps, box, goal, first, count, work):  # type: ignore[no-untyped-def]
-    """Write the same of the robots in contact, see `View.contact_push`."""
+    Those `touching` weigh more, see `View.contact_push`, or all the same.
+    """
     for k in range(count):
         work[_X + k] = work[_Y + k] = work[_WEIGHT + k] = 0.0
     for r in range(len(robots)):
         x, y = robots[r, 0, first : first + count], robots[r, 1, first : first + count]
         apart = gaps[r, first : first + count]
         for k in range(count):
-            weight = np.exp(-max(apart[k], 0.0) / CLOSE) + LEAST
+            weight = np.exp(-max(apart[k], 0.0) / CLOSE) + LEAST if touching else 1.0
             work[_X + k] += weight * x[k]
             work[_Y + k] += weight * y[k]
             work[_WEIGHT + k] += weight
-    _of_middle(box, goal, first, count, work, CONTACT_PUSH, CONTACT_CROSS_TRACK)
-
-
-@njit(cache=True, fastmath=_EXACT)
-def _of_middle(box, goal, first, count, work, push, cross_track):  # type: ignore[no-untyped-def]
-    """Write into two rows where a weighted middle would push the box, and its cross-track error."""
     gx, gy = goal[0], goal[1]
     bx, by = box[0, first : first + count], box[1, first : first + count]
     for k in range(count):
@@ -227,7 +210,7 @@ def _of_path(  # type: ignore[no-untyped-def]
 ):
     """Write where the box is going and by how much it will miss the goal, see `View.path`.
 
-    Behind `_of_contact_push`, whose weighted middle it takes; `middle` ``(3, m)`` is scratch.
+    Behind `_of_middle` of those in contact, which it takes; `middle` ``(3, m)`` is scratch.
     """
     bx, by = box[0, first : first + count], box[1, first : first + count]
     for k in range(count):
@@ -255,8 +238,8 @@ def _of_path(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, fastmath=_EXACT)
-def _of_all(gaps, first, count, work):  # type: ignore[no-untyped-def]
-    """Write the two greatest gaps of all robots, and how many robots are away."""
+def _of_all(gaps, first, count, aways, work):  # type: ignore[no-untyped-def]
+    """Write the two greatest gaps of all robots, how far each is away, and how many are."""
     for k in range(count):
         work[_WIDEST + k] = work[_SECOND + k] = -np.inf
         work[_AWAY + k] = 0.0
@@ -266,17 +249,24 @@ def _of_all(gaps, first, count, work):  # type: ignore[no-untyped-def]
             widest = work[_WIDEST + k]
             work[_SECOND + k] = max(work[_SECOND + k], min(gap[k], widest))
             work[_WIDEST + k] = max(widest, gap[k])
-            work[_AWAY + k] += min(max(gap[k] / AWAY, 0.0), 1.0)
+            away = min(max(gap[k] / AWAY, 0.0), 1.0)
+            aways[r, k] = away
+            work[_AWAY + k] += away
 
 
 @njit(cache=True, fastmath=_EXACT)
-def _of_others(gaps, robot, first, count, work):  # type: ignore[no-untyped-def]
+def _of_others(gaps, robot, first, count, aways, work):  # type: ignore[no-untyped-def]
     """Write the greatest gap of the other robots and how many are away; of one alone its own."""
     n, gap = len(gaps), gaps[robot, first : first + count]
     share, alone = 1.0 / max(n - 1, 1), n == 1
+    in_order = n <= IN_ORDER
     for k in range(count):
-        away = min(max(gap[k] / AWAY, 0.0), 1.0)
-        work[AWAY_OTHERS + k] = away if alone else share * (work[_AWAY + k] - away)
+        work[AWAY_OTHERS + k] = 0.0 if in_order else share * (work[_AWAY + k] - aways[robot, k])
+    for r in range(n if in_order else 0):
+        if r != robot or alone:
+            for k in range(count):
+                work[AWAY_OTHERS + k] += share * aways[r, k]
+    for k in range(count):
         others = work[_SECOND + k] if gap[k] == work[_WIDEST + k] else work[_WIDEST + k]
         work[OTHERS + k] = gap[k] if alone else others
 
@@ -312,26 +302,28 @@ def _relational(  # type: ignore[no-untyped-def]
     columns
         Where the rows of the variables begin, see `Columns`.
     of_push, of_contact, of_path, of_face
-        None where nothing is wanted that `_of_push`, `_of_contact_push`, `_of_path` or `_of_face`
-        writes: numba leaves out branches on None, so that this is not even compiled.
+        None where nothing is wanted that `_of_middle` of all or of those in contact, `_of_path` or
+        `_of_face` writes: numba leaves out branches on None, so that this is not even compiled.
     """
-    m = box.shape[1]
+    m, aways = box.shape[1], np.empty((len(gaps), LANES))
     out, work = np.empty((len(wanted), m, len(columns))), np.empty(_SIZE)
     middle = np.empty((3, m if of_path is not None else 0))
     for first in range(0, m, LANES):
         count = min(LANES, m - first)
         _of_box(box, goal, before, periods, first, count, work)
-        _of_all(gaps, first, count, work)
+        _of_all(gaps, first, count, aways, work)
         if of_push is not None:
-            _of_push(robots, box, goal, first, count, work)
+            _of_middle(robots, gaps, False, box, goal, first, count, work, PUSH, CROSS_TRACK)
         if of_contact is not None:
-            _of_contact_push(robots, gaps, box, goal, first, count, work)
+            _of_middle(
+                robots, gaps, True, box, goal, first, count, work, CONTACT_PUSH, CONTACT_CROSS_TRACK
+            )
         if of_path is not None:
             _of_path(box, origin, periods, edges, friction_radius, middle, first, count, work)
         for i in range(len(wanted)):
             r = wanted[i]
             _of_robot(robots[r], gaps[r], box, first, count, work)
-            _of_others(gaps, r, first, count, work)
+            _of_others(gaps, r, first, count, aways, work)
             if of_face is not None:
                 _of_face(robots[r], box, edges, first, count, work)
             for k in range(count):

@@ -2,8 +2,21 @@
 
 Where the robot stands (gap, bearing of the box, side of the box as seen along the course to the
 goal), how far off the others are, where the robots' middle would push the box, how the box is
-turned, how far it has to go and whether it gets there. A further variable is one function here, one
-name in `variables.STATE_VARIABLES`, and, to be fast in prediction, one column of `kernels`.
+turned, how far it has to go and whether it gets there. A further variable is one function here, and
+to be fast in prediction one column of `kernels`.
+
+A state variable is a function of a `View` and a robot, see
+`nested_agents.scenarios.state_variables`. One of your own is written as the built-in ones are, and
+a spec names it ``"mine.py:face_bearing"``::
+
+    from nested_agents import View, state_variable
+
+    @state_variable("m", 0.0, 1.5)
+    def nearness(view: View, robot: int):
+        return view.distance + view.gaps[:, robot]
+
+Built-in variables are compiled for prediction: with one of its seven shared variables written as
+here, the decision of a team of two e-Pucks takes about a third longer.
 """
 
 from collections.abc import Callable
@@ -12,6 +25,7 @@ from math import pi
 import numpy as np
 
 from ....core.numerics.arrays import FloatArray
+from ....core.plugins.registry import Registry
 from ...state_variables import StateFunction, StateVariable, state_variable
 from ..world.geometry import wrap
 from .view import View
@@ -35,8 +49,7 @@ def _angle(
 
 def _missed(view: View, bearing: FloatArray) -> FloatArray:
     off = np.clip(bearing, -0.5 * pi, 0.5 * pi)
-    missed: FloatArray = view.distance * np.sin(off)
-    return missed
+    return view.distance * np.sin(off)
 
 
 @state_variable("m", 0.0, 0.5, centres=GAPS, labels=NEARNESS, mirrored="same")
@@ -61,8 +74,7 @@ def side(view: View, robot: int) -> FloatArray:
 def others_gap(view: View, robot: int) -> FloatArray:
     """Greatest gap of the other robots; of the robot itself if it is alone."""
     others = [r for r in range(view.gaps.shape[1]) if r != robot] or [robot]
-    gaps: FloatArray = view.gaps[:, others].max(axis=1)
-    return gaps
+    return view.gaps[:, others].max(axis=1)
 
 
 @_angle(SIDES, common=True)
@@ -126,8 +138,7 @@ def others_away(view: View, robot: int) -> FloatArray:
     Of a robot that is alone, its own.
     """
     others = [r for r in range(view.gaps.shape[1]) if r != robot] or [robot]
-    away: FloatArray = np.clip(view.gaps[:, others] / AWAY, 0.0, 1.0).mean(axis=1)
-    return away
+    return np.clip(view.gaps[:, others] / AWAY, 0.0, 1.0).mean(axis=1)
 
 
 @_angle((-1.2, -0.4, 0.0, 0.4, 1.2), common=True)
@@ -159,3 +170,10 @@ def path_bearing(view: View, robot: int) -> FloatArray:
 def path_cross_track_error(view: View, robot: int) -> FloatArray:
     """By how much that path would miss the goal; beyond it the whole distance."""
     return _missed(view, path_bearing(view, robot))
+
+
+STATE_VARIABLES = Registry(
+    "state variable",
+    {name: f"{__name__}:{name}" for name, v in [*vars().items()] if isinstance(v, StateVariable)},
+)
+"""State variables by the name that specs use."""

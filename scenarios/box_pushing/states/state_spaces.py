@@ -9,17 +9,17 @@ many situations at once. A further state space is one `BoxStateSpace` and one li
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import partial
 from math import pi
 
 import numpy as np
 
 from ....core.interface.spaces import StateSpace, Variable
 from ....core.numerics.arrays import FloatArray
-from ...state_variables import StateVariable, find_variable, guarded, sensed, space_of
+from ...state_variables import StateVariable, filled, find_variable, sensed, space_of
 from ..world.geometry import wrap
-from .kernels import COMPILED, Columns
-from .variables import STATE_VARIABLES
+from .kernels import Columns
+from .relational import STATE_VARIABLES
 from .view import View
 
 
@@ -35,42 +35,18 @@ class BoxStateSpace:
     """Whether `own` reads the poses; if not, none need be predicted for it."""
     functions: tuple[StateVariable, ...]
     """The shared variables, in order."""
-    compiled: tuple[bool, ...]
-    """Which of them have a column of `kernels`."""
-    of_users: bool = True
-    """Whether the others are functions of users: of them nothing is known, and what they return is
-    checked."""
-
-    @cached_property
-    def _columns(self) -> Columns:
-        names = zip(self.functions, self.compiled, strict=True)
-        return Columns([function.variable.name for function, compiled in names if compiled])
+    columns: Columns | None = None
+    """Computes the built-in ones fast for many situations; none: the functions do."""
 
     def sensed(self, view: View, robots: Sequence[int]) -> FloatArray:
         """Return the shared blocks ``(k, m, d - n_own)`` of k robots, by the functions alone."""
-        trusted = [compiled or not self.of_users for compiled in self.compiled]
-        return sensed(self.functions, trusted, view, robots)
+        return sensed(self.functions, view, robots)
 
     def shared_of(self, view: View, robots: Sequence[int]) -> FloatArray:
         """Return the shared blocks ``(k, m, d - n_own)`` of k robots, fast for many situations."""
-        if not self.of_users:
+        if self.columns is None:
             return self.sensed(view, robots)
-        compiled = self._columns.of(view, robots)
-        if all(self.compiled):
-            return compiled
-        blocks = np.empty((len(robots), len(view.box), len(self.functions)))
-        blocks[:, :, np.array(self.compiled)] = compiled
-        safe = guarded(view)
-        # Every robot is asked, so that `check` finds what is wrongly called common.
-        for column in np.flatnonzero(~np.array(self.compiled)):
-            for block, robot in zip(blocks, robots, strict=True):
-                block[:, column] = self.functions[column].checked(safe, robot)
-        return blocks
-
-    def is_own(self, variable: str) -> bool:
-        """Return whether a variable is one of the user's own, of which nothing else is known."""
-        shared = zip(self.functions, self.compiled, strict=True)
-        return self.of_users and variable in [f.variable.name for f, c in shared if not c]
+        return filled(self.columns.of(view, robots), self.functions, view, robots)
 
 
 def _paper_own(poses: FloatArray, speeds: FloatArray, goal: FloatArray) -> FloatArray:
@@ -97,6 +73,9 @@ def _angle(name: str, centres: tuple[float, ...] = ()) -> Variable:
     return Variable(name, "rad", -pi, pi, True, centres, mirrored="opposite")
 
 
+_shared = partial(StateVariable, common=True, trusted=True)
+
+
 def listed(name: str, *shared: str) -> BoxStateSpace:
     """Return a state space of variables by name, behind the speed of the own wheel.
 
@@ -111,23 +90,17 @@ def listed(name: str, *shared: str) -> BoxStateSpace:
         lambda poses, speeds, goal: speeds[:, None],
         own_needs_pose=False,
         functions=functions,
-        compiled=tuple(one in COMPILED for one in shared),
+        columns=Columns(shared),
     )
 
 
 _PAPER = (
-    StateVariable(
-        _angle("box_orientation", _EVEN), lambda view, robot: wrap(view.box[:, 2]), common=True
+    _shared(_angle("box_orientation", _EVEN), lambda view, robot: wrap(view.box[:, 2])),
+    _shared(
+        _angle("box_goal_bearing", _EVEN), lambda view, robot: wrap(view.course - view.box[:, 2])
     ),
-    StateVariable(
-        _angle("box_goal_bearing", _EVEN),
-        lambda view, robot: wrap(view.course - view.box[:, 2]),
-        common=True,
-    ),
-    StateVariable(
-        Variable("box_distance", "m", 0.0, 1.2, mirrored="same"),
-        lambda view, robot: view.distance,
-        common=True,
+    _shared(
+        Variable("box_distance", "m", 0.0, 1.2, mirrored="same"), lambda view, robot: view.distance
     ),
 )
 
@@ -153,8 +126,6 @@ STATE_SPACES: dict[str, BoxStateSpace] = {
         _paper_own,
         own_needs_pose=True,
         functions=_PAPER,
-        compiled=(False,) * len(_PAPER),
-        of_users=False,
     ),
     # What matters for bringing the box to the goal, and for turning it into the goal pose besides.
     "relational": listed("relational", *_PUSHING),

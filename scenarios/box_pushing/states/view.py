@@ -88,8 +88,7 @@ class View:
     def _contact(self) -> FloatArray:
         """The middle ``(m, 2)`` of the robots in contact [m], see `contact_push`."""
         weights = (np.exp(-np.maximum(self.gaps, 0.0) / CLOSE) + LEAST)[:, :, None]
-        middle: FloatArray = (weights * self.robots[:, :, :2]).sum(axis=1) / weights.sum(axis=1)
-        return middle
+        return (weights * self.robots[:, :, :2]).sum(axis=1) / weights.sum(axis=1)
 
     @cached_property
     def path(self) -> FloatArray:

@@ -9,7 +9,7 @@ also describe one by its vertices.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import cos, pi, sin, sqrt
 
@@ -58,6 +58,8 @@ class BoxSpec:
     """Coefficient of friction with the ground."""
     contact_friction: float = 0.3
     """Coefficient of friction with robots."""
+    grows: bool | str = field(default=True, compare=False)
+    """Whether it grows with the number of robots, or its ``width`` alone."""
 
     def __post_init__(self) -> None:
         if bool(self.vertices) == bool(self.radius):
@@ -143,9 +145,9 @@ class BoxSpec:
         ends = self.outline.edges.reshape(-1, 2)[:, 1]
         return float(ends.min()) - self.outline.rounding, float(ends.max()) + self.outline.rounding
 
-    def scaled(self, factor: float, *, width_only: bool = False) -> BoxSpec:
-        """Return the box with lengths, or those along y only, and mass multiplied by `factor`."""
-        along = 1.0 if width_only else factor
+    def scaled(self, factor: float) -> BoxSpec:
+        """Return the box with mass and lengths, or those that grow, multiplied by `factor`."""
+        along = 1.0 if self.grows == "width" else factor
         outline, *holes = [
             tuple((along * x, factor * y) for x, y in ring) for ring in (self.vertices, *self.holes)
         ]
@@ -174,9 +176,8 @@ def box_for(box: str | BoxSettings, robots: int) -> BoxSpec:
     >>> round(box.area, 12), box.mass
     (0.16, 0.8)
     """
-    described, grows = _described(box)
-    factor = growth(box, robots)
-    return described if factor == 1.0 else described.scaled(factor, width_only=grows == "width")
+    described, factor = _described(box), growth(box, robots)
+    return described if factor == 1.0 else described.scaled(factor)
 
 
 def growth(box: str | BoxSettings, robots: int) -> float:
@@ -192,22 +193,18 @@ def growth(box: str | BoxSettings, robots: int) -> float:
     >>> growth("square", 2), growth("square", 8)
     (1.0, 4.0)
     """
-    return max(robots / ROBOTS_PER_BOX, 1.0) if _described(box)[1] else 1.0
+    return max(robots / ROBOTS_PER_BOX, 1.0) if _described(box).grows else 1.0
 
 
-def _described(box: str | BoxSettings) -> tuple[BoxSpec, bool | str]:
-    """Return a box as it stands in the table or the spec, and whether it grows."""
+def _described(box: str | BoxSettings) -> BoxSpec:
+    """Return a box as it stands in the table or the spec."""
     if isinstance(box, str) and box.startswith("{"):
         box = BoxSettings.model_validate_json(box)
     if isinstance(box, BoxSettings):
-        described = BoxSpec(
-            "own", box.vertices, box.holes,
-            mass=box.mass, friction=box.friction, contact_friction=box.contact_friction,
-        )  # fmt: skip
-        return described, box.grows
+        return BoxSpec(**{**dict(box), "name": "own"})
     if box not in BOXES:
         raise ValueError(f"scenario.box = {box!r}: {closest(box, BOXES)}")
-    return BOXES[box], True
+    return BOXES[box]
 
 
 def _rectangle(name: str, depth: float, width: float) -> BoxSpec:

@@ -7,6 +7,7 @@ polygon, concave or with holes, goes through here first.
 import warnings
 from collections.abc import Sequence
 from heapq import heapify, heappop, heappush
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ from shapely.geometry.polygon import orient
 from shapely.validation import explain_validity
 
 from ....core.numerics.arrays import FloatArray
+from ....core.plugins.deferred import nx
 from .geometry import ring_edges
 
 Vertices = Sequence[tuple[float, float]]
@@ -154,12 +156,12 @@ def convex_pieces(polygon: Polygon) -> tuple[FloatArray, ...]:
     triangles = shapely.constrained_delaunay_triangles(polygon).geoms
     rings = [np.asarray(orient(t).exterior.coords)[:-1] for t in triangles if t.area > 0]
     pieces = dict(enumerate(rings))
-    neighbours = _neighbours(rings)
-    pairs = [(i, j) for i, beside in neighbours.items() for j in beside if i < j]
+    beside = _neighbours(rings)
+    pairs = [(min(edge), max(edge)) for edge in beside.edges]
     heapify(pairs)
     while pairs:
         i, j = heappop(pairs)
-        if i not in pieces or j not in pieces or j not in neighbours[i]:
+        if not beside.has_edge(i, j):  # one of them has been merged since
             continue
         shared = {tuple(p) for p in pieces[i]} & {tuple(p) for p in pieces[j]}
         union = _merged(pieces[i], pieces[j]) if len(shared) >= 2 else None
@@ -167,25 +169,19 @@ def convex_pieces(polygon: Polygon) -> tuple[FloatArray, ...]:
             continue
         pieces[i] = union
         del pieces[j]
-        for other in neighbours.pop(j):
-            neighbours[other].discard(j)
-            if other != i:
-                neighbours[other].add(i)
-                neighbours[i].add(other)
-        for other in neighbours[i]:
+        nx.contracted_nodes(beside, i, j, self_loops=False, copy=False)
+        for other in beside[i]:
             heappush(pairs, (min(i, other), max(i, other)))
     return tuple(pieces.values())
 
 
-def _neighbours(rings: Sequence[FloatArray]) -> dict[int, set[int]]:
-    """Return by index which rings have an edge in common."""
+def _neighbours(rings: Sequence[FloatArray]) -> nx.Graph:
+    """Return the graph that joins rings, by index, which have an edge in common."""
     by_edge: dict[frozenset[tuple[float, ...]], list[int]] = {}
     for index, ring in enumerate(rings):
         points = [tuple(point) for point in ring.tolist()]
         for edge in zip(points, [*points[1:], points[0]], strict=True):
             by_edge.setdefault(frozenset(edge), []).append(index)
-    neighbours: dict[int, set[int]] = {index: set() for index in range(len(rings))}
-    for both in by_edge.values():
-        for one in both:
-            neighbours[one].update(other for other in both if other != one)
-    return neighbours
+    graph = nx.empty_graph(len(rings))
+    graph.add_edges_from(pair for both in by_edge.values() for pair in combinations(both, 2))
+    return graph

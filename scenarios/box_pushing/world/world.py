@@ -15,6 +15,9 @@ The box rubs on the ground by one friction joint at each of its friction points.
 its force to the limit after weighting it with the box's mass as seen from the joint, which leaves
 force not quite against the motion: sliding along its axes, a square meets 4 % less than its
 `friction_force`; along its diagonals and in turning, all of it.
+
+A wheel that fails as free has no drive at all: it resists sideways motion only. All other kinds of
+failure are described in `nested_agents.scenarios.faults.settings`.
 """
 
 from collections.abc import Sequence
@@ -25,6 +28,7 @@ import numpy as np
 from Box2D import _Box2D
 
 from ....core.numerics.arrays import FloatArray
+from ...faults.settings import Failures, Free
 from .boxes import BoxSpec
 from .geometry import gaps
 from .infrared import infrared_readings, sensor_directions
@@ -38,6 +42,8 @@ TOUCHING = 0.001
 of 0.5 mm."""
 SKIN = 0.005
 """Rounding of polygons in Box2D [dm]; its default is twice that."""
+SUBSTEPS = 4
+"""Physics steps of a control period."""
 VELOCITY_ITERATIONS = 8
 POSITION_ITERATIONS = 3
 
@@ -72,8 +78,6 @@ class World:
         The robots; their wheels, in this order, are the actuators.
     box
         The box.
-    substeps
-        Physics steps per control period.
     infrared
         Response of the infrared sensors; none: the e-Puck's. The world adds no noise to it.
 
@@ -106,17 +110,13 @@ class World:
         robots: Sequence[RobotSettings],
         box: BoxSpec,
         *,
-        substeps: int = 4,
         infrared: InfraredSettings | None = None,
     ) -> None:
-        if substeps < 1:
-            raise ValueError(f"substeps = {substeps}, must be at least 1")
         self.robots = tuple(robots)
         self.box = box
-        self.substeps = substeps
         self.sensor = infrared or InfraredSettings()
         self.n_wheels = sum(len(robot.wheels) for robot in robots)
-        self.dt = CONTROL_PERIOD / substeps
+        self.dt = CONTROL_PERIOD / SUBSTEPS
         self._radii: FloatArray = np.array([robot.radius for robot in robots])
         self._sensors = sensor_directions(robots)
         self.set_grip(np.ones(self.n_wheels))
@@ -197,7 +197,7 @@ class World:
         speeds = np.asarray(wheel_speeds, dtype=float) * UNIT
         touched = np.zeros(len(self.robots))
         for _ in range(periods):
-            for _ in range(self.substeps):
+            for _ in range(SUBSTEPS):
                 self._step(speeds)
             self._observe()
             touched += self.contact
@@ -214,12 +214,11 @@ class World:
         Of the box alone, and of the other robots alone; a sensor reads the greater one.
         """
         outline = self.box.outline
-        readings: FloatArray = infrared_readings(
+        return infrared_readings(
             self.robot_poses, self._radii, self._sensors, self.box_pose,
             outline.edges, outline.rounding, self.sensor.reach, self.sensor.decay,
             self.sensor.index,
         )  # fmt: skip
-        return readings
 
     def _step(self, speeds: FloatArray) -> None:
         """Advance by one physics step; the inner loop."""
@@ -280,3 +279,29 @@ def _handles(body: Any) -> tuple[Any, Any, Any]:
 def _twist(handles: tuple[Any, Any, Any]) -> tuple[float, float, float]:
     body, _, velocity = handles
     return get_x(velocity) / UNIT, get_y(velocity) / UNIT, get_omega(body)
+
+
+class WheelFailures(Failures):
+    """The failures that a spec schedules, and the wheels under them."""
+
+    @property
+    def grip(self) -> FloatArray:
+        """What multiplies the drive stiffness of every wheel ``(n,)``: 0 for free ones, else 1."""
+        grip = np.ones(len(self.failed))
+        for failure, wheels in self.active():
+            if isinstance(failure, Free):
+                grip[wheels] = 0.0
+        return grip
+
+    def advance(self, world: World, commands: FloatArray, step: int, periods: int) -> None:
+        """Let a world go on through (a part of) a step, its wheels being commanded `commands`."""
+        if self.strike(step):
+            world.set_grip(self.grip)
+        if not self._settings:
+            world.advance(commands, periods)
+            return
+        touched = np.zeros(len(world.robots))
+        for speeds in self.driven(commands, periods):
+            world.advance(speeds, 1)
+            touched += world.contact_time
+        world.contact_time = touched / periods

@@ -9,12 +9,11 @@ conditions and both measures.
 
 from collections.abc import Sequence
 
-from ...results.analysis import Analysis, Figures
-from ...results.comparison import differences, mean_success, phases_of, with_first
+from ...results.analysis import Analysis, Figures, verdicts
+from ...results.comparison import Pair, differences, phases_of
 from ...results.results import Results
 from ...results.statistics import exactly, rate
 from ...results.summary import Summary
-from ...results.verdicts import by_measure, verdicts
 from ..study import run_training as measure
 
 PUBLISHED = ("success",)
@@ -28,11 +27,13 @@ def analyse(results: Results) -> Analysis:
 
 def compared_with_first(results: Results, names: Sequence[str]) -> Analysis:
     """Return the analysis with conditions under these names, as many as have been trained."""
-    conditions = results.of_phase("training")
-    phases = phases_of(results)
-    measures = {title: mean_success(phase) for title, phase in phases.items()}
-    compared = differences(results, with_first(conditions, names), measures)
-    by_place = {(d.condition, d.measure): d.estimate for d in compared}
+    conditions, phases = results.of_phase("training"), phases_of(results)
+    others, pairs = list(zip(conditions, names, strict=True))[1:], dict[str, list[Pair]]()
+    for title, phase in phases.items() if others else ():
+        base = results.means(conditions[0], phase)
+        pairs[title] = [(name, title, results.means(c, phase), base) for c, name in others]
+    compared = differences(pairs)
+    by_place = {(d.condition, d.measure): d.estimate for ds in compared.values() for d in ds}
     table = []
     for condition, name in zip(conditions, names, strict=True):
         estimates = {}
@@ -40,15 +41,15 @@ def compared_with_first(results: Results, names: Sequence[str]) -> Analysis:
             estimates[title] = rate(results.success(condition, phase))
             estimates[f"{title}, difference"] = by_place.get((name, title), exactly(0.0))
         table.append(Summary(name, len(results.seeds(condition)), estimates))
-    notes = verdicts(compared, names[0]) if compared else []
+    notes = verdicts({f"{title}, less that of {names[0]}": ds for title, ds in compared.items()})
     return Analysis(tuple(table), tuple(notes), differences=compared)
 
 
 def draw(analysis: Analysis) -> Figures:
     """Return the figures of an analysis by name."""
-    from ...presentation import forest
+    from ...presentation.figures import draw_forest
 
-    figure = forest.draw(by_measure(analysis.differences), "difference from the first condition")
+    figure = draw_forest(analysis.differences, "difference from the first condition")
     return {} if figure is None else {"ablation": figure}
 
 

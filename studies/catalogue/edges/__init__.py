@@ -9,29 +9,22 @@ One measure was fixed beforehand: evaluation success. For each condition of trai
 evaluation is compared with that under the hierarchy of training, as in the study `hierarchies`.
 """
 
-from __future__ import annotations
-
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ....core.agents.loop import StepRecord
 from ....core.interface.scenario import groups_of
-from ...errors import SpecError
 from ...results.analysis import Analysis, Figures
 from ...results.results import Results
-from ...results.sizes import Sizes
-from ...results.summary import EVALUATED, two_figures
+from ...results.summary import EVALUATED, Sizes, two_figures
 from ...spec.labels import label_but
 from ...spec.spec import Spec
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..hierarchies import HierarchyCase, analysis_of, estimates
-from ..study import check_evaluated, check_rule_bases
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from ..study import check_evaluated, check_evaluations, check_rule_bases
 
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
@@ -45,10 +38,7 @@ def check(spec: Spec) -> None:
     """Raise `SpecError` unless trained teams are evaluated under other hierarchies."""
     check_evaluated(spec)
     check_rule_bases(spec, "who consider others and are told")
-    if not spec.evaluations:
-        raise SpecError(
-            'evaluations: missing; edges needs one at least, as silent.topology.told = "none"'
-        )
+    check_evaluations(spec, 'silent.topology.told = "none"')
 
 
 def measure(trial: Trial) -> TrialResult:
@@ -87,19 +77,17 @@ def draw(analysis: Analysis) -> Figures:
 
     The second figure has a panel for each setting, if there are enough seeds to compare.
     """
-    from ...presentation import forest
+    from ...presentation.figures import draw_forest
 
-    asked = dict.fromkeys(case.setting for case in analysis.cases)
     names = {case.hierarchy for case in analysis.cases}
-    figures = {"edges": _draw_parted(analysis)} if {*sum(PARTED, ())} <= names else {}
-    each = len(analysis.differences) // len(asked)
-    panels = {s: analysis.differences[k * each :][:each] for k, s in enumerate(asked)}
-    if (figure := forest.draw(panels, f"success less that {TRAINED}")) is not None:
+    figures = _draw_parted(analysis) if {*sum(PARTED, ())} <= names else {}
+    figure = draw_forest(analysis.differences, f"success less that {TRAINED}")
+    if figure is not None:
         figures["differences"] = figure
     return figures
 
 
-def _draw_parted(analysis: Analysis) -> Figure:
+def _draw_parted(analysis: Analysis) -> Figures:
     """Draw success by telling and considering: four fields of a colour for each setting."""
     from ...presentation import figures
 
@@ -122,7 +110,4 @@ def _draw_parted(analysis: Analysis) -> Figure:
         axes.tick_params(length=0, labelsize=7.5)
         axes.spines[:].set_visible(False)
     figure.suptitle("evaluation success of the same weights, 95 % intervals", fontsize=9)
-    return figure
-
-
-__all__ = ["analyse", "check", "draw", "measure"]
+    return {"edges": figure}

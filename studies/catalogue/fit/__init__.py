@@ -13,9 +13,8 @@ from ....core.interface.scenario import groups_of
 from ...errors import SpecError
 from ...results.analysis import Analysis, Figures
 from ...results.results import Results
-from ...results.sizes import Sizes
 from ...results.statistics import exactly, rate
-from ...results.summary import EVALUATED
+from ...results.summary import EVALUATED, Sizes
 from ...spec.labels import label
 from ...spec.spec import Spec
 from ...trials.session import Session
@@ -84,6 +83,3 @@ def draw(analysis: Analysis) -> Figures:
     f.name_rows(panels[0, 0], edges)
     figure.supxlabel(f"{EVALUATED}, bars: 95 % intervals", fontsize=9)
     return {"fit": figure}
-
-
-__all__ = ["analyse", "check", "draw", "measure"]

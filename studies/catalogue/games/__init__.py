@@ -11,11 +11,10 @@ from collections.abc import Iterator, Sequence
 from string import ascii_uppercase
 from textwrap import wrap
 
-from ...results.analysis import Analysis, Case, Figures
+from ...results.analysis import WIDTH, Analysis, Case, Figures
 from ...results.results import Results
 from ...results.statistics import rate
 from ...results.summary import Summary, two_figures
-from ...results.verdicts import WIDTH
 from ...store.schema import EVALUATION
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
@@ -42,9 +41,7 @@ def measure(trial: Trial) -> TrialResult:
     session.evaluate(phase=AFTER_ONE)
     generator.state = state
     session.train(trial.episodes - 1, first=1)
-    session.evaluate()
-    session.run_other_evaluations()
-    return session.result()
+    return session.finish()
 
 
 def analyse(results: Results) -> Analysis:

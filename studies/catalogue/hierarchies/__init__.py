@@ -17,15 +17,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ....core.interface.measures import SUCCESS
 from ...errors import SpecError
-from ...results.analysis import Analysis, Figures
-from ...results.comparison import Array, Difference, adjusted, of_shared_seeds
-from ...results.contrasts import Contrasts, Group
+from ...results.analysis import NOTHING, Analysis, Figures, verdicts
+from ...results.comparison import Array, Pair, differences
 from ...results.results import Results
-from ...results.sizes import Sizes
 from ...results.statistics import Estimate, bootstrap, exactly, rate
-from ...results.summary import EVALUATED, Summary
+from ...results.summary import EVALUATED, Sizes, Summary
 from ...spec.labels import label_but
 from ...spec.spec import Spec
 from ..scaling import NUMBERS, measure
@@ -109,10 +106,21 @@ def analysis_of(results: Results, cases: Sequence[HierarchyCase], reference: str
         )
         for c in cases
     ]
-    contrasts = contrasts_of(results, cases, reference)
-    legend = ["Rows: what else is swept, hierarchy.", ""]
-    notes = (*(legend if any(case.value_of for case in cases) else []), *contrasts.notes)
-    return Analysis(tuple(table), notes if cases else (), cases, contrasts.differences)
+    if not cases:
+        return Analysis(())
+    hierarchies = [case.hierarchy for case in cases]
+    reference = reference if reference in hierarchies else hierarchies[0]
+    success = [results.means(case.condition, case.phase) for case in cases]
+    bases = {c.setting: s for c, s in zip(cases, success, strict=True) if c.hierarchy == reference}
+    pairs: dict[str, list[Pair]] = {setting: [] for setting in bases}
+    for case, own in zip(cases, success, strict=True):
+        if case.setting in bases and case.hierarchy != reference:
+            pairs[case.setting].append((case.hierarchy, EVALUATED, own, bases[case.setting]))
+    compared = {setting: own for setting, own in differences(pairs).items() if own}
+    what = f"success, evaluation, less that of {reference}"
+    notes = ["Rows: what else is swept, hierarchy.", ""] * any(case.value_of for case in cases)
+    notes += verdicts({": ".join(filter(None, (s, what))): own for s, own in compared.items()})
+    return Analysis(tuple(table), tuple(notes) if compared else (*notes, NOTHING), cases, compared)
 
 
 def estimates(
@@ -141,33 +149,6 @@ def to_the_goal(success: Array, steps: Array) -> Array:
     return np.array([run[reached].mean() for reached, run in runs if reached.any()])
 
 
-def contrasts_of(
-    results: Results, cases: Sequence[HierarchyCase], reference: str = REFERENCE
-) -> Contrasts:
-    """Compare each hierarchy with the reference in every setting, p adjusted over all settings."""
-    hierarchies = list(dict.fromkeys(case.hierarchy for case in cases))
-    reference = reference if reference in hierarchies else next(iter(hierarchies), "")
-    bases = {case.setting: case for case in cases if case.hierarchy == reference}
-    settings, compared = [], []
-    for case in cases:
-        base = bases.get(case.setting, case)
-        own, other = of_shared_seeds(
-            [results.seeds(one.condition) for one in (case, base)],
-            [results.success(one.condition, one.phase).mean(axis=1) for one in (case, base)],
-        )
-        if base is not case and len(own) >= 2:
-            settings.append(case.setting)
-            compared.append(
-                Difference.between(case.hierarchy, EVALUATED, own, other, of_rates=True)
-            )
-    every = tuple(zip(settings, adjusted(compared), strict=True))
-    groups = tuple(
-        Group(setting, reference, tuple(d for s, d in every if s == setting), ())
-        for setting in dict.fromkeys(settings)
-    )
-    return Contrasts(SUCCESS, "evaluation", groups)
-
-
 def draw(analysis: Analysis) -> Figures:
     """Return the figure: success and time of a decision by number of robots.
 
@@ -175,7 +156,7 @@ def draw(analysis: Analysis) -> Figures:
     bars their 95 % intervals; hierarchies differ by colour and marker, and stand a little beside
     each other.
     """
-    from ...presentation import by_robots, figures  # matplotlib takes its time
+    from ...presentation import figures  # matplotlib takes its time
 
     cases = analysis.cases
     hierarchies = list(dict.fromkeys(case.hierarchy for case in cases))
@@ -188,16 +169,16 @@ def draw(analysis: Analysis) -> Figures:
             for axes, title in zip(column, (EVALUATED, DECIDING), strict=True):
                 robots, values = [c.robots for c in own], [c.values[title] for c in own]
                 if own:
-                    by_robots.draw_line(axes, robots, values, index, len(hierarchies))
+                    figures.draw_line(axes, robots, values, index, len(hierarchies))
         column[0].set_title(f"value of: {value_of}" if value_of else "", loc="left")
         column[1].set_xlabel(cases[0].sizes.word)
     for axes in panels.flat:
-        by_robots.scale_axis(axes, sorted({case.robots for case in cases}))
+        figures.scale_axis(axes, sorted({case.robots for case in cases}))
     figures.as_rates(panels[0, 0])
     figures.log_axis(panels[1, 0])
     for axes, title in zip(panels[:, 0], (EVALUATED, "deciding [ms]"), strict=True):
         axes.set_ylabel(title)
-    by_robots.name_lines(figure, hierarchies, "means over seeds, bars: 95 % intervals")
+    figures.name_lines(figure, hierarchies, "means over seeds, bars: 95 % intervals")
     return {"hierarchies": figure}
 
 

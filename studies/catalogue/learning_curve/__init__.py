@@ -19,8 +19,6 @@ from ...results.summary import EVALUATED, Summary, evaluated
 from ..study import run_training as measure
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
     from ...spec.spec import Spec
 
 BLOCK = 5
@@ -112,34 +110,24 @@ def draw(analysis: Analysis) -> Figures:
     figure, panels = f.grid(len(followed), COLUMNS, (3.6, 2.1), (0.0, 1.2), width, sharex=True)
     conditions = [line.condition for line in analysis.table]
     for axes, (measured, training) in zip(panels.flat, followed, strict=False):
-        _panel(axes, measured, curves_of(measured, training), conditions)
+        for condition, curve in curves_of(measured, training).items():
+            episodes = range(len(curve.value))  # counted from 0, as in rows and specs
+            marker = "o" if len(curve.value) == 1 else None
+            f.draw_curve(axes, episodes, curve, conditions.index(condition), marker=marker)
+        axes.set_title(measured.heading, loc="left")
+        if measured.is_rate:
+            f.as_rates(axes)
+        else:
+            axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
+        axes.grid(axis="y", alpha=0.25)
     for axes in panels.flat[len(followed) - panels.shape[1] : len(followed)]:
         f.as_episodes(axes)
     seeds = {line.condition: line.seeds for line in analysis.table}
     same = len(set(seeds.values())) == 1
     labels = [c if same else f"{c} ({n} seeds)" for c, n in seeds.items()]
     note = f"mean over {next(iter(seeds.values()))} seeds" if same else "mean over seeds"
-    handles = [f.handle(label, **f.look(i), lw=1.6) for i, label in enumerate(labels)]
-    ncols = max(1, min(len(labels), 90 // (max(map(len, seeds)) + 8)))
-    f.add_legend(figure, handles, f"{note}, band: 95 % interval", ncols=ncols)
+    f.name_curves(figure, labels, f"{note}, band: 95 % interval")
     return {"learning-curves": figure}
-
-
-def _panel(
-    axes: Axes, measured: Measure, curves: Mapping[str, Estimate], conditions: Sequence[str]
-) -> None:
-    from ...presentation.figures import as_rates, draw_curve
-
-    for condition, curve in curves.items():
-        episodes = range(len(curve.value))  # counted from 0, as in rows and specs
-        marker = "o" if len(curve.value) == 1 else None
-        draw_curve(axes, episodes, curve, conditions.index(condition), marker=marker)
-    axes.set_title(measured.heading, loc="left")
-    if measured.is_rate:
-        as_rates(axes)
-    else:
-        axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
-    axes.grid(axis="y", alpha=0.25)
 
 
 __all__ = ["analyse", "check", "draw", "measure"]

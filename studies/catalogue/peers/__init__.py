@@ -11,12 +11,11 @@ from time import process_time
 
 import numpy as np
 
-from ...results.analysis import Analysis, Figures
-from ...results.comparison import Array, differences, mean_success, with_first
+from ...results.analysis import Analysis, Figures, verdicts
+from ...results.comparison import Array, differences
 from ...results.results import Results
 from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, rate, stacked
 from ...results.summary import EVALUATED, Summary, evaluated
-from ...results.verdicts import verdicts
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..study import check_evaluated as check
@@ -53,9 +52,7 @@ def measure(trial: Trial) -> TrialResult:
             state = generator.state
             session.evaluate(phase=f"{AFTER}{count}")
             generator.state = state
-    session.evaluate()
-    session.run_other_evaluations()
-    return session.result(usage=usage)
+    return session.finish(usage=usage)
 
 
 @dataclass(frozen=True)
@@ -101,9 +98,13 @@ def analyse(results: Results) -> Analysis:
                 tuple(rate(success) for success in every.values()),
             )
         )
-    compared = differences(results, with_first(conditions), {EVALUATED: mean_success("evaluation")})
-    notes = ["success, N: when evaluated after N episodes of training."] if courses else []
-    notes += verdicts(compared, conditions[0]) if compared else []
+    if not courses:
+        return Analysis(())
+    success = [results.means(condition, "evaluation") for condition in conditions]
+    pairs = [(c, EVALUATED, own, success[0]) for c, own in zip(conditions, success, strict=True)]
+    compared = differences({EVALUATED: pairs[1:]})
+    notes = ["success, N: when evaluated after N episodes of training."]
+    notes += verdicts({f"{EVALUATED}, less that of {conditions[0]}": compared[EVALUATED]})
     return Analysis(tuple(table), tuple(notes), courses, compared)
 
 
@@ -114,8 +115,6 @@ def draw(analysis: Analysis) -> Figures:
     """
     from ...presentation import figures as f  # matplotlib takes its time
 
-    if not analysis.cases:
-        return {}
     figure, panels = f.panels(1, 2, (7.2, 3.4), sharey=True)
     for i, course in enumerate(analysis.cases):
         for axes, spent in zip(panels[0], (course.decisions, course.seconds), strict=True):
@@ -127,11 +126,8 @@ def draw(analysis: Analysis) -> Figures:
         f.as_rates(axes)
         axes.grid(axis="y", alpha=0.25)
     panels[0, 0].set_ylabel(EVALUATED)
-    handles = [
-        f.handle(course.condition, **f.look(i), lw=1.6, marker="o", markersize=3.5)
-        for i, course in enumerate(analysis.cases)
-    ]
-    f.add_legend(figure, handles)
+    conditions = [course.condition for course in analysis.cases]
+    f.name_curves(figure, conditions, marker="o", markersize=3.5)
     return {"peers": figure}
 
 

@@ -79,9 +79,7 @@ def measure(trial: Trial) -> TrialResult:
     period = getattr(trial.settings.scenario, "period", None)
     if period is not None:
         numbers["period"] = float(period)
-    session.evaluate()
-    session.run_other_evaluations()
-    return session.result(numbers, {"decision_median": float(np.median(session.deciding))})
+    return session.finish(numbers, {"decision_median": float(np.median(session.deciding))})
 
 
 def analyse(results: Results) -> Analysis:
@@ -149,6 +147,3 @@ def draw(analysis: Analysis) -> Figures:
     ]
     f.add_legend(figure, handles, ncols=5)
     return {"related": figure}
-
-
-__all__ = ["NUMBERS", "analyse", "check", "draw", "measure"]

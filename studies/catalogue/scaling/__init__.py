@@ -16,19 +16,20 @@ from pathlib import Path
 
 import numpy as np
 
+from ....core.agents.loop import StepRecord
 from ....core.agents.team import of_fuzzy_agents
 from ....core.interface.scenario import groups_of
+from ....core.numerics.arrays import FloatArray
+from ....core.plugins.deferred import pd
 from ...results.analysis import Analysis, Figures
-from ...results.comparison import Array, of_shared_seeds
+from ...results.comparison import shared
 from ...results.results import Results
-from ...results.sizes import Sizes
 from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, exactly, rate
-from ...results.summary import EVALUATED, Summary, evaluated
+from ...results.summary import EVALUATED, Sizes, Summary, evaluated
 from ...spec.labels import label_but
 from ...spec.spec import Spec
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
-from ..contact import ContactShares
 from ..study import check_rule_bases
 
 NUMBERS = ("robots", "agents", "messages", "team_bytes", "decision_median")
@@ -108,6 +109,36 @@ def _peak() -> int | None:
     return None if match is None else 1024 * int(match[1])
 
 
+class ContactShares:
+    """Takes in step records; see `Observer`.
+
+    A scenario tells it by ``contact_time`` ``(M,)`` in `Transition.info`, the fraction of the step
+    in which each robot was in contact.
+    """
+
+    def __init__(self) -> None:
+        self._touching: list[FloatArray] = []
+        self._shares: list[FloatArray] = []
+
+    def __call__(self, record: StepRecord) -> None:
+        """Take in one step."""
+        if "contact_time" not in record.transition.info:
+            return
+        self._touching.append(record.transition.info["contact_time"])
+        if record.last:
+            pushing = max(float(np.max(self._touching, axis=1).sum()), 1e-12)
+            self._shares.append(np.sum(self._touching, axis=0) / pushing)
+            self._touching = []
+
+    @property
+    def shares(self) -> FloatArray:
+        """``(n_episodes, M)`` how much of the time in which any robot is in contact each is.
+
+        Without episodes if the scenario does not tell.
+        """
+        return np.array(self._shares)
+
+
 @dataclass(frozen=True)
 class Point:
     """One condition."""
@@ -122,12 +153,10 @@ class Point:
     """Number of agents."""
     period: float | None
     """What a decision may take to keep up with the robots [s]; none: the scenario has no hurry."""
-    seeds: tuple[int, ...]
-    """Those that have finished."""
     values: dict[str, Estimate]
     """Estimates by title, see `analyse`."""
-    times: dict[str, Array]
-    """By title, times of single seeds ``(n_seeds,)``."""
+    times: dict[str, pd.Series]
+    """By title, times of single seeds."""
 
 
 def analyse(results: Results) -> Analysis:
@@ -142,7 +171,7 @@ def analyse(results: Results) -> Analysis:
         shown = {title: point.values[title] for title in titles if title in point.values}
         is_size = condition == str(point.robots)
         label = sizes.shown(point.robots) if is_size else condition
-        table.append(Summary(label, len(point.seeds), shown))
+        table.append(Summary(label, len(results.seeds(condition)), shown))
     notes = [
         f"\n{evaluator}, time with n agents:\n  "
         + "\n  ".join(f"{what} n^{_exponent_text(power)}" for what, power in by_what.items())
@@ -170,7 +199,7 @@ def _point(results: Results, condition: str, sizes: Sizes) -> Point:
     return Point(
         evaluator, sizes.word, sizes.counts[condition], int(numbers["agents"][0]),
         float(numbers["period_s"][0]) if "period_s" in numbers else None,
-        results.seeds(condition), values, {title: costs[title] for title in TIMES.values()},
+        values, {t: pd.Series(costs[t], results.seeds(condition)) for t in TIMES.values()},
     )  # fmt: skip
 
 
@@ -187,13 +216,12 @@ def exponents_of(points: Sequence[Point]) -> dict[str, dict[str, Estimate]]:
     exponents: dict[str, dict[str, Estimate]] = {}
     for evaluator in dict.fromkeys(p.evaluator for p in points):
         own = [p for p in points if p.evaluator == evaluator]
-        if len({p.agents for p in own}) < 2 or not set.intersection(*(set(p.seeds) for p in own)):
-            continue
         sizes = np.log([p.agents for p in own])
-        exponents[evaluator] = {}
         for what, title in TIMES.items():
-            times = of_shared_seeds([p.seeds for p in own], [p.times[title] for p in own])
-            exponents[evaluator][what] = bootstrap(np.polyfit(sizes, np.log(times), 1)[0])
+            times = np.stack(shared([p.times[title] for p in own]))
+            if len({*sizes}) > 1 and times.size:
+                estimate = bootstrap(np.polyfit(sizes, np.log(times), 1)[0])
+                exponents.setdefault(evaluator, {})[what] = estimate
     return exponents
 
 
@@ -204,7 +232,7 @@ def draw(analysis: Analysis) -> Figures:
     and stand a little beside each other.
     Messages are one black line if all evaluators pass as many.
     """
-    from ...presentation import by_robots, figures  # matplotlib takes its time
+    from ...presentation import figures  # matplotlib takes its time
 
     points = analysis.cases
     evaluators = list(dict.fromkeys(p.evaluator for p in points))
@@ -214,7 +242,7 @@ def draw(analysis: Analysis) -> Figures:
             own = [p for p in points if p.evaluator == evaluator and name in p.values]
             if own:
                 robots, values = [p.robots for p in own], [p.values[name] for p in own]
-                by_robots.draw_line(axes, robots, values, index, len(evaluators))
+                figures.draw_line(axes, robots, values, index, len(evaluators))
         axes.set_title(title, loc="left")
         if scale == "log":
             figures.log_axis(axes)
@@ -225,12 +253,9 @@ def draw(analysis: Analysis) -> Figures:
     for period in {p.period for p in points if p.period is not None}:
         panels[0, 1].axhline(1e3 * period, color="#888888", linewidth=0.8, ls=":")
     for axes in panels.flat:
-        by_robots.scale_axis(axes, sorted({p.robots for p in points}))
+        figures.scale_axis(axes, sorted({p.robots for p in points}))
     for axes in panels[-1]:
         axes.set_xlabel(points[0].bodies)
     title = "means over seeds, bars: 95 % intervals; dotted: the decision period"
-    by_robots.name_lines(figure, evaluators, title)
+    figures.name_lines(figure, evaluators, title)
     return {"scaling": figure}
-
-
-__all__ = ["NUMBERS", "analyse", "check", "draw", "measure"]

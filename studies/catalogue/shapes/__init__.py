@@ -8,14 +8,13 @@ the shape; the predictor by which they look ahead is given it (see docs/predicto
 
 import numpy as np
 
-from ...errors import SpecError
-from ...results.analysis import Analysis, Figures
-from ...results.comparison import Difference, adjusted, ratio
+from ...results.analysis import Analysis, Figures, power_lines
+from ...results.comparison import Difference, adjusted, compare_pairs, ratio
 from ...results.results import Results
 from ...results.statistics import Estimate, bootstrap, rate
 from ...results.summary import Summary
-from ...results.verdicts import power_lines
 from ...spec.spec import Spec
+from ..study import check_evaluations
 from ..study import run_training as measure
 
 TRAINED = "trained on"
@@ -24,8 +23,7 @@ TRAINED = "trained on"
 
 def check(spec: Spec) -> None:
     """Raise `SpecError` unless there is another box to compare with."""
-    if not spec.evaluations:
-        raise SpecError('evaluations: missing; shapes needs one at least, as circle.box = "circle"')
+    check_evaluations(spec, 'circle.box = "circle"')
 
 
 def analyse(results: Results) -> Analysis:
@@ -64,7 +62,7 @@ def ratios_of(results: Results, condition: str) -> tuple[Difference, ...]:
     runs = base.mean(axis=1)
     return adjusted(
         [
-            Difference.of(box, "ratio", outcomes.mean(axis=1), runs, ratio(outcomes, base))
+            compare_pairs(box, "ratio", outcomes.mean(axis=1), runs, ratio(outcomes, base))
             for box, outcomes in others.items()
         ]
     )
@@ -88,10 +86,10 @@ def _line(d: Difference) -> str:
 
 def draw(analysis: Analysis) -> Figures:
     """Return the figures of an analysis by name."""
-    from ...presentation import forest
+    from ...presentation.figures import draw_forest
 
     unit = "success over that with the box of training"
-    figure = forest.draw(dict(analysis.cases), unit, null=1.0)
+    figure = draw_forest(dict(analysis.cases), unit, null=1.0)
     return {} if figure is None else {"shapes": figure}
 
 

@@ -14,23 +14,23 @@ what the episodes after the onset fall short of the level before, in episodes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from ....core.agents.team import Team, of_fuzzy_agents
-from ....core.learners.frozen import FrozenSettings
 from ....core.learners.learner import LearnerSettings
+from ....core.learners.td import FrozenSettings
+from ....core.plugins.deferred import pd
 from ...errors import SpecError
-from ...results.analysis import Analysis, Figures
-from ...results.comparison import Array, Difference, adjusted, of_shared_seeds
+from ...results.analysis import Analysis, Figures, verdicts
+from ...results.comparison import Array, Pair, differences
 from ...results.results import Results
 from ...results.statistics import NOT_NEGATIVE, bootstrap, rate
 from ...results.summary import Summary
-from ...results.verdicts import verdicts
 from ...spec.labels import label_but
 from ...spec.spec import Spec
 from ...trials.arrangement import arrange
@@ -38,13 +38,12 @@ from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..study import check_rule_bases
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
 NUMBERS = ("onset",)
 """What of whole trials the analysis rests on."""
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
+AT_END = "success at the end"
+"""What is compared."""
 BLOCK = 5
 """Episodes that a level is measured over."""
 REGAINED = 0.9
@@ -75,11 +74,9 @@ def measure(trial: Trial) -> TrialResult:
     kept = _keeping_weights(session)
     session.train(trial.episodes - onset, onset)
     session.train(trial.episodes - onset, onset, phase=KEPT, team=kept)
-    session.evaluate()
-    session.run_other_evaluations()
     begun = sorted({f.episode for f in getattr(trial.settings.scenario, "failures", ())} - {onset})
     later = {f"onset.{k}": float(episode) for k, episode in enumerate(begun, 2)}
-    return session.result({"onset": float(onset), **later})
+    return session.finish({"onset": float(onset), **later})
 
 
 def check(spec: Spec) -> None:
@@ -177,11 +174,11 @@ def analyse(results: Results) -> Analysis:
     adapts.
     """
     courses = courses_of(results)
-    gains = _gains(courses)
+    gains = differences({AT_END: list(_gains(courses))})
     notes = ["Named after the colon is what adapts to the failure."] if courses else []
     if not all(course.before.any() for course in courses):
         notes += ["No recovery is measured where no episode before the failure succeeded."]
-    notes += verdicts(gains, "nothing adapting")
+    notes += verdicts({f"{AT_END}, less that of nothing adapting": gains[AT_END]})
     return Analysis(tuple(map(_summary, courses)), tuple(notes), courses, gains)
 
 
@@ -232,19 +229,12 @@ def _summary(course: Course) -> Summary:
     return Summary(f"{course.fault}: {course.adapts}", len(course.success), estimates)
 
 
-def _gains(courses: Sequence[Course]) -> tuple[Difference, ...]:
-    bases = {course.fault: course for course in courses if course.adapts == "nothing"}
-    gains = []
-    for course in courses:
-        base = bases.get(course.fault)
-        if base is None or base is course:
-            continue
-        both = (course, base)
-        own, other = of_shared_seeds([c.seeds for c in both], [c.end.mean(axis=1) for c in both])
-        if len(own) >= 2:
-            named = f"{course.fault}, {course.adapts}"
-            gains.append(Difference.between(named, "success at the end", own, other, of_rates=True))
-    return adjusted(gains)
+def _gains(courses: Sequence[Course]) -> Iterator[Pair]:
+    """Yield every case with that of the same fault in which nothing adapts."""
+    ends = {(c.fault, c.adapts): pd.Series(c.end.mean(axis=1), c.seeds) for c in courses}
+    for (fault, adapts), end in ends.items():
+        if adapts != "nothing" and (fault, "nothing") in ends:
+            yield f"{fault}, {adapts}", AT_END, end, ends[fault, "nothing"]
 
 
 def draw(analysis: Analysis) -> Figures:
@@ -264,7 +254,11 @@ def draw(analysis: Analysis) -> Figures:
     columns = panels.shape[1]
     for axes, fault in zip(panels.flat, faults, strict=False):
         for course in (c for c in courses if c.fault == fault):
-            _draw_course(axes, course, cases.index(course.adapts))
+            for onset in course.onsets:
+                axes.axvline(onset - 0.5, color="#888888", linewidth=0.8)
+            curve = bootstrap(_smoothed(course.success, course.onset), bounds=(0, 1))
+            episodes = range(len(curve.value))  # counted from 0, as in rows and specs
+            f.draw_curve(axes, episodes, curve, cases.index(course.adapts), alpha=0.1)
         axes.set_title("\n".join(wrap(fault, round(60 / columns))), loc="left")
         f.as_rates(axes)
         axes.grid(axis="y", alpha=0.25)
@@ -280,16 +274,6 @@ def draw(analysis: Analysis) -> Figures:
     return {"wheel-failure": figure}
 
 
-def _draw_course(axes: Axes, course: Course, index: int) -> None:
-    from ...presentation.figures import draw_curve
-
-    for onset in course.onsets:
-        axes.axvline(onset - 0.5, color="#888888", linewidth=0.8)
-    runs = _smoothed(course.success, course.onset)
-    episodes = np.arange(runs.shape[1])  # counted from 0, as in rows and specs
-    draw_curve(axes, episodes, bootstrap(runs, bounds=(0, 1)), index, alpha=0.1)
-
-
 def _smoothed(success: np.ndarray, onset: int) -> np.ndarray:
     """Return means over the episode and those before it, but not across the onset."""
     means = [
@@ -297,6 +281,3 @@ def _smoothed(success: np.ndarray, onset: int) -> np.ndarray:
         for e in range(success.shape[1])
     ]
     return np.stack(means, axis=1)
-
-
-__all__ = ["NUMBERS", "analyse", "check", "draw", "measure"]

@@ -20,8 +20,8 @@ def command() -> None:
 
 @command.command()
 @click.argument("spec", type=options.PATH, metavar="SPEC.toml")
-@click.option("--out", type=options.PATH, metavar="DIR", required=True, help="Of the study.")
-@click.option("--robots", type=sizes, multiple=True, default=["2", "4", "8"], help="Team sizes.")
+@options.out("Where to keep the study.", required=True)
+@click.option("--robots", type=sizes, multiple=True, default=["2", "4", "8"], help="How many.")
 @click.option("--seeds", type=click.IntRange(5), default=5, metavar="N", help="From seed 0 on.")
 @click.option("--name", metavar="TEXT", required=True, help="What tables call the entry.")
 @click.option("--about", metavar="TEXT", required=True, help="How it learns, in a line.")
@@ -30,9 +30,10 @@ def command() -> None:
 def run(
     spec: Path, out: Path, robots: tuple[str, ...], seeds: int, jobs: int | None, **entry: Any
 ) -> int:
-    """Train and evaluate the condition of a spec by the rules, and write its entry.
+    """Train and evaluate a spec by the rules.
 
-    The entry is DIR/entry.json; the same command again goes on with what is missing.
+    It has one condition. Its entry is DIR/entry.json; the same command again goes on with what is
+    missing.
     """
     from ...benchmark.push_n import Entry, run_spec
     from ...store import durable
@@ -48,7 +49,7 @@ def run(
 @entries
 @click.option("--schema", is_flag=True, help="Print the JSON schema of entries.")
 def check(entries: tuple[Path, ...], schema: bool) -> int:
-    """Check that entries keep the rules that a file can show."""
+    """Check the rules that a file can show."""
     import json
 
     from ...benchmark.push_n import Entry, load_entry
@@ -67,7 +68,7 @@ def check(entries: tuple[Path, ...], schema: bool) -> int:
 @click.option("--measure", type=measures, default="success", help="In evaluation, or of training.")
 @options.form
 def table(entries: tuple[Path, ...], measure: str, form: str) -> int:
-    """Print the committed entries, and others below them, by number of robots."""
+    """Print entries by number of robots: the committed ones, then others."""
     from ...benchmark.push_n import committed_entries, load_entry, table_of
     from ...presentation.tables import tabulate
     from ..display import print_table, print_wrapped

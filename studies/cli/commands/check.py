@@ -24,13 +24,7 @@ Case = tuple[str, Callable[[], Any], list[int]]
 
 @click.command()
 @click.argument("source", metavar="SPEC.toml|FILE.py:NAME")
-@click.option(
-    "--steps",
-    type=int,
-    metavar="N",
-    default=40,
-    help="Most steps of the episodes that are played for it.",
-)
+@options.number("--steps", "N", 40, "Most steps of the episodes that are played for it.")
 @options.changes
 def command(source: str, steps: int, changes: tuple[str, ...]) -> int:
     """Check what every scenario must promise, such as equal bits for equal seeds.
@@ -78,7 +72,7 @@ def _learned_errors(
     """Yield the errors of learned predictors by variable, see `errors_of`, each once."""
     from ....core.adaptation.predictors import LearnedPredictorSettings
     from ....core.agents.team import of_fuzzy_agents
-    from ...explain.predictor import errors_of
+    from ...explain.team import errors_of
     from ...spec.spec import Spec
     from ...trials.session import Session
     from ...trials.trial import trials_of
@@ -101,16 +95,14 @@ def _cases(source: str, changes: tuple[str, ...]) -> Iterator[Case]:
     """Yield what is to be checked, each scenario of a spec once."""
     from ....core.learners import check_prediction
     from ....core.plugins.sources import active
-    from ...errors import SpecError
+    from ...errors import SpecError, refused
     from ...spec.spec import Spec
 
     if ".py:" in source or source.endswith(".py"):
         if changes:
             raise SpecError("--set: lays values over a spec, not over a Python file")
-        try:
+        with refused():
             factory = active().load(source)
-        except ValueError as error:
-            raise SpecError(" ".join(str(error).split())) from None
         try:
             factory()
         except (Exception, SystemExit) as error:
@@ -121,10 +113,8 @@ def _cases(source: str, changes: tuple[str, ...]) -> Iterator[Case]:
     seen: set[Any] = set()
     for condition in Spec.load(Path(source), changes).conditions():
         settings = condition.settings.scenario
-        try:
+        with refused():
             check_prediction(condition.settings.learner, settings.build())
-        except ValueError as error:
-            raise SpecError(str(error)) from None
         if settings not in seen:
             seen.add(settings)
             # Played are the first episode and those in which failures begin.

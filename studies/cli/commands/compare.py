@@ -26,10 +26,9 @@ from .. import options
 @click.option(
     "--reference", metavar="LABEL", help="What the others are compared with; by default the first."
 )
-@click.option(
+@options.flag(
     "--statistics",
-    is_flag=True,
-    help="Add interquartile mean and probability of improvement, over the groups of --by as tasks.",
+    "Add interquartile mean and probability of improvement, over the groups of --by as tasks.",
 )
 @options.plot
 @options.where
@@ -49,7 +48,7 @@ def command(
     DIR is where a study is kept, FILE.json a file of results. Conditions are compared on the seeds
     that both have, on equal worlds.
     """
-    from ...errors import SpecError
+    from ...errors import refused
     from ..display import print_table
     from ..loading import load_results
 
@@ -58,10 +57,8 @@ def command(
     if plot is not None:
         from ...presentation.figures import write
 
-        try:
+        with refused():
             write(comparison.figure(), plot)
-        except ValueError as error:
-            raise SpecError(str(error)) from None
     tables = [comparison.table, *([comparison.aggregated] if statistics else [])]
     if form != "table":
         print(*(getattr(table, form) for table in tables), sep="\n", end="")

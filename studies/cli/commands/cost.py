@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
+from ....core.agents.cost import Problem
+from ...cost.table import Form, cost_table, written
+from ...errors import refused
+from ...presentation.progress import say
 from .. import options
-
-if TYPE_CHECKING:
-    from ...cost.table import Form
 
 MOST_AGENTS = 10_000
 """Of one row: its integers have some fifty thousand digits."""
@@ -32,19 +32,22 @@ RANGE = re.compile(r"(\d{1,6})(?::(\d{1,6})(?::(\*?)(\d{1,6}))?)?", re.ASCII)
     metavar="SPEC...",
     default=("chain",),
     help="One or more topologies as in a spec: chain teams tree:2 ..., or LABEL=SPEC with a label "
-    "of your own; single-agent: Eq. 23.",
+    "of your own; single-agent: Eq. 23; or ways to decide: best-response, max-plus, fitted-q, "
+    "hierarchy-ppo.",
 )
-@click.option("--rules", type=int, metavar="N", default=5**7, help="|S|, rules of one agent.")
-@click.option("--actions", type=int, metavar="N", default=4, help="|A|, actions of one agent.")
-@click.option(
-    "--iterations", type=int, metavar="N", default=450, help="L, iterations (steps) of an epoch."
-)
+@options.number("--rules", "N", 5**7, "|S|, rules of one agent.")
+@options.number("--actions", "N", 4, "|A|, actions of one agent.")
+@options.number("--iterations", "N", 450, "L, iterations (steps) of an epoch.")
 @click.option("--measured/--no-measured", help="Also count and time steps of the running system.")
 @click.option(
     "--repeats",
     type=int,
     metavar="N",
     help="Measure so often, each time with a new team; from 2 on times have an interval.",
+)
+@click.option(
+    "--network/--no-network",
+    help="Also count messages, and how long a decision waits for them at 1 and 10 ms each.",
 )
 @options.formats("table", "json", "csv", "latex")
 @options.plot
@@ -53,29 +56,24 @@ def command(
     topology: tuple[str, ...],
     measured: bool,
     repeats: int | None,
+    network: bool,
     form: Form,
     plot: Path | None,
     **quantities: int,
 ) -> int:
     """Print the cost of hierarchies, by formula (Eq. 18-23) and, if asked, measured."""
-    from ....core.agents.cost import Problem
-    from ...api.costs import cost_table
-    from ...cost.table import written
-    from ...errors import SpecError
-    from ...presentation.progress import say
-
-    try:
+    with refused():
         problem, sizes = Problem(**quantities), numbers(agents)
         if measured := measured or repeats is not None:
             say("measuring, first compiling what is not: no steps of more than a second or so")
         often = 1 if repeats is None else repeats
-        rows = cost_table(topology, sizes, problem, measured=measured, repeats=often).rows
+        rows = cost_table(
+            topology, sizes, problem, measured=measured, repeats=often, network=network
+        ).rows
         if plot is not None:
             from ...cost.figure import draw
 
             draw(rows, plot)
-    except ValueError as error:
-        raise SpecError(str(error)) from None
     print(written(rows, form))
     return 0
 

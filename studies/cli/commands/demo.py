@@ -8,12 +8,9 @@ from .. import options
 
 
 @click.command()
-@click.option(
-    "--out",
-    type=options.PATH,
-    metavar="DIR",
+@options.out(
+    "Where to keep the study; made if it does not exist. The same command again continues it.",
     default="nested-agents-demo",
-    help="Where to keep the study; made if it does not exist. The same command again continues it.",
 )
 @options.jobs
 @click.option("--print-spec", is_flag=True, help="Print the spec that would be run, and stop.")
@@ -31,4 +28,9 @@ def command(out: Path, jobs: int | None, print_spec: bool) -> int:
     from ..display import show_results
 
     study = run(Spec.parse(text), out, jobs=jobs, observer=Terminal())
-    return show_results(study, with_replays=True)
+    status = show_results(study)
+    for episode in ("first", "last") if not study.failed else ():
+        path = out / "replay" / f"{episode}-episode.gif"
+        path.parent.mkdir(exist_ok=True)
+        print(f"replay  {study.replay(episode=episode, path=path).path}")
+    return status

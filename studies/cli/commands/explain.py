@@ -22,8 +22,7 @@ def command(directory: Path, condition: str | None, seed: int | None, trust: boo
     must give the episodes that are kept.
     """
     from ...explain import team
-    from ...explain.figures import draw
-    from ...explain.text import MOST_AGENTS, text
+    from ...explain.text import MOST_AGENTS, draw, text
     from ...presentation.figures import save
     from ...store import durable
     from ...trials.keeping import finished_trial

@@ -11,26 +11,14 @@ from .. import options
 @click.command()
 @click.argument("spec", type=options.PATH, metavar="SPEC.toml")
 @options.jobs
-@click.option(
-    "--deviation",
-    type=float,
-    metavar="SD",
-    default=0.25,
-    help="Standard deviation that is supposed of the differences of single seeds.",
-)
-@click.option(
-    "--smallest",
-    type=float,
-    metavar="D",
-    default=0.2,
-    help="The smallest difference of success rates that is of interest.",
-)
-@click.option("--timed/--no-timed", default=True, help="Try two episodes of every condition.")
+@options.number("--deviation", "SD", 0.25, "Supposed standard deviation of differences of seeds.")
+@options.number("--smallest", "D", 0.2, "The smallest difference of success rates of interest.")
+@click.option("--timed/--no-timed", default=True, help="Try episodes of every condition.")
 @options.changes
 def command(spec: Path, changes: tuple[str, ...], **supposed: Any) -> int:
     """Tell trials, time, memory and the differences that a study can find, before it is run.
 
-    SPEC.toml says what to run. Two episodes of every condition are tried out.
+    SPEC.toml says what to run. Episodes of every condition are tried out for a second.
     """
     from ...api.planning import plan
     from ...spec.spec import Spec

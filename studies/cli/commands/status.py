@@ -15,8 +15,7 @@ def command(directory: Path) -> int:
     DIR is where the study is kept.
     """
     from ...store.store import Store
-    from ...workers.progress import progress
-    from ..standing import describe, warnings
+    from ..standing import describe, progress, warnings
 
     with Store.open(directory) as store:
         now = progress(store)

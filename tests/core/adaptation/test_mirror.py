@@ -9,7 +9,7 @@ from nested_agents.core.adaptation.mirror import Mirror
 from nested_agents.core.agents.team import Team
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.learners.batch import BatchTDSettings
-from nested_agents.core.rules.settings import RuleBaseSettings
+from nested_agents.core.rules.rule_base import RuleBaseSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.world.settings import RobotSettings, WheelSettings
 from nested_agents.scenarios.kinematic_chain.config import KinematicChainSettings

@@ -14,7 +14,7 @@ from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.interface.scenario import EmbodiedScenario, Scenario, roles_of
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.learners.td import TDLambdaSettings
-from nested_agents.core.rules.settings import RuleBaseSettings
+from nested_agents.core.rules.rule_base import RuleBaseSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.checking.checker import check_scenario

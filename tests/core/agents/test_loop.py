@@ -14,9 +14,8 @@ from nested_agents.core.decision.exploration import BurstExploration
 from nested_agents.core.decision.settings import Decision
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.learners.batch import BatchTDSettings
-from nested_agents.core.learners.frozen import FrozenSettings
-from nested_agents.core.learners.td import TDLambdaSettings
-from nested_agents.core.rules.settings import RuleBaseSettings
+from nested_agents.core.learners.td import FrozenSettings, TDLambdaSettings
+from nested_agents.core.rules.rule_base import RuleBaseSettings
 
 LEARNING = TDLambdaSettings(step_size=0.1)
 

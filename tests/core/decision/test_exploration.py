@@ -49,7 +49,7 @@ def test_boltzmann_at_the_ends() -> None:
 
 def test_temperature_and_rate_at_the_start_and_later() -> None:
     # T(0) = 1 + T_max and the rate is eps T_max / (T_max - 1); T(t) -> 1 and the rate -> 0.
-    explorer = after(EpsilonDecreasingBoltzmann(PaperExploration(epsilon=0.5)), 0)
+    explorer = after(EpsilonDecreasingBoltzmann(PaperExploration(epsilon=0.5), 1), 0)
     assert explorer.temperature == pytest.approx(101.0)
     assert explorer.rate == pytest.approx(0.5 * 100.0 / 99.0)
     after(explorer, 450)
@@ -62,7 +62,7 @@ def test_temperature_and_rate_at_the_start_and_later() -> None:
 
 def test_the_rate_is_cut_off_at_one() -> None:
     # The rate 100 exp(-0.005 t) / 99 exceeds 1 until t = 200 ln(100 / 99) = 2.01.
-    explorer = EpsilonDecreasingBoltzmann(PaperExploration())
+    explorer = EpsilonDecreasingBoltzmann(PaperExploration(), 1)
     assert after(explorer, 0).rate == 1.0
     assert after(explorer, 2).rate == 1.0
     assert explorer.memory[0] == 2.0
@@ -73,7 +73,7 @@ def test_the_rate_is_cut_off_at_one() -> None:
 
 @pytest.mark.parametrize(("clock", "expected"), [("run", 9.0), ("episode", 4.0)])
 def test_the_clock_counts_the_run_or_the_episode(clock: str, expected: float) -> None:
-    explorer = EpsilonDecreasingBoltzmann(PaperExploration(clock=clock))
+    explorer = EpsilonDecreasingBoltzmann(PaperExploration(clock=clock), 1)
     assert after(after(explorer, 5), 4).memory[0] == expected
 
 
@@ -83,7 +83,7 @@ def test_of_values_that_are_no_numbers_none_is_greatest(rng: np.random.Generator
 
 
 def test_without_epsilon_the_greatest_is_taken(rng: np.random.Generator) -> None:
-    explorer = EpsilonDecreasingBoltzmann(PaperExploration(epsilon=0.0))
+    explorer = EpsilonDecreasingBoltzmann(PaperExploration(epsilon=0.0), 1)
     assert {explorer.choose(0, VALUES, rng) for _ in range(200)} == {1}
 
 
@@ -105,7 +105,7 @@ def test_without_epsilon_the_greatest_is_taken(rng: np.random.Generator) -> None
 def test_how_actions_are_drawn(
     settings: dict, expected: np.ndarray, rng: np.random.Generator
 ) -> None:
-    explorer = EpsilonDecreasingBoltzmann(PaperExploration(max_temperature=3.0, **settings))
+    explorer = EpsilonDecreasingBoltzmann(PaperExploration(max_temperature=3.0, **settings), 1)
     drawn = fractions([explorer.choose(0, VALUES, rng) for _ in range(20000)], 4)
     # Five standard deviations of a share of 20000 draws are below 0.018.
     assert drawn == pytest.approx(expected, abs=0.018)

@@ -6,22 +6,20 @@ import numpy as np
 import pytest
 
 from nested_agents.core.evaluators.auto import AutoSettings
-from nested_agents.core.evaluators.best_response import BestResponse
+from nested_agents.core.evaluators.best_response import BestResponse, BestResponseSettings
 from nested_agents.core.evaluators.evaluator import (
     DecisionProblem,
     Deliberation,
+    Pooling,
     Rule,
     ValueOf,
     concerned,
 )
-from nested_agents.core.evaluators.exact import ExactEnumeration
-from nested_agents.core.evaluators.pooled import Pooling
-from nested_agents.core.evaluators.sampling import Sampling, SamplingSettings
+from nested_agents.core.evaluators.exact import ExactEnumeration, Sampling, SamplingSettings
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.interface.spaces import StateSpace, Variable
 from nested_agents.core.numerics.arrays import FloatArray
-from nested_agents.core.rules.rule_base import RuleBase
-from nested_agents.core.rules.settings import RuleBaseSettings
+from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
 
 A = 4
 NEUTRAL = 2
@@ -196,7 +194,7 @@ class InStep:
 
 
 def decided(
-    hierarchy, first, plan="private", unseen="maintain", seed=0, prediction=None
+    hierarchy, first, plan="private", unseen="maintain", seed=0, prediction=None, sweeps=1
 ) -> list[np.ndarray]:
     """What all value their actions at, after the first agent does `first` whatever it values."""
     n = len(hierarchy)
@@ -207,7 +205,8 @@ def decided(
         rules, hierarchy, A, tuple((i,) for i in range(n)), "reward", "best-response", 0.9, "own",
         unseen, plan, hierarchy.told == "ancestors",
     )  # fmt: skip
-    search, rng = BestResponse(problem), np.random.default_rng(seed)
+    search = BestResponseSettings(sweeps=sweeps).build(problem)
+    rng = np.random.default_rng(seed)
     prediction = prediction or InStep()
     joint, values = np.full(n, NEUTRAL), []
     for agent in hierarchy.order:
@@ -222,23 +221,35 @@ def decided(
     return values
 
 
-def test_the_plan_is_not_predicted_again() -> None:
-    """Six of one wheel: 16 starts, then all four actions of the first, three of every other."""
-    tried: list[int] = []
+class Noted(InStep):
+    """Notes how many joint actions it was asked for each time."""
 
-    class Noted(InStep):
-        def rewards(self, joint: np.ndarray) -> np.ndarray:
-            tried.append(len(joint))
-            return super().rewards(joint)
+    def __init__(self) -> None:
+        self.tried: list[int] = []
 
-    class Twins(Noted):
-        alike = np.array([[0, 1, 1, 0]] * 6)
+    def rewards(self, joint: np.ndarray) -> np.ndarray:
+        self.tried.append(len(joint))
+        return super().rewards(joint)
 
-    hierarchy = Hierarchy(NAMES, PAIRS)
-    for prediction, each in ((Noted(), 3), (Twins(), 1)):
-        tried.clear()
-        decided(hierarchy, 0, prediction=prediction)
-        assert tried[1:7] == [each + 1] + 5 * [each]
+
+class Twins(Noted):
+    """Two pairs of actions come to the same."""
+
+    alike = np.array([[0, 1, 1, 0]] * 6)
+
+
+@pytest.mark.parametrize(("prediction", "each"), [(Noted(), 3), (Twins(), 1)])
+def test_the_plan_is_not_predicted_again(prediction, each: int) -> None:
+    """Six of one wheel: 40 starts, then all actions of the first, all but the plan's of others."""
+    decided(Hierarchy(NAMES, PAIRS), 0, prediction=prediction)
+    assert prediction.tried[:7] == [40, each + 1] + 5 * [each]
+
+
+@pytest.mark.parametrize(("sweeps", "tried"), [(0, 40 + 24), (1, 40 + 19 + 24), (2, 40 + 37 + 24)])
+def test_every_sweep_goes_over_all_bodies(sweeps: int, tried: int) -> None:
+    prediction = Noted()
+    decided(Hierarchy(NAMES, PAIRS), 0, prediction=prediction, sweeps=sweeps)
+    assert sum(prediction.tried) == tried
 
 
 NAMES = tuple("abcdef")

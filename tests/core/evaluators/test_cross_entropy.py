@@ -10,8 +10,7 @@ from nested_agents.core.evaluators.cross_entropy import CrossEntropySettings
 from nested_agents.core.evaluators.evaluator import DecisionProblem, Deliberation, Evaluator
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.interface.spaces import StateSpace, Variable
-from nested_agents.core.rules.rule_base import RuleBase
-from nested_agents.core.rules.settings import RuleBaseSettings
+from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.kinematic_chain.config import KinematicChainSettings
 from nested_agents.studies.spec.spec import Spec

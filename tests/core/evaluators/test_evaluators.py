@@ -16,15 +16,17 @@ from nested_agents.core.evaluators.evaluator import (
     Rule,
     Teammates,
     combinations,
+)
+from nested_agents.core.evaluators.exact import (
+    ExactEnumeration,
+    Sampling,
+    SamplingSettings,
     probabilities_of,
 )
-from nested_agents.core.evaluators.exact import ExactEnumeration
-from nested_agents.core.evaluators.sampling import Sampling, SamplingSettings
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.interface.prediction import Blocks
 from nested_agents.core.interface.spaces import StateSpace, Variable
-from nested_agents.core.rules.rule_base import RuleBase
-from nested_agents.core.rules.settings import RuleBaseSettings
+from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
 
 A = 4
 NEUTRAL = 2

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from nested_agents.core.learners.batch import REWARD_SCALE, BatchTD, BatchTDSettings
-from nested_agents.core.learners.frozen import Frozen, FrozenSettings
 from nested_agents.core.learners.learner import Learner
+from nested_agents.core.learners.td import Frozen, FrozenSettings
 
 from .test_shared_weights import LEARNING, ROLES, experience, feed, learner_of, rules_of
 

@@ -3,8 +3,12 @@
 import numpy as np
 import pytest
 
-from nested_agents.core.learners.fmq import FMQ, FMQSettings
-from nested_agents.core.learners.optimistic import OptimisticTD, OptimisticTDSettings
+from nested_agents.core.learners.one_step import (
+    FMQ,
+    FMQSettings,
+    OptimisticTD,
+    OptimisticTDSettings,
+)
 from nested_agents.core.learners.td import TDLambda, TDLambdaSettings
 from nested_agents.core.rules.kernels.fuzzy import Partition
 from nested_agents.core.rules.rule_base import RuleBase

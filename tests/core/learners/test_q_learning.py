@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from nested_agents.core.interface.spaces import StateSpace, Variable
-from nested_agents.core.learners.q_learning import QLearningSettings
-from nested_agents.core.rules.rule_base import RuleBase
-from nested_agents.core.rules.settings import RuleBaseSettings
+from nested_agents.core.learners.one_step import QLearningSettings
+from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
 
 PLACE = Variable("place", "1", 0, 2, centres=(0.0, 1.0, 2.0))
 MOVE = Variable("move", "1", 0, 1, centres=(0.0, 1.0))

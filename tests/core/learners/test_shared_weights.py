@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import rule_oracles as oracle
 
-from nested_agents.core.agents.rows import rows_of
+from nested_agents.core.interface.scenario import rows_of
 from nested_agents.core.learners import LEARNERS
 from nested_agents.core.learners.batch import REWARD_SCALE, BatchTD, BatchTDSettings
 from nested_agents.core.learners.learner import Learner

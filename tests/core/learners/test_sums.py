@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
-from nested_agents.core.learners.sparse_cooperative import (
+from nested_agents.core.learners.one_step import (
     SparseCooperative,
     SparseCooperativeSettings,
+    ValueDecomposition,
+    ValueDecompositionSettings,
 )
-from nested_agents.core.learners.vdn import ValueDecomposition, ValueDecompositionSettings
 from nested_agents.core.rules.kernels.fuzzy import Partition
 from nested_agents.core.rules.rule_base import RuleBase
 

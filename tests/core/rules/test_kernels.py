@@ -10,11 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nested_agents.core.interface.prediction import Blocks
-from nested_agents.core.rules.kernels.few_states import each_dense
+from nested_agents.core.rules.kernels.compact import td_update as kernels_td_update
 from nested_agents.core.rules.kernels.fuzzy import Partition
 from nested_agents.core.rules.kernels.layout import layout, unpack
 from nested_agents.core.rules.kernels.strengths import exponential, many_strengths
-from nested_agents.core.rules.kernels.updates import add_features
+from nested_agents.core.rules.kernels.updates import add_features, each_dense
 from nested_agents.core.rules.rule_base import RuleBase
 
 N_ACTIONS, N_AGENTS, GROUP = 4, 4, 2
@@ -118,7 +118,7 @@ def test_enumerate(base: RuleBase, rng: np.random.Generator, agent: int, average
 
 
 def td_update(base: RuleBase, *given: object) -> None:
-    base.td_update(*given, base.layout)
+    kernels_td_update(*given, base.layout)
 
 
 @pytest.mark.parametrize("discount", [0.95, 0.0])

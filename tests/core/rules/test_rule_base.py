@@ -10,8 +10,7 @@ import pytest
 from nested_agents.core.interface.prediction import Blocks
 from nested_agents.core.interface.spaces import StateSpace, Variable
 from nested_agents.core.rules.kernels.fuzzy import Partition
-from nested_agents.core.rules.rule_base import RuleBase
-from nested_agents.core.rules.settings import RuleBaseSettings
+from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
 
 LOW_HIGH = Partition((0.0, 1.0), "triangular")
 

@@ -240,6 +240,23 @@ class Hidden(Carts):
         return super().step(action)
 
 
+class Broken(Odd):
+    """It raises as it starts, where random episodes are to show its ranges."""
+
+    def __init__(self) -> None:
+        super().__init__(Box(-np.inf, np.inf, (2,)))
+
+    def reset(self, **keys: Any) -> Any:
+        raise TypeError("no state")
+
+
+class Grown(Odd):
+    """It observes more numbers than its space has."""
+
+    def reset(self, **keys: Any) -> Any:
+        return np.zeros(3), {}
+
+
 IMAGE = Box(0, 255, (8, 8, 3), np.uint8)
 
 
@@ -256,12 +273,18 @@ IMAGE = Box(0, 255, (8, 8, 3), np.uint8)
         (lambda: from_gymnasium(Odd(done=Discrete(1))), "actions: agents have 1 each"),
         (lambda: from_gymnasium(Odd(done=Box(-np.inf, 1.0, (2,)))), "wrap it in RescaleAction"),
         (lambda: from_gymnasium(Carts(), variables={"a": 2}), r"give scenario\.ranges\.a"),
-        (lambda: from_gymnasium(Carts(), variables={"a": 9}), "'a' = 9: must be a numb"),
+        (lambda: from_gymnasium(Carts(), variables={"a": 9}), "a = 9: must be a numb"),
         (lambda: from_gymnasium(Carts(), variables={"a": "b"}), "0 to 3 or o0, o1, o2, o3"),
         (lambda: from_gymnasium(Carts(), variables={"a": (1, 1, 1)}), "one for each of 2"),
         (lambda: from_gymnasium(Carts(), ranges={"b": (0.0, 1.0)}), r"ranges\.b: no state variab"),
         (lambda: from_gymnasium(Carts(), ranges={"o0": (1.0, 0.0)}), "the lower end first"),
         (lambda: from_gymnasium(Carts(), success={"b": (0.0, 1.0)}), r"success\.b: no state vari"),
+        (lambda: from_gymnasium(Carts(), success={"o0": 3.0}), "o0 must be a range"),
+        (lambda: from_gymnasium(Carts(), success={"return": (0, 1)}), "return must be a number"),
+        (lambda: from_gymnasium(Carts(), angles={"a": {"cos": 1, "sin": 1}}), "two numbers"),
+        (lambda: from_gymnasium(Carts(), angles={"o1": 0}), "another state variable has this"),
+        (lambda: from_gymnasium(Grown(Box(0.0, 1.0, (2,)))).reset(0), "observed are 3 numbers, of"),
+        (lambda: from_gymnasium(Broken()), "cannot be played, TypeError: no state"),
         (lambda: from_gymnasium(Carts(), neutral=5), "neutral = 5: allowed 0 to 4"),
         (lambda: from_gymnasium(Carts(), groups=((1,), (0,))), r"groups = \[\[1\], \[0\]\]"),
         (lambda: from_gymnasium(Locked(), predictor="copy"), "cannot be copied, TypeError"),

@@ -9,9 +9,8 @@ from PIL import Image
 import nested_agents as na
 from nested_agents.core.numerics.arrays import FloatArray
 from nested_agents.scenarios.kinematic_chain.config import KinematicChainSettings
-from nested_agents.scenarios.kinematic_chain.kernels import COMPILED
 from nested_agents.scenarios.kinematic_chain.scenario import KinematicChain
-from nested_agents.scenarios.kinematic_chain.variables import CHAIN_VARIABLES
+from nested_agents.scenarios.kinematic_chain.variables import CHAIN_VARIABLES, COMPILED
 from nested_agents.scenarios.kinematic_chain.view import ChainView
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec

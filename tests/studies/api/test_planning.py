@@ -1,9 +1,10 @@
 import re
 
+import numpy as np
 import pytest
 
 import nested_agents as na
-from nested_agents.studies.api.planning import Pace, paced
+from nested_agents.studies.api.planning import learned, try_out
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.trials.trial import trials_of
 
@@ -38,16 +39,19 @@ def test_more_seeds_find_smaller_differences() -> None:
 
 
 def test_learning_from_all_that_is_kept_grows_with_the_square_of_training() -> None:
-    pace = Pace(acting=0.001, learning=0.0, regression=1e-6, bytes=(0.0, 0.0))
-    one, two = (pace.seconds(100, [n], 0) - 0.1 * n for n in (100, 200))
-    assert two / one == pytest.approx(4.0, rel=0.01)
-    assert pace.seconds(100, [10], 500) == pytest.approx(1.5 + 1e-6 * 100**2 * 55)
+    steps = np.array([30.0, 10.0, 20.0])
+    taken = 1e-3 * steps + 1e-6 * steps * np.array([30.0, 40.0, 60.0])
+    quick, slow = learned(steps, taken, np.array([50.0, 100.0]), np.array([10]))
+    assert quick == pytest.approx(0.5 + 1e-6 * 50**2 * 55)
+    assert slow == pytest.approx(1.0 + 1e-6 * 100**2 * 55)
+    stages = learned(steps, taken, np.array([100.0]), np.array([4, 6]))
+    assert stages[0] == pytest.approx(1.0 + 1e-6 * 100**2 * (10 + 21))
 
 
-def test_what_is_tried_is_on_a_seed_that_no_study_reports() -> None:
-    pace = paced(trials_of(SPEC)[0])
-    assert 0.0 < pace.acting < 1.0
-    assert pace.bytes[0] > 0.0
+def test_what_a_condition_takes_is_tried_out() -> None:
+    tried = try_out(trials_of(SPEC)[0])
+    assert 0.0 < tried.seconds[0] <= tried.seconds[1] < 60.0
+    assert tried.memory > 0.0
 
 
 @pytest.mark.parametrize(

@@ -59,7 +59,7 @@ def test_what_was_interrupted_goes_on_and_runs_nothing_twice(tuned, tmp_path, mo
                 if len(ran) in (3, 9):  # in the first rung, and in the last
                     raise KeyboardInterrupt
 
-    monkeypatch.setattr(tuning, "_Rungs", Interrupting)
+    monkeypatch.setattr(tuning, "Terminal", Interrupting)
     budget = {**BUDGET, "progress": True}
     for _ in range(2):
         with pytest.raises(KeyboardInterrupt):
@@ -86,9 +86,10 @@ def test_the_same_draw_gives_the_same_configurations() -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        (["--trials", "1"], "--trials 1: must be at least 2"),
-        (["--seeds", "1"], "--seeds 1: must be at least 2"),
-        (["--first-seed", "9999"], "--first-seed 9999: must be at least 10000"),
+        (["--trials", "1"], "--trials 1: allowed 2 to 10,000"),
+        (["--draw", "-1"], "--draw -1: allowed 0 to"),
+        (["--seeds", "1"], "--seeds 1: allowed 2 to 10,000"),
+        (["--first-seed", "9999"], "--first-seed 9999: allowed 10,000 to"),
         (["--set", "evaluation=0"], "evaluation = 0: tune compares evaluation success"),
         (["--set", "seeds=[10003]"], "seeds: 10003 would be tuned on and reported"),
         (["--set", "tune.'learner.rigde'=[1]"], "learner.rigde = 1: unknown key"),

@@ -108,6 +108,7 @@ def test_worlds_are_those_of_evaluations_in_studies() -> None:
     np.testing.assert_array_equal(worlds[18], env.seats["single"].observe(states))
 
 
+@pytest.mark.slow
 def test_a_spec_is_entered(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "mine.toml").write_text('preset = "random"\nepisodes = 1\n')
     told = ["--name", "r", "--about", "by chance", "--given", "nothing", "--robots", "2"]
@@ -131,7 +132,7 @@ def test_specs_that_break_a_rule(
     tmp_path: Path, spec: str, message: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "mine.toml").write_text(spec)
-    told = ["--name", "r", "--about", "a", "--robots", "2", "--out", str(tmp_path / "out")]
+    told = ["--name", "r", "--about", "a", "--robots", "2", "4", "--out", str(tmp_path / "out")]
     assert main(["benchmark", "run", str(tmp_path / "mine.toml"), *told]) == 2
     error = capsys.readouterr().err
     assert message in error

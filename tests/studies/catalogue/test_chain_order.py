@@ -11,6 +11,8 @@ from made_up_results import NOTHING, Arrays
 from nested_agents.studies.catalogue import chain_order as chain_order
 from nested_agents.studies.catalogue.chain_order import analyse, draw
 from nested_agents.studies.presentation.figures import save
+from nested_agents.studies.results.analysis import Analysis
+from nested_agents.studies.results.comparison import Difference
 from nested_agents.studies.spec.spec import Spec
 
 STUDIES = Path(chain_order.__file__).parent
@@ -31,11 +33,15 @@ def made_up(chances: list[float], seeds: int = 20) -> Arrays:
     return Arrays(outcomes(15), outcomes(10), seeds=numbered)
 
 
+def every(analysis: Analysis) -> list[Difference]:
+    return [d for of_measure in analysis.differences.values() for d in of_measure]
+
+
 def test_equal_orders_are_not_told_apart() -> None:
     analysis = analyse(made_up([0.7] * 6).frames())
     assert [c.p > 0.05 for c in analysis.cases] == [True, True]
-    assert len(analysis.differences) == 10
-    assert all(d.p > 0.05 for d in analysis.differences)
+    assert len(every(analysis)) == 10
+    assert all(d.p > 0.05 for d in every(analysis))
     assert "6 orders do not differ significantly" in analysis.notes[0]
 
 
@@ -43,7 +49,7 @@ def test_one_bad_order_is_found_and_named() -> None:
     analysis = analyse(made_up([0.7, 0.7, 0.7, 0.3, 0.7, 0.7]).frames())
     for comparison in analysis.cases:
         assert comparison.p < 0.001
-    assert [d.condition for d in analysis.differences if d.p < 0.05] == ["2 3 1", "2 3 1"]
+    assert [d.condition for d in every(analysis) if d.p < 0.05] == ["2 3 1", "2 3 1"]
     assert "6 orders differ" in analysis.notes[0]
     assert "evaluation success, less that of 1 2 3:" in analysis.notes
     assert sum(note.startswith("  worse: 2 3 1") for note in analysis.notes) == 2
@@ -67,8 +73,8 @@ def test_orders_are_compared_on_the_seeds_that_all_have_finished() -> None:
     analysis = analyse(replace(results, evaluation={}).frames())
     (test,) = analysis.cases
     assert (test.orders, test.seeds, test.p) == (6, 14, 1.0)
-    assert [d.seeds for d in analysis.differences] == [18] * 5
-    assert all(float(d.estimate.value) == 0.0 for d in analysis.differences)
+    assert [d.seeds for d in every(analysis)] == [18] * 5
+    assert all(float(d.estimate.value) == 0.0 for d in every(analysis))
 
 
 def test_what_no_two_seeds_have_finished_is_not_compared() -> None:
@@ -94,3 +100,33 @@ def test_the_specs_hold_distinct_orders_of_at_least_twenty_seeds(name: str, orde
     spec = Spec.load(STUDIES / f"{name}.toml")
     assert len(spec.conditions()) == orders
     assert len(spec.seeds) >= 20
+
+
+@pytest.mark.parametrize(
+    ("chances", "verdict"),
+    [
+        ((1.0, 1.0), "equal (-.06 to .06)"),
+        ((0.6, 0.2), "the order matters (-.45 to "),
+        ((0.5, 0.55), "not decided ("),
+    ],
+)
+def test_orders_are_compared_within_overrides(chances: tuple[float, float], verdict: str) -> None:
+    rng = np.random.default_rng(2)
+    orders = {"chain": chances[0], "chain:reversed": chances[0], "chain:b,a": chances[1]}
+    success, columns = {}, {}
+    for name in ("fuzzy", "ppo"):
+        for order, chance in orders.items():
+            label = f"{name}, topology={order}"
+            own = chance if name == "ppo" else 1.0
+            success[label] = {"success": (rng.random((60, 10)) < own).astype(float)}
+            columns[label] = {"name": name, "topology": order}
+    numbered = dict.fromkeys(success, tuple(range(60)))
+    made = Arrays(success, success, seeds=numbered, columns=columns)
+    analysis = analyse(made.frames())
+    assert [line.condition for line in analysis.table][:2] == [
+        "fuzzy, chain",
+        "fuzzy, chain:reversed",
+    ]
+    assert analysis.notes[0] == "fuzzy, 3 orders, within 0.1: equal (-.06 to .06)"
+    assert analysis.notes[1].startswith(f"ppo, 3 orders, within 0.1: {verdict}")
+    assert {name: len(own) for name, own in analysis.differences.items()} == {"fuzzy": 2, "ppo": 2}

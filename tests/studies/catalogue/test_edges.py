@@ -32,7 +32,7 @@ def test_every_hierarchy_is_compared_with_that_of_training() -> None:
     analysis = analyse(made_up().frames())
     names = [TRAINED, *OUTCOMES]
     assert [line.condition for line in analysis.table] == names
-    told, considered = analysis.differences
+    ((told, considered),) = analysis.differences.values()
     assert (told.condition, considered.condition) == tuple(OUTCOMES)
     assert told.estimate.high < -0.4
     assert told.p < 0.01 < considered.p
@@ -72,8 +72,7 @@ def test_told_by_considered_is_drawn_as_four_fields_for_each_size() -> None:
     results.columns["own-value"] = {"name": "", "scenario.robots": 2}
     analysis = analyse(results.frames())
     larger = [replace(case, robots=4) for case in analysis.cases]
-    both = {"cases": [*analysis.cases, *larger], "differences": analysis.differences * 2}
-    figure = draw(replace(analysis, **both))["edges"]
+    figure = draw(replace(analysis, cases=[*analysis.cases, *larger]))["edges"]
     assert [axes.get_title(loc="left") for axes in figure.axes] == ["2 robots", "4 robots"]
     fields = [text.get_text() for text in figure.axes[0].texts[::2]]
     assert fields[0] == "0"  # neither

@@ -30,7 +30,7 @@ def test_edges_are_compared_with_none_in_their_game() -> None:
         f"8 players, climbing, {name}" for name in EDGES
     ]
     assert float(analysis.table[0].estimates["messages"].value) == 7.0
-    own, wrong = analysis.differences
+    ((own, wrong),) = analysis.differences.values()
     assert (own.condition, wrong.condition) == ("own edges", "wrong edges")
     assert own.estimate.low > 0.4
     assert own.p < 0.05 < wrong.p

@@ -4,13 +4,12 @@ from pathlib import Path
 
 import made_up
 import pytest
-from made_up_results import NOTHING, Arrays, hierarchies
+from made_up_results import NOTHING, hierarchies
 
 from nested_agents.studies.catalogue import hierarchies as module
 from nested_agents.studies.catalogue.hierarchies import (
     analyse,
     check,
-    contrasts_of,
     draw,
     measure,
 )
@@ -18,7 +17,7 @@ from nested_agents.studies.catalogue.study import drawn
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.presentation.tables import tabulate
-from nested_agents.studies.results.contrasts import Group, contrasts
+from nested_agents.studies.results.contrasts import contrasts
 from nested_agents.studies.results.power import seeds_needed
 from nested_agents.studies.results.results import read
 from nested_agents.studies.spec.spec import Spec
@@ -34,21 +33,13 @@ CHANCES = {
 }
 
 
-def groups(results: Arrays) -> tuple[Group, ...]:
-    frames = results.frames()
-    return contrasts_of(frames, analyse(frames).cases).groups
-
-
 def test_where_a_hierarchy_matters_is_told_and_where_not() -> None:
     analysis = analyse(hierarchies(CHANCES).frames())
-    own = groups(hierarchies(CHANCES))
-    assert [group.setting for group in own] == [
+    assert list(analysis.differences) == [
         "2 robots, own", "2 robots, team", "8 robots, own", "8 robots, team",
     ]  # fmt: skip
-    assert {group.reference for group in own} == {"chain"}
-    *others, last = own
-    assert all(d.p > 0.05 for group in others for d in group.differences)
-    star, tree = last.differences
+    *others, (star, tree) = analysis.differences.values()
+    assert all(d.p > 0.05 for group in others for d in group)
     assert (star.condition, star.seeds, tree.condition) == ("star", 20, "tree:2")
     assert star.p < 0.05 < tree.p
     assert star.estimate.low < -0.6 < star.estimate.high < -0.4
@@ -61,7 +52,7 @@ def test_where_a_hierarchy_matters_is_told_and_where_not() -> None:
 
 def test_differences_are_those_that_compare_prints() -> None:
     frames = hierarchies(CHANCES).frames()
-    (star,) = [d for d in analyse(frames).differences if d.condition == "star"][-1:]
+    (star,) = [d for d in analyse(frames).differences["8 robots, team"] if d.condition == "star"]
     compared = contrasts(frames, by="topology", reference="chain")
     (same,) = [d for d in compared.differences if d.condition == "star"][-1:]
     assert (star.shown, star.seeds) == (same.shown, same.seeds)
@@ -82,7 +73,9 @@ def test_the_seeds_needed_are_the_fewest_whose_least_p_is_small_enough(compariso
 
 def test_the_first_hierarchy_is_the_reference_where_there_is_no_chain() -> None:
     chances = {key: chance for key, chance in CHANCES.items() if key[0] != "chain"}
-    assert {group.reference for group in groups(hierarchies(chances))} == {"star"}
+    assert "2 robots, own: success, evaluation, less that of star:" in (
+        analyse(hierarchies(chances).frames()).notes
+    )
 
 
 def test_what_the_reference_has_not_finished_is_not_compared() -> None:
@@ -91,7 +84,7 @@ def test_what_the_reference_has_not_finished_is_not_compared() -> None:
         arrays.pop("topology=chain, value_of=team, robots=8")
     results.seeds["topology=chain, value_of=own, robots=8"] = tuple(range(40, 60))
     analysis = analyse(results.frames())
-    assert [group.setting for group in groups(results)] == ["2 robots, own", "2 robots, team"]
+    assert list(analysis.differences) == ["2 robots, own", "2 robots, team"]
     assert len(analysis.table) == 11
 
 
@@ -179,7 +172,7 @@ def test_a_tiny_study_is_run_and_read(tmp_path: Path) -> None:
     ]  # fmt: skip
     messages = [float(line.estimates["messages"].value) for line in analysis.table]
     assert messages == [1.0, 0.0, 1.0, 0.0, 6.0, 1.0, 6.0, 1.0]
-    assert len(contrasts_of(results, analysis.cases).groups) == 4
+    assert len(analysis.differences) == 4
 
 
 def test_the_spec_crosses_hierarchies_whose_value_and_sizes_over_seeds_enough() -> None:

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from made_up_results import NOTHING, Arrays
 
+from nested_agents.studies.catalogue import peers as module
 from nested_agents.studies.catalogue import wheel_failure
 from nested_agents.studies.catalogue.peers import analyse, check, draw, measure, stops
-from nested_agents.studies.catalogue.study import load_study
+from nested_agents.studies.catalogue.study import drawn, load_study
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.spec.spec import Spec
@@ -53,13 +54,13 @@ def test_success_against_experience_and_time(tmp_path: Path) -> None:
     assert list(analysis.table[0].estimates) == [
         "success, 2", "success, 10", "evaluation success", "decisions", "CPU [s]"
     ]  # fmt: skip
-    (difference,) = analysis.differences
+    ((difference,),) = analysis.differences.values()
     assert difference.condition == "PPO"
     assert float(difference.estimate.value) == pytest.approx(-0.5, abs=0.1)
     assert max(len(line) for note in analysis.notes for line in note.splitlines()) <= 80
     paths = save(draw(analysis), tmp_path)
     assert [path.name for path in paths] == ["peers.png", "peers.svg"]
-    assert draw(analyse(NOTHING)) == {}
+    assert drawn(module, analyse(NOTHING)) == {}
 
 
 def test_evaluations_on_the_way_leave_no_trace() -> None:

@@ -8,6 +8,7 @@ from made_up_results import NOTHING, wheel_failure
 from nested_agents.studies.catalogue import wheel_failure as module
 from nested_agents.studies.catalogue.study import drawn
 from nested_agents.studies.catalogue.wheel_failure import (
+    AT_END,
     KEPT,
     Course,
     analyse,
@@ -52,7 +53,7 @@ def test_cases_are_told_apart_by_what_adapts() -> None:
     ends = {line.condition: float(line.estimates["end"].value) for line in analysis.table}
     assert ends["4 wheels, seized: both"] > 0.85
     assert ends["4 wheels, seized: nothing"] < 0.2
-    gains = {gain.condition: gain for gain in analysis.differences}
+    gains = {gain.condition: gain for gain in analysis.differences[AT_END]}
     assert len(gains) == 6
     assert gains["4 wheels, seized, both"].p < 0.001
     assert gains["2 wheels, seized, both"].p == 1.0
@@ -96,11 +97,11 @@ def test_twins_are_found_by_what_is_swept(columns: dict, faults: list | None) ->
     if faults is None:  # nothing is said of self-models
         assert {adapts for _, adapts in found} == {"training", KEPT}
         assert {fault for fault, _ in found} == set(results.training)
-        assert analysis.differences == ()
+        assert analysis.differences[AT_END] == ()
     else:
         cases = ("nothing", "weights", "self-model", "both")
         assert found == [(fault, adapts) for fault in faults for adapts in cases]
-        assert len(analysis.differences) == 3
+        assert len(analysis.differences[AT_END]) == 3
 
 
 def test_the_figure_is_drawn_or_left_out(tmp_path: Path) -> None:

@@ -21,9 +21,17 @@ from made_up_results import (
 from nested_agents.scenarios.box_pushing.scenario import MEASURES
 from nested_agents.studies.catalogue.study import load_study
 from nested_agents.studies.claims import claims
-from nested_agents.studies.claims.claims import OWN, PAPERS, at_least, at_most, judge, within
+from nested_agents.studies.claims.claims import (
+    OWN,
+    PAPERS,
+    at_least,
+    at_most,
+    judge,
+    markdown,
+    print_claims,
+    within,
+)
 from nested_agents.studies.claims.measures import Measured
-from nested_agents.studies.claims.table import markdown, print_claims
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.results import published
 from nested_agents.studies.results.results import Results
@@ -257,6 +265,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         *claims.studies_of(),
         "fit",
         "fit-landmarks",
+        "fit-games-ppo",
         "edges-classes",
         "edges-hierarchies",
         "edges-arms",
@@ -266,6 +275,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "arms",
         "arm-transfer",
         "long-arms",
+        "thousand-arms",
         "tasks",
         "told",
         "costs",

@@ -16,10 +16,8 @@ import pytest
 from made_up_commands import finish, heeding_interrupts, run_here, start, wait_for_results
 
 from nested_agents.studies.api import run_study as studies_run
-from nested_agents.studies.api.study import run
 from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli import commands
-from nested_agents.studies.cli.display import show_results
 from nested_agents.studies.cli.main import COMMANDS, main
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store.store import DATABASE
@@ -181,7 +179,7 @@ def test_presets(capsys, monkeypatch):
     assert "step_size = 0.00012" in capsys.readouterr().out
 
 
-def test_a_replay_of_the_first_and_the_last_episode_is_drawn_once(tmp_path, monkeypatch):
+def test_the_demo_draws_a_replay_of_the_first_and_of_the_last_episode(tmp_path, monkeypatch):
     drawn = []
     rendering = ModuleType("rendering")
     rendering.animate = lambda recording, path: (drawn.append(recording), path.touch())
@@ -190,20 +188,11 @@ def test_a_replay_of_the_first_and_the_last_episode_is_drawn_once(tmp_path, monk
     )
     monkeypatch.setattr(learning_curve, "measure", made_up.measure)
     monkeypatch.setattr(studies_run, "check", lambda spec: made_up.MEASURES)
-    for _ in range(2):
-        study = run(made_up.SPEC, tmp_path, jobs=2, progress=False)
-        assert show_results(study, with_replays=True) == 0
+    assert main(["demo", "--out", str(tmp_path)]) == 0
     assert len(drawn) == 2
     assert sorted(p.name for p in (tmp_path / "replay").iterdir()) == [
         "first-episode.gif", "last-episode.gif",
     ]  # fmt: skip
-
-
-def test_the_replay_of_one_episode_is_of_the_last(tmp_path):
-    spec = Spec.of({"seeds": 1, "episodes": 1, "steps": 2, "evaluation": 0})
-    study = run(spec, tmp_path, jobs=1, progress=False)
-    assert show_results(study, with_replays=True) == 0
-    assert [p.name for p in (tmp_path / "replay").iterdir()] == ["last-episode.gif"]
 
 
 def test_the_demos_spec_is_valid_toml(capsys, tmp_path):
@@ -252,7 +241,7 @@ BAD = {
     "status nowhere": "nowhere: holds no study",
     "retry nowhere": "nowhere: holds no study",
     "presets papr": "did you mean 'paper'",
-    "rum": "error: rum: unknown command; did you mean 'run'? known: check, claims",
+    "rum": "error: rum: unknown command; did you mean 'run'? known: benchmark, check",
     "--versio": "'--versio'. Did you mean '--version'?",
     "demo --job 3": "No such option '--job'. (Did you mean one of: '--jobs', '--out'?)",
     "demo extra": "unexpected extra argument (extra); see nested-agents demo --help",

@@ -14,11 +14,13 @@ from nested_agents.core.evaluators.evaluator import Counts
 from nested_agents.studies.cli.commands.cost import numbers
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.cost.cost import (
+    WAYS,
     CostRow,
     StepCost,
     agents_below,
     cost_rows,
     measure,
+    messages,
     step_formula,
 )
 from nested_agents.studies.cost.figure import draw
@@ -143,6 +145,51 @@ def test_counted_is_formula(topology: str, n: int) -> None:
     assert measured.counted.joint_actions == sum(4 ** (1 + b) for b in below)
     assert measured.counted.weight_updates == 25 * n
     assert measured.deciding > 0 < measured.memory
+
+
+@pytest.mark.parametrize(
+    ("way", "n"), [("best-response", 1), ("best-response", 6), ("max-plus", 5)]
+)
+def test_ways_to_decide_count_as_their_formula(way: str, n: int) -> None:
+    measured = measure(way, n)
+    assert measured is not None
+    assert step_formula(way, n) == measured.counted
+
+
+def test_ways_to_decide_are_added_up_as_the_hierarchies() -> None:
+    """Of six agents the first tries 4 + 3 * 12 starts and 6 * 4 around them, each its own four."""
+    rows = {row.topology: row for row in cost_rows([*WAYS, "independent"], [6], Problem(7, 4, 5))}
+    exact = {name: row.nested_exact for name, row in rows.items()}
+    assert exact["best-response"] == 35 * (68**2 + 5 * 4**2)
+    assert exact["fitted-q"] == exact["independent"] == 35 * 6 * 4**2
+    assert exact["hierarchy-ppo"] == 35 * 6
+    assert all(measure(way, 6) is None for way in ("fitted-q", "hierarchy-ppo"))
+    assert rows["best-response"].nested_closed_form is None
+
+
+@pytest.mark.parametrize(
+    ("topology", "expected"),
+    [
+        ("chain", (28, 7)),
+        ("hierarchy-ppo", (28, 7)),
+        ("independent", (0, 0)),
+        ("single-agent", (14, 2)),
+        ("coordination-graph", (14, 14)),
+        ("max-plus", (100 * 2 * 7, 100)),
+    ],
+)
+def test_messages(topology: str, expected: tuple[int, int]) -> None:
+    assert messages(topology, 8) == expected
+
+
+def test_what_a_network_costs(said) -> None:
+    command = ("--agents", "8,1024", "--topology", "chain", "graph=coordination-graph", "--network")
+    lines = said(*command)[1].splitlines()
+    assert max(map(len, lines)) <= 80
+    assert lines[-7].split() == ["8", "chain", "28", "7", "0.007", "0.07", "0.028", "0.28"]
+    (record,) = json.loads(said("--agents", "8", "--network", "--format", "json")[1])
+    assert (record["messages"], record["messages_in_turn"]) == (28, 7)
+    assert said(*command, "--format", "latex")[1].count("tabular") == 4
 
 
 def test_the_single_agent_counts_as_its_formula() -> None:

@@ -2,7 +2,7 @@ import numpy as np
 
 from nested_agents.core.adaptation.self_model import SelfModel, SelfModelSettings
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS, nominal_effect
-from nested_agents.studies.explain.body import Bodies, table, verdicts
+from nested_agents.studies.explain.text import Bodies, effects_table, verdicts
 
 FOUR = nominal_effect(ROBOTS["four-wheel"])
 AGENTS = [f"robot{r}.{name}" for r in (1, 2) for name in ROBOTS["four-wheel"].wheel_names]
@@ -52,7 +52,7 @@ def test_the_table_fits_80_columns_with_six_wheels():
     six = ROBOTS["six-wheel"]
     effect = nominal_effect(six)
     bodies = Bodies({m: (effect,) for m in ("built", "before", "after")}, (0 * effect,))
-    lines = table(bodies, [f"robot1.{name}" for name in six.wheel_names]).splitlines()
+    lines = effects_table(bodies, [f"robot1.{name}" for name in six.wheel_names]).splitlines()
     assert max(len(line.rstrip()) for line in lines) <= 80
     assert lines[0].split()[:2] == ["front-left", "front-right"]
     assert [line.split()[0] for line in lines[1:5]] == ["robot1", "before", "after", "turning"]

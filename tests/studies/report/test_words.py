@@ -1,7 +1,7 @@
 import Box2D
 import pytest
 
-from nested_agents.studies.report import words
+from nested_agents.studies.report import page as words
 from nested_agents.studies.spec.outline import StudyOutline
 from nested_agents.studies.spec.spec import Spec
 

@@ -5,7 +5,7 @@ import pytest
 
 from nested_agents.core.interface.measures import SUCCESS, Measure
 from nested_agents.studies.errors import SpecError
-from nested_agents.studies.presentation.profiles import draw
+from nested_agents.studies.presentation.figures import draw_profiles
 from nested_agents.studies.results import aggregates
 from nested_agents.studies.results.aggregates import (
     aggregate,
@@ -92,7 +92,7 @@ def test_groups_of_a_comparison_are_tasks() -> None:
     assert "P(improvement)" not in a
     assert found.curves["b"].value == pytest.approx(np.ones(4))
     assert "within 2 of 2 tasks" in found.notes[0]
-    figure = draw(found)
+    figure = draw_profiles(found)
     assert len(figure.axes) == 2
 
 

@@ -3,20 +3,25 @@ import pytest
 from made_up_results import ablation
 
 from nested_agents.studies.results.comparison import (
-    aligned,
+    Difference,
     difference,
     differences,
-    mean_success,
     ratio,
-    with_first,
+    shared,
 )
+from nested_agents.studies.results.results import Results
 
-MEASURES = {"greedy": mean_success("evaluation")}
+
+def with_first(results: Results) -> tuple[Difference, ...]:
+    first, *others = results.conditions
+    base = results.means(first, "evaluation")
+    pairs = [(c, "greedy", results.means(c, "evaluation"), base) for c in others]
+    return differences({"all": pairs})["all"]
 
 
 def test_a_difference_is_found_and_none_is_not() -> None:
     results = ablation({"default": 0.9, "same": 0.9, "worse": 0.3}).frames()
-    same, worse = differences(results, with_first(results.conditions), MEASURES)
+    same, worse = with_first(results)
     assert same.p > 0.05
     assert same.estimate.low < 0.0 < same.estimate.high
     assert worse.p < 0.001
@@ -30,11 +35,12 @@ def test_only_seeds_that_both_have_are_compared() -> None:
     arrays.seeds["a"] = tuple(range(20))
     arrays.seeds["b"] = tuple(range(15, 35))
     results = arrays.frames()
-    one, other = aligned(results, ("a", "b"), MEASURES["greedy"])
-    assert (one == MEASURES["greedy"](results, "a")[15:]).all()
-    assert (other == MEASURES["greedy"](results, "b")[:5]).all()
+    means = [results.means(condition, "evaluation") for condition in ("a", "b")]
+    one, other = shared(means)
+    assert (one == means[0].to_numpy()[15:]).all()
+    assert (other == means[1].to_numpy()[:5]).all()
     arrays.seeds["b"] = tuple(range(100, 120))
-    assert differences(arrays.frames(), with_first(["a", "b"]), MEASURES) == ()
+    assert with_first(arrays.frames()) == ()
 
 
 def outcomes(rng: np.random.Generator, chance: float) -> np.ndarray:

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 import nested_agents as na
-from nested_agents.studies.results.numbers import NUMBERS
+from nested_agents.studies.results.results import NUMBERS
 from nested_agents.studies.spec.studies import STUDIES
 
 

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 from scipy import special, stats
 
-from nested_agents.studies.results.comparison import Difference, adjusted
+from nested_agents.studies.results.analysis import power_lines, power_text, verdict_lines
+from nested_agents.studies.results.comparison import Difference, adjusted, compare_pairs
 from nested_agents.studies.results.paired_tests import LEVEL, paired_permutation
 from nested_agents.studies.results.power import (
     detectable,
@@ -13,7 +14,6 @@ from nested_agents.studies.results.power import (
     seeds_needed,
 )
 from nested_agents.studies.results.statistics import bootstrap
-from nested_agents.studies.results.verdicts import power_lines, power_text, verdict_lines
 
 
 def found_in_simulation(
@@ -79,7 +79,7 @@ def test_the_deviation_is_pooled_and_of_rates_never_zero() -> None:
 
 def compared(own: list[float], base: list[float], title: str = "other") -> Difference:
     pair = np.array(own, dtype=float), np.array(base, dtype=float)
-    return Difference.of(title, "success", *pair, bootstrap(pair[0] - pair[1], bounds=(-1, 1)))
+    return compare_pairs(title, "success", *pair, bootstrap(pair[0] - pair[1], bounds=(-1, 1)))
 
 
 def test_five_seeds_that_all_agree_are_told_what_they_lack() -> None:

@@ -7,11 +7,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nested_agents.core.interface.hierarchy import Hierarchy
+from nested_agents.scenarios.line_up import LineUp
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.objects import plain
+from nested_agents.studies.spec.overlay import dumps
 from nested_agents.studies.spec.presets import PRESETS
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.spec.toml import dumps
 from nested_agents.topologies import build
 
 BAD = {
@@ -460,6 +461,11 @@ def test_a_topology_given_as_an_object_keeps_its_relations(topology):
     else:
         pairs = built.edges if topology.is_directed() else built.neighbours
         assert pairs == ((0, 1), (1, 2))
+
+
+def test_a_class_stands_for_its_name_as_kind_of_a_table_too() -> None:
+    table = plain({"scenario": {"kind": LineUp, "carts": 2}})["scenario"]
+    assert table == plain({"scenario": LineUp})["scenario"] | {"carts": 2}
 
 
 def test_edges_beside_neighbours_have_no_table():

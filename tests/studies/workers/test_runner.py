@@ -11,13 +11,12 @@ from joblib.externals.loky import get_reusable_executor
 
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.trials.keeping import pending
-from nested_agents.studies.workers.loky import LokyWorkers
 from nested_agents.studies.workers.runner import ATTEMPTS, run_trials
-from nested_agents.studies.workers.workers import start_workers
+from nested_agents.studies.workers.workers import LokyWorkers, start_workers
 
 
 def content(store):
-    return store.rows("training"), store.rows("evaluation")
+    return list(store.episodes()[1])
 
 
 def run(directory, measure, jobs=2):
@@ -108,7 +107,7 @@ def test_workers_do_not_outlive_a_killed_parent(tmp_path):
     program = """
         import sys
         import made_up
-        from nested_agents.studies.workers.loky import LokyWorkers
+        from nested_agents.studies.workers.workers import LokyWorkers
         from nested_agents.studies.workers.runner import run_trials
         from pathlib import Path
         with made_up.opened(Path(sys.argv[1])) as store:

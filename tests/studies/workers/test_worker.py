@@ -131,6 +131,24 @@ def test_whatever_a_scenario_raises_when_it_is_built_is_one_line(act, tmp_path, 
     assert not (tmp_path / "study").exists()
 
 
+@pytest.mark.parametrize(
+    ("act", "status", "line"),
+    [
+        ("raise ValueError('no power')", 2, "error: no power, in line 7 of raises.py"),
+        ("raise KeyboardInterrupt", 130, "interrupted in line 7 of raises.py"),
+    ],
+)
+def test_its_own_words_and_an_interruption_have_their_line(
+    act, status, line, tmp_path, capsys
+) -> None:
+    (tmp_path / "raises.py").write_text(BUILT.replace("{}", act, 1))
+    spec = tmp_path / "spec.toml"
+    spec.write_text('[scenario]\nkind = "raises.py:Raises"\n')
+    assert main(["run", str(spec), "--out", str(tmp_path / "study")]) == status
+    assert capsys.readouterr().err == f"nested-agents: {line}\n"
+    assert not (tmp_path / "study").exists()
+
+
 def test_what_a_scenario_raises_on_being_asked_is_one_line_too(tmp_path, capsys) -> None:
     text = BUILT.replace("{}", "pass", 1) + "    measures = property(lambda self: 1 / 0)\n"
     (tmp_path / "raises.py").write_text(text)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from nested_agents.scenarios.box_pushing.options.config import PushingPointsSettings
-from nested_agents.scenarios.box_pushing.options.points import pushing_points
+from nested_agents.scenarios.box_pushing.options.pushing import pushing_points
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.geometry import surface
 

@@ -2,6 +2,7 @@
 
 import time
 import warnings
+from dataclasses import replace
 from itertools import combinations
 from math import pi, sqrt
 
@@ -151,7 +152,7 @@ def test_a_described_box_and_its_label() -> None:
     assert box_for(table, 6) == box
     assert box_for(table.model_copy(update={"grows": True}), 6) == box.scaled(3.0)
     wide = table.model_copy(update={"grows": "width"})
-    assert box_for(label(wide), 6) == box.scaled(3.0, width_only=True)
+    assert box_for(label(wide), 6) == replace(box, grows="width").scaled(3.0)
     assert [growth(b, 6) for b in (table, wide, "square")] == [1.0, 3.0, 3.0]
     assert growth("square", 1) == 1.0
     assert label("L") == "L"
@@ -224,7 +225,7 @@ def test_many_vertices_take_no_time(depth: float) -> None:
 
 
 def test_a_box_may_grow_along_its_width_only() -> None:
-    square, wide = BOXES["square"], BOXES["square"].scaled(4.0, width_only=True)
+    square, wide = BOXES["square"], replace(BOXES["square"], grows="width").scaled(4.0)
     assert wide.width == pytest.approx((-0.4, 0.4))
     assert wide.area == pytest.approx(4 * square.area)
     assert wide.mass == 4 * square.mass

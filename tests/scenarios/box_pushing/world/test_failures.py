@@ -12,14 +12,13 @@ from nested_agents.core.numerics.arrays import FloatArray
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
-from nested_agents.scenarios.box_pushing.world.failures import WheelFailures
 from nested_agents.scenarios.box_pushing.world.robots import ROBOTS, nominal_effect
 from nested_agents.scenarios.box_pushing.world.settings import (
     Failure,
     FailureSettings,
     RobotSettings,
 )
-from nested_agents.scenarios.box_pushing.world.world import World
+from nested_agents.scenarios.box_pushing.world.world import WheelFailures, World
 
 WHEELS = ("robot1.left", "robot1.right", "robot2.left", "robot2.right")
 KINDS = ("seized", "free", "weak", "reversed", "stuck", "delayed", "noisy")
