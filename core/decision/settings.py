@@ -3,8 +3,8 @@
 from typing import Annotated, Literal
 
 from ..evaluators import EVALUATORS, EvaluatorSettings
-from ..evaluators.auto import AutoSettings
 from ..evaluators.evaluator import Plan, Teammates, Unseen, ValueOf
+from ..evaluators.exact import AutoSettings
 from ..plugins.plugged import Plugged
 from ..plugins.settings import Settings, unwritten
 

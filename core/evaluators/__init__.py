@@ -13,7 +13,7 @@ from .evaluator import EvaluatorSettings
 EVALUATORS = SettingsRegistry(
     "evaluator",
     {
-        "auto": f"{__name__}.auto:AutoSettings",
+        "auto": f"{__name__}.exact:AutoSettings",
         "exact": f"{__name__}.exact:ExactEnumeration",
         "sampling": f"{__name__}.exact:SamplingSettings",
         "variable-elimination": f"{__name__}.coordination:VariableEliminationSettings",

@@ -21,7 +21,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from ...core.coordination.elimination import Elimination
+from ...core.coordination.maximisers import Elimination
 from ...core.coordination.shapes import Shape, shaped
 from ...core.interface.measures import Measure
 from ...core.interface.scenario import Transition

@@ -32,8 +32,8 @@ from ...faults.settings import Failures, Free
 from .boxes import BoxSpec
 from .geometry import gaps
 from .infrared import infrared_readings, sensor_directions
+from .robots import wheel_model, wheel_wrenches
 from .settings import CONTROL_PERIOD, InfraredSettings, RobotSettings
-from .wheels import wheel_model, wheel_wrenches
 
 UNIT = 10.0
 """Box2D units per metre."""
