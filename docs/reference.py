@@ -62,7 +62,7 @@ MODULES = {
         "evaluators.evaluator", "evaluators.exact", "evaluators.best_response",
         "evaluators.coordination", "evaluators.cross_entropy",
         "coordination.maximisers", "adaptation.self_model",
-        "adaptation.calibration", "agents.cost", "plugins.registry", "plugins.plugged",
+        "adaptation.calibration", "agents.cost", "plugins.registry",
         "plugins.settings", "numerics.streams", "numerics.ties",
         "policies.settings", "policies.peer",
     )),

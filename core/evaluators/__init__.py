@@ -7,7 +7,7 @@ mean (uniform), or their mean weighted with how often the agents below were seen
 (empirical frequencies). Evaluators differ in which joint actions they try.
 """
 
-from ..plugins.plugged import SettingsRegistry
+from ..plugins.registry import SettingsRegistry
 from .evaluator import EvaluatorSettings
 
 EVALUATORS = SettingsRegistry(

@@ -27,7 +27,7 @@ from ..decision.settings import Decision
 from ..evaluators.evaluator import Counts, Deliberation
 from ..interface.spaces import ActionSet, StateSpace, choice
 from ..numerics.arrays import FloatArray, IntArray
-from ..plugins.plugged import Plugged
+from ..plugins.registry import Plugged
 from ..plugins.settings import Positive
 from ..rules.kernels.fuzzy import Partition
 from ..rules.rule_base import RuleBase

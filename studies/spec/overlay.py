@@ -13,7 +13,7 @@ from typing import Any
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from ...core.plugins.plugged import Plugged, SettingsRegistry
+from ...core.plugins.registry import Plugged, SettingsRegistry
 
 TomlTable = dict[str, Any]
 
