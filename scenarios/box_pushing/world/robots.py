@@ -239,3 +239,18 @@ def wheel_wrenches(  # type: ignore[no-untyped-def]
             f1 += fy
             torque += x * fy - y * fx
         out[r, 0], out[r, 1], out[r, 2] = cos * f0 - sin * f1, sin * f0 + cos * f1, torque
+
+
+def sensor_directions(robots: Sequence[RobotSettings]) -> FloatArray:
+    """Return the directions ``(M, S)`` of the robots' sensors [rad].
+
+    Raises
+    ------
+    ValueError
+        If robots have different numbers of sensors.
+    """
+    sensors = [E_PUCK_SENSORS if robot.sensors is None else robot.sensors for robot in robots]
+    counts = {len(directions) for directions in sensors}
+    if len(counts) != 1:
+        raise ValueError(f"robots: {sorted(counts)} sensors, must be the same number on each")
+    return np.array(sensors)
