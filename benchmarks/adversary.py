@@ -47,8 +47,8 @@ from nested_agents.studies.api.study import load
 from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli.main import main as command_line
 from nested_agents.studies.errors import SpecError
+from nested_agents.studies.spec.overlay import dumps
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.spec.toml import dumps
 from nested_agents.studies.store import durable
 from nested_agents.studies.store.store import DATABASE, LOCK, Store
 from nested_agents.studies.trials.arrangement import check

@@ -22,8 +22,8 @@ from nested_agents.studies.cli.main import COMMANDS
 from nested_agents.studies.cli.main import nested_agents as program
 from nested_agents.studies.results.results import EPISODE_COLUMNS, NUMBERS, TRIAL_COLUMNS
 from nested_agents.studies.spec.keys import tables
+from nested_agents.studies.spec.overlay import dumps
 from nested_agents.studies.spec.presets import PRESETS
-from nested_agents.studies.spec.toml import dumps
 
 BESIDE = {
     "*swept keys*": ("", "a column for every swept key, and `name` if there are overrides"),
@@ -84,7 +84,7 @@ MODULES = {
         "state_variables", "checking.checker", "checking.sensing",
     )),
     "studies": ("What is measured, compared and drawn.", (
-        "api.study", "api.teams", "api.planning", "api.costs", "api.comparison", "api.recovery",
+        "api.study", "api.teams", "api.planning", "cost.table", "api.comparison", "api.recovery",
         "api.run_study", "api.tuning",
         "errors", "spec.spec", "spec.keys", "spec.presets", "trials.trial",
         "trials.arrangement", "trials.session",

@@ -63,7 +63,7 @@ _PLACES = {
     "bootstrap": ("studies.results.statistics", "bootstrap"),
     "build_hierarchy": ("topologies", "build"),
     "check_scenario": ("scenarios.checking.checker", "check_scenario"),
-    "cost_table": ("studies.api.costs", "cost_table"),
+    "cost_table": ("studies.cost.table", "cost_table"),
     "control_loop": ("core.agents.loop", "control_loop"),
     "detectable": ("studies.results.power", "detectable"),
     "from_gymnasium": ("scenarios.adapters.adapted", "from_gymnasium"),

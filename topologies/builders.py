@@ -29,21 +29,21 @@ Bodies: TypeAlias = Sequence[Names]
 Pairs: TypeAlias = tuple[tuple[str, str], ...]
 Members = TypeAliasType("Members", "tuple[str | Members, ...]")
 """The members of a team: agents, or teams of members, to any depth."""
+Seed = Annotated[int, Field(ge=0)]
 
 
-def chain(
-    agents: Names,
-    bodies: Bodies = (),
-    *,
-    order: Annotated[
-        Literal["listed", "reversed", "interleaved"] | tuple[str, ...],
-        Field(
-            description="The agents' own order, its reverse, wheel by wheel across robots, or all "
-            "names in order."
-        ),
-    ] = "listed",
-) -> nx.DiGraph:
+Order: TypeAlias = Literal["listed", "reversed", "interleaved"] | tuple[str, ...]
+
+
+def chain(agents: Names, bodies: Bodies = (), *, order: Order = "listed") -> nx.DiGraph:
     """Put each agent above the next one in `order`: the paper's nested chain.
+
+    Parameters
+    ----------
+    agents, bodies
+        Names, also by body.
+    order
+        The agents' own order, its reverse, wheel by wheel across robots, or all names in order.
 
     Examples
     --------
@@ -64,12 +64,16 @@ def chain(
 
 
 def tree(
-    agents: Names,
-    bodies: Bodies = (),
-    *,
-    branching: Annotated[int, Field(ge=1, description="Number of subordinates of an agent.")] = 2,
+    agents: Names, bodies: Bodies = (), *, branching: Annotated[int, Field(ge=1)] = 2
 ) -> nx.DiGraph:
     """Put every agent but the last ones above `branching` others.
+
+    Parameters
+    ----------
+    agents, bodies
+        Names, also by body.
+    branching
+        Number of subordinates of an agent.
 
     Examples
     --------
@@ -80,15 +84,15 @@ def tree(
     return nx.relabel_nodes(graph, dict(enumerate(agents)))
 
 
-def star(
-    agents: Names,
-    bodies: Bodies = (),
-    *,
-    leader: Annotated[
-        str | None, Field(description="Name of the leader; none: the first agent.")
-    ] = None,
-) -> nx.DiGraph:
+def star(agents: Names, bodies: Bodies = (), *, leader: str | None = None) -> nx.DiGraph:
     """Put one leader right above everyone else.
+
+    Parameters
+    ----------
+    agents, bodies
+        Names, also by body.
+    leader
+        Name of the leader; none: the first agent.
 
     Examples
     --------
@@ -106,23 +110,23 @@ def teams(
     agents: Names,
     bodies: Bodies = (),
     *,
-    link: Annotated[
-        Literal["chain", "star"],
-        Field(description="Whether the leaders of the members of a team form a chain or a star."),
-    ] = "chain",
-    members: Annotated[
-        Members | None,
-        Field(
-            description="Nested lists of agent names, to any depth; none: the bodies (robots) of "
-            "the scenario."
-        ),
-    ] = None,
+    link: Literal["chain", "star"] = "chain",
+    members: Members | None = None,
 ) -> nx.DiGraph:
     """Put the leaders of nested teams in a chain or a star, each above its team.
 
     The leader of a team is that of its first member, that of an agent the agent itself. Without
     `members`, the team is one of robots of wheels: the first wheels form a chain, each above its
     own robot's other wheels.
+
+    Parameters
+    ----------
+    agents, bodies
+        Names, also by body.
+    link
+        Whether the leaders of the members of a team form a chain or a star.
+    members
+        Nested lists of agent names, to any depth; none: the bodies (robots) of the scenario.
 
     Examples
     --------
@@ -162,24 +166,24 @@ def coordination_graph(
     agents: Names,
     bodies: Bodies = (),
     *,
-    shape: Annotated[
-        Shape | Literal["scenario"],
-        Field(
-            description="In agent order; on a ring the last is a neighbour of the first, in a tree "
-            "everybody of two later ones, in a grid of those in rows and columns. Or those whose "
-            "actions matter to each other, as the scenario has it."
-        ),
-    ] = "line",
-    edges: Annotated[
-        Pairs | None, Field(description="Pairs of neighbours in place of a shape.")
-    ] = None,
-    others: Annotated[
-        Annotated[int, Field(ge=0)] | None,
-        unwritten(None),
-        Field(description="Seed of as many other pairs, drawn at random, in place of these."),
-    ] = None,
+    shape: Shape | Literal["scenario"] = "line",
+    edges: Pairs | None = None,
+    others: Annotated[Seed | None, unwritten(None)] = None,
 ) -> nx.Graph:
     """Join neighbours in a shape, or as listed, who decide at once.
+
+    Parameters
+    ----------
+    agents, bodies
+        Names, also by body.
+    shape
+        In agent order; on a ring the last is a neighbour of the first, in a tree everybody of two
+        later ones, in a grid of those in rows and columns. Or those whose actions matter to each
+        other, as the scenario has it.
+    edges
+        Pairs of neighbours in place of a shape.
+    others
+        Seed of as many other pairs, drawn at random, in place of these.
 
     Raises
     ------
@@ -204,13 +208,18 @@ def coordination_graph(
 
 
 def from_edges(
-    agents: Names,
-    bodies: Bodies = (),
-    *,
-    edges: Annotated[Pairs, Field(description="Pairs (superior, subordinate).")],
-    alone: Annotated[tuple[str, ...], Field(description="Agents that are in no edge.")] = (),
+    agents: Names, bodies: Bodies = (), *, edges: Pairs, alone: tuple[str, ...] = ()
 ) -> nx.DiGraph:
     """Take any hierarchy, edge by edge.
+
+    Parameters
+    ----------
+    agents, bodies
+        Names, also by body.
+    edges
+        Pairs (superior, subordinate).
+    alone
+        Agents that are in no edge.
 
     Raises
     ------
@@ -228,13 +237,18 @@ def from_edges(
 
 
 def random_hierarchy(
-    agents: Names,
-    bodies: Bodies = (),
-    *,
-    seed: Annotated[int, Field(ge=0, description="Seed of its random numbers.")] = 0,
-    density: Annotated[Fraction, Field(description="Probability of each possible edge.")] = 0.3,
+    agents: Names, bodies: Bodies = (), *, seed: Seed = 0, density: Fraction = 0.3
 ) -> nx.DiGraph:
     """Rank the agents at random, each above each lower one with a probability.
+
+    Parameters
+    ----------
+    agents, bodies
+        Names, also by body.
+    seed
+        Seed of its random numbers.
+    density
+        Probability of each possible edge.
 
     Examples
     --------

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Annotated, Any, Literal, Self, get_args
 
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from ..core.agents.messages import AbsentAgents, AnyMessageFailure
 from ..core.coordination.shapes import Shape, oriented
@@ -25,6 +25,10 @@ from .builders import Bodies, Members, Names, from_networkx, names_of  # noqa: F
 from .checks import check_names, shown
 
 BUILDERS = "nested_agents.topologies.builders"
+BUILT = (
+    "chain", "tree", "star", "teams", "independent", "simultaneous", "coordination-graph",
+)  # fmt: skip
+"""Topologies whose builder is called so."""
 
 
 class TopologySettings(Settings):
@@ -79,18 +83,9 @@ IMPLIED = {"members": "teams", "edges": "edges"}
 
 TOPOLOGIES = SettingsRegistry(
     "topology",
-    {
-        "chain": f"{BUILDERS}:chain",
-        "tree": f"{BUILDERS}:tree",
-        "star": f"{BUILDERS}:star",
-        "teams": f"{BUILDERS}:teams",
-        "independent": f"{BUILDERS}:independent",
-        "simultaneous": f"{BUILDERS}:simultaneous",
-        "coordination-graph": f"{BUILDERS}:coordination_graph",
-        "edges": f"{BUILDERS}:from_edges",
-        "random": f"{BUILDERS}:random_hierarchy",
-        "file": f"{__name__}:from_file",
-    },
+    {name: f"{BUILDERS}:{name.replace('-', '_')}" for name in BUILT}
+    | {"edges": f"{BUILDERS}:from_edges", "random": f"{BUILDERS}:random_hierarchy"}
+    | {"file": f"{__name__}:from_file"},
     TopologySettings,
     moved={
         "single-agent": "who the agents are has a key of its own: agents = 'team'",
@@ -133,10 +128,8 @@ def parse(text: str | Mapping[str, Any]) -> TopologySettings:
             return _made("file", {"path": text})
         if sources.is_reference(text) or text in TOPOLOGIES.installed():
             return _made(text, {})
-    except SettingsError as error:
-        raise ValueError(f"topology {text!r}: {error.problem}") from None
     except ValueError as error:
-        raise ValueError(f"topology {text!r}: {error}") from None
+        raise ValueError(f"topology {text!r}: {getattr(error, 'problem', error)}") from None
     if "." in kind or "/" in kind:
         folder = sources.active().folder
         is_there = folder is not None and (folder / text).exists()
@@ -228,13 +221,16 @@ def build(
         raise ValueError(f"topology {title!r}: {problem}") from None
 
 
-def from_file(
-    agents: Names,
-    bodies: Bodies = (),
-    *,
-    path: Annotated[str, Field(description="Path of the file, relative to the spec.")],
-) -> nx.DiGraph:
-    """Read a graph or nested teams from a GraphML, JSON or TOML file."""
+def from_file(agents: Names, bodies: Bodies = (), *, path: str) -> nx.DiGraph:
+    """Read a graph or nested teams from a GraphML, JSON or TOML file.
+
+    Parameters
+    ----------
+    agents, bodies
+        Names, also by body.
+    path
+        Path of the file, relative to the spec.
+    """
     content = read(path)
     if isinstance(content, TopologySettings):
         return content.build(agents, bodies)

@@ -34,10 +34,15 @@ class HierarchyView:
     """What it makes."""
     bodies: tuple[tuple[int, ...], ...]
     """Its agents by body."""
-    tries: tuple[int, ...]
-    """Joint actions that each agent tries per step, in agent order."""
+    actions: int
+    """Actions of an agent."""
     failures: tuple[MessageFailure, ...] = ()
     """What fails of the messages."""
+
+    @property
+    def tries(self) -> tuple[int, ...]:
+        """Joint actions that each agent tries per step, in agent order."""
+        return tuple(self.actions ** (1 + count) for count in below_counts(self.hierarchy))
 
     @property
     def failing(self) -> tuple[int, ...]:
@@ -83,9 +88,7 @@ def view(
     if per != "actuator":
         bodies = tuple((i,) for i in range(len(names)))
     hierarchy = build(settings, names, bodies)
-    own = actions ** len(blocks[0])
-    tries = tuple(own ** (1 + count) for count in below_counts(hierarchy))
-    return HierarchyView(text, hierarchy, bodies, tries)
+    return HierarchyView(text, hierarchy, bodies, actions ** len(blocks[0]))
 
 
 def named_by(settings: TopologySettings) -> tuple[str, ...]:

@@ -9,23 +9,27 @@ Each kind of thing has one registry. A thing gets in
 
 What has settings is in a registry of their *settings models*, whose method `build` makes the thing.
 A class with a nested ``Settings`` stands for the model that builds it; a function for one whose
-fields are its annotated keyword-only parameters.
+fields are its annotated keyword-only parameters, documented as its docstring does.
 """
 
 import os
+import re
 import sys
 from collections.abc import Callable, Mapping
-from inspect import isfunction, signature
+from inspect import getdoc, isfunction, signature
 from pathlib import Path
 from pkgutil import resolve_name
-from typing import Any, Literal, cast
+from typing import Annotated, Any, Literal, cast
 
-from pydantic import create_model
+from pydantic import Field, create_model
 from pydantic_core import PydanticCustomError, core_schema
 
 from . import sources
 from .messages import closest
 from .settings import Settings, tuples
+
+MEANING = re.compile(r"^(\w+)\n((?:    .*\n?)+)", re.MULTILINE)
+"""A parameter in a docstring: its name, and what is said of it, indented."""
 
 
 class Registry:
@@ -263,13 +267,20 @@ class SettingsRegistry(Registry):
 
 
 def _parameters(thing: Any) -> dict[str, Any]:
-    """Return type and default of each annotated keyword-only parameter of a function, by name."""
+    """Return type and default of each annotated keyword-only parameter of a function, by name.
+
+    What the section "Parameters" of its docstring, in the form of numpydoc, says of each goes with
+    the type.
+    """
     if not isfunction(thing):
         return {}
+    section = getdoc(thing) or ""
+    meanings = dict(MEANING.findall(section.partition("Parameters\n----------\n")[2]))
     fields: dict[str, Any] = {}
     for p in signature(thing, eval_str=True).parameters.values():
         if p.kind is p.KEYWORD_ONLY and p.annotation is not p.empty:
-            fields[p.name] = p.annotation, ... if p.default is p.empty else p.default
+            of_type = cast(Any, Annotated)[p.annotation, Field(description=meanings.get(p.name))]
+            fields[p.name] = of_type, ... if p.default is p.empty else p.default
     return fields
 
 

@@ -20,9 +20,8 @@ from ..errors import SpecError, show
 from ..presentation.progress import Terminal
 from ..presentation.words import count
 from ..results.results import Results, read
-from ..spec.overlay import TomlTable, nested, overlay
+from ..spec.overlay import TomlTable, dumps, nested, overlay
 from ..spec.spec import Spec
-from ..spec.toml import dumps
 from ..store import durable
 from ..trials.arrangement import check
 from ..trials.trial import Trial, trials_of

@@ -76,6 +76,12 @@ def check_evaluated(spec: Spec) -> None:
         )
 
 
+def check_evaluations(spec: Spec, example: str) -> None:
+    """Raise `SpecError` unless trained teams are evaluated otherwise, too, as in an `example`."""
+    if not spec.evaluations:
+        raise SpecError(f"evaluations: missing; {spec.study} needs one at least, as {example}")
+
+
 def check_rule_bases(spec: Spec, why: str) -> None:
     """Refuse conditions whose learner is no hierarchy of fuzzy agents.
 

@@ -5,6 +5,7 @@ An option that may be given several times takes several values at once, too: `co
 
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -62,6 +63,24 @@ directory = click.argument("directory", type=PATH, metavar="DIR")
 sources = click.argument("sources", type=PATH, metavar="DIR...|FILE.json", nargs=-1, required=True)
 """Existing studies, or a file of results."""
 
+Decorator = Callable[[Callable[..., int]], Callable[..., int]]
+
+
+def number(name: str, metavar: str, default: float, text: str) -> Decorator:
+    """Return an option that takes a number, a whole one if its default is."""
+    return click.option(name, metavar=metavar, type=type(default), default=default, help=text)
+
+
+def flag(name: str, text: str) -> Decorator:
+    """Return an option that takes no value."""
+    return click.option(name, is_flag=True, help=text)
+
+
+def out(text: str, metavar: str = "DIR", **more: Any) -> Decorator:
+    """Return the option ``--out``, where to write."""
+    return click.option("--out", type=PATH, metavar=metavar, help=text, **more)
+
+
 jobs = click.option(
     "--jobs", type=int, metavar="N", help="Trials at a time; by default one for every core."
 )
@@ -80,10 +99,9 @@ _address = click.option(
     help="Of the scheduler of a running Dask cluster, all of whose workers are used unless --jobs "
     "says otherwise. If missing, a cluster is started here.",
 )
-_accept_code = click.option(
+_accept_code = flag(
     "--accept-code",
-    is_flag=True,
-    help="Go on with a study although the installed code that computes it has changed since.",
+    "Go on with a study although the installed code that computes it has changed since.",
 )
 
 
@@ -92,10 +110,9 @@ def running(command: Callable[..., int]) -> Callable[..., int]:
     return jobs(_backend(_address(_accept_code(command))))
 
 
-trust = click.option(
+trust = flag(
     "--trust",
-    is_flag=True,
-    help="Run, from now on, the Python files that came with the study, though no spec of yours has "
+    "Run, from now on, the Python files that came with the study, though no spec of yours has "
     "run them yet. They can do whatever you can.",
 )
 """Whether the users' files that a study brings along may be run."""
@@ -140,9 +157,7 @@ where = click.option(
 """A part of the trials, see `nested_agents.studies.results.selection.chosen`."""
 
 
-def formats(
-    *choices: str, text: str = "How to print it."
-) -> Callable[[Callable[..., int]], Callable[..., int]]:
+def formats(*choices: str, text: str = "How to print it.") -> Decorator:
     """Return the option ``--format``, whose default is the first choice."""
     kind = click.Choice(choices)
     return click.option("--format", "form", type=kind, default=choices[0], help=text)

@@ -6,7 +6,7 @@ from statistics import fmean
 
 from ..presentation.words import count, duration
 from ..spec.outline import StudyOutline, other_spec
-from ..store.store import Store, last, look
+from ..store.store import Store, look
 from ..trials.code import outdated
 from ..workers.worker import cores
 
@@ -26,8 +26,8 @@ class Progress:
     running: tuple[tuple[str, int, float], ...]
     """Condition, seed, and seconds so far of the trials that are running."""
     processes: int
-    """How many trials run at a time; if none does, as many as in the last run, or as would now: the
-    cores of this machine; or none where nothing is left."""
+    """How many trials run at a time; if none does, the cores of this machine; or none where nothing
+    is left."""
     seconds: float | None
     """Estimate of the time left [s]; None if nothing has finished to go by."""
     damaged: tuple[str, ...]
@@ -46,7 +46,7 @@ def progress(store: Store) -> Progress:
     left = [trial for trial in pending if trial.identity not in begun]
     failed = [*states.values()].count("failed")
     finished = len(trials) - len(pending)
-    usual = (last(store.directory) or cores()) if left and refusal is None else 0
+    usual = cores() if left and refusal is None else 0
     processes = usual if now is None else now[0]
     seconds = _estimate(
         store.mean_seconds(),

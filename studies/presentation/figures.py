@@ -140,6 +140,12 @@ def add_legend(figure: Figure, handles: Sequence[Line2D], title: str = "", ncols
     )  # fmt: skip
 
 
+def name_curves(figure: Figure, labels: Sequence[str], title: str = "", **look_of: Any) -> None:
+    """Name the curves above the panels, as many beside each other as there is room for."""
+    handles = [handle(label, **look(i), lw=1.6, **look_of) for i, label in enumerate(labels)]
+    add_legend(figure, handles, title, ncols=max(1, 90 // (max(map(len, labels)) + 8)))
+
+
 def save(figures: Mapping[str, Figure], folder: Path, formats: Sequence[str] = USUAL) -> list[Path]:
     """Write figures into an existing folder, by their names; return the paths.
 
@@ -302,6 +308,5 @@ def draw_profiles(aggregates: Aggregates) -> Figure:
                 draw_curve(own, range(len(curve.value)), curve, index)
             own.set(title="interquartile mean, training")
             as_episodes(own)
-        handles = [handle(name, **look(i), lw=1.6) for i, name in enumerate(names)]
-        add_legend(figure, handles, ncols=max(1, 90 // (max(map(len, names)) + 8)))
+        name_curves(figure, names)
     return figure

@@ -23,7 +23,7 @@ from ..results.analysis import identity_lines
 from ..results.contrasts import contrasts
 from ..results.results import read
 from ..spec.outline import StudyOutline, sources_of
-from ..spec.toml import dumps
+from ..spec.overlay import dumps
 from ..store.schema import RESULTS_VERSION
 from ..store.store import Store
 from ..workers.worker import installed

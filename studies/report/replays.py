@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 from ...scenarios import SCENARIOS
 from ..errors import SpecError
 from ..presentation.words import count
+from ..results.results import read
 from ..store.durable import NotRecordedError, Recording
 from ..store.store import Planned, Store
 from ..trials.keeping import spec_of
@@ -166,6 +167,6 @@ def _players() -> tuple[Any, ...]:
 
 def _reached(store: Store) -> Mapping[tuple[str, int, int], bool]:
     """Return whether each training episode reached the goal, by condition, seed and number."""
-    names, rows = store.rows("training")
-    at = [names.index(name) for name in ("condition", "seed", "episode", "success")]
-    return {(row[at[0]], row[at[1]], row[at[2]]): bool(row[at[3]]) for row in rows}
+    training = read(store).episodes.query("phase == 'training'")
+    success: Any = training.set_index(["condition", "seed", "episode"])["success"]
+    return dict(success.astype(bool))

@@ -11,9 +11,9 @@ from ...core.plugins.messages import closest
 from ..errors import SpecError
 from ..spec.labels import aliases, label
 from .analysis import NOTHING, WORDS, identity_lines, verdicts
-from .comparison import Array, Difference, differences
+from .comparison import Array, BySeed, Difference, differences
 from .results import SECONDS, Results, shown
-from .statistics import bootstrap, rate
+from .statistics import Estimate, bootstrap, rate
 from .summary import Summary
 
 STEPS = Measure("steps", "steps", "1", better="lower", least=0.0)
@@ -116,22 +116,22 @@ def contrasts(
         phase = "evaluation" if is_whole else "training"
     shown_as, values, phase = _values(results, measure, phase)
     groups = _groups([c for c in results.columns if c in values], results.columns, by, reference)
-    by_seed = {c: pd.Series(own, results.seeds(c)) for c, own in values.items()}
     pairs = {
-        setting: [(name, measure, by_seed[c], by_seed[members[0][1]]) for name, c in members[1:]]
+        setting: [(name, measure, values[c], values[members[0][1]]) for name, c in members[1:]]
         for setting, members in groups
     }
     compared, made = differences(pairs, of_rates=shown_as.is_rate), []
     for setting, members in groups:
-        own = compared[setting]
-        lines = _lines(results, shown_as, phase, setting, members, values, own)
-        trained = {
-            name: results.values(c, shown_as.name)
-            for name, c in members
-            if phase and results.has(c, "training", shown_as.name)
-        }
-        means = {name: values[c] for name, c in members}
-        made.append(Group(setting, members[0][0], own, lines, means, trained))
+        less = {d.condition: {"difference": d.estimate} for d in compared[setting]}
+        lines, trained = [], {}
+        for name, c in members:
+            own = {shown_as.heading: _estimate(results, shown_as, phase, c, values[c].to_numpy())}
+            whose = ", ".join(filter(None, (setting, name)))
+            lines.append(Summary(whose, len(values[c]), own | less.get(name, {})))
+            if phase and results.has(c, "training", shown_as.name):
+                trained[name] = results.values(c, shown_as.name)
+        means = {name: values[c].to_numpy() for name, c in members}
+        made.append(Group(setting, members[0][0], compared[setting], tuple(lines), means, trained))
     return Contrasts(shown_as, phase, tuple(made), results.identical)
 
 
@@ -139,16 +139,15 @@ Members = list[tuple[str, str]]
 """Names of the conditions of a group, and their labels; the reference first."""
 
 
-def _values(results: Results, name: str, phase: str) -> tuple[Measure, dict[str, Array], str]:
-    """Return a measure, its means by condition ``(n_seeds,)``, and the phase that they are of."""
+def _values(results: Results, name: str, phase: str) -> tuple[Measure, dict[str, BySeed], str]:
+    """Return a measure, its means of seeds by condition, and the phase that they are of."""
     measures = {m.name: m for m in (*results.measures, *EPISODES)}
     name = next((m.name for m in measures.values() if m.heading == name), name)
     if name in measures:
         if phase not in results.phases:
             raise SpecError(f"phase = {phase!r}: {closest(phase, results.phases)}")
         of_phase = (c for c in results.of_phase(phase) if results.has(c, phase, name))
-        means = {c: results.values(c, name, phase).mean(axis=1) for c in of_phase}
-        return measures[name], means, phase
+        return measures[name], {c: results.means(c, phase, name) for c in of_phase}, phase
     numbers = {c: results.numbers(c) for c in results.conditions}
     columns = dict.fromkeys(n for own in numbers.values() for n in own)
     names = {c: (c, c.removeprefix(SECONDS), shown(c)[0].heading) for c in columns}
@@ -156,7 +155,8 @@ def _values(results: Results, name: str, phase: str) -> tuple[Measure, dict[str,
     if column is None:
         raise SpecError(f"measure = {name!r}: {closest(name, {*measures, *columns})}")
     measure, factor = shown(column)
-    return measure, {c: factor * own[column] for c, own in numbers.items() if column in own}, ""
+    of_trials = {c: factor * own[column] for c, own in numbers.items() if column in own}
+    return measure, {c: pd.Series(own, results.seeds(c)) for c, own in of_trials.items()}, ""
 
 
 def _groups(
@@ -205,26 +205,10 @@ def _led(members: Members, reference: str | None, known: Mapping[str, Collection
     return [members[first], *members[:first], *members[first + 1 :]]
 
 
-def _lines(
-    results: Results,
-    measure: Measure,
-    phase: str,
-    setting: str,
-    members: Members,
-    values: Mapping[str, Array],
-    differences: tuple[Difference, ...],
-) -> tuple[Summary, ...]:
-    by_name = {d.condition: d.estimate for d in differences}
-    lines = []
-    for name, condition in members:
-        own = values[condition]
-        estimates = {
-            measure.heading: rate(results.values(condition, measure.name, phase))
-            if phase and measure.is_rate
-            else bootstrap(np.asarray(own, dtype=float), bounds=measure.bounds)
-        }
-        if name in by_name:
-            estimates["difference"] = by_name[name]
-        whose = ", ".join(filter(None, (setting, name)))
-        lines.append(Summary(whose, len(own), estimates))
-    return tuple(lines)
+def _estimate(
+    results: Results, measure: Measure, phase: str, condition: str, means: Array
+) -> Estimate:
+    """Return a rate over all episodes, or the mean of means of seeds ``(n_seeds,)``."""
+    if phase and measure.is_rate:
+        return rate(results.values(condition, measure.name, phase))
+    return bootstrap(np.asarray(means, dtype=float), bounds=measure.bounds)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -269,12 +269,9 @@ def select(results: Results, keep: NDArray[np.bool_]) -> Results:
     trials = results.trials[keep].reset_index(drop=True)
     chosen = pd.MultiIndex.from_frame(trials[keys])
     episodes = results.episodes[pd.MultiIndex.from_frame(results.episodes[keys]).isin(chosen)]
-    left = set(trials["condition"])
-    columns = {c: row for c, row in results.columns.items() if c in left}
-    return Results(
-        episodes.reset_index(drop=True), trials, results.phases, columns, results.measures,
-        results.usage,
-    )  # fmt: skip
+    columns = {c: results.columns[c] for c in results.columns if c in set(trials["condition"])}
+    episodes = episodes.reset_index(drop=True)
+    return replace(results, episodes=episodes, trials=trials, columns=columns)
 
 
 def join(

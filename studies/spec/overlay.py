@@ -10,6 +10,7 @@ import typing
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+import tomli_w
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
@@ -153,3 +154,34 @@ def assignment(text: str) -> TomlTable:
         return tomllib.loads(f"{key} = '{value}'")
     except tomllib.TOMLDecodeError:
         raise ValueError("the key is not valid TOML") from None
+
+
+def dumps(table: Mapping[str, Any]) -> str:
+    """Return a table as TOML text; entries that are None are left out, as TOML has no word for it.
+
+    Raises
+    ------
+    TypeError
+        If it holds anything but text, numbers, booleans, sequences and tables.
+
+    Examples
+    --------
+    >>> print(dumps({"seeds": 8, "sweep": {"scenario.box": ("square", "circle")}}), end="")
+    seeds = 8
+    <BLANKLINE>
+    [sweep]
+    "scenario.box" = [
+        "square",
+        "circle",
+    ]
+    """
+    return tomli_w.dumps(_plain(table), multiline_strings=False)
+
+
+def _plain(value: Any) -> Any:
+    """Return tables without what is None, and lists in place of tuples, at any depth."""
+    if isinstance(value, Mapping):
+        return {key: _plain(inner) for key, inner in value.items() if inner is not None}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return value

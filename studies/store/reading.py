@@ -180,11 +180,6 @@ class Reading:
         swept = [column[0] for column in cursor.description][2:]
         return {row[1]: dict(zip(swept, row[2:], strict=True)) for row in cursor}
 
-    def rows(self, phase: str = "training") -> tuple[list[str], list[tuple[Any, ...]]]:
-        """Return the column names and the rows of a phase, by condition, seed and episode."""
-        cursor = self._db.execute("SELECT * FROM results WHERE phase = ?", (phase,))
-        return [column[0] for column in cursor.description], cursor.fetchall()
-
     def episodes(self) -> tuple[list[str], Iterator[tuple[Any, ...]]]:
         """Return the column names and the rows of all phases, by condition, seed and episode.
 
@@ -226,9 +221,8 @@ class Reading:
 
     def numbers(self) -> list[tuple[str, int, str, float, bool]]:
         """Return condition, seed, name, value and whether it is a function of the trial."""
-        cursor = self._db.execute(
-            "SELECT condition, seed, n.name, value, repeatable FROM numbers n "
+        return self._db.execute(
+            "SELECT condition, seed, n.name, value, repeatable = 1 FROM numbers n "
             "JOIN trials USING (identity) JOIN conditions USING (condition) "
             "ORDER BY position, seed, n.name"
-        )
-        return [(*row[:4], bool(row[4])) for row in cursor]
+        ).fetchall()

@@ -281,15 +281,6 @@ def look(directory: Path) -> tuple[int, dict[str, float]] | None:
         return 1, {}  # begins or ends just now
 
 
-def last(directory: Path) -> int | None:
-    """Return how many trials the last run in a directory ran at a time; None if that is unknown."""
-    try:
-        processes = json.loads((directory / MARK).read_text())["processes"]
-    except (OSError, ValueError, KeyError, TypeError):
-        return None
-    return processes if isinstance(processes, int) and processes > 0 else None
-
-
 def _locked(path: Path) -> bool:
     try:
         with open(path) as lock:

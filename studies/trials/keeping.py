@@ -14,9 +14,8 @@ from ...core.plugins.sources import FOLDER, Sources, kept_name
 from ..errors import SpecError, show
 from ..spec.labels import aliases
 from ..spec.outline import sources_of
-from ..spec.overlay import flat
+from ..spec.overlay import dumps, flat
 from ..spec.spec import Spec
-from ..spec.toml import dumps
 from ..store import integrity
 from ..store.database import DATABASE, SPEC_FILE
 from ..store.reading import Reading

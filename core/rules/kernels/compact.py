@@ -179,17 +179,6 @@ def _add_lines(theta, which: IntArray, states, rows: IntArray, skipped: int, lay
 
 
 @njit(cache=True)
-def _products(which: IntArray, lay: Layout) -> IntArray:
-    """Return the terms among these that are of several variables."""
-    kept, n_kept = np.empty(len(which), np.int64), 0
-    for t in which:
-        if lay.lengths[t] > 1:
-            kept[n_kept] = t
-            n_kept += 1
-    return kept[:n_kept]
-
-
-@njit(cache=True)
 def total_compact(  # type: ignore[no-untyped-def]
     weights, agents: IntArray, firsts: IntArray, kinds, own: FloatArray, shared: FloatArray,
     packed: Packed,
@@ -220,9 +209,9 @@ def total_compact(  # type: ignore[no-untyped-def]
     _add_lines(of_agents, of_own, own, agents, 0, lay, mine)
     _add_lines(of_bodies, of_body, shared, bodies, n_own, lay, theirs)
     _add_lines(of_all, of_common, shared, bodies, n_own, lay, total)
-    of_own, of_body, of_common = (
-        _products(of_own, lay), _products(of_body, lay), _products(of_common, lay),
-    )  # fmt: skip
+    of_own = of_own[lay.lengths[of_own] > 1]
+    of_body = of_body[lay.lengths[of_body] > 1]
+    of_common = of_common[lay.lengths[of_common] > 1]
     # A call takes a microsecond, as long as the lines of an agent.
     for b in range(len(shared) if len(of_own) + len(of_body) > 0 else 0):
         for i in range(firsts[b], firsts[b + 1]):

@@ -16,7 +16,6 @@ import numpy as np
 
 from ....core.agents.loop import StepRecord
 from ....core.interface.scenario import groups_of
-from ...errors import SpecError
 from ...results.analysis import Analysis, Figures
 from ...results.results import Results
 from ...results.summary import EVALUATED, Sizes, two_figures
@@ -25,7 +24,7 @@ from ...spec.spec import Spec
 from ...trials.session import Session
 from ...trials.trial import Trial, TrialResult
 from ..hierarchies import HierarchyCase, analysis_of, estimates
-from ..study import check_evaluated, check_rule_bases
+from ..study import check_evaluated, check_evaluations, check_rule_bases
 
 PUBLISHED = ("success",)
 """Measures of an episode that published results keep."""
@@ -39,10 +38,7 @@ def check(spec: Spec) -> None:
     """Raise `SpecError` unless trained teams are evaluated under other hierarchies."""
     check_evaluated(spec)
     check_rule_bases(spec, "who consider others and are told")
-    if not spec.evaluations:
-        raise SpecError(
-            'evaluations: missing; edges needs one at least, as silent.topology.told = "none"'
-        )
+    check_evaluations(spec, 'silent.topology.told = "none"')
 
 
 def measure(trial: Trial) -> TrialResult:

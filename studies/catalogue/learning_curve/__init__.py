@@ -126,9 +126,7 @@ def draw(analysis: Analysis) -> Figures:
     same = len(set(seeds.values())) == 1
     labels = [c if same else f"{c} ({n} seeds)" for c, n in seeds.items()]
     note = f"mean over {next(iter(seeds.values()))} seeds" if same else "mean over seeds"
-    handles = [f.handle(label, **f.look(i), lw=1.6) for i, label in enumerate(labels)]
-    ncols = max(1, min(len(labels), 90 // (max(map(len, seeds)) + 8)))
-    f.add_legend(figure, handles, f"{note}, band: 95 % interval", ncols=ncols)
+    f.name_curves(figure, labels, f"{note}, band: 95 % interval")
     return {"learning-curves": figure}
 
 

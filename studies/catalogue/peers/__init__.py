@@ -128,11 +128,8 @@ def draw(analysis: Analysis) -> Figures:
         f.as_rates(axes)
         axes.grid(axis="y", alpha=0.25)
     panels[0, 0].set_ylabel(EVALUATED)
-    handles = [
-        f.handle(course.condition, **f.look(i), lw=1.6, marker="o", markersize=3.5)
-        for i, course in enumerate(analysis.cases)
-    ]
-    f.add_legend(figure, handles)
+    conditions = [course.condition for course in analysis.cases]
+    f.name_curves(figure, conditions, marker="o", markersize=3.5)
     return {"peers": figure}
 
 

@@ -8,13 +8,13 @@ the shape; the predictor by which they look ahead is given it (see docs/predicto
 
 import numpy as np
 
-from ...errors import SpecError
 from ...results.analysis import Analysis, Figures, power_lines
 from ...results.comparison import Difference, adjusted, compare_pairs, ratio
 from ...results.results import Results
 from ...results.statistics import Estimate, bootstrap, rate
 from ...results.summary import Summary
 from ...spec.spec import Spec
+from ..study import check_evaluations
 from ..study import run_training as measure
 
 TRAINED = "trained on"
@@ -23,8 +23,7 @@ TRAINED = "trained on"
 
 def check(spec: Spec) -> None:
     """Raise `SpecError` unless there is another box to compare with."""
-    if not spec.evaluations:
-        raise SpecError('evaluations: missing; shapes needs one at least, as circle.box = "circle"')
+    check_evaluations(spec, 'circle.box = "circle"')
 
 
 def analyse(results: Results) -> Analysis:

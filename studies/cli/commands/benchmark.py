@@ -20,9 +20,7 @@ def command() -> None:
 
 @command.command()
 @click.argument("spec", type=options.PATH, metavar="SPEC.toml")
-@click.option(
-    "--out", type=options.PATH, metavar="DIR", required=True, help="Where to keep the study."
-)
+@options.out("Where to keep the study.", required=True)
 @click.option("--robots", type=sizes, multiple=True, default=["2", "4", "8"], help="How many.")
 @click.option("--seeds", type=click.IntRange(5), default=5, metavar="N", help="From seed 0 on.")
 @click.option("--name", metavar="TEXT", required=True, help="What tables call the entry.")

@@ -24,13 +24,7 @@ Case = tuple[str, Callable[[], Any], list[int]]
 
 @click.command()
 @click.argument("source", metavar="SPEC.toml|FILE.py:NAME")
-@click.option(
-    "--steps",
-    type=int,
-    metavar="N",
-    default=40,
-    help="Most steps of the episodes that are played for it.",
-)
+@options.number("--steps", "N", 40, "Most steps of the episodes that are played for it.")
 @options.changes
 def command(source: str, steps: int, changes: tuple[str, ...]) -> int:
     """Check what every scenario must promise, such as equal bits for equal seeds.

@@ -1,53 +1,39 @@
 """``nested-agents claims``: what the paper claims, and the verdict on each."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
+from ....core.plugins.messages import closest
+from ...api.study import run
+from ...claims import claims
+from ...errors import SpecError
+from ...presentation.progress import Terminal, say
+from ...results import published
 from .. import options
-
-if TYPE_CHECKING:
-    from ...claims.claims import Format
-    from ...results.published import Published
 
 
 @click.command()
-@click.option(
-    "--out",
-    type=options.PATH,
-    metavar="DIR",
-    help="Run the studies that the claims rest on, each in a directory of its own below this one; "
-    "what has been run before is read.",
+@options.out(
+    "Run the studies that the claims rest on, each in a directory of its own below this one; "
+    "what has been run before is read."
 )
-@click.option(
-    "--quick",
-    is_flag=True,
-    help="Small versions of the studies: six minutes on two cores, and wide intervals.",
+@options.flag(
+    "--quick", "Small versions of the studies: six minutes on two cores, and wide intervals."
 )
 @click.option(
     "--of",
     default="nested-agents",
-    show_default=True,
     metavar="PAPER",
     help="Whose claims: this paper's, or those of action-dependency-graphs (arXiv 2506.00797).",
 )
 @options.jobs
 @options.formats("table", "json", "markdown")
-def command(out: Path | None, quick: bool, of: str, jobs: int | None, form: Format) -> int:
+def command(out: Path | None, quick: bool, of: str, jobs: int | None, form: claims.Format) -> int:
     """Print one table: each claim of a paper, its measure, the result, the verdict.
 
     Without --out the table is made from the results that are committed in the repository.
     """
-    from ....core.plugins.messages import closest
-    from ...claims import claims
-    from ...claims.claims import print_claims
-    from ...errors import SpecError
-    from ...presentation.progress import say
-    from ...results import published
-
     if of not in claims.PAPERS:
         raise SpecError(f"--of = {of!r}: {closest(of, claims.PAPERS)}")
     if out is not None:
@@ -66,18 +52,12 @@ def command(out: Path | None, quick: bool, of: str, jobs: int | None, form: Form
     for study, of_study in results.items():
         if of_study.note:
             say(f"{study}: {of_study.note}")
-    print_claims(claims.judge({study: p.results for study, p in results.items()}, of), form)
+    claims.print_claims(claims.judge({study: p.results for study, p in results.items()}, of), form)
     return 0
 
 
-def _run(out: Path, of: str, *, quick: bool, jobs: int | None) -> dict[str, Published]:
+def _run(out: Path, of: str, *, quick: bool, jobs: int | None) -> dict[str, published.Published]:
     """Run the studies of the claims, or what is left of them; return the results by study."""
-    from ...api.study import run
-    from ...claims import claims
-    from ...errors import SpecError
-    from ...presentation.progress import Terminal
-    from ...results import published
-
     results = {}
     for study in claims.studies_of(of):
         name = study.replace("-", "_")

@@ -26,10 +26,9 @@ from .. import options
 @click.option(
     "--reference", metavar="LABEL", help="What the others are compared with; by default the first."
 )
-@click.option(
+@options.flag(
     "--statistics",
-    is_flag=True,
-    help="Add interquartile mean and probability of improvement, over the groups of --by as tasks.",
+    "Add interquartile mean and probability of improvement, over the groups of --by as tasks.",
 )
 @options.plot
 @options.where

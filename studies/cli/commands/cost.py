@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
+from ....core.agents.cost import Problem
+from ...cost.table import Form, cost_table, written
+from ...errors import refused
+from ...presentation.progress import say
 from .. import options
-
-if TYPE_CHECKING:
-    from ...cost.table import Form
 
 MOST_AGENTS = 10_000
 """Of one row: its integers have some fifty thousand digits."""
@@ -35,11 +35,9 @@ RANGE = re.compile(r"(\d{1,6})(?::(\d{1,6})(?::(\*?)(\d{1,6}))?)?", re.ASCII)
     "of your own; single-agent: Eq. 23; or ways to decide: best-response, max-plus, fitted-q, "
     "hierarchy-ppo.",
 )
-@click.option("--rules", type=int, metavar="N", default=5**7, help="|S|, rules of one agent.")
-@click.option("--actions", type=int, metavar="N", default=4, help="|A|, actions of one agent.")
-@click.option(
-    "--iterations", type=int, metavar="N", default=450, help="L, iterations (steps) of an epoch."
-)
+@options.number("--rules", "N", 5**7, "|S|, rules of one agent.")
+@options.number("--actions", "N", 4, "|A|, actions of one agent.")
+@options.number("--iterations", "N", 450, "L, iterations (steps) of an epoch.")
 @click.option("--measured/--no-measured", help="Also count and time steps of the running system.")
 @click.option(
     "--repeats",
@@ -64,12 +62,6 @@ def command(
     **quantities: int,
 ) -> int:
     """Print the cost of hierarchies, by formula (Eq. 18-23) and, if asked, measured."""
-    from ....core.agents.cost import Problem
-    from ...api.costs import cost_table
-    from ...cost.table import written
-    from ...errors import refused
-    from ...presentation.progress import say
-
     with refused():
         problem, sizes = Problem(**quantities), numbers(agents)
         if measured := measured or repeats is not None:

@@ -8,12 +8,9 @@ from .. import options
 
 
 @click.command()
-@click.option(
-    "--out",
-    type=options.PATH,
-    metavar="DIR",
+@options.out(
+    "Where to keep the study; made if it does not exist. The same command again continues it.",
     default="nested-agents-demo",
-    help="Where to keep the study; made if it does not exist. The same command again continues it.",
 )
 @options.jobs
 @click.option("--print-spec", is_flag=True, help="Print the spec that would be run, and stop.")

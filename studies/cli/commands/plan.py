@@ -11,20 +11,8 @@ from .. import options
 @click.command()
 @click.argument("spec", type=options.PATH, metavar="SPEC.toml")
 @options.jobs
-@click.option(
-    "--deviation",
-    type=float,
-    metavar="SD",
-    default=0.25,
-    help="Standard deviation that is supposed of the differences of single seeds.",
-)
-@click.option(
-    "--smallest",
-    type=float,
-    metavar="D",
-    default=0.2,
-    help="The smallest difference of success rates that is of interest.",
-)
+@options.number("--deviation", "SD", 0.25, "Supposed standard deviation of differences of seeds.")
+@options.number("--smallest", "D", 0.2, "The smallest difference of success rates of interest.")
 @click.option("--timed/--no-timed", default=True, help="Try two episodes of every condition.")
 @options.changes
 def command(spec: Path, changes: tuple[str, ...], **supposed: Any) -> int:

@@ -19,7 +19,7 @@ def command(name: str | None) -> int:
             print_wrapped(preset.summary, f"{key:<{left}}", left)
         return 0
     from ...spec.conditions import resolve
-    from ...spec.toml import dumps
+    from ...spec.overlay import dumps
 
     settings = resolve(name, {}, {})
     if defaults := settings.scenario.scenario_defaults(name):

@@ -9,12 +9,7 @@ from .. import options
 
 @click.command()
 @options.directory
-@click.option(
-    "--out",
-    type=options.PATH,
-    metavar="FILE.html",
-    help="Where to write; by default report.html in the study's directory.",
-)
+@options.out("Where to write; by default report.html in the study's directory.", "FILE.html")
 @options.trust
 def command(directory: Path, out: Path | None, trust: bool) -> int:
     """Write a study as one self-contained HTML file: verdict, table, figures, replays, spec.

@@ -10,13 +10,10 @@ from .. import options
 
 @click.command()
 @click.argument("spec", type=options.PATH, metavar="SPEC.toml")
-@click.option(
-    "--out",
-    type=options.PATH,
-    metavar="DIR",
-    required=True,
-    help="Where to keep the study; made if it does not exist. Every trial is kept the moment it "
+@options.out(
+    "Where to keep the study; made if it does not exist. Every trial is kept the moment it "
     "finishes, so interrupting costs only those that are running.",
+    required=True,
 )
 @options.running
 @options.trust

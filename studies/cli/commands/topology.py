@@ -1,13 +1,21 @@
 """``nested-agents topology``: which hierarchies there are, and what one of them looks like."""
 
+from __future__ import annotations
+
 import tomllib
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from ....core.agents.joint_agents import Agents
+from ....core.interface.scenario import groups_of
 from ....topologies.view import Form, HierarchyView, kinds, printed, view
+from ...errors import SpecError, refused
 from .. import options
+
+if TYPE_CHECKING:
+    from ...spec.spec import Spec
 
 TOPOLOGY = {"kind", "members", "edges"}
 """Keys of a file that holds a topology and no more."""
@@ -60,7 +68,6 @@ def show(
     teams.json, ...; or the spec of a study, whose hierarchies are shown over its own agents.
     """
     from ....topologies.drawing import draw
-    from ...errors import SpecError, refused
 
     with refused():
         views = _of_spec(topology)
@@ -89,6 +96,27 @@ def _of_spec(path: str) -> list[HierarchyView] | None:
     if TOPOLOGY & table.keys() or (list(table) == ["topology"] and "kind" not in table["topology"]):
         return None
     from ...spec.spec import Spec
-    from ...trials.hierarchies import views
 
-    return views(Spec.load(Path(path)))
+    return _views(Spec.load(Path(path)))
+
+
+def _views(spec: Spec) -> list[HierarchyView]:
+    """Return the distinct hierarchies of conditions and evaluations, called by the first of each.
+
+    Raises
+    ------
+    SpecError
+        If one cannot be built; one line.
+    """
+    distinct: dict[tuple[object, ...], HierarchyView] = {}
+    with spec.sources.active():
+        for condition in spec.conditions():
+            others = {f"{condition.label}, {name}": s for name, s in condition.evaluations}
+            for label, settings in ({condition.label: condition.settings} | others).items():
+                with refused(after=f" (condition {label!r})"):
+                    scenario, hierarchy = settings.arrange(settings.scenario.build())
+                own, failures = len(scenario.action_set), settings.topology.failures
+                shown = HierarchyView(label, hierarchy, groups_of(scenario), own, failures)
+                parts = hierarchy.told, hierarchy.considers, failures, own
+                distinct.setdefault((hierarchy.agents, hierarchy.edges, *parts), shown)
+    return list(distinct.values())

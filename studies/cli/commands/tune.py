@@ -10,27 +10,14 @@ from .. import options
 
 @click.command()
 @click.argument("spec", type=options.PATH, metavar="SPEC.toml")
-@click.option(
-    "--out",
-    type=options.PATH,
-    metavar="DIR",
+@options.out(
+    "Where to keep the study of all configurations, best.toml and configurations.csv.",
     required=True,
-    help="Where to keep the study of all configurations, best.toml and configurations.csv.",
 )
-@click.option(
-    "--trials",
-    type=int,
-    metavar="N",
-    default=20,
-    help="Configurations to try, the spec's own among them.",
-)
-@click.option(
-    "--seeds", type=int, metavar="N", default=16, help="On which the last ones are compared."
-)
-@click.option(
-    "--first-seed", type=int, metavar="N", default=10_000, help="Of these seeds; at least 10000."
-)
-@click.option("--draw", type=int, metavar="N", default=0, help="Seed of the draw.")
+@options.number("--trials", "N", 20, "Configurations to try, the spec's own among them.")
+@options.number("--seeds", "N", 16, "On which the last ones are compared.")
+@options.number("--first-seed", "N", 10_000, "Of these seeds; at least 10000.")
+@options.number("--draw", "N", 0, "Seed of the draw.")
 @options.running
 @options.changes
 def command(spec: Path, out: Path, changes: tuple[str, ...], **tuned: Any) -> int:

@@ -12,9 +12,9 @@ import pytest
 from made_up_commands import run_here
 from rich.console import Console
 
+from nested_agents.studies.cli.commands.watch import curve, frame
 from nested_agents.studies.cli.main import main
-from nested_agents.studies.cli.watching import curve, frame
-from nested_agents.studies.spec.toml import dumps
+from nested_agents.studies.spec.overlay import dumps
 
 
 @pytest.fixture(scope="module")

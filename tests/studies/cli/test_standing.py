@@ -9,7 +9,6 @@ from nested_agents.studies.store import integrity
 from nested_agents.studies.store.store import LOCK, MARK, Running, Store, look
 from nested_agents.studies.trials import code
 from nested_agents.studies.workers.runner import save
-from nested_agents.studies.workers.worker import cores
 
 
 @pytest.fixture
@@ -46,14 +45,6 @@ def test_what_a_run_has_handed_out_is_running(study):
         running.end(made_up.TRIALS[5].identity)
         assert look(study)[1] == {}
     assert look(study) is None
-
-
-def test_the_time_left_is_told_for_the_processes_that_ran(study):
-    with made_up.opened(study), Running(study, 3):
-        pass
-    assert read(study).processes == 3
-    (study / MARK).write_text('{"processes": "many"}')
-    assert read(study).processes == cores()
 
 
 def test_a_mark_that_outlived_its_process_is_passed_over(study):

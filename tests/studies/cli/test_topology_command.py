@@ -145,7 +145,7 @@ def test_a_plot_is_written(said, tmp_path: Path) -> None:
         (("show", "chain:"), "topology 'chain:': order must be written a,b,c, received ''"),
         (("show", "tree:0"), "topology 'tree:0': branching = 0: must be at least 1"),
         (("show", "tree:2", "--agents", "x"), "'--agents': 'x' is not a valid integer"),
-        (("show", "chain", "--plot", ""), "an argument: must not be empty"),
+        (("show", "chain", "--plot", ""), "--plot: must not be empty"),
         (("show", "edges:a>b,b>a"), "topology 'edges': cycle a -> b -> a"),
         (("show", "chian"), "did you mean 'chain'?"),
         (("show", "chain", "--agents", "0"), "'--agents': 0 is not in the range x>=1"),

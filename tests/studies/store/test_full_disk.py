@@ -9,7 +9,7 @@ import pytest
 from nested_agents.studies.api import run_study as studies_run
 from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli.main import main
-from nested_agents.studies.spec.toml import dumps
+from nested_agents.studies.spec.overlay import dumps
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.workers.worker import attempt
 
@@ -57,7 +57,7 @@ def ballast(disk, free):
 def content(directory):
     with Store.open(directory) as store:
         store.verify()
-        rows = store.rows("training"), store.rows("evaluation")
+        rows = list(store.episodes()[1])
     return rows, {p.name: p.read_bytes() for p in (directory / "recordings").iterdir()}
 
 

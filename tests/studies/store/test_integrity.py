@@ -27,7 +27,7 @@ def finish(directory):
 def content(directory):
     with Store.open(directory) as store:
         store.verify()
-        rows = store.rows("training"), store.rows("evaluation"), store.numbers()
+        rows = list(store.episodes()[1]), store.numbers()
     return rows, {p.name: p.read_bytes() for p in (directory / "recordings").iterdir()}
 
 

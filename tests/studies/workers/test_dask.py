@@ -15,7 +15,7 @@ from nested_agents.studies.api import run_study as studies_run
 from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.errors import SpecError
-from nested_agents.studies.spec.toml import dumps
+from nested_agents.studies.spec.overlay import dumps
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.keeping import pending
 from nested_agents.studies.workers import dask as dask_workers
@@ -86,7 +86,7 @@ def content(store):
     """Rows and recordings, byte for byte."""
     recordings = sorted((store.directory / "recordings").glob("*.npz"))
     files = {path.name: path.read_bytes() for path in recordings}
-    return store.rows("training"), store.rows("evaluation"), files
+    return list(store.episodes()[1]), files
 
 
 def test_a_worker_killed_in_a_cluster_costs_its_running_trial_only(cluster, tmp_path, expected):

@@ -16,7 +16,7 @@ from nested_agents.studies.workers.workers import LokyWorkers, start_workers
 
 
 def content(store):
-    return store.rows("training"), store.rows("evaluation")
+    return list(store.episodes()[1])
 
 
 def run(directory, measure, jobs=2):
