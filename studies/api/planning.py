@@ -47,8 +47,6 @@ QUICK, LONG = 0.25, 2.0
 last."""
 FASTER, SLOWER = 0.7, 2.2
 """By what the time of another process, and other seeds, differ from what was tried."""
-IDLER = 2.0
-"""By how much a busy machine may be less so by then."""
 KEEPING = np.array([0.02, 0.15])
 """Seconds to hand out a trial and to keep it, from and to: a disk takes longer than a processor."""
 STARTS = 5
@@ -183,10 +181,10 @@ def _taken(spec: Spec, trials: Sequence[Trial], processes: int) -> tuple[Range, 
     # Processes that have no trial left wait for the last one.
     slow += (1 - 1 / processes) * max(each.seconds[1] for each in tried)
     busy = max((time.perf_counter() - begin) / (_used() - used), 1.0)
-    least, most = FASTER * max(busy / IDLER, 1.0), SLOWER * busy
+    least, most = FASTER * busy**0.5, SLOWER * busy  # others may stop, or not
     memory = _resident() + max(each.memory for each in tried)
     seconds = least * (started + quick), most * (started + loading + slow)
-    return seconds, processes * memory
+    return (float(seconds[0]), float(seconds[1])), processes * memory
 
 
 def try_out(trial: Trial) -> Tried:

@@ -93,7 +93,7 @@ def load_entry(path: Path) -> Entry:
     """
     try:
         return Entry(**tuples(json.loads(path.read_text(encoding="utf-8"))))
-    except (ValueError, TypeError) as error:  # of JSON, or of a rule
+    except (ValueError, TypeError, RecursionError) as error:  # of JSON, or of a rule
         raise SpecError(f"{path}: {error}") from None
 
 

@@ -125,7 +125,7 @@ def load(path: Path) -> Published:
     """
     try:
         return loads(path.read_text(encoding="utf-8"))
-    except (KeyError, TypeError, AttributeError, ValueError) as error:
+    except (KeyError, TypeError, AttributeError, ValueError, RecursionError) as error:
         raise SpecError(f"{path}: holds no published results: {error}") from None
 
 

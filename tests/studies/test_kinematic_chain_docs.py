@@ -20,6 +20,10 @@ REACHED = ("success", "evaluation success", "decision [ms]")
         ("arms", REACHED),
         ("long-arms", REACHED),
         ("arm-transfer", ("evaluation success", "success, eight", "success, sixteen")),
+        (
+            "thousand-arms",
+            ("evaluation success", *(f"success, {n}" for n in ("128", "256", "512", "1,024"))),
+        ),
         ("locked-joint", ("before", "just after", "end")),
     ],
 )

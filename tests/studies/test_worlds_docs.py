@@ -5,10 +5,53 @@ from pathlib import Path
 import pytest
 from published_tables import print_table
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "worlds.md"
+from nested_agents.studies.cli.main import main
+from nested_agents.studies.results import published
+from nested_agents.studies.spec.spec import Spec
+from nested_agents.studies.trials.session import Session
+from nested_agents.studies.trials.trial import trials_of
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = ROOT / "docs" / "worlds.md"
+WORLDS = ROOT / "examples" / "worlds"
 COLUMNS = ("success last 5", "evaluation success", "total reward")
 
 
 def test_the_pendulum(capsys: pytest.CaptureFixture[str]) -> None:
     table = print_table("pendulum", COLUMNS, capsys)
     assert table in PAGE.read_text(encoding="utf-8"), f"docs/worlds.md: put in\n{table}"
+
+
+@pytest.mark.parametrize("path", sorted(WORLDS.glob("*.json")), ids=lambda path: path.stem)
+def test_worlds_of_others(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    table = {**published.load(path).outline.table, "seeds": 12}
+    assert table == Spec.load(path.with_suffix(".toml")).table()
+    assert main(["table", str(path), "--columns", "total reward", "--format", "markdown"]) == 0
+    rows = capsys.readouterr().out
+    assert rows in PAGE.read_text(encoding="utf-8"), f"docs/worlds.md: put in\n{rows}"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("spec", "extras", "agents"),
+    [
+        ("swimmer", ("mujoco", "stable_baselines3"), 2),
+        ("swimmer_4", ("mujoco", "stable_baselines3"), 4),
+        ("spread", ("mpe2",), 3),
+        ("spread_ppo", ("mpe2", "stable_baselines3"), 3),
+    ],
+)
+def test_specs_of_worlds_of_others_run(
+    spec: str, extras: tuple[str, ...], agents: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for extra in extras:
+        pytest.importorskip(extra, reason="extras mpe, mujoco, peers")
+    monkeypatch.chdir(ROOT)  # the swimmer of four joints is a file of examples
+    path = ROOT / "studies" / "catalogue" / "learning_curve" / f"{spec}.toml"
+    few = ["seeds=1", "episodes=2", "steps=3", "evaluation=1"]
+    for trial in trials_of(Spec.load(path, few)):
+        session = Session(trial)
+        session.train(2)
+        session.evaluate()
+        assert len(session.scenario.agents) == agents
+        assert [row.phase for row in session.result().rows] == ["training"] * 2 + ["evaluation"]

@@ -74,7 +74,9 @@ def test_what_is_exported_is_read_back(tmp_path, capsys) -> None:
     assert back.table(["evaluation success"]).csv == study.table(["evaluation success"]).csv
 
 
-@pytest.mark.parametrize("content", ["[]", "{}", '{"a": 1}', '{"a": {"b": {"c": {"d": {}}}}}'])
+@pytest.mark.parametrize(
+    "content", ["[]", "{}", '{"a": 1}', '{"a": {"b": {"c": {"d": {}}}}}', "[" * 100_000]
+)
 def test_other_files_are_refused(content, tmp_path, capsys) -> None:
     path = tmp_path / "other.json"
     path.write_text(content)
