@@ -18,7 +18,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field, PrivateAttr, ValidationError, field_validator
+from pydantic import Field, PrivateAttr, ValidationError, ValidationInfo, field_validator
 
 from ...core.agents.joint_agents import Agents
 from ...core.learners import LearnerSettings
@@ -110,20 +110,15 @@ class Spec(Settings):
     _conditions: tuple[Condition, ...] = PrivateAttr(default=())
     _sources: Sources = PrivateAttr(default_factory=Sources)
 
-    @field_validator("study")
+    @field_validator("study", "preset")
     @classmethod
-    def _known(cls, value: str) -> str:
-        if is_reference(value):
+    def _known(cls, value: str, info: ValidationInfo) -> str:
+        is_study = info.field_name == "study"
+        known = STUDIES.names() if is_study else PRESETS
+        if is_study and is_reference(value):
             STUDIES.find(value)
-        elif value not in STUDIES.names():
-            raise ValueError(closest(value, STUDIES.names()))
-        return value
-
-    @field_validator("preset")
-    @classmethod
-    def _preset(cls, value: str) -> str:
-        if value not in PRESETS:
-            raise ValueError(closest(value, PRESETS))
+        elif value not in known:
+            raise ValueError(closest(value, known))
         return value
 
     @field_validator("seeds", mode="before")

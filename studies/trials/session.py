@@ -159,6 +159,14 @@ class Session:
             self._evaluate(there, f"{EVALUATION}{name}", (observers or {}).get(name))
             rng.state = state
 
+    def finish(
+        self, numbers: Mapping[str, float] | None = None, usage: Mapping[str, float] | None = None
+    ) -> TrialResult:
+        """Evaluate the team, also in the trial's `evaluations`; return the `result`."""
+        self.evaluate()
+        self.run_other_evaluations()
+        return self.result(numbers, usage)
+
     def _keep_team(self) -> None:
         if self.trial.keep_teams:
             arrays = self.team.arrays()
@@ -261,6 +269,4 @@ def run_trial(trial: Trial) -> TrialResult:
     """
     session = Session(trial)
     session.train(trial.episodes)
-    session.evaluate()
-    session.run_other_evaluations()
-    return session.result()
+    return session.finish()

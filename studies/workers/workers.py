@@ -67,12 +67,9 @@ def start_workers(
         raise SpecError(
             f"--backend dask: {error.name} is not installed; pip install 'nested-agents[dask]'"
         ) from None
-    if address is None:
-        with DaskWorkers.local(wanted) as workers:
-            yield workers
-    else:
-        with DaskWorkers.at(address, jobs) as workers:
-            yield workers
+    cluster = DaskWorkers.local(wanted) if address is None else DaskWorkers.at(address, jobs)
+    with cluster as workers:
+        yield workers
 
 
 QUIET = "ignore:resource_tracker:UserWarning"

@@ -41,9 +41,7 @@ def measure(trial: Trial) -> TrialResult:
     session.evaluate(phase=AFTER_ONE)
     generator.state = state
     session.train(trial.episodes - 1, first=1)
-    session.evaluate()
-    session.run_other_evaluations()
-    return session.result()
+    return session.finish()
 
 
 def analyse(results: Results) -> Analysis:

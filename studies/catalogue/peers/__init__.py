@@ -52,9 +52,7 @@ def measure(trial: Trial) -> TrialResult:
             state = generator.state
             session.evaluate(phase=f"{AFTER}{count}")
             generator.state = state
-    session.evaluate()
-    session.run_other_evaluations()
-    return session.result(usage=usage)
+    return session.finish(usage=usage)
 
 
 @dataclass(frozen=True)

@@ -79,9 +79,7 @@ def measure(trial: Trial) -> TrialResult:
     period = getattr(trial.settings.scenario, "period", None)
     if period is not None:
         numbers["period"] = float(period)
-    session.evaluate()
-    session.run_other_evaluations()
-    return session.result(numbers, {"decision_median": float(np.median(session.deciding))})
+    return session.finish(numbers, {"decision_median": float(np.median(session.deciding))})
 
 
 def analyse(results: Results) -> Analysis:

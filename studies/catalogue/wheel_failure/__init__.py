@@ -74,11 +74,9 @@ def measure(trial: Trial) -> TrialResult:
     kept = _keeping_weights(session)
     session.train(trial.episodes - onset, onset)
     session.train(trial.episodes - onset, onset, phase=KEPT, team=kept)
-    session.evaluate()
-    session.run_other_evaluations()
     begun = sorted({f.episode for f in getattr(trial.settings.scenario, "failures", ())} - {onset})
     later = {f"onset.{k}": float(episode) for k, episode in enumerate(begun, 2)}
-    return session.result({"onset": float(onset), **later})
+    return session.finish({"onset": float(onset), **later})
 
 
 def check(spec: Spec) -> None:

@@ -10,8 +10,7 @@ import nested_agents as na
 from nested_agents.core.numerics.arrays import FloatArray
 from nested_agents.scenarios.kinematic_chain.config import KinematicChainSettings
 from nested_agents.scenarios.kinematic_chain.scenario import KinematicChain
-from nested_agents.scenarios.kinematic_chain.variables import CHAIN_VARIABLES, COMPILED
-from nested_agents.scenarios.kinematic_chain.view import ChainView
+from nested_agents.scenarios.kinematic_chain.variables import CHAIN_VARIABLES, COMPILED, ChainView
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.trials.arrangement import check
@@ -158,7 +157,7 @@ def test_it_brings_what_learns_best_and_a_spec_has_the_last_word() -> None:
     ("table", "said"),
     [
         ({"joints": 1}, "scenario.joints = 1"),
-        ({"joints": 1025}, "scenario.joints = 1025"),
+        ({"joints": 6000}, "scenario.joints = 6000"),
         ({"joint_limit": 4.0}, "scenario.joint_limit = 4.0"),
         ({"failures": [{"kind": "free", "joints": "joint1"}]}, "free"),
         ({"state_space": ["gap"]}, "gap"),
