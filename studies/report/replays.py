@@ -169,4 +169,5 @@ def _reached(store: Store) -> Mapping[tuple[str, int, int], bool]:
     """Return whether each training episode reached the goal, by condition, seed and number."""
     training = read(store).episodes.query("phase == 'training'")
     success: Any = training.set_index(["condition", "seed", "episode"])["success"]
-    return dict(success.astype(bool))
+    reached: dict[tuple[str, int, int], bool] = success.astype(bool).to_dict()
+    return reached
