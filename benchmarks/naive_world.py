@@ -70,7 +70,7 @@ class NaiveWorld(World):
         self.contact_time = touched / periods
 
     def _drive(self, r: int, speeds: list[float]) -> None:
-        """Apply the forces of a robot's wheels, see `scenarios.box_pushing.world.wheels`."""
+        """Apply the forces of a robot's wheels, see `scenarios.box_pushing.world.robots`."""
         body, model = self._bodies[r], self._wheels
         vx, vy = body.linearVelocity
         omega = body.angularVelocity

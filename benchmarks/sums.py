@@ -22,8 +22,7 @@ from itertools import product
 import numpy as np
 
 from nested_agents.core.agents.loop import world_seed
-from nested_agents.core.coordination.elimination import Elimination, Scope
-from nested_agents.core.coordination.max_plus import MaxPlus
+from nested_agents.core.coordination.maximisers import Elimination, MaxPlus, Scope
 from nested_agents.core.interface.prediction import Prediction
 from nested_agents.core.numerics.arrays import FloatArray, IntArray
 from nested_agents.studies.spec.spec import Spec

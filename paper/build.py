@@ -14,7 +14,7 @@ import jinja2
 import nested_agents as na
 from nested_agents.studies.benchmark import push_n
 from nested_agents.studies.claims import claims
-from nested_agents.studies.presentation.cells import Cell
+from nested_agents.studies.presentation.tables import Cell
 from nested_agents.studies.results import published
 from nested_agents.studies.results.comparison import order_tests
 from nested_agents.studies.results.summary import Summary, two_figures

@@ -9,7 +9,7 @@ Examples
 ('cart1', 'cart2')
 """
 
-from ..core.plugins.plugged import SettingsRegistry
+from ..core.plugins.registry import SettingsRegistry
 from ..core.plugins.settings import ScenarioSettings
 
 __all__ = ["DEFAULT", "SCENARIOS"]

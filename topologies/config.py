@@ -18,7 +18,7 @@ from ..core.interface.hierarchy import Considers, Hierarchy, Told
 from ..core.plugins import sources
 from ..core.plugins.deferred import nx
 from ..core.plugins.messages import closest
-from ..core.plugins.plugged import Plugged, SettingsRegistry
+from ..core.plugins.registry import Plugged, SettingsRegistry
 from ..core.plugins.settings import Settings, SettingsError, tuples, unwritten
 from . import files
 from .builders import Bodies, Members, Names, from_networkx, names_of  # noqa: F401 - of a field

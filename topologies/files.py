@@ -16,7 +16,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from ..core.plugins import plugged, sources
+from ..core.plugins import registry, sources
 from ..core.plugins.deferred import nx
 from .builders import Bodies, Names, independent
 from .checks import check_legible, with_edges
@@ -86,7 +86,7 @@ def _called(build: Callable[..., Any], name: str, agents: Names, bodies: Bodies)
     except KeyboardInterrupt:
         raise
     except BaseException as error:
-        ours = {__file__, plugged.__file__}
+        ours = {__file__, registry.__file__}
         frames = [f for f in traceback.extract_tb(error.__traceback__) if f.filename not in ours]
         # Of the user's file, whatever library it has called.
         lines = [f.lineno for f in frames if f.filename == frames[0].filename]

@@ -25,6 +25,9 @@ from ..numerics.streams import set_words, words_of
 from ..numerics.ties import greatest
 from .messages import MessageFailure, Messages
 
+DECIDED = ("rule", "teammates", "value_of", "unseen", "plan")
+"""What of the settings of decisions an evaluator is told."""
+
 
 class Team:
     """Agents in a hierarchy, one rule base each; consequent weights are an agent's own or a role's.
@@ -117,18 +120,11 @@ class Team:
         decision = settings.decision
         if decision.rule != "random":
             problem = DecisionProblem(
-                self.rules,
-                hierarchy,
-                n_actions,
-                groups_of(scenario),
-                decision.rule,
-                decision.teammates,
-                settings.discount,
-                decision.value_of,
-                decision.unseen,
-                decision.plan,
+                self.rules, hierarchy, n_actions, groups_of(scenario),
+                discount=settings.discount,
                 handed_down=hierarchy.told == "ancestors" and not failures,
-            )
+                **{name: getattr(decision, name) for name in DECIDED},
+            )  # fmt: skip
             own: Any = self.learner
             self.evaluator = own if self._values_actions else decision.evaluator.build(problem)
         self.explorer: Explorer = settings.exploration.build(n)

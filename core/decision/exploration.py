@@ -16,7 +16,7 @@ from pydantic import Field
 from ..interface.prediction import Exploring
 from ..numerics.arrays import FloatArray
 from ..numerics.ties import greatest
-from ..plugins.plugged import SettingsRegistry
+from ..plugins.registry import SettingsRegistry
 from ..plugins.settings import Fraction, NonNegative, PartSettings, Positive
 
 

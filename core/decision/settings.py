@@ -3,9 +3,9 @@
 from typing import Annotated, Literal
 
 from ..evaluators import EVALUATORS, EvaluatorSettings
-from ..evaluators.auto import AutoSettings
 from ..evaluators.evaluator import Plan, Teammates, Unseen, ValueOf
-from ..plugins.plugged import Plugged
+from ..evaluators.exact import AutoSettings
+from ..plugins.registry import Plugged
 from ..plugins.settings import Settings, unwritten
 
 

@@ -7,13 +7,13 @@ mean (uniform), or their mean weighted with how often the agents below were seen
 (empirical frequencies). Evaluators differ in which joint actions they try.
 """
 
-from ..plugins.plugged import SettingsRegistry
+from ..plugins.registry import SettingsRegistry
 from .evaluator import EvaluatorSettings
 
 EVALUATORS = SettingsRegistry(
     "evaluator",
     {
-        "auto": f"{__name__}.auto:AutoSettings",
+        "auto": f"{__name__}.exact:AutoSettings",
         "exact": f"{__name__}.exact:ExactEnumeration",
         "sampling": f"{__name__}.exact:SamplingSettings",
         "variable-elimination": f"{__name__}.coordination:VariableEliminationSettings",

@@ -17,8 +17,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from ..coordination.elimination import Elimination, Scope
-from ..coordination.max_plus import MaxPlus
+from ..coordination.maximisers import Elimination, MaxPlus, Scope
 from ..interface.prediction import Prediction
 from ..numerics.arrays import FloatArray, IntArray
 from .evaluator import Aggregation, DecisionProblem, Deliberation, EvaluatorSettings, combinations

@@ -111,8 +111,7 @@ class Hierarchy:
         _check_edges(edges, agents, ARROW, "superior")
         _check_edges([tuple(sorted(pair)) for pair in sides], agents, LINE, "neighbour")
         index = {name: i for i, name in enumerate(agents)}
-        graph = nx.DiGraph()
-        graph.add_nodes_from(range(len(agents)))
+        graph = nx.empty_graph(len(agents), create_using=nx.DiGraph)
         graph.add_edges_from((index[a], index[b]) for a, b in edges)
         if not nx.is_directed_acyclic_graph(graph):
             cycle = [agents[a] for a, _ in nx.find_cycle(graph)]
@@ -124,13 +123,12 @@ class Hierarchy:
         )
         """Pairs of neighbours, by index, each once."""
         self.order: tuple[int, ...] = tuple(nx.lexicographical_topological_sort(graph))
-        beside: list[set[int]] = [set() for _ in agents]
+        beside = nx.empty_graph(len(agents))
+        beside.add_edges_from(self.neighbours)
         for a, b in self.neighbours:
             if nx.has_path(graph, a, b) or nx.has_path(graph, b, a):
                 pair = LINE.format(agents[a], agents[b])
                 raise ValueError(f"hierarchy: neighbours {pair} are superior and subordinate, too")
-            beside[a].add(b)
-            beside[b].add(a)
         self.bodies = tuple(bodies) or tuple((name,) for name in agents)
         place = {index[name]: k for k, body in enumerate(self.bodies) for name in body}
 
@@ -140,7 +138,7 @@ class Hierarchy:
             away = {j: abs(place[j] - place[agent]) for j in RELATIONS[every](graph, agent)}
             return [j for j, bodies in away.items() if WHERE[min(bodies, 2)] in relation]
 
-        below = [{*related(i, considers, "descendants"), *own} for i, own in enumerate(beside)]
+        below = [{*related(i, considers, "descendants"), *beside[i]} for i in beside]
         self._below = tuple(tuple(sorted(agents)) for agents in below)
         above = (related(i, told, "ancestors") for i in range(len(agents)))
         self._above = tuple(tuple(sorted(agents)) for agents in above)

@@ -9,7 +9,7 @@ R(s) / (1 - discount). Siblings differ where their mathematics differs.
 from typing import cast
 
 from ..interface.scenario import Scenario
-from ..plugins.plugged import SettingsRegistry
+from ..plugins.registry import SettingsRegistry
 from .learner import LearnerSettings, TeamSettings
 
 PEERS = f"{__name__.rpartition('.')[0]}.policies.settings"

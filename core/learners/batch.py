@@ -16,12 +16,13 @@ import numpy as np
 from pydantic import Field
 
 from ..numerics.arrays import FloatArray, IntArray
+from ..numerics.compiling import njit
 from ..plugins.settings import Fraction, Positive
-from ..rules.kernels import regression
-from ..rules.kernels.regression import CUT_OFF, TERMINAL
 from ..rules.rule_base import RuleBase
 from .learner import LearnerSettings
 
+TERMINAL, CUT_OFF = -1, -2
+"""In place of the index of the next after-state: it is entered for ever; it is not known."""
 REWARD_SCALE = 100.0
 """Rewards are of the order of 0.01; the ridge weighs against rewards times this."""
 MOST_RULES = 4096
@@ -133,11 +134,11 @@ class BatchTD:
             low, high = np.array([rewards.min(), rewards.max()]) / (1.0 - s.discount)
             theta = self.theta[row].astype(float) * REWARD_SCALE
             for _ in range(s.regression_iterations):
-                returns = regression.lambda_returns(
+                returns = lambda_returns(
                     values_of(theta), rewards, follower, s.discount, s.trace_decay
                 )
                 targets = weights * np.clip(returns, low, high)
-                theta = solve(regression.moment(taken, strengths, targets, theta.size))
+                theta = solve(moment(taken, strengths, targets, theta.size))
             change = theta / REWARD_SCALE - self.theta[row]
             self.theta[row] += s.target_averaging_rate * change
         return self.theta.size
@@ -154,8 +155,8 @@ class BatchTD:
         """
         active, strengths = self._active[row]
         gram = self.settings.ridge * np.eye(self.rules.n_rules)
-        regression.add_gram(gram, active, strengths, known)
-        return known, lambda theta: regression.row_values(theta, active, strengths), solver(gram)
+        add_gram(gram, active, strengths, known)
+        return known, lambda theta: row_values(theta, active, strengths), solver(gram)
 
     def _extend(self) -> None:
         """Find the active rules of the after-states that are new since the last regression."""
@@ -238,3 +239,59 @@ class BatchTD:
         """Begin with weights and experience of another team, of which no episode is under way."""
         self.theta = former.theta[rows]
         self._earlier = [Earlier(former.states_of(row), *former._outcomes(row)) for row in rows]
+
+
+@njit(cache=True)
+def add_gram(
+    gram: FloatArray, active: IntArray, strengths: FloatArray, weights: FloatArray
+) -> None:
+    """Add the weighted phi phi' of every row to `gram`."""
+    for s in range(len(active)):
+        for a in range(active.shape[1]):
+            weighted = weights[s] * strengths[s, a]
+            if weighted > 0.0:
+                for b in range(active.shape[1]):
+                    gram[active[s, a], active[s, b]] += weighted * strengths[s, b]
+
+
+@njit(cache=True)
+def row_values(theta: FloatArray, active: IntArray, strengths: FloatArray) -> FloatArray:
+    """Return f ``(N,)`` of all rows."""
+    values = np.zeros(len(active))
+    for s in range(len(active)):
+        for a in range(active.shape[1]):
+            values[s] += strengths[s, a] * theta[active[s, a]]
+    return values
+
+
+@njit(cache=True)
+def moment(
+    active: IntArray, strengths: FloatArray, targets: FloatArray, n_rules: int
+) -> FloatArray:
+    """Return the sum of phi times target over all rows."""
+    moment = np.zeros(n_rules)
+    for s in range(len(active)):
+        for a in range(active.shape[1]):
+            moment[active[s, a]] += strengths[s, a] * targets[s]
+    return moment
+
+
+@njit(cache=True)
+def lambda_returns(
+    values: FloatArray, rewards: FloatArray, follower: IntArray, discount: float, decay: float
+) -> FloatArray:
+    """Return the lambda-return of every row, by recursion from the end of each episode.
+
+    ``G(s) = R(s) + gamma ((1 - lambda) f(s') + lambda G(s'))``
+    """
+    returns = np.empty(len(values))
+    for s in range(len(values) - 1, -1, -1):
+        if follower[s] == TERMINAL:
+            returns[s] = rewards[s] / (1.0 - discount)
+        elif follower[s] == CUT_OFF:
+            returns[s] = values[s]
+        else:
+            after = follower[s]
+            ahead = (1.0 - decay) * values[after] + decay * returns[after]
+            returns[s] = rewards[s] + discount * ahead
+    return returns

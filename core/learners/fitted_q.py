@@ -27,12 +27,11 @@ from ..decision.settings import Decision
 from ..evaluators.evaluator import Counts, Deliberation
 from ..interface.spaces import ActionSet, StateSpace, choice
 from ..numerics.arrays import FloatArray, IntArray
-from ..plugins.plugged import Plugged
+from ..plugins.registry import Plugged
 from ..plugins.settings import Positive
-from ..rules.kernels import regression
 from ..rules.kernels.fuzzy import Partition
 from ..rules.rule_base import RuleBase
-from .batch import BatchTD, Function, solver
+from .batch import BatchTD, Function, add_gram, row_values, solver
 from .learner import LearnerSettings
 
 NOBODY = "nobody"
@@ -160,9 +159,7 @@ class FittedQ(BatchTD):
 
         def values_of(theta: FloatArray) -> FloatArray:
             columns = np.ascontiguousarray(theta.reshape(-1, n_actions).T)
-            return np.max(
-                [regression.row_values(own, active, strengths) for own in columns], axis=0
-            )
+            return np.max([row_values(own, active, strengths) for own in columns], axis=0)
 
         def solve(moment: FloatArray) -> FloatArray:
             columns = zip(solvers, moment.reshape(-1, n_actions).T, strict=True)
@@ -184,7 +181,7 @@ class FittedQ(BatchTD):
         self._weights[row] = np.append(kept * self._weights[row], known[new])
         for action, gram in enumerate(self._gram[row]):
             weights = known[new] * (taken[:, 0] % self._n_actions == action)
-            regression.add_gram(gram, taken // self._n_actions, strengths, weights)
+            add_gram(gram, taken // self._n_actions, strengths, weights)
         return self._gram[row], np.append(self._weights[row], np.zeros(len(known) - end))
 
     def arrays(self) -> dict[str, FloatArray]:

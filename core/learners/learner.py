@@ -12,7 +12,7 @@ from ..decision.exploration import EXPLORATIONS, BurstExploration, ExplorationSe
 from ..decision.settings import Decision
 from ..interface.spaces import ActionSet, StateSpace
 from ..numerics.arrays import FloatArray
-from ..plugins.plugged import Plugged
+from ..plugins.registry import Plugged
 from ..plugins.settings import PartSettings, unwritten
 from ..rules.rule_base import RuleBase, RuleBaseSettings
 

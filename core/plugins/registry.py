@@ -7,18 +7,29 @@ Each kind of thing has one registry. A thing gets in
 3. by a name such as ``"arm.py:Arm"``, relative to the spec that says it;
 4. as the object itself, from Python: it becomes the name of where it is defined.
 
-What has settings is in a registry of their models, see `plugged`.
+What has settings is in a registry of their *settings models*, whose method `build` makes the thing.
+A class with a nested ``Settings`` stands for the model that builds it; a function for one whose
+fields are its annotated keyword-only parameters, documented as its docstring does.
 """
 
 import os
+import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from inspect import getdoc, isfunction, signature
 from pathlib import Path
 from pkgutil import resolve_name
-from typing import Any
+from typing import Annotated, Any, Literal, cast
+
+from pydantic import Field, create_model
+from pydantic_core import PydanticCustomError, core_schema
 
 from . import sources
 from .messages import closest
+from .settings import Settings, tuples
+
+MEANING = re.compile(r"^(\w+)\n((?:    .*\n?)+)", re.MULTILINE)
+"""A parameter in a docstring: its name, and what is said of it, indented."""
 
 
 class Registry:
@@ -134,3 +145,190 @@ def _relative(path: str) -> str:
     """Return a path as it is written from the working directory."""
     here, there = os.path.realpath(os.getcwd()), os.path.realpath(path)
     return os.path.relpath(there, here) if there.startswith(here + os.sep) else there
+
+
+class SettingsRegistry(Registry):
+    """The things of a kind that have settings, distinguished by ``kind`` in a table.
+
+    Parameters
+    ----------
+    kind, built_in, moved
+        As of `Registry`.
+    base
+        What the settings of things of the kind inherit.
+    root
+        What those inherit at least that are of another sort; none: there is no other sort.
+
+    Examples
+    --------
+    A class of one's own needs a nested model, and gets its instance:
+
+    >>> class Cart:
+    ...     class Settings(Settings):
+    ...         wheels: int = 2
+    ...     def __init__(self, settings):
+    ...         self.wheels = settings.wheels
+    >>> carts = SettingsRegistry("cart", {}, Settings)
+    >>> model = carts.adapted("cart.py:Cart", Cart)
+    >>> model(wheels=4).build().wheels
+    4
+    """
+
+    def __init__(
+        self,
+        kind: str,
+        built_in: Mapping[str, str],
+        base: type[Settings],
+        root: type[Settings] | None = None,
+        moved: Mapping[str, str] | None = None,
+    ) -> None:
+        super().__init__(kind, built_in, moved)
+        self.base, self.root = base, root or base
+        self._adapted: dict[tuple[str, int], tuple[Any, type[Settings]]] = {}
+
+    def model(self, name: str) -> type[Settings]:
+        """Return the settings model of a thing, by name or by where it is.
+
+        Raises
+        ------
+        ValueError
+            If there is none, or it is not of this kind; one line.
+        """
+        return self.adapted(name, self.find(name))
+
+    def adapted(self, name: str, thing: Any) -> type[Settings]:
+        """Return the settings model that stands for a thing, whose ``kind`` is `name`.
+
+        Raises
+        ------
+        ValueError
+            If its settings are not of this kind, or it cannot be called.
+        """
+        if name in self.built_in and isinstance(thing, type) and issubclass(thing, Settings):
+            return thing
+        key = name, id(thing)
+        if key not in self._adapted:
+            self._adapted[key] = thing, self._derived(name, thing)
+        return self._adapted[key][1]
+
+    def _derived(self, name: str, thing: Any) -> type[Settings]:
+        is_model = isinstance(thing, type) and issubclass(thing, Settings)
+        own = thing if is_model else getattr(thing, "Settings", self.base)
+        if not (isinstance(own, type) and issubclass(own, self.root)):
+            base = f"{self.base.__module__}.{self.base.__qualname__}"
+            raise ValueError(f"is no {self.kind}, whose Settings inherit {base}")
+        if not callable(thing):
+            raise ValueError(f"is no {self.kind}, but a {type(thing).__name__}")
+        has_own = hasattr(thing, "Settings")
+        fields = {} if is_model or has_own else _parameters(thing)
+        model = create_model(
+            own.__qualname__,
+            __base__=own,
+            __module__=own.__module__,
+            __doc__=own.__doc__ if is_model or has_own else thing.__doc__,
+            kind=(cast(Any, Literal[name]), name),
+            **fields,
+        )
+        if not is_model:
+
+            def build(settings: Settings, *given: Any) -> Any:
+                given = (settings, *given) if has_own else given
+                named = {field: getattr(settings, field) for field in fields}
+                if not isinstance(thing, type):  # a function says it itself
+                    return thing(*given, **named)
+                try:
+                    signature(thing).bind(*given, **named)
+                except TypeError as error:
+                    lacks = "" if has_own else "; it has no nested class Settings"
+                    raise ValueError(f"{self.kind} {name!r}: {error}{lacks}") from None
+                try:
+                    return thing(*given, **named)
+                except OSError:
+                    raise
+                except Exception as error:
+                    where = sources.place(error)
+                    raised = f"{self.kind} {name!r} raises {sources.format_error(error)}"
+                    if isinstance(error, ValueError):  # its own words
+                        raised = f"{sources.message(error)}{',' if where else ''}"
+                    raise ValueError(f"{raised}{where}") from error
+
+            model.build = build  # type: ignore[attr-defined]
+        return cast(type[Settings], model)
+
+    def parsed(self, text: str) -> Any:
+        """Return the settings that a name alone stands for.
+
+        Raises
+        ------
+        ValueError
+            If there is no such thing, or it has settings that must be given.
+        """
+        return self.model(text)()
+
+
+def _parameters(thing: Any) -> dict[str, Any]:
+    """Return type and default of each annotated keyword-only parameter of a function, by name.
+
+    What the section "Parameters" of its docstring, in the form of numpydoc, says of each goes with
+    the type.
+    """
+    if not isfunction(thing):
+        return {}
+    section = getdoc(thing) or ""
+    meanings = dict(MEANING.findall(section.partition("Parameters\n----------\n")[2]))
+    fields: dict[str, Any] = {}
+    for p in signature(thing).parameters.values():  # what is returned may be slow to import
+        if p.kind is p.KEYWORD_ONLY and p.annotation is not p.empty:
+            is_text = isinstance(p.annotation, str)
+            type_ = eval(p.annotation, thing.__globals__) if is_text else p.annotation
+            of_type = cast(Any, Annotated)[type_, Field(description=meanings.get(p.name))]
+            fields[p.name] = of_type, ... if p.default is p.empty else p.default
+    return fields
+
+
+def _dumped(value: Settings, info: Any) -> Any:
+    """Write settings as the model that holds them is written."""
+    return value.model_dump(mode=info.mode, exclude_none=info.exclude_none)
+
+
+class Plugged:
+    """Marks a field that holds the settings of any thing of a registry.
+
+    A table is validated by the model that its ``kind`` names; a text is what `shorthand` makes of
+    it; settings stand for themselves.
+
+    Parameters
+    ----------
+    registry
+        Which things.
+    shorthand
+        What a text stands for; none: a table is needed.
+    """
+
+    def __init__(
+        self, registry: SettingsRegistry, shorthand: Callable[[str], Settings] | None = None
+    ) -> None:
+        self.registry, self.shorthand = registry, shorthand
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> core_schema.CoreSchema:
+        """Return how pydantic validates and writes the field."""
+        return core_schema.with_info_plain_validator_function(
+            self._validated,
+            serialization=core_schema.plain_serializer_function_ser_schema(_dumped, info_arg=True),
+        )
+
+    def _validated(self, value: Any, info: Any) -> Settings:
+        if isinstance(value, Settings):
+            return value
+        if isinstance(value, str) and self.shorthand is not None:
+            return self.shorthand(value)
+        if not isinstance(value, Mapping):
+            words = "a name or a table" if self.shorthand is not None else "a table"
+            raise PydanticCustomError("table", cast(Any, f"must be {words}"))
+        try:
+            model = self.registry.model(str(value.get("kind", "")))
+        except ValueError as error:
+            raise PydanticCustomError(
+                "plugged_kind", cast(Any, "{message}"), {"message": str(error)}
+            ) from None
+        return model.model_validate(tuples(value), strict=True, context=info.context)

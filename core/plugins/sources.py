@@ -67,7 +67,6 @@ class Sources:
         self.folder = folder
         self._texts = dict(texts or {})
         self._studies = [place for place in (study, folder) if place is not None]
-        # By name; of what was sent to a worker all that is known is that its sender has run it.
         self._brought = dict.fromkeys(self._texts, brought_by) if brought_by else {}
         self._was_sent = False
 
@@ -77,8 +76,9 @@ class Sources:
     def __hash__(self) -> int:
         return hash(tuple(sorted(self._texts)))
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return _sent, (self._texts,)
+    def __getstate__(self) -> dict[str, Any]:
+        # Of what was sent to a worker all that is known is that its sender has run it.
+        return {**vars(Sources(None, self._texts)), "_was_sent": True}
 
     @property
     def texts(self) -> dict[str, str]:
@@ -196,13 +196,6 @@ class Sources:
             del sys.modules[key]
             raise ValueError(f"{name} cannot be run: {format_error(error)}") from None
         return module
-
-
-def _sent(texts: Mapping[str, str]) -> Sources:
-    """Return the files that another process has sent."""
-    sources = Sources(None, texts)
-    sources._was_sent = True
-    return sources
 
 
 _ACTIVE: ContextVar[Sources | None] = ContextVar("sources", default=None)

@@ -6,9 +6,8 @@ from stable_baselines3 import DQN
 
 from ..interface.scenario import Scenario, Transition
 from ..numerics.arrays import FloatArray, IntArray
-from .inputs import Inputs, RewardScale
 from .networks import Layers, drawing_from, prepare, weights_of
-from .peer import Peer, Seen
+from .peer import Inputs, Peer, RewardScale, Seen
 from .settings import DQNSettings
 
 

@@ -9,7 +9,7 @@ from gymnasium.spaces import Box, Discrete
 
 from ...core.interface.spaces import ActionSet
 from ...core.numerics.arrays import FloatArray, IntArray
-from ..faults.action_scales import limits_of
+from ..faults.carried import limits_of
 
 
 class Actuators:

@@ -24,10 +24,17 @@ from ...core.numerics.arrays import FloatArray, IntArray
 from ...core.plugins.sources import format_error
 from ..movies import film
 from .actuators import Actuators
-from .copies import copies_of, fault_of_copies
 from .observations import Perception
 from .settings import AdaptedSettings, GymnasiumSettings, PettingZooSettings
-from .simulators import Make, Played, Simulator, make_by_id, simulator_of
+from .simulators import (
+    Make,
+    Played,
+    Simulator,
+    copies_of,
+    fault_of_copies,
+    make_by_id,
+    simulator_of,
+)
 
 EPISODES, STEPS = 10, 200
 """Random episodes from which unknown ranges are taken, and the most steps of each."""

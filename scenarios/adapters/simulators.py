@@ -2,10 +2,21 @@
 
 A player acts and observes: the one of Gymnasium, an agent of PettingZoo. Who has left an episode
 before its end observes what it last observed, and is paid nothing.
+
+Copies of a simulator are stepped to predict what joint actions lead to. A simulator of MuJoCo is
+saved by its ``MjData``, played and brought back: what its environment makes of that, observations
+and rewards, is its own. Others are saved as Python objects, without spaces and windows, and made
+anew of that. Either way a copy has the random numbers of the original.
 """
 
-from collections.abc import Callable, Mapping
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from importlib import import_module
+from io import BytesIO
+from types import FunctionType, ModuleType
 from typing import Any, NamedTuple
 
 import gymnasium
@@ -127,3 +138,115 @@ def simulator_of(env: Any) -> Simulator:
     if not env.metadata.get("is_parallelizable", False):
         raise ValueError("its agents act in turns, allowed: those that act at the same time")
     return ParallelSimulator(aec_to_parallel(env))
+
+
+SHARED = ("pygame", "glfw", "OpenGL", "moderngl")
+"""Packages whose objects a simulator draws with; copies have them in common."""
+
+
+def copies_of(simulator: Simulator) -> PickledCopies | SavedMujoco:
+    """Return what makes copies of a simulator as it is now, by ``lane``, until its next step."""
+    data = getattr(simulator.env.unwrapped, "data", None)
+    is_mujoco = type(data).__module__.partition(".")[0] == "mujoco"
+    return SavedMujoco(simulator) if is_mujoco else PickledCopies(simulator)
+
+
+class PickledCopies:
+    """Copies of Python objects.
+
+    Parameters
+    ----------
+    simulator
+        The original.
+    """
+
+    def __init__(self, simulator: Simulator) -> None:
+        self._layers = list(_layers(simulator))
+        self._kept: dict[int, Any] = {id(layer): layer for layer in self._layers}
+        file = BytesIO()
+        pickler: Any = pickle.Pickler(file, pickle.HIGHEST_PROTOCOL)
+        pickler.persistent_id = self._identity
+        # Attribute by attribute: many environments (EzPickle) would be made anew.
+        pickler.dump([vars(layer) for layer in self._layers])
+        self._saved = file.getvalue()
+
+    def _identity(self, value: Any) -> int | None:
+        """Return the identity of what copies have in common, and of the layers themselves."""
+        if id(value) not in self._kept:
+            if not _is_shared(value):
+                return None
+            self._kept[id(value)] = value
+        return id(value)
+
+    @contextmanager
+    def lane(self) -> Iterator[Simulator]:
+        """Return a copy."""
+        made = {id(layer): object.__new__(type(layer)) for layer in self._layers}
+        unpickler: Any = pickle.Unpickler(BytesIO(self._saved))
+        unpickler.persistent_load = {**self._kept, **made}.__getitem__
+        for layer, attributes in zip(made.values(), unpickler.load(), strict=True):
+            vars(layer).update(attributes)
+        yield made[id(self._layers[0])]
+
+
+class SavedMujoco:
+    """The simulator itself, brought back afterwards.
+
+    Parameters
+    ----------
+    simulator
+        The original, an environment of MuJoCo.
+    """
+
+    def __init__(self, simulator: Simulator) -> None:
+        mujoco: Any = import_module("mujoco")
+        env: Any = simulator.env.unwrapped
+        self._simulator, self._env = simulator, env
+        self._attributes = [(layer, dict(vars(layer))) for layer in _layers(simulator)]
+        self._copy, self._saved = mujoco.mj_copyData, mujoco.MjData(env.model)
+        self._copy(self._saved, env.model, env.data)
+
+    @contextmanager
+    def lane(self) -> Iterator[Simulator]:
+        """Return the simulator, which is where it was when the context ends."""
+        try:
+            yield self._simulator
+        finally:
+            self._copy(self._env.data, self._env.model, self._saved)
+            for layer, values in self._attributes:
+                vars(layer).update(values)
+
+
+def fault_of_copies(simulator: Simulator, actions: Mapping[str, Any]) -> str:
+    """Return why a simulator cannot be copied, in words; nothing if it can.
+
+    It is started and played for some steps. Then two copies and itself must do the same.
+    """
+    simulator.reset(0)
+    for _ in range(2):
+        simulator.step(actions)
+    played = []
+    try:
+        copies = copies_of(simulator)
+        for _ in range(2):
+            with copies.lane() as lane:
+                played.append(pickle.dumps([lane.step(actions) for _ in range(2)]))
+    except Exception as error:  # an environment may be anybody's
+        return format_error(error)
+    played.append(pickle.dumps([simulator.step(actions) for _ in range(2)]))
+    return "" if len(set(played)) == 1 else "a copy does something else than the original"
+
+
+def _layers(simulator: Simulator) -> Iterator[Any]:
+    """Yield a simulator and all that its environment is wrapped in, from the outside in."""
+    layer: Any = simulator
+    while layer is not None:
+        yield layer
+        inside = vars(layer)
+        layer = inside.get("env", inside.get("aec_env"))
+
+
+def _is_shared(value: Any) -> bool:
+    """Return whether no step changes a part of an environment."""
+    fixed = gymnasium.Space, gymnasium.envs.registration.EnvSpec, FunctionType, ModuleType
+    return isinstance(value, fixed) or type(value).__module__.partition(".")[0] in SHARED

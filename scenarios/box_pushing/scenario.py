@@ -25,8 +25,8 @@ from .prediction.prediction import BoxPrediction, mean_twists
 from .prediction.predictors import ExactPrediction, Future, push_model
 from .prediction.settings import BeliefSettings
 from .prediction.situation import Premises, Situation
+from .states.relational import View
 from .states.state_spaces import state_space_for
-from .states.view import View
 from .world.boxes import box_for, growth
 from .world.geometry import wrap
 from .world.reward import Task, reward

@@ -1,7 +1,5 @@
 """The settings of the kinematic chain, as they stand in the ``[scenario]`` table of a spec."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Union
 

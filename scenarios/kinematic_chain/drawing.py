@@ -17,7 +17,7 @@ from matplotlib.patches import Circle
 
 from ...core.numerics.arrays import FloatArray
 from ..movies import Scene, film
-from .view import postures_of
+from .variables import postures_of
 
 Recording = Mapping[str, FloatArray]
 

@@ -25,8 +25,7 @@ from ...core.rules.rule_base import RuleBase
 from ..faults.settings import Failures
 from .config import PERIOD, REACH, KinematicChainSettings
 from .responses import Options, respond
-from .variables import ChainStates
-from .view import ChainView, ends_of, postures_of
+from .variables import ChainStates, ChainView, ends_of, postures_of
 
 MEASURES = (
     SUCCESS,

@@ -27,7 +27,7 @@ from ...core.evaluators import EvaluatorSettings
 from ...core.evaluators.evaluator import Counts, DecisionProblem, Deliberation
 from ...core.numerics.arrays import FloatArray, IntArray
 from .scenario import ChainPrediction
-from .view import ends_of, jacobian_of
+from .variables import ends_of, jacobian_of
 
 
 class _Scripted(ABC):

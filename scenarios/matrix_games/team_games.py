@@ -21,7 +21,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from ...core.coordination.elimination import Elimination
+from ...core.coordination.maximisers import Elimination
 from ...core.coordination.shapes import Shape, shaped
 from ...core.interface.measures import Measure
 from ...core.interface.scenario import Transition
@@ -29,7 +29,7 @@ from ...core.interface.spaces import ActionSet, StateSpace, Variable, choice
 from ...core.numerics.arrays import FloatArray, IntArray
 from ...core.plugins.deferred import nx
 from ...core.plugins.settings import NonNegative, ScenarioSettings
-from .games import OF_OPTIMA
+from .scenario import OF_OPTIMA
 
 PLAY = Variable("play", "1", 0.0, 1.0, centres=(0.0, 1.0))
 """What those see who see nothing: 0 always."""

@@ -25,7 +25,7 @@ from ...core.interface.scenario import Scenario, groups_of
 from ...core.learners import LEARNERS, LearnerSettings, TeamSettings
 from ...core.learners.batch import BatchTDSettings
 from ...core.plugins.messages import closest
-from ...core.plugins.plugged import Plugged
+from ...core.plugins.registry import Plugged
 from ...core.plugins.settings import ScenarioSettings, Settings, tuples, unwritten
 from ...scenarios import DEFAULT, SCENARIOS
 from ...topologies import build

@@ -14,7 +14,7 @@ import tomli_w
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from ...core.plugins.plugged import Plugged, SettingsRegistry
+from ...core.plugins.registry import Plugged, SettingsRegistry
 
 TomlTable = dict[str, Any]
 

@@ -8,17 +8,22 @@ from published_tables import print_table
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "predictors.md"
 
 
+TRAINED = "training success", "evaluation success"
+LAST = "success last 5", "evaluation success"
+
+
 @pytest.mark.parametrize(
-    "name",
+    ("name", "columns"),
     [
-        "predictors",
-        "predictors-arm",
-        "predictors-teams",
-        "predictors-pendulum",
-        "predictors-cartpole",
+        ("predictors", TRAINED),
+        ("predictors-arm", TRAINED),
+        ("predictors-midpoint", TRAINED),
+        ("predictors-teams", TRAINED),
+        ("predictors-pendulum", TRAINED),
+        ("predictors-cartpole", TRAINED),
+        ("predictors-cartpole-long", (*LAST, "total reward")),
     ],
 )
-def test_tables(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    columns = "training success", "evaluation success"
+def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
     table = print_table(name, columns, capsys)
     assert table in PAGE.read_text(encoding="utf-8"), f"docs/predictors.md: put in\n{table}"

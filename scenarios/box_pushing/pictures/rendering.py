@@ -27,8 +27,8 @@ from matplotlib.transforms import Affine2D
 from ....core.numerics.arrays import BoolArray, FloatArray
 from ...movies import DPI, Pixels, Scene, film
 from ..world.boxes import BoxSpec, box_for
-from ..world.infrared import infrared_readings, sensor_directions
-from ..world.robots import robot_for
+from ..world.geometry import infrared_readings
+from ..world.robots import robot_for, sensor_directions
 from ..world.settings import InfraredSettings, RobotSettings
 
 Recording = Mapping[str, FloatArray]

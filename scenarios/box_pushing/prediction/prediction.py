@@ -16,7 +16,7 @@ import numpy as np
 
 from ....core.interface.prediction import Blocks, first_alike
 from ....core.numerics.arrays import FloatArray, IntArray
-from ..states.view import View
+from ..states.relational import View
 from ..world.reward import reward
 from .belief import outcomes
 from .push import PushModel, push

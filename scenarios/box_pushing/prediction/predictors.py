@@ -21,7 +21,7 @@ from typing import ClassVar
 import numpy as np
 
 from ....core.numerics.arrays import FloatArray, IntArray
-from ..states.view import View
+from ..states.relational import View
 from ..world.boxes import BoxSpec
 from ..world.robots import compliance
 from ..world.settings import CONTROL_PERIOD, RobotSettings

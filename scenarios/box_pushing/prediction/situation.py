@@ -5,8 +5,8 @@ from functools import cached_property
 
 from ....core.interface.spaces import ActionSet
 from ....core.numerics.arrays import FloatArray
+from ..states.relational import View
 from ..states.state_spaces import BoxStateSpace
-from ..states.view import View
 from ..world.geometry import Outline
 from ..world.reward import Task
 from ..world.settings import InfraredSettings

@@ -15,8 +15,7 @@ from ....core.numerics.arrays import FloatArray, IntArray
 from ....core.numerics.compiling import njit
 from ..world import geometry as rows
 from ..world.geometry import LANES, ON_SURFACE, nearest_points
-from .relational import AWAY, STATE_VARIABLES
-from .view import ARRIVED, CLOSE, KEPT, LEAST, STILL, View
+from .relational import ARRIVED, AWAY, CLOSE, KEPT, LEAST, STATE_VARIABLES, STILL, View
 
 _EXACT = {"contract", "nsz"}
 

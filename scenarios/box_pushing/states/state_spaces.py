@@ -19,8 +19,7 @@ from ....core.numerics.arrays import FloatArray
 from ...state_variables import StateVariable, filled, find_variable, sensed, space_of
 from ..world.geometry import wrap
 from .kernels import Columns
-from .relational import STATE_VARIABLES
-from .view import View
+from .relational import STATE_VARIABLES, View
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,5 @@
 """The settings of robots, boxes, sensors, failures and the reward."""
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self, Union, get_args
 
 import numpy as np

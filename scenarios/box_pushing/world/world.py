@@ -30,10 +30,9 @@ from Box2D import _Box2D
 from ....core.numerics.arrays import FloatArray
 from ...faults.settings import Failures, Free
 from .boxes import BoxSpec
-from .geometry import gaps
-from .infrared import infrared_readings, sensor_directions
+from .geometry import gaps, infrared_readings
+from .robots import sensor_directions, wheel_model, wheel_wrenches
 from .settings import CONTROL_PERIOD, InfraredSettings, RobotSettings
-from .wheels import wheel_model, wheel_wrenches
 
 UNIT = 10.0
 """Box2D units per metre."""

@@ -5,7 +5,6 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 
-from nested_agents.core.evaluators.auto import AutoSettings
 from nested_agents.core.evaluators.best_response import BestResponse, BestResponseSettings
 from nested_agents.core.evaluators.evaluator import (
     DecisionProblem,
@@ -15,7 +14,12 @@ from nested_agents.core.evaluators.evaluator import (
     ValueOf,
     concerned,
 )
-from nested_agents.core.evaluators.exact import ExactEnumeration, Sampling, SamplingSettings
+from nested_agents.core.evaluators.exact import (
+    AutoSettings,
+    ExactEnumeration,
+    Sampling,
+    SamplingSettings,
+)
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.interface.spaces import StateSpace, Variable
 from nested_agents.core.numerics.arrays import FloatArray

@@ -10,8 +10,7 @@ from typing import Annotated
 import pytest
 
 from nested_agents.core.interface.hierarchy import Hierarchy
-from nested_agents.core.plugins.plugged import Plugged, SettingsRegistry
-from nested_agents.core.plugins.registry import Registry
+from nested_agents.core.plugins.registry import Plugged, Registry, SettingsRegistry
 from nested_agents.core.plugins.settings import Settings, SettingsError
 from nested_agents.core.plugins.sources import Sources
 

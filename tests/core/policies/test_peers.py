@@ -8,8 +8,7 @@ import pytest
 from nested_agents.core.interface.scenario import Transition
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.core.learners import LEARNERS
-from nested_agents.core.policies.inputs import FARTHEST, Inputs, RewardScale
-from nested_agents.core.policies.peer import Peer, Seen
+from nested_agents.core.policies.peer import FARTHEST, Inputs, Peer, RewardScale, Seen
 from nested_agents.scenarios.line_up import LineUpSettings
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec

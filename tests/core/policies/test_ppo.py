@@ -11,8 +11,7 @@ import pytest
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.interface.scenario import Transition
 from nested_agents.core.learners import LEARNERS
-from nested_agents.core.policies.inputs import Passing
-from nested_agents.core.policies.peer import Seen
+from nested_agents.core.policies.peer import Passing, Seen
 from nested_agents.scenarios.line_up import LineUpSettings
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.spec import Spec

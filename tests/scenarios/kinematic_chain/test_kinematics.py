@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from nested_agents.scenarios.kinematic_chain.view import ends_of, jacobian_of, postures_of
+from nested_agents.scenarios.kinematic_chain.variables import ends_of, jacobian_of, postures_of
 
 
 def composed(angles: np.ndarray, length: float) -> np.ndarray:

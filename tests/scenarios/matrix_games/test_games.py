@@ -6,8 +6,13 @@ import pytest
 from nested_agents.core.interface.scenario import Scenario
 from nested_agents.core.plugins.settings import SettingsError
 from nested_agents.scenarios.checking.checker import check_scenario
-from nested_agents.scenarios.matrix_games.games import GAMES, optimal, payoffs_of
-from nested_agents.scenarios.matrix_games.scenario import MatrixGame, MatrixGameSettings
+from nested_agents.scenarios.matrix_games.scenario import (
+    GAMES,
+    MatrixGame,
+    MatrixGameSettings,
+    optimal,
+    payoffs_of,
+)
 
 
 def game_of(name, observed):

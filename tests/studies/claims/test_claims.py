@@ -304,6 +304,8 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "pendulum",
         "predictors-pendulum",
         "predictors-cartpole",
+        "predictors-cartpole-long",
+        "predictors-midpoint",
         "peers-plans",
         "locked-joint",
         "large-failures",

@@ -2,7 +2,7 @@
 
 import pytest
 
-from nested_agents.core.plugins.plugged import Plugged
+from nested_agents.core.plugins.registry import Plugged
 from nested_agents.core.plugins.settings import Settings
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.conditions import ConditionSettings

@@ -17,7 +17,7 @@ MODULES = {"core/team.py": "N = 3  # agents", "core/loop.py": "def loop(): pass"
 
 def test_all_that_computes_is_known_and_pictures_are_not() -> None:
     known = code.modules()
-    assert {"core/agents/team.py", "scenarios/box_pushing/states/view.py"} <= known.keys()
+    assert {"core/agents/team.py", "scenarios/box_pushing/states/relational.py"} <= known.keys()
     assert not [name for name in known if "pictures" in name or name.endswith("figure.py")]
     assert code.changed(code.present()) == []
 

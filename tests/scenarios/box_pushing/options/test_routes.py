@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nested_agents.scenarios.box_pushing.options.driving import moved, paths
+from nested_agents.scenarios.box_pushing.options.pushing import moved, paths
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 
 

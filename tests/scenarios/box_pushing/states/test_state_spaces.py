@@ -13,14 +13,13 @@ from nested_agents.core.plugins.sources import Sources
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.states.kernels import COMPILED, angle_of
-from nested_agents.scenarios.box_pushing.states.relational import STATE_VARIABLES
+from nested_agents.scenarios.box_pushing.states.relational import STATE_VARIABLES, View
 from nested_agents.scenarios.box_pushing.states.state_spaces import (
     STATE_SPACES,
     BoxStateSpace,
     listed,
     state_space_for,
 )
-from nested_agents.scenarios.box_pushing.states.view import View
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES
 from nested_agents.scenarios.box_pushing.world.geometry import wrap
 from nested_agents.scenarios.state_variables import StateVariable, find_variable, sensed

@@ -8,8 +8,6 @@ from nested_agents.scenarios.box_pushing.world.robots import (
     ROBOTS,
     compliance,
     nominal_effect,
-)
-from nested_agents.scenarios.box_pushing.world.wheels import (
     wheel_model,
     wheel_wrenches,
 )
