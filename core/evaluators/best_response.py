@@ -62,8 +62,8 @@ class _Known(NamedTuple):
     concerned: IntArray
     plan: IntArray
     free: tuple[int, ...]
-    tried: IntArray
     worths: FloatArray
+    """By the action of each of the k free agents, ``(A,) * k``."""
 
     def holds(self, concerned: IntArray, plan: IntArray) -> bool:
         """Return whether it is of the same interest, and of the plan but for the body's agents."""
@@ -143,18 +143,15 @@ class BestResponse(Aggregation):
         if known is not None and not known.holds(concerned, plan):
             known = None
         if known is not None and set(free) < set(known.free):
-            known = _remaining(known, plan, free)
+            worths = known.worths[*(slice(None) if i in free else plan[i] for i in known.free)]
         else:
-            value = None if known is None else known.worths[self._index(plan, known.free)]
-            tried = self._actions[len(free)]
-            self.count(agent, len(tried))
+            value = None if known is None else known.worths.item(self._index(plan, known.free))
+            self.count(agent, self.n_actions ** len(free))
             worths = self._valued(deliberation, plan, free, value)
-            known = _Known(concerned, plan.copy(), free, tried, worths)
-        self._known = known
-        best = np.full(self.n_actions, -np.inf)
-        np.maximum.at(best, known.tried[:, free.index(agent)], known.worths)
+        self._known = _Known(concerned, plan.copy(), free, worths)
+        best: FloatArray = worths.max(axis=tuple(k for k, i in enumerate(free) if i != agent))
         # What its body does is kept in the plan; what it takes in the end may be told.
-        plan[list(free)] = known.tried[greatest(known.worths, deliberation.rng)]
+        plan[list(free)] = self._actions[len(free)][greatest(worths.ravel(), deliberation.rng)]
         return best
 
     def decide(self, first: Deliberation, exploring: Exploring) -> IntArray | None:
@@ -196,23 +193,24 @@ class BestResponse(Aggregation):
         free: tuple[int, ...],
         value: float | None,
     ) -> FloatArray:
-        """Return what all actions of the free agents of a body are worth, the plan `value`.
+        """Return what all actions of the k free agents of a body are worth ``(A,) * k``.
 
-        That is not predicted again, nor are actions that come to the same.
+        If that of the plan is known, the `value`, it is not predicted again, nor are actions that
+        come to the same.
         """
         body, tried = self._group_of[free[0]], self._actions[len(free)]
-        worths = np.empty(len(tried))
-        alike: IntArray = self._numbers[: len(tried)]
-        predicted: IntArray = alike
-        if free == self.problem.groups[body]:
-            alike, predicted = self._alike[body]
-        if value is not None:
-            planned = alike[self._index(plan, free)]
-            worths[planned], predicted = value, predicted[predicted != planned]
+        shape = (self.n_actions,) * len(free)
+        if value is None:
+            return self.predicted_worth(deliberation, _with(plan, free, tried)).reshape(shape)
+        is_whole, every = free == self.problem.groups[body], self._numbers[: len(tried)]
+        alike, distinct = self._alike[body] if is_whole else (every, every)
+        planned, worths = alike[self._index(plan, free)], np.empty(len(tried))
+        predicted = distinct[distinct != planned]
+        worths[planned] = value
         if len(predicted):
             varied = _with(plan, free, tried[predicted])
             worths[predicted] = self.predicted_worth(deliberation, varied)
-        return worths[alike]
+        return worths[alike].reshape(shape)
 
     def _planned(self, deliberation: Deliberation) -> IntArray:
         """Return a plan ``(n,)`` for the agent and those that it plans for."""
@@ -226,7 +224,7 @@ class BestResponse(Aggregation):
             bodies.setdefault(self._group_of[i], []).append(i)
         plan, value = self._started(deliberation, free), None
         for body, members in self._sweeps * list(bodies.items()):
-            worths = self._valued(deliberation, plan, tuple(members), value)
+            worths = self._valued(deliberation, plan, tuple(members), value).ravel()
             # Told apart in agent order, even where the agents of a body decide in another.
             whole = len(members) == len(self.problem.groups[body])
             distinct = self._alike[body][1] if whole else self._numbers[: len(worths)]
@@ -265,16 +263,6 @@ class BestResponse(Aggregation):
         for i in agents:
             index = index * self.n_actions + int(plan[i])
         return index
-
-
-def _remaining(known: _Known, plan: IntArray, free: tuple[int, ...]) -> _Known:
-    """Return what is known of the free agents' actions, those decided being in the plan."""
-    places = [known.free.index(i) for i in free]
-    decided = [k for k in range(len(known.free)) if k not in places]
-    actions = plan[[known.free[k] for k in decided]]
-    same = (known.tried[:, decided] == actions).all(axis=1)
-    worths = known.worths[same]
-    return _Known(known.concerned, plan.copy(), free, known.tried[same][:, places], worths)
 
 
 def _planners(problem: DecisionProblem) -> list[int]:

@@ -169,5 +169,4 @@ def _reached(store: Store) -> Mapping[tuple[str, int, int], bool]:
     """Return whether each training episode reached the goal, by condition, seed and number."""
     training = read(store).episodes.query("phase == 'training'")
     success: Any = training.set_index(["condition", "seed", "episode"])["success"]
-    reached: dict[tuple[str, int, int], bool] = success.astype(bool).to_dict()
-    return reached
+    return {key: bool(reached) for key, reached in success.items()}

@@ -246,7 +246,7 @@ class Twins(Noted):
 def test_the_plan_is_not_predicted_again(prediction, each: int) -> None:
     """Six of one wheel: 40 starts, then all actions of the first, all but the plan's of others."""
     decided(Hierarchy(NAMES, PAIRS), 0, prediction=prediction)
-    assert prediction.tried[:7] == [40, each + 1] + 5 * [each]
+    assert prediction.tried[:7] == [40, 4] + 5 * [each]
 
 
 @pytest.mark.parametrize(("sweeps", "tried"), [(0, 40 + 24), (1, 40 + 19 + 24), (2, 40 + 37 + 24)])

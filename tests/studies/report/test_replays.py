@@ -1,4 +1,5 @@
 import base64
+import json
 
 from nested_agents.scenarios.box_pushing.pictures import player
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
@@ -18,6 +19,7 @@ def test_first_and_last_of_all_finished_trials(kept, tmp_path):
     assert len(found.episodes) == 10
     assert [e["number"] for e in found.episodes[:2]] == [1, 4]
     assert (len(found.scenes), found.remarks) == (1, [])
+    assert json.loads(json.dumps(found.episodes)) == found.episodes
 
 
 def test_what_there_is_no_room_for_is_named(kept, tmp_path):
