@@ -19,6 +19,7 @@ LAST = "success last 5", "evaluation success"
         ("predictors-arm", TRAINED),
         ("predictors-midpoint", TRAINED),
         ("predictors-teams", TRAINED),
+        ("predictors-teams-three", LAST),
         ("predictors-pendulum", TRAINED),
         ("predictors-cartpole", TRAINED),
         ("predictors-cartpole-long", (*LAST, "total reward")),

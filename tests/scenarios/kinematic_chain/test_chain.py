@@ -157,7 +157,7 @@ def test_it_brings_what_learns_best_and_a_spec_has_the_last_word() -> None:
     ("table", "said"),
     [
         ({"joints": 1}, "scenario.joints = 1"),
-        ({"joints": 1025}, "scenario.joints = 1025"),
+        ({"joints": 6000}, "scenario.joints = 6000"),
         ({"joint_limit": 4.0}, "scenario.joint_limit = 4.0"),
         ({"failures": [{"kind": "free", "joints": "joint1"}]}, "free"),
         ({"state_space": ["gap"]}, "gap"),

@@ -301,6 +301,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "predictors",
         "predictors-arm",
         "predictors-teams",
+        "predictors-teams-three",
         "pendulum",
         "predictors-pendulum",
         "predictors-cartpole",

@@ -98,10 +98,10 @@ def test_ray_equals_its_reference(x: float, y: float, angle: float, which: int) 
     got = ray(edges, rounding, x, y, *direction, 0.3)
     reference = ray_numpy(edges, rounding, x, y, *direction, 0.3)
     if abs(got - reference) > 1e-7:
-        # Only a ray that grazes the surface may be judged differently.
+        # Only a ray that grazes the surface may be judged differently, or is given up beside it.
         travelled = min(got, reference)
         point = x + travelled * direction[0], y + travelled * direction[1]
-        assert abs(surface(edges, rounding, *point)[0]) < 1e-6
+        assert abs(surface(edges, rounding, *point)[0]) < 0.3 / 2000
 
 
 def test_radius_reaches_the_farthest_point() -> None:
