@@ -4,6 +4,7 @@ import re
 import sys
 from importlib.metadata import version as installed_version
 from pathlib import Path
+from types import BuiltinFunctionType, GenericAlias
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
@@ -67,6 +68,13 @@ def escape_bars(app, what, name, thing, options, lines):
         lines[i] = "``".join(parts)
 
 
+def skip_signatures_of_c(app, what, name, thing, skip, options):
+    """Leave out aliases of tuples and functions of C, over whose signatures Sphinx 9.0 stumbles."""
+    is_alias = isinstance(thing, GenericAlias) and thing.__origin__ is tuple
+    return True if is_alias or isinstance(thing, BuiltinFunctionType) else None
+
+
 def setup(app):
     """Connect what is above."""
     app.connect("autodoc-process-docstring", escape_bars)
+    app.connect("autodoc-skip-member", skip_signatures_of_c)

@@ -48,10 +48,7 @@ def read(path: str) -> nx.DiGraph | dict[str, Any]:
             graph = nx.parse_graphml(text, node_type=_name)
             check_legible(graph)
             return graph
-        as_toml = suffix == ".toml"
-        return _table_of(
-            tomllib.loads(text) if as_toml else json.loads(text, parse_constant=_no_name)
-        )
+        return _table_of(tomllib.loads(text) if suffix == ".toml" else json.loads(text))
     except RecursionError:
         raise ValueError(f"{path} holds no graph: it is nested too deeply") from None
     except (
@@ -145,7 +142,3 @@ def _name(text: str | None) -> str:
     if text is None:
         raise ValueError("a node has no id, or an edge no source or target")
     return text
-
-
-def _no_name(constant: str) -> Any:
-    raise ValueError(f"{constant} is neither a name nor JSON")

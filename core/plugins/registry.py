@@ -277,9 +277,11 @@ def _parameters(thing: Any) -> dict[str, Any]:
     section = getdoc(thing) or ""
     meanings = dict(MEANING.findall(section.partition("Parameters\n----------\n")[2]))
     fields: dict[str, Any] = {}
-    for p in signature(thing, eval_str=True).parameters.values():
+    for p in signature(thing).parameters.values():  # what is returned may be slow to import
         if p.kind is p.KEYWORD_ONLY and p.annotation is not p.empty:
-            of_type = cast(Any, Annotated)[p.annotation, Field(description=meanings.get(p.name))]
+            is_text = isinstance(p.annotation, str)
+            type_ = eval(p.annotation, thing.__globals__) if is_text else p.annotation
+            of_type = cast(Any, Annotated)[type_, Field(description=meanings.get(p.name))]
             fields[p.name] = of_type, ... if p.default is p.empty else p.default
     return fields
 

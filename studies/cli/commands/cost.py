@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from ....core.agents.cost import Problem
-from ...cost.table import Form, cost_table, written
-from ...errors import refused
-from ...presentation.progress import say
 from .. import options
+
+if TYPE_CHECKING:
+    from ...cost.table import Form
 
 MOST_AGENTS = 10_000
 """Of one row: its integers have some fifty thousand digits."""
@@ -62,6 +62,11 @@ def command(
     **quantities: int,
 ) -> int:
     """Print the cost of hierarchies, by formula (Eq. 18-23) and, if asked, measured."""
+    from ....core.agents.cost import Problem
+    from ...cost.table import cost_table, written
+    from ...errors import refused
+    from ...presentation.progress import say
+
     with refused():
         problem, sizes = Problem(**quantities), numbers(agents)
         if measured := measured or repeats is not None:

@@ -16,7 +16,8 @@ from nested_agents.studies.workers.workers import LokyWorkers, start_workers
 
 
 def content(store):
-    return list(store.episodes()[1])
+    names, rows = store.episodes()
+    return names, list(rows)
 
 
 def run(directory, measure, jobs=2):
@@ -37,9 +38,9 @@ def test_one_and_two_jobs_give_the_same_rows_and_recordings(tmp_path, uninterrup
     assert len(outcomes) == len(made_up.TRIALS)
     assert rows == uninterrupted
     assert failed == []
-    (names, training), (_, evaluation) = rows
+    names, episodes = rows
     assert names[:3] == ["condition", "preset", "seed"]
-    assert (len(training), len(evaluation)) == (6 * 4, 6 * 2)
+    assert len(episodes) == 6 * 4 + 6 * 2
 
 
 def test_results_are_kept_one_by_one_and_the_rest_runs_later(tmp_path, uninterrupted):
@@ -63,7 +64,7 @@ def test_a_failed_trial_is_kept_with_its_traceback_and_the_others_go_on(tmp_path
     assert (condition, seed) == ("frozen", 1)
     assert "in failing" in error
     assert error.rstrip().endswith("RuntimeError: a wheel came off")
-    assert len(rows[0][1]) == 5 * 4
+    assert len(rows[1]) == 5 * 4 + 5 * 2
 
 
 def test_a_failed_trial_is_run_again_only_on_request(tmp_path, uninterrupted):
