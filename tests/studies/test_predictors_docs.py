@@ -21,6 +21,7 @@ LAST = "success last 5", "evaluation success"
         ("predictors-teams", TRAINED),
         ("predictors-teams-three", LAST),
         ("predictors-pendulum", TRAINED),
+        ("predictors-pendulum-midpoint", LAST),
         ("predictors-cartpole", TRAINED),
         ("predictors-cartpole-long", (*LAST, "total reward")),
     ],

@@ -304,6 +304,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "predictors-teams-three",
         "pendulum",
         "predictors-pendulum",
+        "predictors-pendulum-midpoint",
         "predictors-cartpole",
         "predictors-cartpole-long",
         "predictors-midpoint",
