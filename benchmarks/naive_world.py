@@ -16,6 +16,7 @@ import numpy as np
 from nested_agents.core.numerics.arrays import FloatArray
 from nested_agents.scenarios.box_pushing.world.world import (
     POSITION_ITERATIONS,
+    SUBSTEPS,
     UNIT,
     VELOCITY_ITERATIONS,
     World,
@@ -52,7 +53,7 @@ class NaiveWorld(World):
         speeds = [float(speed) * UNIT for speed in wheel_speeds]
         touched = np.zeros(len(self.robots))
         for _ in range(periods):
-            for _ in range(self.substeps):
+            for _ in range(SUBSTEPS):
                 for r in range(len(self.robots)):
                     self._drive(r, speeds)
                 self._world.Step(self.dt, VELOCITY_ITERATIONS, POSITION_ITERATIONS)
