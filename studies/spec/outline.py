@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -106,9 +105,11 @@ def other_spec(store: Reading) -> str | None:
     try:
         copy = tomllib.loads(path.read_text(encoding="utf-8-sig"))
         if copy != own:
+            from .overlay import dumps
             from .spec import Spec
 
-            copy = json.loads(json.dumps(Spec.of(copy, sources_of(store)).table()))
+            tables = Spec.of(copy, sources_of(store)).table(), own
+            copy, own = (tomllib.loads(dumps(table)) for table in tables)  # without what is None
     except (OSError, ValueError, RecursionError) as error:
         return f"{path}: is not the spec of {DATABASE} beside it: {error}"
     for key in sorted(own.keys() | copy.keys()):

@@ -15,6 +15,7 @@ from rich.console import Console
 from nested_agents.studies.cli.commands.watch import curve, frame
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.overlay import dumps
+from nested_agents.studies.store.store import Store
 
 
 @pytest.fixture(scope="module")
@@ -129,6 +130,12 @@ def test_a_database_of_another_study_is_noted_by_all_that_read_it(
     said = " ".join(" ".join(said_by(capsys, command, own, *once)[1:]).split())
     assert "study.toml: is not the spec of results.sqlite beside it, whose results these" in said
     assert "steps = 6 here, 5 there" in said
+
+
+def test_what_is_none_in_one_of_two_specs_is_not_noted(study, capsys, monkeypatch) -> None:
+    kept = Store.spec
+    monkeypatch.setattr(Store, "spec", lambda store: {**kept(store), "evaluation_steps": None})
+    assert "is not the spec" not in " ".join(said_by(capsys, "table", study[0])[1:])
 
 
 def test_a_copy_of_the_spec_that_means_the_same_is_not_noted(study, tmp_path, capsys) -> None:
