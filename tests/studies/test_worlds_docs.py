@@ -14,8 +14,16 @@ PAGE = ROOT / "docs" / "worlds.md"
 COLUMNS = ("success last 5", "evaluation success", "total reward")
 
 
-def test_the_pendulum(capsys: pytest.CaptureFixture[str]) -> None:
-    table = print_table("pendulum", COLUMNS, capsys)
+@pytest.mark.parametrize(
+    ("name", "columns"),
+    [
+        ("pendulum", COLUMNS),
+        ("spread", ("evaluation steps", "total reward")),
+        ("swimmer", COLUMNS),
+    ],
+)
+def test_tables(name: str, columns: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
+    table = print_table(name, columns, capsys)
     assert table in PAGE.read_text(encoding="utf-8"), f"docs/worlds.md: put in\n{table}"
 
 

@@ -307,6 +307,8 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "predictors-teams",
         "predictors-teams-three",
         "pendulum",
+        "spread",
+        "swimmer",
         "predictors-pendulum",
         "predictors-pendulum-midpoint",
         "predictors-cartpole",
