@@ -19,14 +19,14 @@ def built_in_models() -> set[type[Settings]]:
     """All settings models of ours that have fields, however they are reached.
 
     Not those of controllers of one scenario, which are named by module and class, nor those of
-    faults of other environments.
+    faults of other environments, nor entries of a benchmark.
     """
     found = subclasses(Settings) - {Settings, ConditionSettings}
     return {
         model
         for model in found
         if model.__module__.startswith("nested_agents.")
-        and not model.__module__.endswith((".scripted", ".actuators"))
+        and not model.__module__.endswith((".scripted", ".actuators", ".push_n"))
         and set(model.model_fields) - {"kind"}
     }
 
