@@ -25,6 +25,7 @@ LONG = ("success, 4", "success, 40", "success, 120", *COLUMNS[2:])
         ("peers-arm", ARM),
         ("peers-boxes", COLUMNS),
         ("fit-games-ppo", EDGES),
+        ("fit-ring-ppo", EDGES),
         ("peers-one-robot", COLUMNS),
         ("peers-four-robots", COLUMNS),
         ("peers-100", LONG),

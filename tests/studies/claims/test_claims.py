@@ -267,6 +267,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         "fit-landmarks",
         "fit-three-actions",
         "fit-games-ppo",
+        "fit-ring-ppo",
         "edges-classes",
         "edges-hierarchies",
         "edges-arms",
