@@ -265,6 +265,7 @@ def test_the_committed_results_make_the_page(capsys) -> None:
         *claims.studies_of(),
         "fit",
         "fit-landmarks",
+        "fit-arms",
         "fit-three-actions",
         "fit-games-ppo",
         "fit-ring-ppo",
