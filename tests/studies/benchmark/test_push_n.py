@@ -4,7 +4,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -14,6 +14,7 @@ from nested_agents.core.agents.loop import world_seed
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.environments import BoxPushingEnv
 from nested_agents.studies.benchmark import push_n
+from nested_agents.studies.cli.commands import benchmark
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.trials.session import EVALUATION_WORLDS
 
@@ -151,3 +152,8 @@ def test_a_learner_of_another_library_is_entered(
     assert main(["benchmark", "check", str(path)]) == 0
     assert "PPO of examples, 2 robots x 5 seeds" in capsys.readouterr().out
     assert push_n.load_entry(path).teams[0].decisions == (64,) * 5
+
+
+def test_the_command_offers_what_entries_may_be() -> None:
+    assert tuple(map(int, benchmark.sizes.choices)) == push_n.SIZES
+    assert tuple(benchmark.given.choices) == get_args(push_n.Entry.model_fields["given"].annotation)
