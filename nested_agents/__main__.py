@@ -5,21 +5,35 @@ from __future__ import annotations
 import atexit
 import os
 import signal
+from functools import partial
+from types import FrameType
 
 
 def main() -> int:
     """Run the command line and return its exit status; Ctrl-C ends even the imports in silence."""
-    is_usual = signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    if is_usual:
-        # Until a command begins there is nothing to tidy up. Some imports swallow exceptions.
-        signal.signal(signal.SIGINT, lambda *_: os._exit(130))
+    pressed: list[int] = []
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, partial(_interrupt, pressed))
         # What is done cannot be interrupted; other handlers Python puts away before it has ended.
         atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
     from .studies.cli.main import main as run
 
-    if is_usual:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-    return run()
+    try:
+        return run()
+    except Exception:
+        if pressed:  # compiled code, as pydantic's, raises an exception of its own in its place
+            return 130
+        raise
+
+
+def _interrupt(pressed: list[int], number: int, frame: FrameType | None) -> None:
+    """Raise KeyboardInterrupt, but end at once in an import: some imports swallow exceptions."""
+    pressed.append(number)
+    while frame is not None:
+        if frame.f_code.co_filename.startswith("<frozen importlib."):
+            os._exit(130)
+        frame = frame.f_back
+    raise KeyboardInterrupt
 
 
 if __name__ == "__main__":
