@@ -11,7 +11,7 @@ from pathlib import Path
 import click
 
 import nested_agents
-from nested_agents.core.interface.measures import Measure
+from nested_agents.core.interface.scenario import Measure
 from nested_agents.scenarios import SCENARIOS
 from nested_agents.scenarios.adapters.adapted import AdaptedWorld
 from nested_agents.scenarios.box_pushing.states.relational import STATE_VARIABLES
@@ -54,17 +54,13 @@ VARIABLES = {"box-pushing": STATE_VARIABLES, "kinematic-chain": CHAIN_VARIABLES}
 """State variables by the scenario that has them."""
 MODULES = {
     "core": ("How agents perceive, predict, decide and learn, and what that costs.", (
-        "interface.hierarchy", "interface.spaces", "interface.prediction",
-        "interface.scenario", "interface.measures", "agents.team",
-        "adaptation.mirror", "agents.loop", "decision.settings",
-        "decision.exploration", "rules.kernels.fuzzy", "rules.rule_base",
-        "learners.learner", "learners.td", "learners.batch", "learners.one_step",
-        "evaluators.evaluator", "evaluators.exact", "evaluators.best_response",
-        "evaluators.coordination", "evaluators.cross_entropy",
-        "coordination.maximisers", "adaptation.self_model",
-        "adaptation.calibration", "agents.cost", "plugins.registry",
-        "plugins.settings", "numerics",
-        "policies.settings", "policies.peer",
+        "interface.hierarchy", "interface.spaces", "interface.scenario", "agents.team",
+        "adaptation.mirror", "agents.loop", "decision.settings", "decision.exploration",
+        "rules.kernels.fuzzy", "rules.rule_base", "learners.learner", "learners.td",
+        "learners.batch", "evaluators.evaluator", "evaluators.best_response",
+        "evaluators.coordination", "evaluators.cross_entropy", "coordination.graphs",
+        "adaptation.self_model", "agents.cost", "plugins.registry", "plugins.settings",
+        "numerics", "policies.settings", "policies.peer",
     )),
     "topologies": ("Who is above whom.", ("builders", "checks", "config", "drawing", "files")),
     "scenarios": ("Where agents act.", (

@@ -17,8 +17,8 @@ import numpy as np
 from pydantic import Field
 from typing_extensions import TypeAliasType
 
-from ..core.coordination import shapes
-from ..core.coordination.shapes import Shape
+from ..core.coordination import graphs
+from ..core.coordination.graphs import Shape
 from ..core.interface.hierarchy import Hierarchy
 from ..core.plugins.deferred import nx
 from ..core.plugins.settings import Fraction, unwritten
@@ -198,13 +198,13 @@ def coordination_graph(
     if edges is None:
         if shape == "scenario":
             raise ValueError("shape = 'scenario': the scenario has no interactions of its agents")
-        graph = nx.relabel_nodes(shapes.shaped(shape, len(agents)), dict(enumerate(agents)))
+        graph = nx.relabel_nodes(graphs.shaped(shape, len(agents)), dict(enumerate(agents)))
     else:
         pairs = [(min(a, b), max(a, b)) for a, b in edges]
         Hierarchy(agents, [], pairs)  # raises and names what is wrong
         graph = nx.empty_graph(agents)
         graph.add_edges_from(pairs)
-    return graph if others is None else shapes.others(graph, others)
+    return graph if others is None else graphs.others(graph, others)
 
 
 def from_edges(

@@ -13,13 +13,12 @@ from typing import Annotated, Any, Literal, Self, get_args
 from pydantic import model_validator
 
 from ..core.agents.messages import AbsentAgents, AnyMessageFailure
-from ..core.coordination.shapes import Shape, oriented
+from ..core.coordination.graphs import Shape, oriented
 from ..core.interface.hierarchy import Considers, Hierarchy, Told
 from ..core.plugins import sources
 from ..core.plugins.deferred import nx
-from ..core.plugins.messages import closest
 from ..core.plugins.registry import Plugged, SettingsRegistry
-from ..core.plugins.settings import Settings, SettingsError, tuples, unwritten
+from ..core.plugins.settings import Settings, SettingsError, closest, tuples, unwritten
 from . import files
 from .builders import Bodies, Members, Names, from_networkx, names_of  # noqa: F401 - of a field
 from .checks import check_names, shown

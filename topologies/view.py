@@ -9,7 +9,7 @@ from decimal import Decimal
 from typing import Literal
 
 from ..core.agents.cost import below_counts
-from ..core.agents.joint_agents import Agents, joint_blocks
+from ..core.agents.loop import Agents, joint_blocks
 from ..core.agents.messages import MessageFailure
 from ..core.interface.hierarchy import Hierarchy
 from . import TOPOLOGIES, TopologySettings, build, parse

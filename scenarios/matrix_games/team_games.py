@@ -21,10 +21,8 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from ...core.coordination.maximisers import Elimination
-from ...core.coordination.shapes import Shape, shaped
-from ...core.interface.measures import Measure
-from ...core.interface.scenario import Transition
+from ...core.coordination.graphs import Elimination, Shape, shaped
+from ...core.interface.scenario import Measure, Transition
 from ...core.interface.spaces import ActionSet, StateSpace, Variable, choice
 from ...core.numerics import FloatArray, IntArray
 from ...core.plugins.deferred import nx

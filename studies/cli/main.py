@@ -13,7 +13,7 @@ from importlib import import_module
 
 import click
 
-from ...core.plugins.messages import closest
+from ...core.plugins.settings import closest
 from ..errors import SpecError
 from .options import complete
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.interface.measures import SUCCESS, Measure
+from ...core.interface.scenario import SUCCESS, Measure
 from .results import Array, Results, from_arrays
 
 STEP, FINAL = "step_", "absolute_metrics"

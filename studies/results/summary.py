@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...core.interface.measures import SUCCESS
+from ...core.interface.scenario import SUCCESS
 from .results import Results
 from .statistics import Estimate, rate
 

@@ -14,7 +14,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ....core.interface.prediction import Blocks, first_alike
+from ....core.interface.spaces import Blocks, first_alike
 from ....core.numerics import FloatArray, IntArray
 from ..states.relational import View
 from ..world.reward import reward

@@ -17,7 +17,7 @@ import numpy as np
 from shapely.geometry import Polygon
 
 from ....core.numerics import FloatArray
-from ....core.plugins.messages import closest
+from ....core.plugins.settings import closest
 from .geometry import Outline
 from .polygons import Moments, Vertices, centred, convex_pieces, moments, polygon_edges
 from .settings import GRAVITY, BoxSettings

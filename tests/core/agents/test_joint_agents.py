@@ -6,8 +6,13 @@ import numpy as np
 import pytest
 
 from nested_agents.core.adaptation.self_model import SelfModelSettings
-from nested_agents.core.agents.joint_agents import Agents, JointPrediction, join_agents
-from nested_agents.core.agents.loop import control_loop, policy_seed
+from nested_agents.core.agents.loop import (
+    Agents,
+    JointPrediction,
+    control_loop,
+    join_agents,
+    policy_seed,
+)
 from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.settings import Decision
 from nested_agents.core.interface.hierarchy import Hierarchy

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from nested_agents.core.agents.cost import Problem
-from nested_agents.core.coordination.maximisers import Elimination, MaxPlus, interaction, order_of
+from nested_agents.core.coordination.graphs import Elimination, MaxPlus, interaction, order_of
 
 
 def total(scopes, tables, joint):

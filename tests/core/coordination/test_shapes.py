@@ -5,7 +5,7 @@ from itertools import combinations
 import networkx as nx
 import pytest
 
-from nested_agents.core.coordination.shapes import oriented, others, shaped
+from nested_agents.core.coordination.graphs import oriented, others, shaped
 
 
 @pytest.mark.parametrize(

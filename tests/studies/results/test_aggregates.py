@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from nested_agents.core.interface.measures import SUCCESS, Measure
+from nested_agents.core.interface.scenario import SUCCESS, Measure
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import draw_profiles
 from nested_agents.studies.results import aggregates
