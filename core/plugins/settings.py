@@ -16,9 +16,6 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
-if TYPE_CHECKING:
-    from pydantic._internal._model_construction import ModelMetaclass
-
 Keys = tuple[int | str, ...]
 """Where a value stands: keys of tables, and indices of lists."""
 
@@ -201,6 +198,12 @@ class SettingsError(ValueError):
     def __init__(self, name: str, problem: str) -> None:
         super().__init__(f"{name}: {problem}")
         self.problem = problem
+
+
+if TYPE_CHECKING:
+    from pydantic._internal._model_construction import ModelMetaclass
+else:
+    ModelMetaclass = type(BaseModel)
 
 
 class _Made(ModelMetaclass):
