@@ -24,7 +24,7 @@ from ...core.agents.loop import Agents
 from ...core.learners import LearnerSettings
 from ...core.plugins.settings import Settings, closest, tuples
 from ...core.plugins.sources import Sources, is_reference, named
-from ...topologies.checks import listed
+from ...topologies.builders import listed
 from ..errors import SpecError, refused, show
 from .conditions import (
     SECTIONS,

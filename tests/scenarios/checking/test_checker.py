@@ -21,10 +21,15 @@ from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.world.settings import (
     WheelFailure,
 )
-from nested_agents.scenarios.checking.checker import CHECKS, ScenarioError, check_scenario
+from nested_agents.scenarios.checking.checker import (
+    CHECKS,
+    ScenarioError,
+    check_scenario,
+    faults_of_sensing,
+    predicted_steps,
+)
 from nested_agents.scenarios.checking.frames import random_actions
 from nested_agents.scenarios.checking.predictions import faults_of_prediction
-from nested_agents.scenarios.checking.sensing import faults_of_sensing, predicted_steps
 from nested_agents.scenarios.line_up import (
     DISTANCE,
     LEAD,
