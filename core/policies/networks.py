@@ -1,10 +1,8 @@
-"""What peers with networks share: acting by their weights, their random numbers, their arrays.
+"""Peers with networks: DQN and PPO of stable-baselines3, decision by decision.
 
-And a policy of stable-baselines3 whose actor sees other inputs than its critic.
-
-DQN of stable-baselines3, decision by decision, for a scenario of one agent.
-
-PPO of stable-baselines3, decision by decision: of agents in a hierarchy, and of one for all.
+DQN is for a scenario of one agent, PPO for agents in a hierarchy and for one that acts for all. A
+network acts by its weights as arrays; a policy may have an actor that sees other inputs than its
+critic.
 
 The policy, its rollout buffer and its update are stable-baselines3's; here is what its own loop
 does in between. Actions are drawn by adding Gumbel noise to the logarithms of probabilities.
