@@ -28,9 +28,9 @@ from ..api.study import run
 from ..claims.claims import PUBLISHED
 from ..errors import SpecError
 from ..results import published
+from ..results.analysis import Summary
 from ..results.results import Results
 from ..results.statistics import NOT_NEGATIVE, bootstrap, rate
-from ..results.summary import Summary
 from ..spec.spec import Spec
 from ..trials.session import EVALUATION_WORLDS
 
