@@ -1,5 +1,7 @@
 """Trained teams that a study keeps, evaluated under other hierarchies."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from itertools import product

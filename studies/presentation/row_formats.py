@@ -4,6 +4,8 @@ The table is for a terminal: it names condition and phase once, above their rows
 the condition's label says already, the swept keys, is left to CSV and JSON.
 """
 
+from __future__ import annotations
+
 import csv
 import io
 import json

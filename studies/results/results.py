@@ -5,6 +5,8 @@ unit and meaning stand in ``frame.attrs["columns"]`` by its name. A part
 of a study's trials can be chosen, and several studies put together.
 """
 
+from __future__ import annotations
+
 import tomllib
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
