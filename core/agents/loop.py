@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..interface.scenario import Actors, Scenario, Transition, check_reward
-from ..numerics.arrays import FloatArray, IntArray
+from ..numerics import FloatArray, IntArray
 
 
 @dataclass(frozen=True)
