@@ -13,7 +13,7 @@ from typing import Any
 import Box2D
 import numpy as np
 
-from nested_agents.core.numerics.arrays import FloatArray
+from nested_agents.core.numerics import FloatArray
 from nested_agents.scenarios.box_pushing.world.world import (
     POSITION_ITERATIONS,
     SUBSTEPS,

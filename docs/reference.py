@@ -63,7 +63,7 @@ MODULES = {
         "evaluators.coordination", "evaluators.cross_entropy",
         "coordination.maximisers", "adaptation.self_model",
         "adaptation.calibration", "agents.cost", "plugins.registry",
-        "plugins.settings", "numerics.streams", "numerics.ties",
+        "plugins.settings", "numerics",
         "policies.settings", "policies.peer",
     )),
     "topologies": ("Who is above whom.", ("builders", "checks", "config", "drawing", "files")),

@@ -68,7 +68,7 @@ _PLACES = {
     "detectable": ("studies.results.statistics", "detectable"),
     "from_gymnasium": ("scenarios.adapters.adapted", "from_gymnasium"),
     "from_pettingzoo": ("scenarios.adapters.adapted", "from_pettingzoo"),
-    "greatest": ("core.numerics.ties", "greatest"),
+    "greatest": ("core.numerics", "greatest"),
     "load": ("studies.api.study", "load"),
     "parse_topology": ("topologies", "parse"),
     "plan": ("studies.api.planning", "plan"),

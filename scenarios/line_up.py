@@ -24,7 +24,7 @@ from ..core.interface.measures import SUCCESS, Measure
 from ..core.interface.prediction import Blocks
 from ..core.interface.scenario import Transition
 from ..core.interface.spaces import ActionSet, StateSpace, Variable
-from ..core.numerics.arrays import FloatArray, IntArray
+from ..core.numerics import FloatArray, IntArray
 from ..core.plugins.settings import ScenarioSettings
 
 PERIOD = 0.25

@@ -22,7 +22,7 @@ from typing import Any, cast
 import numpy as np
 
 from ..interface.scenario import EmbodiedScenario, Scenario, Transition
-from ..numerics.arrays import FloatArray, IntArray
+from ..numerics import FloatArray, IntArray
 from ..plugins.settings import NonNegative, Positive, Settings
 
 

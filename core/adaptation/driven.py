@@ -11,8 +11,7 @@ from itertools import combinations
 import numpy as np
 
 from ..interface.scenario import Scenario, groups_of, roles_of
-from ..numerics.arrays import FloatArray
-from ..numerics.compiling import njit
+from ..numerics import FloatArray, njit
 from ..rules.kernels.compact import active_compact
 from ..rules.kernels.fuzzy import Partition
 from ..rules.kernels.layout import Packed

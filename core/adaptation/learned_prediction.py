@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from ..interface.prediction import Blocks, first_alike
-from ..numerics.arrays import FloatArray, IntArray
+from ..numerics import FloatArray, IntArray
 
 
 class LearnedPrediction:

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from ..interface.scenario import EmbodiedScenario, Scenario, Transition
-from ..numerics.arrays import FloatArray, IntArray
+from ..numerics import FloatArray, IntArray
 from ..plugins.settings import Positive, Settings
 
 MEMORY = 100

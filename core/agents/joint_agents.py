@@ -26,7 +26,7 @@ from ..interface.measures import measures_of
 from ..interface.prediction import Blocks, Prediction
 from ..interface.scenario import EmbodiedScenario, Scenario, Transition, groups_of, roles_of
 from ..interface.spaces import ActionSet, StateSpace, Variable
-from ..numerics.arrays import FloatArray, IntArray
+from ..numerics import FloatArray, IntArray
 
 Agents = Literal["actuator", "body", "team"]
 """What there is one agent for."""

@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..interface.scenario import Actors, Scenario, Transition
-from ..numerics.arrays import FloatArray, IntArray
+from ..interface.scenario import Actors, Scenario, Transition, check_reward
+from ..numerics import FloatArray, IntArray
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ def control_loop(
     ------
     ValueError
         If the scenario does not predict what the team decides by, see `Team.check`, or its states
-        cannot be learned from, see `StateSpace.checked`.
+        or rewards cannot be learned from, see `StateSpace.checked` and `check_reward`.
     """
     first_world = first_episode if first_world is None else first_world
     explore = learn if explore is None else explore
@@ -122,6 +122,7 @@ def control_loop(
             transition = scenario.step(joint_action)
             last = transition.terminated or transition.truncated or step == steps - 1
             space.checked(transition.states, agents)
+            check_reward(transition.reward, agents)
             moved = perf_counter()
             if learn:
                 team.adapt(prediction, joint_action, transition)

@@ -20,9 +20,7 @@ from ..interface.prediction import NOT_EXPLORING, Prediction
 from ..interface.scenario import Actors, EmbodiedScenario, Scenario, Transition, groups_of, rows_of
 from ..learners import check_prediction
 from ..learners.learner import Learner, LearnerSettings
-from ..numerics.arrays import FloatArray, IntArray
-from ..numerics.streams import set_words, words_of
-from ..numerics.ties import greatest
+from ..numerics import FloatArray, IntArray, greatest, set_words, words_of
 from .messages import MessageFailure, Messages
 
 DECIDED = ("rule", "teammates", "value_of", "unseen", "plan")

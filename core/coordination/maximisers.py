@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..numerics.arrays import FloatArray, IntArray
+from ..numerics import FloatArray, IntArray
 from ..plugins.deferred import nx
 
 Scope = tuple[int, ...]

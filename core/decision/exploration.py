@@ -14,8 +14,7 @@ import numpy as np
 from pydantic import Field
 
 from ..interface.prediction import Exploring
-from ..numerics.arrays import FloatArray
-from ..numerics.ties import greatest
+from ..numerics import FloatArray, greatest
 from ..plugins.registry import SettingsRegistry
 from ..plugins.settings import Fraction, NonNegative, PartSettings, Positive
 

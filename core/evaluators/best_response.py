@@ -28,8 +28,7 @@ from pydantic import Field
 
 from ..interface.hierarchy import Hierarchy
 from ..interface.prediction import BestResponses, Exploring, Prediction
-from ..numerics.arrays import FloatArray, IntArray
-from ..numerics.ties import greatest
+from ..numerics import FloatArray, IntArray, greatest
 from ..plugins.settings import unwritten
 from .evaluator import (
     Aggregation,

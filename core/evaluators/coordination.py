@@ -19,7 +19,7 @@ from pydantic import Field
 
 from ..coordination.maximisers import Elimination, MaxPlus, Scope
 from ..interface.prediction import Prediction
-from ..numerics.arrays import FloatArray, IntArray
+from ..numerics import FloatArray, IntArray
 from .evaluator import Aggregation, DecisionProblem, Deliberation, EvaluatorSettings, combinations
 
 FIRST = 1e-9

@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import Field
 
 from ..interface.prediction import Prediction
-from ..numerics.arrays import FloatArray, IntArray
+from ..numerics import FloatArray, IntArray
 from .evaluator import Aggregation, DecisionProblem, Deliberation, EvaluatorSettings
 
 NAME = "cross-entropy"

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..interface.hierarchy import Hierarchy
 from ..interface.prediction import Prediction, states_by_group
-from ..numerics.arrays import FloatArray, IntArray
+from ..numerics import FloatArray, IntArray
 from ..plugins.settings import PartSettings
 from ..rules.rule_base import RuleBase
 

@@ -13,7 +13,7 @@ from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
-from ..numerics.arrays import FloatArray, IntArray
+from ..numerics import FloatArray, IntArray
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from ..numerics.arrays import FloatArray, IntArray
+from ..numerics import FloatArray, IntArray
 from .spaces import ActionSet, StateSpace
 
 
@@ -34,6 +34,23 @@ class Transition:
     absorbing: bool = True
     """Whether a terminal state is as if entered again for ever, as where a box stands at its goal;
     if not, its reward is received once, as in Gymnasium."""
+
+
+def check_reward(reward: object, agents: Sequence[str]) -> None:
+    """Check that the reward of some agents can be learned from.
+
+    Raises
+    ------
+    ValueError
+        If it is neither a finite number nor one for each of them.
+    """
+    array = np.asarray(reward)
+    is_number = array.dtype.kind in "biuf" and np.isfinite(array).all()
+    if not is_number or array.shape not in ((), (len(agents),)):
+        raise ValueError(
+            f"reward = {reward!r:.60}, allowed: a finite number, or one for each of "
+            f"{len(agents)} agents"
+        )
 
 
 @runtime_checkable

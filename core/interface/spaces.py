@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from ..numerics.arrays import FloatArray, IntArray
+from ..numerics import FloatArray, IntArray
 
 FARTHEST = 1000.0
 """Ranges of a variable beyond which its value cannot be meant."""

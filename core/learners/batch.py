@@ -15,8 +15,7 @@ from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from ..numerics.arrays import FloatArray, IntArray
-from ..numerics.compiling import njit
+from ..numerics import FloatArray, IntArray, njit
 from ..plugins.settings import Fraction, Positive
 from ..rules.rule_base import RuleBase
 from .learner import LearnerSettings

@@ -26,7 +26,7 @@ from ..decision.exploration import EXPLORATIONS, BurstExploration, ExplorationSe
 from ..decision.settings import Decision
 from ..evaluators.evaluator import Counts, Deliberation
 from ..interface.spaces import ActionSet, StateSpace, choice
-from ..numerics.arrays import FloatArray, IntArray
+from ..numerics import FloatArray, IntArray
 from ..plugins.registry import Plugged
 from ..plugins.settings import Positive
 from ..rules.kernels.fuzzy import Partition

@@ -11,7 +11,7 @@ from ..adaptation.self_model import SelfModelSettings
 from ..decision.exploration import EXPLORATIONS, BurstExploration, ExplorationSettings
 from ..decision.settings import Decision
 from ..interface.spaces import ActionSet, StateSpace
-from ..numerics.arrays import FloatArray
+from ..numerics import FloatArray
 from ..plugins.registry import Plugged
 from ..plugins.settings import PartSettings, unwritten
 from ..rules.rule_base import RuleBase, RuleBaseSettings

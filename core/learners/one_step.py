@@ -21,7 +21,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from ..numerics.arrays import FloatArray, IntArray
+from ..numerics import FloatArray, IntArray
 from ..plugins.settings import Fraction, NonNegative, Positive
 from ..rules.kernels.updates import add_features
 from ..rules.rule_base import RuleBase

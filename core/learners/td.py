@@ -12,7 +12,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from ..numerics.arrays import FloatArray, IntArray
+from ..numerics import FloatArray, IntArray
 from ..plugins.settings import Fraction, Positive
 from ..rules.kernels.compact import td_update
 from ..rules.rule_base import RuleBase

@@ -5,7 +5,7 @@ from gymnasium.spaces import Discrete
 from stable_baselines3 import DQN
 
 from ..interface.scenario import Scenario, Transition
-from ..numerics.arrays import FloatArray, IntArray
+from ..numerics import FloatArray, IntArray
 from .networks import Layers, drawing_from, prepare, weights_of
 from .peer import Inputs, Peer, RewardScale, Seen
 from .settings import DQNSettings

@@ -14,7 +14,7 @@ from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.torch_layers import MlpExtractor
 
-from ..numerics.arrays import FloatArray
+from ..numerics import FloatArray
 
 # Equal sums on a machine, whatever else runs; small networks are fastest so.
 torch.set_num_threads(1)

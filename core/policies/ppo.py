@@ -20,7 +20,7 @@ from stable_baselines3 import PPO
 
 from ..interface.hierarchy import Hierarchy
 from ..interface.scenario import Scenario, Transition, roles_of
-from ..numerics.arrays import FloatArray, IntArray
+from ..numerics import FloatArray, IntArray
 from .networks import Layers, SplitPolicy, drawing_from, prepare, weights_of
 from .peer import Inputs, Passing, Peer, RewardScale, Seen
 from .settings import MultiAgentPPOSettings, PolicyGradientSettings, PPOSettings

@@ -23,7 +23,7 @@ from pydantic import Field
 
 from ..interface.prediction import Blocks
 from ..interface.spaces import StateSpace
-from ..numerics.arrays import FloatArray, IntArray
+from ..numerics import FloatArray, IntArray
 from ..plugins.settings import Positive, Settings
 from .kernels.compact import active_compact, each_compact, total_compact
 from .kernels.dense import values_dense

@@ -20,7 +20,7 @@ import numpy as np
 from ...core.interface.measures import SUCCESS, Measure
 from ...core.interface.scenario import Transition
 from ...core.interface.spaces import StateSpace
-from ...core.numerics.arrays import FloatArray, IntArray
+from ...core.numerics import FloatArray, IntArray
 from ...core.plugins.sources import format_error
 from ..movies import film
 from .actuators import Actuators

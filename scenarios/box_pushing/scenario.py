@@ -17,8 +17,7 @@ from ...core.agents.team import Team
 from ...core.interface.measures import SUCCESS, Measure
 from ...core.interface.scenario import Transition
 from ...core.interface.spaces import ActionSet
-from ...core.numerics.arrays import FloatArray, IntArray
-from ...core.numerics.streams import stream_of
+from ...core.numerics import FloatArray, IntArray, stream_of
 from .config import BoxPushingSettings
 from .prediction.belief import APART, CONSTANTS, PushBelief, believing, least_gap
 from .prediction.prediction import BoxPrediction, mean_twists

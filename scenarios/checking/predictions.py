@@ -15,7 +15,7 @@ import numpy as np
 
 from ...core.interface.prediction import Blocks, states_by_group
 from ...core.interface.scenario import Scenario, groups_of
-from ...core.numerics.arrays import BoolArray, FloatArray, IntArray
+from ...core.numerics import BoolArray, FloatArray, IntArray
 
 MOST_JOINT_ACTIONS = 4**8
 """Joint actions beyond which no tables are asked for: they might not fit into memory."""

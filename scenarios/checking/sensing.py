@@ -13,7 +13,7 @@ import numpy as np
 
 from ...core.agents.loop import world_seed
 from ...core.interface.scenario import Scenario
-from ...core.numerics.arrays import FloatArray, IntArray
+from ...core.numerics import FloatArray, IntArray
 from .frames import at
 from .predictions import apart
 

@@ -19,7 +19,7 @@ import gymnasium
 import numpy as np
 from gymnasium.spaces import Box, Discrete, MultiDiscrete
 
-from ...core.numerics.arrays import BoolArray, FloatArray
+from ...core.numerics import BoolArray, FloatArray
 from .actuators import ActuatorFault
 from .settings import Failures
 

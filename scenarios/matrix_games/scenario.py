@@ -39,7 +39,7 @@ from ...core.agents.team import Team
 from ...core.interface.measures import SUCCESS, Measure
 from ...core.interface.scenario import Transition
 from ...core.interface.spaces import ActionSet, StateSpace, choice
-from ...core.numerics.arrays import FloatArray, IntArray
+from ...core.numerics import FloatArray, IntArray
 from ...core.plugins.messages import closest
 from ...core.plugins.settings import ScenarioSettings
 

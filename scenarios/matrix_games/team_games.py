@@ -26,7 +26,7 @@ from ...core.coordination.shapes import Shape, shaped
 from ...core.interface.measures import Measure
 from ...core.interface.scenario import Transition
 from ...core.interface.spaces import ActionSet, StateSpace, Variable, choice
-from ...core.numerics.arrays import FloatArray, IntArray
+from ...core.numerics import FloatArray, IntArray
 from ...core.plugins.deferred import nx
 from ...core.plugins.settings import NonNegative, ScenarioSettings
 from .scenario import OF_OPTIMA

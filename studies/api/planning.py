@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.numerics.arrays import FloatArray, IntArray
+from ...core.numerics import FloatArray, IntArray
 from ...core.plugins.deferred import optimize
 from ..errors import WIDTH, SpecError
 from ..presentation.words import count, duration

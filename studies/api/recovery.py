@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from ...core.numerics.arrays import FloatArray
+from ...core.numerics import FloatArray
 from ...scenarios.faults.actuators import ActuatorFault
 from ...scenarios.faults.wrappers import FaultyEnv, FaultyParallelEnv
 from ..presentation.tables import SummaryTable, tabulate

@@ -6,8 +6,7 @@ two active functions; bit v of a corner's number tells which it is of the term's
 
 import numpy as np
 
-from ...numerics.arrays import FloatArray, IntArray
-from ...numerics.compiling import njit
+from ...numerics import FloatArray, IntArray, njit
 from .layout import Layout, Packed, unpack
 from .strengths import all_strengths, pair, strengths_room
 from .updates import advance, values_of_two

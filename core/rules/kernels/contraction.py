@@ -12,7 +12,7 @@ Where five functions to a variable are spelled out, it is for the paper's case.
 
 import numpy as np
 
-from ...numerics.compiling import njit
+from ...numerics import njit
 from .layout import Layout
 from .strengths import hull, negligible, product_of, strengths_of, strengths_room
 

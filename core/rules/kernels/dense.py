@@ -6,8 +6,7 @@ situations side by side.
 
 import numpy as np
 
-from ...numerics.arrays import FloatArray, IntArray
-from ...numerics.compiling import njit
+from ...numerics import FloatArray, IntArray, njit
 from .contraction import contract, total_width
 from .layout import Layout, Packed, unpack
 from .strengths import LANES, many_strengths

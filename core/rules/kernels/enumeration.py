@@ -7,8 +7,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from ...numerics.arrays import IntArray
-from ...numerics.compiling import njit
+from ...numerics import IntArray, njit
 from .compact import looked_up
 from .dense import folded
 from .layout import Packed, unpack

@@ -23,7 +23,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from ...interface.spaces import Variable
-from ...numerics.arrays import FloatArray
+from ...numerics import FloatArray
 
 Membership = Literal["triangular", "sigmoid"]
 

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 
-from ...numerics.arrays import FloatArray, IntArray
-from ...numerics.compiling import njit
+from ...numerics import FloatArray, IntArray, njit
 
 if TYPE_CHECKING:
     from .fuzzy import Partition

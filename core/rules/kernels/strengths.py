@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from ...numerics.arrays import FloatArray
-from ...numerics.compiling import njit
+from ...numerics import FloatArray, njit
 from .layout import Layout
 
 NEGLIGIBLE, NEGLIGIBLE_SINGLE = 1e-15, 1e-8

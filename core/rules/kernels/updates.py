@@ -5,8 +5,7 @@ For any partitions also values of few states of every agent.
 
 import numpy as np
 
-from ...numerics.arrays import FloatArray, IntArray
-from ...numerics.compiling import njit
+from ...numerics import FloatArray, IntArray, njit
 from .layout import Layout, Packed, unpack
 from .strengths import all_strengths, hull, negligible, product_of, strengths_room
 

@@ -20,8 +20,7 @@ import numpy as np
 from shapely.geometry import Point, Polygon
 from shapely.geometry.polygon import orient
 
-from ....core.numerics.arrays import FloatArray, IntArray
-from ....core.numerics.compiling import njit
+from ....core.numerics import FloatArray, IntArray, njit
 from ..prediction.predictors import push_model
 from ..scenario import BoxPushing
 from ..world.boxes import BoxSpec

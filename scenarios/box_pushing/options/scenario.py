@@ -22,7 +22,7 @@ import numpy as np
 
 from ....core.interface.scenario import Transition
 from ....core.interface.spaces import ActionSet, StateSpace, Variable, choice
-from ....core.numerics.arrays import FloatArray, IntArray
+from ....core.numerics import FloatArray, IntArray
 from ..config import BoxPushingSettings, BoxTaskSettings
 from ..scenario import MEASURES, BoxPushing
 from ..world.geometry import wrap

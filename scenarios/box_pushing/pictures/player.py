@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from ....core.numerics.arrays import FloatArray
+from ....core.numerics import FloatArray
 from ..world.boxes import box_for
 from ..world.robots import robot_for
 

@@ -18,7 +18,7 @@ from matplotlib.patches import Circle, PathPatch
 from shapely.geometry import Point, Polygon
 
 from ....core.agents.team import Team
-from ....core.numerics.arrays import FloatArray
+from ....core.numerics import FloatArray
 from ..prediction.prediction import BoxPrediction
 from ..world.boxes import BoxSpec
 from ..world.geometry import surface, wrap

@@ -15,7 +15,7 @@ from typing import ClassVar
 import numpy as np
 
 from ....core.interface.prediction import Blocks, first_alike
-from ....core.numerics.arrays import FloatArray, IntArray
+from ....core.numerics import FloatArray, IntArray
 from ..states.relational import View
 from ..world.reward import reward
 from .belief import outcomes

@@ -20,7 +20,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ....core.numerics.arrays import FloatArray, IntArray
+from ....core.numerics import FloatArray, IntArray
 from ..states.relational import View
 from ..world.boxes import BoxSpec
 from ..world.robots import compliance

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from ....core.interface.spaces import ActionSet
-from ....core.numerics.arrays import FloatArray
+from ....core.numerics import FloatArray
 from ..states.relational import View
 from ..states.state_spaces import BoxStateSpace
 from ..world.geometry import Outline

@@ -16,7 +16,7 @@ from math import cos, pi, sin, sqrt
 import numpy as np
 from shapely.geometry import Polygon
 
-from ....core.numerics.arrays import FloatArray
+from ....core.numerics import FloatArray
 from ....core.plugins.messages import closest
 from .geometry import Outline
 from .polygons import Moments, Vertices, centred, convex_pieces, moments, polygon_edges

@@ -17,7 +17,7 @@ from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 from shapely.validation import explain_validity
 
-from ....core.numerics.arrays import FloatArray
+from ....core.numerics import FloatArray
 from ....core.plugins.deferred import nx
 from .geometry import ring_edges
 

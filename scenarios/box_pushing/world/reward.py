@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....core.numerics.arrays import BoolArray, FloatArray
+from ....core.numerics import BoolArray, FloatArray
 from .settings import RewardSettings
 
 

@@ -33,8 +33,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....core.numerics.arrays import FloatArray, IntArray
-from ....core.numerics.compiling import njit
+from ....core.numerics import FloatArray, IntArray, njit
 from ....core.plugins.messages import closest
 from ....core.plugins.settings import tuples
 from .settings import RobotSettings

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, Literal, Self, Union, get
 import numpy as np
 from pydantic import Field, model_validator
 
-from ....core.numerics.arrays import FloatArray
+from ....core.numerics import FloatArray
 from ....core.plugins.scheduled import Names
 from ....core.plugins.settings import NonNegative, Positive, Settings, unwritten
 from ...faults.settings import DISCRIMINATOR, KINDS, FailureSettings, befalling

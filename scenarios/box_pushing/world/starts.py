@@ -12,7 +12,7 @@ from math import cos, pi, radians, sin
 
 import numpy as np
 
-from ....core.numerics.arrays import FloatArray
+from ....core.numerics import FloatArray
 from .boxes import BoxSpec
 from .geometry import surface, wrap
 from .settings import RobotSettings

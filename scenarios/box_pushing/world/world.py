@@ -27,7 +27,7 @@ import Box2D
 import numpy as np
 from Box2D import _Box2D
 
-from ....core.numerics.arrays import FloatArray
+from ....core.numerics import FloatArray
 from ...faults.settings import Failures, Free
 from .boxes import BoxSpec
 from .geometry import gaps, infrared_readings

@@ -22,7 +22,7 @@ from nested_agents.core.evaluators.exact import (
 )
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.interface.spaces import StateSpace, Variable
-from nested_agents.core.numerics.arrays import FloatArray
+from nested_agents.core.numerics import FloatArray
 from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
 
 A = 4

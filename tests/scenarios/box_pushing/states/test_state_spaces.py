@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nested_agents.core.interface.spaces import Variable
-from nested_agents.core.numerics.arrays import FloatArray
+from nested_agents.core.numerics import FloatArray
 from nested_agents.core.plugins.sources import Sources
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing

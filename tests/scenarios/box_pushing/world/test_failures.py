@@ -8,7 +8,7 @@ from pydantic import TypeAdapter, ValidationError
 from scipy.linalg import expm
 
 from nested_agents.core.agents.loop import world_seed
-from nested_agents.core.numerics.arrays import FloatArray
+from nested_agents.core.numerics import FloatArray
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES

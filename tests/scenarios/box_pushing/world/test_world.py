@@ -5,7 +5,7 @@ import gc
 import numpy as np
 import pytest
 
-from nested_agents.core.numerics.arrays import FloatArray
+from nested_agents.core.numerics import FloatArray
 from nested_agents.scenarios.box_pushing.world import world as world_module
 from nested_agents.scenarios.box_pushing.world.boxes import BOXES, box_for
 from nested_agents.scenarios.box_pushing.world.robots import (
