@@ -50,7 +50,8 @@ from nested_agents.studies.errors import SpecError
 from nested_agents.studies.spec.overlay import dumps
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store import durable
-from nested_agents.studies.store.store import DATABASE, LOCK, Store
+from nested_agents.studies.store.database import DATABASE
+from nested_agents.studies.store.store import LOCK, Store
 from nested_agents.studies.trials.arrangement import check
 from nested_agents.studies.trials.keeping import open_to_run, pending, spec_of
 from nested_agents.studies.trials.session import run_trial

@@ -81,8 +81,7 @@ MODULES = {
         "errors", "spec.spec", "spec.keys", "spec.presets", "trials.trial",
         "trials.arrangement", "trials.session",
         "store.store", "results.results", "results.analysis", "results.statistics",
-        "results.comparison", "results.aggregates", "results.marl_eval",
-        "results.power", "results.summary", "catalogue.study", "cost.cost",
+        "results.contrasts", "results.published", "results.power", "catalogue.study", "cost.cost",
         "claims.claims",
     )),
 }  # fmt: skip

@@ -36,6 +36,7 @@ from ..interface.scenario import (
     EmbodiedScenario,
     Scenario,
     Transition,
+    check_reward,
     groups_of,
     measures_of,
     roles_of,
@@ -126,7 +127,7 @@ def control_loop(
     ------
     ValueError
         If the scenario does not predict what the team decides by, see `Team.check`, or its states
-        cannot be learned from, see `StateSpace.checked`.
+        or rewards cannot be learned from, see `StateSpace.checked` and `check_reward`.
     """
     first_world = first_episode if first_world is None else first_world
     explore = learn if explore is None else explore
@@ -148,6 +149,7 @@ def control_loop(
             transition = scenario.step(joint_action)
             last = transition.terminated or transition.truncated or step == steps - 1
             space.checked(transition.states, agents)
+            check_reward(transition.reward, agents)
             moved = perf_counter()
             if learn:
                 team.adapt(prediction, joint_action, transition)

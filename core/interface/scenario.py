@@ -38,6 +38,23 @@ class Transition:
     if not, its reward is received once, as in Gymnasium."""
 
 
+def check_reward(reward: object, agents: Sequence[str]) -> None:
+    """Check that the reward of some agents can be learned from.
+
+    Raises
+    ------
+    ValueError
+        If it is neither a finite number nor one for each of them.
+    """
+    array = np.asarray(reward)
+    is_number = array.dtype.kind in "biuf" and np.isfinite(array).all()
+    if not is_number or array.shape not in ((), (len(agents),)):
+        raise ValueError(
+            f"reward = {reward!r:.60}, allowed: a finite number, or one for each of "
+            f"{len(agents)} agents"
+        )
+
+
 @runtime_checkable
 class Scenario(Protocol):
     """A world with a task. Everything a learner may know of it.

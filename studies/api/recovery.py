@@ -20,8 +20,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 from ...core.numerics import FloatArray
 from ...scenarios.faults.wrappers import ActuatorFault, FaultyEnv, FaultyParallelEnv
 from ..presentation.tables import SummaryTable, tabulate
+from ..results.analysis import Summary
 from ..results.statistics import NOT_NEGATIVE, bootstrap, rate
-from ..results.summary import Summary
 
 BLOCK = 5
 """Episodes that a level is measured over."""

@@ -32,11 +32,9 @@ from ..presentation.progress import Terminal
 from ..presentation.tables import SummaryTable, tabulate
 from ..presentation.words import count
 from ..results import published
-from ..results.analysis import power_text
 from ..results.contrasts import contrasts
-from ..results.power import SMALLEST, USUAL_DEVIATION
-from ..results.results import Results, read
-from ..results.selection import chosen, together
+from ..results.power import SMALLEST, USUAL_DEVIATION, power_text
+from ..results.results import Results, chosen, read, together
 from ..spec.outline import StudyOutline, other_spec, sources_of
 from ..store import durable
 from ..store.store import Store

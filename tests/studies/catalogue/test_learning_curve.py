@@ -11,8 +11,7 @@ from nested_agents.studies.catalogue.learning_curve import analyse, curves_of, d
 from nested_agents.studies.presentation.figures import save
 from nested_agents.studies.presentation.row_formats import write_rows
 from nested_agents.studies.presentation.tables import Cell
-from nested_agents.studies.results.statistics import Estimate
-from nested_agents.studies.results.summary import two_figures
+from nested_agents.studies.results.statistics import Estimate, two_figures
 
 
 def arrays(seeds, episodes, success):

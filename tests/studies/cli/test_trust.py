@@ -7,7 +7,7 @@ import pytest
 
 from nested_agents.core.plugins import sources
 from nested_agents.studies.cli.main import main
-from nested_agents.studies.store.store import SPEC_FILE
+from nested_agents.studies.store.database import SPEC_FILE
 
 SPEC = """
 study = "mine.py:STUDY"
