@@ -22,8 +22,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.numerics import FloatArray, IntArray
-from ...core.plugins.deferred import optimize
+from ...core.numerics import FloatArray, IntArray, optimize
 from ..errors import WIDTH, SpecError
 from ..presentation.words import count, duration
 from ..results.power import SMALLEST, USUAL_DEVIATION, power_text

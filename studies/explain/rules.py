@@ -18,8 +18,7 @@ from math import degrees
 import numpy as np
 
 from ...core.interface.spaces import Variable
-from ...core.numerics import FloatArray
-from ...core.plugins.deferred import pd
+from ...core.numerics import FloatArray, pd
 from ...core.rules.kernels.fuzzy import Partition
 from ...core.rules.rule_base import RuleBase
 from ..errors import WIDTH

@@ -18,7 +18,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from ...core.interface.scenario import Measure
-from ...core.plugins.deferred import pd
+from ...core.numerics import pd
 
 Format = Literal["table", "csv", "json"]
 
