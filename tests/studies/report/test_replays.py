@@ -1,6 +1,7 @@
 import base64
 import json
 
+from nested_agents.scenarios.box_pushing.pictures import rendering
 from nested_agents.scenarios.box_pushing.scenario import BoxPushing
 from nested_agents.studies.report.replays import replays
 from nested_agents.studies.store.store import Store
