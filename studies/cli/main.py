@@ -15,7 +15,7 @@ from typing import Any
 
 import click
 
-from ...core.plugins.messages import closest
+from ...core.plugins.settings import closest
 from ..errors import SpecError
 from .options import complete
 

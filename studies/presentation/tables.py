@@ -15,7 +15,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from ...core.plugins.deferred import pd
-from ...core.plugins.messages import near
+from ...core.plugins.settings import near
 from ..errors import SpecError
 from ..results.analysis import Summary
 from ..results.statistics import FEW, Estimate, between, exactly, two_figures
