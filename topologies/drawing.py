@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..core.interface.hierarchy import Hierarchy
-from ..core.numerics.arrays import FloatArray
+from ..core.numerics import FloatArray
 from ..core.plugins.deferred import nx
 
 if TYPE_CHECKING:

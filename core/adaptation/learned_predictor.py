@@ -21,7 +21,7 @@ from typing import Any, cast
 import numpy as np
 
 from ..interface.scenario import Scenario, Transition, groups_of, roles_of
-from ..numerics.arrays import BoolArray, FloatArray, IntArray
+from ..numerics import BoolArray, FloatArray, IntArray
 from ..rules.kernels.fuzzy import Partition
 from ..rules.rule_base import RuleBase
 from .driven import Bodies, driven_states

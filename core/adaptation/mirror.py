@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..interface.scenario import Scenario
-from ..numerics.arrays import FloatArray, IntArray
+from ..numerics import FloatArray, IntArray
 
 
 class Mirror:

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from ..interface.scenario import Scenario
-from ..numerics.arrays import FloatArray, IntArray
+from ..numerics import FloatArray, IntArray
 from ..plugins.settings import PartSettings, Positive, unwritten
 
 

@@ -15,8 +15,7 @@ from numpy.random import Generator
 from pydantic import Field
 
 from ..interface.hierarchy import Hierarchy
-from ..numerics.arrays import BoolArray, IntArray
-from ..numerics.streams import stream_of
+from ..numerics import BoolArray, IntArray, stream_of
 from ..plugins.scheduled import Names, Scheduled
 from ..plugins.settings import Fraction
 

@@ -17,9 +17,9 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from ..coordination.maximisers import Elimination, MaxPlus, Scope
-from ..interface.prediction import Prediction
-from ..numerics.arrays import FloatArray, IntArray
+from ..coordination.graphs import Elimination, MaxPlus, Scope
+from ..interface.spaces import Prediction
+from ..numerics import FloatArray, IntArray
 from .evaluator import Aggregation, DecisionProblem, Deliberation, EvaluatorSettings, combinations
 
 FIRST = 1e-9

@@ -5,13 +5,12 @@ from typing import Annotated, ClassVar, Literal, Protocol
 
 from pydantic import Field
 
-from ..adaptation.calibration import CalibrationSettings
 from ..adaptation.predictors import GivenPredictor, Predictor
-from ..adaptation.self_model import SelfModelSettings
+from ..adaptation.self_model import CalibrationSettings, SelfModelSettings
 from ..decision.exploration import EXPLORATIONS, BurstExploration, ExplorationSettings
 from ..decision.settings import Decision
 from ..interface.spaces import ActionSet, StateSpace
-from ..numerics.arrays import FloatArray
+from ..numerics import FloatArray
 from ..plugins.registry import Plugged
 from ..plugins.settings import PartSettings, unwritten
 from ..rules.rule_base import RuleBase, RuleBaseSettings

@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from ...core.interface.measures import Measure
+from ...core.interface.scenario import Measure
 from ...core.plugins.deferred import pd
 
 Format = Literal["table", "csv", "json"]

@@ -17,9 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from ....core.numerics.arrays import FloatArray
-from ..world.boxes import box_for
-from ..world.robots import robot_for
+from ....core.numerics import FloatArray
+from ..world.bodies import box_for, robot_for
 
 Recording = Mapping[str, Any]
 
