@@ -32,9 +32,12 @@ ACTS = (
     "raise ValueError('two\\nlines')", "raise Mute", "return None", "return 'text'", "return 0",
     "return np.zeros((9, 9))", "return np.full((2, 2), np.nan)", "return np.full((2, 2), np.inf)",
     "return np.full((2, 2), 1e300)", "return [[0.0], [0.0, 1.0]]",
+    "return replace(super().step(*arguments), reward='1.0')",
+    "return replace(super().step(*arguments), reward=np.nan)",
 )  # fmt: skip
 SCENARIO = """
 import os, sys
+from dataclasses import replace
 import numpy as np
 import nested_agents as na
 from nested_agents.scenarios.line_up import LineUp

@@ -27,9 +27,8 @@ import numpy as np
 from pydantic import Field
 
 from ..interface.hierarchy import Hierarchy
-from ..interface.prediction import BestResponses, Exploring, Prediction
-from ..numerics.arrays import FloatArray, IntArray
-from ..numerics.ties import greatest
+from ..interface.spaces import BestResponses, Exploring, Prediction
+from ..numerics import FloatArray, IntArray, greatest
 from ..plugins.settings import unwritten
 from .evaluator import (
     Aggregation,

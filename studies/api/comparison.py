@@ -8,9 +8,8 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from ..presentation.tables import SummaryTable, tabulate
-from ..results.aggregates import Aggregates, aggregate
-from ..results.comparison import Difference
-from ..results.contrasts import Contrasts
+from ..results.analysis import Difference
+from ..results.contrasts import Aggregates, Contrasts, aggregate
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

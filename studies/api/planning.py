@@ -22,12 +22,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.numerics.arrays import FloatArray, IntArray
-from ...core.plugins.deferred import optimize
-from ..errors import SpecError
+from ...core.numerics import FloatArray, IntArray, optimize
+from ..errors import WIDTH, SpecError
 from ..presentation.words import count, duration
-from ..results.analysis import WIDTH, power_text
-from ..results.power import SMALLEST, USUAL_DEVIATION
+from ..results.power import SMALLEST, USUAL_DEVIATION, power_text
 from ..spec.outline import StudyOutline
 from ..spec.spec import Spec
 from ..trials.session import Session, run_trial

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ...core.interface.scenario import can_draw
-from ...core.plugins.messages import closest
+from ...core.plugins.settings import closest
 from ..errors import SpecError
 from ..store.store import Store
 

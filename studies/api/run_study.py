@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 
-from ...core.interface.measures import Measure
+from ...core.interface.scenario import Measure
 from ...core.plugins.sources import is_reference
 from ..catalogue.study import load_study, measured
 from ..spec.spec import Spec
@@ -32,6 +32,7 @@ def run_study(
     accept_code: bool = False,
     observer: Observer | None = None,
     chosen: Sequence[Trial] = (),
+    title: str = "",
 ) -> Iterator[Store]:
     """Run what is left of a study; then its store is open for as long as the context lasts.
 
@@ -51,6 +52,8 @@ def run_study(
         Who is notified of progress; None: nobody.
     chosen
         Those of its trials that are run; none named: all.
+    title
+        What is noted first, once nothing is refused any more; empty: nothing.
 
     Yields
     ------
@@ -73,7 +76,7 @@ def run_study(
         if retry_failed:
             store.forget_failed()
         left = pending(store, trials)
-        for note in (*store.notes, *spec.warnings()):
+        for note in filter(None, (title, *store.notes, *spec.warnings())):
             observer.note(note)
         if left:
             observer.announce(spec, directory, workers.processes)

@@ -22,9 +22,9 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...core.interface.measures import SUCCESS
-from ...core.plugins.deferred import pd
-from ...core.plugins.messages import closest
+from ...core.interface.scenario import SUCCESS
+from ...core.numerics import pd
+from ...core.plugins.settings import closest
 from ...core.plugins.sources import Sources
 from ..catalogue.study import analysed, drawn, load_study
 from ..errors import SpecError
@@ -32,11 +32,9 @@ from ..presentation.progress import Terminal
 from ..presentation.tables import SummaryTable, tabulate
 from ..presentation.words import count
 from ..results import published
-from ..results.analysis import power_text
 from ..results.contrasts import contrasts
-from ..results.power import SMALLEST, USUAL_DEVIATION
-from ..results.results import Results, read
-from ..results.selection import chosen, together
+from ..results.power import SMALLEST, USUAL_DEVIATION, power_text
+from ..results.results import Results, chosen, read, together
 from ..spec.outline import StudyOutline, other_spec, sources_of
 from ..store import durable
 from ..store.store import Store

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ...core.interface.scenario import roles_of
-from ...core.plugins.deferred import pd
+from ...core.numerics import pd
 from ..errors import SpecError, show
 from ..presentation.progress import Terminal
 from ..presentation.words import count
@@ -155,10 +155,10 @@ def tune(
             for trial in everything
             if trial.condition in wanted and trial.seed < first_seed + n_seeds
         }
-        observer.note(f"{count(len(names), 'configuration')} on {count(n_seeds, 'seed')}")
+        title = f"{count(len(names), 'configuration')} on {count(n_seeds, 'seed')}"
         with run_study(
             study, out, jobs=jobs, backend=backend, address=address, accept_code=accept_code,
-            observer=observer, chosen=list(planned.values()),
+            observer=observer, chosen=list(planned.values()), title=title,
         ) as store:  # fmt: skip
             results = read(store)
         table = _table(results, points, range(first_seed, first_seed + n_seeds))

@@ -5,19 +5,23 @@ Statuses: 0 done, 1 a trial failed, 2 something the user can mend (one line on s
 module of that name in `commands`, which offers a click command called ``command``.
 """
 
+import codecs
 import os
 import sys
 import warnings
 from collections.abc import Callable, Sequence
 from importlib import import_module
+from typing import Any
 
 import click
 
-from ...core.plugins.messages import closest
+from ...core.plugins.settings import closest
 from ..errors import SpecError
 from .options import complete
 
 PROGRAM = "nested-agents"
+IN_ASCII = "nested-agents-ascii"
+"""Name of the error handler of the streams: a terminal that lacks dashes shows ``-`` for them."""
 
 COMMANDS: dict[str, str] = {
     "demo": "Train two e-Pucks to push a box: table, figures and replay.",
@@ -88,8 +92,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     warnings.filterwarnings("ignore", message=r"Glyph .* missing from font")
     for stream in (sys.stdout, sys.stderr):
         if getattr(stream, "errors", None) == "strict":
-            stream.reconfigure(errors="replace")  # type: ignore[union-attr]
+            stream.reconfigure(errors=IN_ASCII)  # type: ignore[union-attr]
     return run_to_status(PROGRAM, lambda: _run(arguments or ["--help"]))
+
+
+def _in_ascii(error: Any) -> tuple[str, int]:
+    """Return what stands for the characters that a terminal lacks, and where they end."""
+    lacking = error.object[error.start : error.end]
+    return "".join("-" if c in "–−" else "?" for c in lacking), error.end
+
+
+codecs.register_error(IN_ASCII, _in_ascii)
 
 
 def run_to_status(program: str, run: Callable[[], int]) -> int:

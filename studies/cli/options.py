@@ -154,7 +154,7 @@ where = click.option(
     metavar="CHOICE",
     help="Only the trials of a choice, a query of pandas: \"robots == 8 and box == 'circle'\".",
 )
-"""A part of the trials, see `nested_agents.studies.results.selection.chosen`."""
+"""A part of the trials, see `nested_agents.studies.results.results.chosen`."""
 
 
 def formats(*choices: str, text: str = "How to print it.") -> Decorator:

@@ -14,7 +14,7 @@ from html import escape
 from typing import Any, Literal
 
 from ...core.agents.cost import Problem
-from ...core.plugins.deferred import pd
+from ...core.numerics import pd
 from ...topologies.view import aligned, readable
 from ..presentation.row_formats import write_csv
 from ..presentation.tables import in_latex

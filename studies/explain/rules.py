@@ -18,10 +18,10 @@ from math import degrees
 import numpy as np
 
 from ...core.interface.spaces import Variable
-from ...core.numerics.arrays import FloatArray
-from ...core.plugins.deferred import pd
+from ...core.numerics import FloatArray, pd
 from ...core.rules.kernels.fuzzy import Partition
 from ...core.rules.rule_base import RuleBase
+from ..errors import WIDTH
 
 WORDS = {
     2: ("low", "high"),
@@ -29,8 +29,6 @@ WORDS = {
     5: ("very low", "low", "medium", "high", "very high"),
 }
 """Of membership functions on a line that have none of their own."""
-WIDTH = 80
-"""Of a line [characters]; columns that do not fit side by side follow below."""
 
 
 @dataclass(frozen=True)

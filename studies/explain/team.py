@@ -23,7 +23,7 @@ from ...core.agents.loop import world_seed
 from ...core.agents.team import Team, of_fuzzy_agents
 from ...core.interface.scenario import Scenario
 from ...core.interface.spaces import Variable
-from ...core.numerics.arrays import FloatArray
+from ...core.numerics import FloatArray
 from ...core.rules.rule_base import RuleBase
 from ...scenarios.checking.predictions import apart
 from ..errors import SpecError, refused

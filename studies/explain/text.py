@@ -9,12 +9,13 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
-from ...core.agents.joint_agents import body_of
-from ...core.plugins.deferred import pd
+from ...core.agents.loop import body_of
+from ...core.numerics import pd
+from ..errors import WIDTH
 from ..presentation import figures
 from ..presentation.figures import add_legend, look, marker
 from . import rules as explain_rules
-from .rules import WIDTH, exponent, percent
+from .rules import exponent, percent
 from .team import Bodies, Explanation
 
 MOST_AGENTS = 8

@@ -17,8 +17,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from ...core.interface.measures import Measure
-from ...core.plugins.deferred import pd
+from ...core.interface.scenario import Measure
+from ...core.numerics import pd
 
 Format = Literal["table", "csv", "json"]
 

@@ -14,11 +14,11 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from ...core.plugins.deferred import pd
-from ...core.plugins.messages import near
+from ...core.numerics import pd
+from ...core.plugins.settings import near
 from ..errors import SpecError
-from ..results.statistics import FEW, Estimate, exactly
-from ..results.summary import Summary, between, two_figures
+from ..results.analysis import Summary
+from ..results.statistics import FEW, Estimate, between, exactly, two_figures
 from .row_formats import in_csv
 from .words import count
 

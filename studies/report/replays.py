@@ -23,7 +23,8 @@ from ..errors import SpecError
 from ..presentation.words import count
 from ..results.results import read
 from ..store.durable import NotRecordedError, Recording
-from ..store.store import Planned, Store
+from ..store.schema import Planned
+from ..store.store import Store
 from ..trials.keeping import spec_of
 from ..trials.trial import Trial, trials_of
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
-from ...core.plugins.messages import closest, dotted, mistaken, near, place, rule
+from ...core.plugins.settings import closest, dotted, mistaken, near, place, rule
 from ..errors import show
 from .overlay import Slot, field_of, kind_of, model_at, models_of, registry_of
 

@@ -20,12 +20,11 @@ from typing import Annotated, Any
 
 from pydantic import Field, PrivateAttr, ValidationError, ValidationInfo, field_validator
 
-from ...core.agents.joint_agents import Agents
+from ...core.agents.loop import Agents
 from ...core.learners import LearnerSettings
-from ...core.plugins.messages import closest
-from ...core.plugins.settings import Settings, tuples
+from ...core.plugins.settings import Settings, closest, tuples
 from ...core.plugins.sources import Sources, is_reference, named
-from ...topologies.checks import listed
+from ...topologies.builders import listed
 from ..errors import SpecError, refused, show
 from .conditions import (
     SECTIONS,

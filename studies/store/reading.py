@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Self
 
-from ...core.interface.measures import Measure
+from ...core.interface.scenario import Measure
 from ..errors import SpecError
 from . import database, integrity
 from .database import DATABASE

@@ -14,7 +14,7 @@ from itertools import groupby
 from operator import itemgetter
 from typing import Any, NamedTuple
 
-from ...core.interface.measures import Measure
+from ...core.interface.scenario import Measure
 from .database import insert, quoted
 
 RESULTS_VERSION = 4

@@ -14,10 +14,9 @@ import numpy as np
 
 from ...core.agents.loop import policy_seed
 from ...core.agents.team import Team, of_fuzzy_agents
-from ...core.interface.measures import Measure, measures_of
-from ...core.interface.scenario import Actors, Scenario, carried_rows, lacking
+from ...core.interface.scenario import Actors, Measure, Scenario, carried_rows, lacking, measures_of
 from ...core.learners import LearnerSettings, TeamSettings, check_prediction
-from ...core.numerics.arrays import IntArray
+from ...core.numerics import IntArray
 from ...core.plugins.sources import format_error, place
 from ..errors import SpecError
 from ..spec.conditions import Condition, ConditionSettings, Stage

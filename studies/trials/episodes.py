@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ...core.interface.measures import Measure
-from ...core.interface.scenario import Transition
+from ...core.interface.scenario import Measure, Transition
 from ..errors import SpecError
 from ..store.schema import AFTER, BEFORE
 

@@ -9,8 +9,7 @@ from typing import Any
 
 from ...core.agents.loop import StepRecord, control_loop, world_seed
 from ...core.agents.team import Team
-from ...core.interface.measures import measures_of
-from ...core.interface.scenario import Actors, EpisodeRecorder, RecordedScenario
+from ...core.interface.scenario import Actors, EpisodeRecorder, RecordedScenario, measures_of
 from ..store.durable import TEAM, Recording
 from ..store.schema import EVALUATION, STAGE
 from .arrangement import Arrangement, arrange, teach, transfer

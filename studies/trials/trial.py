@@ -9,8 +9,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from ...core.interface.measures import Measure
-from ...core.interface.scenario import Scenario
+from ...core.interface.scenario import Measure, Scenario
 from ...core.plugins.sources import Sources, named
 from ..spec.conditions import ConditionSettings, Stage
 from ..spec.labels import lengths

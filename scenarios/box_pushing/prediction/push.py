@@ -15,8 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....core.numerics.arrays import FloatArray, IntArray
-from ....core.numerics.compiling import njit
+from ....core.numerics import FloatArray, IntArray, njit
 from ..world.geometry import LANES, nearest_points, surface
 from . import push_lanes as lanes
 from .push_lanes import BODY_SIZE, BOX_SIZE, MARGIN

@@ -10,7 +10,7 @@ is the oracle of the tests, `tests/scenarios/box_pushing/push_oracle.py`.
 
 import numpy as np
 
-from ....core.numerics.compiling import njit
+from ....core.numerics import njit
 from ..world.geometry import LANES, NEAREST_SIZE
 
 CREEP = 0.002

@@ -11,8 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....core.numerics.arrays import FloatArray, IntArray
-from ....core.numerics.compiling import njit
+from ....core.numerics import FloatArray, IntArray, njit
 
 SAME_TWIST = 1e-11
 """Twists [m/s, rad/s] that differ by less are one twist."""

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from ....core.plugins.messages import closest
+from ....core.plugins.settings import closest
 from ...api.study import run
 from ...claims import claims
 from ...errors import SpecError

@@ -8,7 +8,7 @@ import click
 from ...catalogue.study import published_part
 from ...errors import SpecError
 from ...presentation.row_formats import in_csv
-from ...results import marl_eval, published
+from ...results import published
 from ...results.results import read
 from ...spec.outline import StudyOutline
 from ...store import durable
@@ -55,7 +55,7 @@ def export(store: Store, folder: Path, form: Form, *, overwrite: bool = False) -
     form
         Of the files, and their suffix; JSON is the form of
         `nested_agents.studies.results.published`, marl-eval, ``marl-eval.json``, that of
-        `nested_agents.studies.results.marl_eval`.
+        `nested_agents.studies.results.published`.
     overwrite
         Whether files of these names may be replaced.
 
@@ -97,6 +97,6 @@ def _texts(store: Store, form: Form) -> dict[str, str]:
         return {"results.json": published.dumps(outline, kept)}
     if form == "marl-eval":
         kinds = {c: own["scenario"]["kind"] for c, own in store.settings().items()}
-        return {"marl-eval.json": marl_eval.dumps(results, kinds, outline.study)}
+        return {"marl-eval.json": published.dumps_marl_eval(results, kinds, outline.study)}
     frames = {"episodes.csv": results.episodes, "trials.csv": results.trials}
     return {name: in_csv(frame) for name, frame in frames.items()}

@@ -30,7 +30,7 @@ def command(directory: Path, form: Format, phase: str) -> int:
     """
     import sys
 
-    from ....core.plugins.messages import closest
+    from ....core.plugins.settings import closest
     from ...errors import SpecError
     from ...results.results import read
     from ..loading import opened

@@ -35,7 +35,7 @@ def command(
     from ...errors import SpecError
     from ...presentation.progress import Terminal
     from ...spec.spec import Spec
-    from ...store.store import DATABASE, SPEC_FILE
+    from ...store.database import DATABASE, SPEC_FILE
     from ..display import show_results
     from ..loading import trust_files
 

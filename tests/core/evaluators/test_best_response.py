@@ -7,22 +7,20 @@ import pytest
 
 from nested_agents.core.evaluators.best_response import BestResponse, BestResponseSettings
 from nested_agents.core.evaluators.evaluator import (
+    AutoSettings,
     DecisionProblem,
     Deliberation,
+    ExactEnumeration,
     Pooling,
     Rule,
+    Sampling,
+    SamplingSettings,
     ValueOf,
     concerned,
 )
-from nested_agents.core.evaluators.exact import (
-    AutoSettings,
-    ExactEnumeration,
-    Sampling,
-    SamplingSettings,
-)
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.interface.spaces import StateSpace, Variable
-from nested_agents.core.numerics.arrays import FloatArray
+from nested_agents.core.numerics import FloatArray
 from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
 
 A = 4

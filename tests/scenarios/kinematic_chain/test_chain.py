@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 import nested_agents as na
-from nested_agents.core.numerics.arrays import FloatArray
+from nested_agents.core.numerics import FloatArray
 from nested_agents.scenarios.kinematic_chain.config import KinematicChainSettings
 from nested_agents.scenarios.kinematic_chain.scenario import KinematicChain
 from nested_agents.scenarios.kinematic_chain.variables import CHAIN_VARIABLES, COMPILED, ChainView

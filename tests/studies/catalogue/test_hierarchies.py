@@ -7,12 +7,7 @@ import pytest
 from made_up_results import NOTHING, hierarchies
 
 from nested_agents.studies.catalogue import hierarchies as module
-from nested_agents.studies.catalogue.hierarchies import (
-    analyse,
-    check,
-    draw,
-    measure,
-)
+from nested_agents.studies.catalogue.hierarchies import analyse, check, draw, measure
 from nested_agents.studies.catalogue.study import drawn
 from nested_agents.studies.errors import SpecError
 from nested_agents.studies.presentation.figures import save

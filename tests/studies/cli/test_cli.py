@@ -20,7 +20,7 @@ from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli import commands
 from nested_agents.studies.cli.main import COMMANDS, main
 from nested_agents.studies.spec.spec import Spec
-from nested_agents.studies.store.store import DATABASE
+from nested_agents.studies.store.database import DATABASE
 
 
 @pytest.fixture(scope="module")

@@ -11,8 +11,9 @@ from nested_agents.studies.explain import team as explain
 from nested_agents.studies.explain import text as explain_text
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store import integrity
+from nested_agents.studies.store.database import DATABASE
 from nested_agents.studies.store.schema import RESULTS_VERSION
-from nested_agents.studies.store.store import DATABASE, Store
+from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.keeping import finished_trial
 from nested_agents.studies.trials.session import run_trial
 from nested_agents.studies.trials.trial import trials_of

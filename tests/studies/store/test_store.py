@@ -10,8 +10,9 @@ from nested_agents.studies.spec import spec as spec_module
 from nested_agents.studies.spec.spec import Spec
 from nested_agents.studies.store import durable, integrity
 from nested_agents.studies.store import store as store_module
+from nested_agents.studies.store.database import DATABASE, SPEC_FILE
 from nested_agents.studies.store.schema import RESULTS_VERSION
-from nested_agents.studies.store.store import DATABASE, SPEC_FILE, Store
+from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.keeping import pending, spec_of
 from nested_agents.studies.trials.trial import trials_of
 from nested_agents.studies.workers.runner import save

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from nested_agents.core.numerics.compiling import stamp
+from nested_agents.core.numerics import stamp
 
-ROOT = Path(__file__).resolve().parents[3]
-NJIT = "from nested_agents.core.numerics.compiling import njit\n"
+ROOT = Path(__file__).resolve().parents[2]
+NJIT = "from nested_agents.core.numerics import njit\n"
 CALLER = """from .inner.called import called
 
 
@@ -88,8 +88,8 @@ import sys
 import numpy as np
 from nested_agents.scenarios.box_pushing.prediction.predictors import push_model
 from nested_agents.scenarios.box_pushing.prediction.push import push
-from nested_agents.scenarios.box_pushing.world.boxes import BOXES
-from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
+from nested_agents.scenarios.box_pushing.world.bodies import BOXES
+from nested_agents.scenarios.box_pushing.world.bodies import ROBOTS
 
 rng = np.random.default_rng(0)
 model = push_model("push", [ROBOTS["e-puck"]] * 2, BOXES["square"])
@@ -121,6 +121,6 @@ def test_a_stamp_is_of_all_that_is_imported() -> None:
 def test_all_kernels_are_compiled_so() -> None:
     for folder in ("core", "scenarios", "topologies", "studies"):
         for path in (ROOT / folder).rglob("*.py"):
-            if path.name != "compiling.py":
+            if path.name != "numerics.py":
                 found = re.search(r"^\s*(from|import) numba\b.*", path.read_text(), re.MULTILINE)
                 assert found is None, f"{path}: {found and found[0]}; see core/numerics"

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from made_up_results import ablation
 
-from nested_agents.studies.results.comparison import (
+from nested_agents.studies.results.analysis import (
     Difference,
     difference,
     differences,
