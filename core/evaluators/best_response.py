@@ -136,11 +136,10 @@ class BestResponse(Aggregation):
         ]
         self._others = [np.setdiff1d(np.arange(n), free) for free in self._free]
         self._starts: dict[tuple[int, ...], IntArray] = {}
-        # Bodies in the order of decision of whom the first agent considers the others.
-        own = [self._own[i] for i in hierarchy.order]
-        self._bodies = [agents for agents in own if agents in groups]
-        if problem.value_of != "team":
-            self._bodies = []
+        # The bodies in the order of decision, if what one is worth to one agent is so to all.
+        whole = {*groups}
+        bodies = [own for i in hierarchy.order if (own := self._own[i]) in whole]
+        self._bodies = bodies if problem.value_of == "team" else []
         self._rank = {agents: k for k, agents in enumerate(self._bodies)}
         self._prediction: Prediction | None = None
         self._plans: dict[int, IntArray] = {}
@@ -285,7 +284,7 @@ class BestResponse(Aggregation):
         for i in free:
             bodies.setdefault(self._group_of[i], []).append(i)
         plan, value = self._started(deliberation, free), None
-        for body, members in self._sweeps * list(bodies.items()):
+        for members in self._sweeps * list(bodies.values()):
             worths = self._valued(deliberation, plan, tuple(members), value).ravel()
             distinct = self._told_apart(tuple(sorted(members)))[1]
             self.count(agent, len(distinct))
@@ -359,9 +358,10 @@ def _in_order(hierarchy: Hierarchy, agents: set[int]) -> tuple[int, ...]:
 
 
 def _with(joint_action: IntArray, changes: list[tuple[tuple[int, ...], IntArray]]) -> IntArray:
-    """Return the joint action ``(n,)`` with the actions ``(m, k)`` of some k agents, of others ..."""
-    joint = np.empty((sum(len(actions) for _, actions in changes), len(joint_action)), np.int64)
-    joint[:], at = joint_action, 0
+    """Return the joint action ``(n,)`` with some agents' actions ``(m, k)``, set by set of them."""
+    rows = sum(len(actions) for _, actions in changes)
+    joint, at = np.empty((rows, len(joint_action)), dtype=np.int64), 0
+    joint[:] = joint_action
     for agents, actions in changes:
         joint[at : at + len(actions), agents] = actions
         at += len(actions)
