@@ -25,13 +25,13 @@ import numpy as np
 from ...core.numerics import FloatArray, IntArray
 from ...core.plugins.deferred import optimize
 from ..errors import WIDTH, SpecError
-from ..presentation.words import count, duration
+from ..presentation.progress import count, duration
 from ..results.power import SMALLEST, USUAL_DEVIATION, power_text
 from ..spec.outline import StudyOutline
 from ..spec.spec import Spec
 from ..trials.session import Session, run_trial
 from ..trials.trial import Trial, trials_of
-from ..workers.worker import cores
+from ..workers.runner import cores
 from ..workers.workers import check_jobs
 from .run_study import examine
 

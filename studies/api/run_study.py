@@ -12,11 +12,10 @@ from ...core.plugins.sources import is_reference
 from ..catalogue.study import load_study, measured
 from ..spec.spec import Spec
 from ..store.store import Store
-from ..trials.arrangement import check
 from ..trials.keeping import open_to_run, pending
+from ..trials.session import check
 from ..trials.trial import Trial, trials_of
-from ..workers.runner import Backend, Observer, run_trials
-from ..workers.worker import RunTrial
+from ..workers.runner import Backend, Observer, RunTrial, run_trials
 from ..workers.workers import start_workers
 
 

@@ -16,8 +16,7 @@ from typing import Any, Literal
 from ...core.agents.cost import Problem
 from ...core.plugins.deferred import pd
 from ...topologies.view import aligned, readable
-from ..presentation.row_formats import write_csv
-from ..presentation.tables import in_latex
+from ..presentation.tables import in_latex, write_csv
 from .cost import PAPER, RULES, CostRow, cost_rows
 
 Form = Literal["table", "json", "csv", "latex"]

@@ -11,7 +11,7 @@ import pytest
 
 from nested_agents.core.agents.cost import Problem
 from nested_agents.core.evaluators.evaluator import Counts
-from nested_agents.studies.cli.commands.cost import numbers
+from nested_agents.studies.cli.commands.describing import numbers
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.cost.cost import (
     WAYS,
