@@ -30,9 +30,11 @@ from nested_agents.core.evaluators.evaluator import (
     DecisionProblem,
     Deliberation,
     Evaluator,
+    ExactEnumeration,
+    Sampling,
+    SamplingSettings,
     Teammates,
 )
-from nested_agents.core.evaluators.exact import ExactEnumeration, Sampling, SamplingSettings
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.learners.batch import BatchTDSettings
 from nested_agents.core.numerics import FloatArray

@@ -11,12 +11,11 @@ from pathlib import Path
 import click
 
 import nested_agents
-from nested_agents.core.interface.measures import Measure
+from nested_agents.core.interface.scenario import Measure
 from nested_agents.scenarios import SCENARIOS
 from nested_agents.scenarios.adapters.adapted import AdaptedWorld
 from nested_agents.scenarios.box_pushing.states.relational import STATE_VARIABLES
-from nested_agents.scenarios.box_pushing.world.boxes import BOXES
-from nested_agents.scenarios.box_pushing.world.robots import ROBOTS
+from nested_agents.scenarios.box_pushing.world.bodies import BOXES, ROBOTS
 from nested_agents.scenarios.kinematic_chain.variables import CHAIN_VARIABLES
 from nested_agents.studies.cli.main import COMMANDS
 from nested_agents.studies.cli.main import nested_agents as program
@@ -54,34 +53,27 @@ VARIABLES = {"box-pushing": STATE_VARIABLES, "kinematic-chain": CHAIN_VARIABLES}
 """State variables by the scenario that has them."""
 MODULES = {
     "core": ("How agents perceive, predict, decide and learn, and what that costs.", (
-        "interface.hierarchy", "interface.spaces", "interface.prediction",
-        "interface.scenario", "interface.measures", "agents.team",
-        "adaptation.mirror", "agents.loop", "decision.settings",
-        "decision.exploration", "rules.kernels.fuzzy", "rules.rule_base",
-        "learners.learner", "learners.td", "learners.batch", "learners.one_step",
-        "evaluators.evaluator", "evaluators.exact", "evaluators.best_response",
-        "evaluators.coordination", "evaluators.cross_entropy",
-        "coordination.maximisers", "adaptation.self_model",
-        "adaptation.calibration", "agents.cost", "plugins.registry",
-        "plugins.settings", "numerics",
-        "policies.settings", "policies.peer",
+        "interface.hierarchy", "interface.spaces", "interface.scenario", "agents.team",
+        "adaptation.mirror", "agents.loop", "decision.settings", "decision.exploration",
+        "rules.kernels.fuzzy", "rules.rule_base", "learners.learner", "learners.td",
+        "learners.batch", "evaluators.evaluator", "evaluators.best_response",
+        "evaluators.coordination", "evaluators.cross_entropy", "coordination.graphs",
+        "adaptation.self_model", "agents.cost", "plugins.registry", "plugins.settings",
+        "numerics", "policies.settings", "policies.peer",
     )),
-    "topologies": ("Who is above whom.", ("builders", "checks", "config", "drawing", "files")),
+    "topologies": ("Who is above whom.", ("builders", "config", "drawing", )),
     "scenarios": ("Where agents act.", (
-        "box_pushing.config", "box_pushing.world.settings", "box_pushing.prediction.settings",
-        "box_pushing.scenario", "box_pushing.environments", "adapters.passing_down",
-        "adapters.adapted", "adapters.settings",
-        "box_pushing.world.reward", "box_pushing.world.starts", "box_pushing.states.relational",
-        "box_pushing.states.state_spaces",
-        "box_pushing.prediction.predictors", "box_pushing.world.boxes",
-        "box_pushing.world.robots", "box_pushing.world.world",
+        "box_pushing.config", "box_pushing.world.settings",
+        "box_pushing.prediction.settings", "box_pushing.scenario",
+        "box_pushing.environments", "adapters.passing_down", "adapters.adapted",
+        "adapters.settings", "box_pushing.states.relational",
+        "box_pushing.states.state_spaces", "box_pushing.prediction.predictors",
+        "box_pushing.world.bodies", "box_pushing.world.world",
         "box_pushing.pictures.rendering", "box_pushing.options.config",
-        "box_pushing.options.pushing", "box_pushing.options.scenario",
-        "kinematic_chain.config", "kinematic_chain.scenario",
-        "kinematic_chain.variables", "matrix_games.scenario",
-        "line_up", "faults.settings", "faults.actuators",
-        "faults.carried", "faults.wrappers",
-        "state_variables", "checking.checker", "checking.sensing",
+        "box_pushing.options.scenario", "kinematic_chain.config",
+        "kinematic_chain.scenario", "kinematic_chain.variables", "matrix_games.scenario",
+        "line_up", "faults.settings", "faults.wrappers", "state_variables",
+        "checking.checker",
     )),
     "studies": ("What is measured, compared and drawn.", (
         "api.study", "api.teams", "api.planning", "cost.table", "api.recovery",

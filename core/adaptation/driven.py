@@ -12,9 +12,8 @@ import numpy as np
 
 from ..interface.scenario import Scenario, groups_of, roles_of
 from ..numerics import FloatArray, njit
-from ..rules.kernels.compact import active_compact
-from ..rules.kernels.fuzzy import Partition
-from ..rules.kernels.layout import Packed
+from ..rules.kernels.fuzzy import Packed, Partition
+from ..rules.kernels.states import active_compact
 from ..rules.rule_base import RuleBase
 
 

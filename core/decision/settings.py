@@ -3,8 +3,7 @@
 from typing import Annotated, Literal
 
 from ..evaluators import EVALUATORS, EvaluatorSettings
-from ..evaluators.evaluator import Plan, Teammates, Unseen, ValueOf
-from ..evaluators.exact import AutoSettings
+from ..evaluators.evaluator import AutoSettings, Plan, Teammates, Unseen, ValueOf
 from ..plugins.registry import Plugged
 from ..plugins.settings import Settings, unwritten
 

@@ -27,7 +27,7 @@ import numpy as np
 from pydantic import Field
 
 from ..interface.hierarchy import Hierarchy
-from ..interface.prediction import BestResponses, Exploring, Prediction
+from ..interface.spaces import BestResponses, Exploring, Prediction
 from ..numerics import FloatArray, IntArray, greatest
 from ..plugins.settings import unwritten
 from .evaluator import (

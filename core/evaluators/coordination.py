@@ -17,8 +17,8 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from ..coordination.maximisers import Elimination, MaxPlus, Scope
-from ..interface.prediction import Prediction
+from ..coordination.graphs import Elimination, MaxPlus, Scope
+from ..interface.spaces import Prediction
 from ..numerics import FloatArray, IntArray
 from .evaluator import Aggregation, DecisionProblem, Deliberation, EvaluatorSettings, combinations
 

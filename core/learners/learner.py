@@ -5,9 +5,8 @@ from typing import Annotated, ClassVar, Literal, Protocol
 
 from pydantic import Field
 
-from ..adaptation.calibration import CalibrationSettings
 from ..adaptation.predictors import GivenPredictor, Predictor
-from ..adaptation.self_model import SelfModelSettings
+from ..adaptation.self_model import CalibrationSettings, SelfModelSettings
 from ..decision.exploration import EXPLORATIONS, BurstExploration, ExplorationSettings
 from ..decision.settings import Decision
 from ..interface.spaces import ActionSet, StateSpace

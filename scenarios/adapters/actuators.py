@@ -9,7 +9,7 @@ from gymnasium.spaces import Box, Discrete
 
 from ...core.interface.spaces import ActionSet
 from ...core.numerics import FloatArray, IntArray
-from ..faults.carried import limits_of
+from ..faults.wrappers import limits_of
 
 
 class Actuators:

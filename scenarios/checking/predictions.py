@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from ...core.interface.prediction import Blocks, states_by_group
 from ...core.interface.scenario import Scenario, groups_of
+from ...core.interface.spaces import Blocks, states_by_group
 from ...core.numerics import BoolArray, FloatArray, IntArray
 
 MOST_JOINT_ACTIONS = 4**8

@@ -22,9 +22,8 @@ import numpy as np
 from ...core.agents.loop import EpisodeSummary
 from ...core.agents.team import Team
 from ...core.decision.exploration import Boltzmann, EpsilonDecreasingBoltzmann
-from ...core.evaluators.exact import ExactEnumeration
-from ...core.learners.one_step import FMQ, OptimisticTD
-from ...core.learners.td import Frozen, TDLambda
+from ...core.evaluators.evaluator import ExactEnumeration
+from ...core.learners.td import FMQ, Frozen, OptimisticTD, TDLambda
 from ...core.numerics import FloatArray, IntArray, njit
 
 BEST, UNIFORM, EMPIRICAL, CONDITIONAL = range(4)

@@ -18,8 +18,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from ...core.numerics import FloatArray
-from ...scenarios.faults.actuators import ActuatorFault
-from ...scenarios.faults.wrappers import FaultyEnv, FaultyParallelEnv
+from ...scenarios.faults.wrappers import ActuatorFault, FaultyEnv, FaultyParallelEnv
 from ..presentation.tables import SummaryTable, tabulate
 from ..results.analysis import Summary
 from ..results.statistics import NOT_NEGATIVE, bootstrap, rate

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 
-from ...core.interface.measures import Measure
+from ...core.interface.scenario import Measure
 from ...core.plugins.sources import is_reference
 from ..catalogue.study import load_study, measured
 from ..spec.spec import Spec

@@ -24,10 +24,9 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ...core.interface.measures import SUCCESS
-from ...core.interface.scenario import can_draw
+from ...core.interface.scenario import SUCCESS, can_draw
 from ...core.plugins.deferred import pd
-from ...core.plugins.messages import closest
+from ...core.plugins.settings import closest
 from ...core.plugins.sources import Sources
 from ..catalogue.study import analysed, drawn, load_study
 from ..errors import SpecError

@@ -54,7 +54,7 @@ def show_results(study: StudyResults, formats: Sequence[str] = ()) -> int:
     int
         1 if any trial failed, else 0.
     """
-    from ...topologies.checks import listed
+    from ...topologies.builders import listed
     from ..presentation import figures  # Matplotlib takes its time, for which no trial has to wait
     from ..presentation.progress import count, say
 

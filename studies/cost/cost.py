@@ -23,8 +23,7 @@ from itertools import chain
 from statistics import median
 
 from ...core.agents.cost import Problem, below_counts, is_chain
-from ...core.agents.joint_agents import join_agents
-from ...core.agents.loop import control_loop, policy_seed
+from ...core.agents.loop import control_loop, join_agents, policy_seed
 from ...core.agents.team import Team
 from ...core.decision.settings import Decision
 from ...core.evaluators.best_response import CUTS

@@ -21,9 +21,9 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from ...core.interface.measures import Measure
+from ...core.interface.scenario import Measure
 from ...core.plugins.deferred import pd
-from ...core.plugins.messages import near
+from ...core.plugins.settings import near
 from ..errors import SpecError
 from ..results.analysis import Summary
 from ..results.statistics import FEW, Estimate, between, exactly, two_figures

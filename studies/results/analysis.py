@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.interface.measures import SUCCESS
+from ...core.interface.scenario import SUCCESS
 from ...core.plugins.deferred import pd
 from ..errors import WIDTH
 from .power import SMALLEST, deviation_of, power_text

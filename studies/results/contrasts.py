@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...core.interface.measures import Measure
+from ...core.interface.scenario import Measure
 from ...core.plugins.deferred import pd, stats
-from ...core.plugins.messages import closest
+from ...core.plugins.settings import closest
 from ..errors import SpecError
 from ..spec.labels import aliases, label
 from .analysis import NOTHING, BySeed, Difference, Summary, differences, identity_lines, verdicts

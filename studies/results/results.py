@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.interface.measures import SUCCESS, Measure
+from ...core.interface.scenario import SUCCESS, Measure
 from ...core.plugins import sources
 from ...core.plugins.deferred import pd
 from ..errors import SpecError

@@ -17,8 +17,7 @@ from annotated_types import Ge, Gt, Le, Lt, MinLen
 from pydantic.fields import FieldInfo
 from typing_extensions import TypeAliasType
 
-from ...core.plugins.messages import near
-from ...core.plugins.settings import Settings
+from ...core.plugins.settings import Settings, near
 from .conditions import ConditionSettings, Override, StageSettings
 from .presets import PRESETS
 from .spec import Spec

@@ -22,19 +22,18 @@ from typing import Annotated, Any
 
 from pydantic import Field, PrivateAttr, ValidationError, ValidationInfo, field_validator
 
-from ...core.agents.joint_agents import Agents
+from ...core.agents.loop import Agents
 from ...core.decision.exploration import EXPLORATIONS
 from ...core.evaluators import EVALUATORS
 from ...core.interface.hierarchy import Hierarchy
 from ...core.learners import LEARNERS, LearnerSettings
 from ...core.plugins.deferred import nx
-from ...core.plugins.messages import closest
 from ...core.plugins.registry import Registry
-from ...core.plugins.settings import Settings, tuples
+from ...core.plugins.settings import Settings, closest, tuples
 from ...core.plugins.sources import Sources, is_reference, named
 from ...scenarios import SCENARIOS
 from ...topologies import TOPOLOGIES
-from ...topologies.checks import listed
+from ...topologies.builders import listed
 from ..errors import SpecError, refused, show
 from .conditions import (
     SECTIONS,

@@ -18,8 +18,8 @@ import tomli_w
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
-from ...core.plugins.messages import closest, dotted, mistaken, near, place, rule
 from ...core.plugins.registry import Plugged, SettingsRegistry
+from ...core.plugins.settings import closest, dotted, mistaken, near, place, rule
 from ..errors import show
 
 TomlTable = dict[str, Any]

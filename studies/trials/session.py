@@ -16,14 +16,15 @@ import numpy as np
 
 from ...core.agents.loop import StepRecord, control_loop, policy_seed, world_seed
 from ...core.agents.team import Team, of_fuzzy_agents
-from ...core.interface.measures import Measure, measures_of
 from ...core.interface.scenario import (
     Actors,
     EpisodeRecorder,
+    Measure,
     RecordedScenario,
     Scenario,
     carried_rows,
     lacking,
+    measures_of,
 )
 from ...core.learners import LearnerSettings, TeamSettings, check_prediction
 from ...core.numerics import IntArray

@@ -11,8 +11,7 @@ import pandas as pd
 import pytest
 
 import nested_agents as na
-from nested_agents.core.interface.measures import SUCCESS, Measure
-from nested_agents.core.interface.scenario import groups_of
+from nested_agents.core.interface.scenario import SUCCESS, Measure, groups_of
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings
 from nested_agents.scenarios.line_up import LineUp, LineUpSettings
 from nested_agents.studies.api.study import load

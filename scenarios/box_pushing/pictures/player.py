@@ -18,8 +18,7 @@ from typing import Any
 import numpy as np
 
 from ....core.numerics import FloatArray
-from ..world.boxes import box_for
-from ..world.robots import robot_for
+from ..world.bodies import box_for, robot_for
 
 Recording = Mapping[str, Any]
 

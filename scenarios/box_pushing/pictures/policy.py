@@ -20,10 +20,10 @@ from shapely.geometry import Point, Polygon
 from ....core.agents.team import Team
 from ....core.numerics import FloatArray
 from ..prediction.prediction import BoxPrediction
-from ..world.boxes import BoxSpec
+from ..world.bodies import BoxSpec
 from ..world.geometry import surface, wrap
 from ..world.settings import RobotSettings
-from ..world.starts import place
+from ..world.world import place
 from .rendering import BOX_COLOUR, curve
 
 AHEAD = 0.6

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ....core.numerics import FloatArray, njit
-from ..world.robots import resistance
+from ..world.bodies import resistance
 from ..world.settings import RobotSettings
 from .push import PushModel, pushed
 

@@ -22,8 +22,7 @@ import numpy as np
 
 from ....core.numerics import FloatArray, IntArray
 from ..states.relational import View
-from ..world.boxes import BoxSpec
-from ..world.robots import compliance
+from ..world.bodies import BoxSpec, compliance
 from ..world.settings import CONTROL_PERIOD, RobotSettings
 from ..world.world import WheelFailures, World, WorldState
 from .prediction import BoxPrediction

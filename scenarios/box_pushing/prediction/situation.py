@@ -8,8 +8,7 @@ from ....core.numerics import FloatArray
 from ..states.relational import View
 from ..states.state_spaces import BoxStateSpace
 from ..world.geometry import Outline
-from ..world.reward import Task
-from ..world.settings import InfraredSettings
+from ..world.settings import InfraredSettings, Task
 from .belief import PushBelief
 
 

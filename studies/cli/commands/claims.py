@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from ....core.plugins.messages import closest
+from ....core.plugins.settings import closest
 from ...api.study import run
 from ...claims.claims import PAPERS, PUBLISHED, QUICK, SPECS, judge, print_claims, studies_of
 from ...errors import SpecError

@@ -6,7 +6,6 @@ from typing import Any, Literal
 
 import click
 
-from ....core.plugins.messages import closest
 from ...errors import SpecError, refused
 from ...spec.outline import StudyOutline
 from ...store import durable
@@ -142,6 +141,7 @@ def results(directory: Path, form: Literal["table", "csv", "json"], phase: str) 
 
     DIR is where the study is kept.
     """
+    from ....core.plugins.settings import closest
     from ...presentation.tables import write_rows
     from ...results.results import read
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ....core.agents.joint_agents import Agents
+from ....core.agents.loop import Agents
 from ....core.interface.scenario import groups_of
 from ....topologies.view import Form, HierarchyView, kinds, printed, view
 from ...errors import SpecError, refused

@@ -7,18 +7,16 @@ import pytest
 
 from nested_agents.core.evaluators.best_response import BestResponse, BestResponseSettings
 from nested_agents.core.evaluators.evaluator import (
+    AutoSettings,
     DecisionProblem,
     Deliberation,
+    ExactEnumeration,
     Pooling,
     Rule,
-    ValueOf,
-    concerned,
-)
-from nested_agents.core.evaluators.exact import (
-    AutoSettings,
-    ExactEnumeration,
     Sampling,
     SamplingSettings,
+    ValueOf,
+    concerned,
 )
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.interface.spaces import StateSpace, Variable

@@ -85,7 +85,7 @@ def test_rewards_are_scaled_by_the_spread_of_returns() -> None:
 
 
 def test_an_extra_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(__import__("sys").modules, "nested_agents.core.policies.ppo", None)
+    monkeypatch.setitem(__import__("sys").modules, "nested_agents.core.policies.networks", None)
     with pytest.raises(SpecError, match=r"'ippo': needs the extra peers, pip install") as raised:
         check(spec_of("ippo"))
     assert "\n" not in str(raised.value)

@@ -20,7 +20,7 @@ from nested_agents.scenarios.box_pushing.states.state_spaces import (
     listed,
     state_space_for,
 )
-from nested_agents.scenarios.box_pushing.world.boxes import BOXES
+from nested_agents.scenarios.box_pushing.world.bodies import BOXES
 from nested_agents.scenarios.box_pushing.world.geometry import wrap
 from nested_agents.scenarios.state_variables import StateVariable, find_variable, sensed
 
