@@ -16,7 +16,7 @@ from collections import Counter
 from collections.abc import Callable, Generator, Iterator, Sequence
 from pathlib import Path
 
-from nested_agents.studies.api import run_study as studies_run
+from nested_agents.studies.api import running as studies_run
 from nested_agents.studies.cli.main import main as command_line
 from nested_agents.studies.store.store import Store
 from nested_agents.studies.trials.trial import Trial

@@ -76,8 +76,7 @@ MODULES = {
         "checking.checker",
     )),
     "studies": ("What is measured, compared and drawn.", (
-        "api.study", "api.teams", "api.planning", "cost.table", "api.recovery",
-        "api.run_study", "api.tuning",
+        "api.study", "api.teams", "api.running", "api.recovery", "api.tuning",
         "errors", "spec.spec", "spec.keys", "spec.presets", "trials.trial", "trials.session",
         "store.store", "results.results", "results.analysis", "results.statistics",
         "results.contrasts", "results.published", "results.power", "catalogue.study", "cost.cost",

@@ -430,7 +430,7 @@ def run(
         Where the study is kept; made if it does not exist. Every trial is kept the moment it
         finishes.
     jobs, backend, address, retry_failed, accept_code
-        As those of `nested_agents.studies.api.run_study.run_study`.
+        As those of `nested_agents.studies.api.running.run_study`.
     progress
         Whether to show how it goes.
     observer
@@ -448,7 +448,7 @@ def run(
     """
     from ..spec.spec import Spec
     from ..workers.runner import Observer
-    from .run_study import run_study
+    from .running import run_study
 
     out = Path(out)
     spec = Spec.read(spec, study=out)

@@ -25,7 +25,7 @@ from ..store import durable
 from ..trials.session import check
 from ..trials.trial import Trial, trials_of
 from ..workers.runner import Backend, Observer
-from .run_study import run_study
+from .running import run_study
 from .study import StudyResults, load
 
 FIRST_SEED = 10_000

@@ -17,7 +17,7 @@ from ..display import print_wrapped
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-    from ...cost.table import Form
+    from ...cost.cost import Form
 
 
 @click.command()
@@ -224,7 +224,7 @@ def cost(
 ) -> int:
     """Print the cost of hierarchies, by formula (Eq. 18-23) and, if asked, measured."""
     from ....core.agents.cost import Problem
-    from ...cost.table import cost_table, written
+    from ...cost.cost import cost_table, written
     from ...presentation.progress import say
 
     with refused():

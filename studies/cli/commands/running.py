@@ -122,10 +122,10 @@ def plan(spec: Path, changes: tuple[str, ...], **supposed: Any) -> int:
 
     SPEC.toml says what to run. Episodes of every condition are tried out for a second.
     """
-    from ...api import planning
+    from ...api import running
     from ...spec.spec import Spec
 
-    print(planning.plan(Spec.load(spec, changes), **supposed))
+    print(running.plan(Spec.load(spec, changes), **supposed))
     return 0
 
 

@@ -15,7 +15,7 @@ import made_up
 import pytest
 from made_up_commands import finish, heeding_interrupts, run_here, start, wait_for_results
 
-from nested_agents.studies.api import run_study as studies_run
+from nested_agents.studies.api import running as studies_run
 from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli import commands
 from nested_agents.studies.cli.main import COMMANDS, main

@@ -22,9 +22,9 @@ from nested_agents.studies.cost.cost import (
     measure,
     messages,
     step_formula,
+    written,
 )
 from nested_agents.studies.cost.figure import draw
-from nested_agents.studies.cost.table import written
 from nested_agents.studies.presentation import figures
 
 FIVE = ("chain", "teams", "tree:2", "star", "independent")

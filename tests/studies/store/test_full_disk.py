@@ -6,7 +6,7 @@ from contextlib import contextmanager
 import made_up
 import pytest
 
-from nested_agents.studies.api import run_study as studies_run
+from nested_agents.studies.api import running as studies_run
 from nested_agents.studies.catalogue import learning_curve
 from nested_agents.studies.cli.main import main
 from nested_agents.studies.spec.tables import dumps
