@@ -66,8 +66,8 @@ SPEC = Spec.of(
 EXPLAIN = "explain"
 TEAM = "na.load(...).team()"
 """No command: what a user reads in Python."""
-SLOW = 10.0
-"""Seconds after which an input counts as one that stalls the program."""
+SLOW, BLOCKED = 10.0, 60.0
+"""Seconds, of the processor and by the clock, after which an input counts as one that stalls."""
 
 Said = tuple[int, str, str]
 """Exit status, output and errors of a command."""
@@ -401,7 +401,7 @@ def hostile(number: int, rng: random.Random, folder: Path) -> Counter[str]:
         kind = list(makers)[attempt % len(makers)]
         tally[kind] += 1
         attack = next(makers[kind])
-        begin = time.monotonic()
+        begin, used = time.monotonic(), time.process_time()
         with warnings.catch_warnings(record=True) as warned:
             warnings.simplefilter("always")
             try:
@@ -409,7 +409,7 @@ def hostile(number: int, rng: random.Random, folder: Path) -> Counter[str]:
             except BaseException:
                 print(f"{kind}:\n{traceback.format_exc()}", file=sys.stderr)
                 became = "traceback"
-        if time.monotonic() - begin > SLOW:
+        if time.monotonic() - begin > BLOCKED or time.process_time() - used > SLOW:
             became = "stalled"
         if any(issubclass(w.category, RuntimeWarning) for w in warned):
             became = "warned"

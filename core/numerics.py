@@ -1,4 +1,4 @@
-"""The numerical ground: array types, the greatest of some values, random streams, kernels.
+"""The numerical ground: arrays, libraries that take their time, random streams, kernels.
 
 Kernels are compiled at their first call, by one process at a time, and cached on disk.
 
@@ -36,7 +36,7 @@ from collections.abc import Callable, Iterator
 from functools import cache, cached_property, update_wrapper
 from pathlib import Path
 from types import CodeType, FunctionType
-from typing import Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,6 +67,43 @@ DIVISION = {"error_model": "numpy"}
 """Division by zero gives what it gives in NumPy: that compiles sooner than raising an exception."""
 
 _threads = threading.RLock()
+
+
+class Deferred:
+    """A module that is imported when something of it is first asked for.
+
+    Parameters
+    ----------
+    name
+        Its full name.
+
+    Examples
+    --------
+    >>> math = Deferred("math")
+    >>> math.floor(2.5)
+    2
+    """
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def __getattr__(self, attribute: str) -> Any:
+        """Return what the module has by this name."""
+        if attribute.startswith("__"):  # asked by who inspects the object, not by who uses it
+            raise AttributeError(attribute)
+        return getattr(importlib.import_module(self._name), attribute)
+
+
+if TYPE_CHECKING:
+    import networkx as nx
+    import pandas as pd
+    from scipy import optimize, special, stats
+else:
+    nx, pd = Deferred("networkx"), Deferred("pandas")
+    optimize, special, stats = map(Deferred, ("scipy.optimize", "scipy.special", "scipy.stats"))
+
+__all__ = ["nx", "optimize", "pd", "special", "stats"]
+"""Libraries that take their time are imported when something of them is first asked for."""
 
 
 def greatest(values: FloatArray, rng: np.random.Generator) -> int:

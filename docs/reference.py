@@ -54,12 +54,12 @@ VARIABLES = {"box-pushing": STATE_VARIABLES, "kinematic-chain": CHAIN_VARIABLES}
 MODULES = {
     "core": ("How agents perceive, predict, decide and learn, and what that costs.", (
         "interface.hierarchy", "interface.spaces", "interface.scenario", "agents.team",
-        "adaptation.mirror", "agents.loop", "decision.settings", "decision.exploration",
+        "adaptation.predictors", "agents.loop", "decision.exploration",
         "rules.kernels.fuzzy", "rules.rule_base", "learners.learner", "learners.td",
         "learners.batch", "evaluators.evaluator", "evaluators.best_response",
-        "evaluators.coordination", "evaluators.cross_entropy", "coordination.graphs",
-        "adaptation.self_model", "agents.cost", "plugins.registry", "plugins.settings",
-        "numerics", "policies.settings", "policies.peer",
+        "evaluators.coordination", "coordination.graphs", "adaptation.self_model",
+        "agents.cost", "plugins.registry", "plugins.settings", "numerics",
+        "policies.settings", "policies.peer",
     )),
     "topologies": ("Who is above whom.", ("builders", "config", "drawing", )),
     "scenarios": ("Where agents act.", (

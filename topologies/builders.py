@@ -22,7 +22,7 @@ from typing_extensions import TypeAliasType
 from ..core.coordination import graphs
 from ..core.coordination.graphs import Shape
 from ..core.interface.hierarchy import Hierarchy
-from ..core.plugins.deferred import nx
+from ..core.numerics import nx
 from ..core.plugins.settings import Fraction, unwritten
 
 

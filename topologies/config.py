@@ -26,8 +26,8 @@ from pydantic import model_validator
 from ..core.agents.messages import AbsentAgents, AnyMessageFailure
 from ..core.coordination.graphs import Shape, oriented
 from ..core.interface.hierarchy import Considers, Hierarchy, Told
+from ..core.numerics import nx
 from ..core.plugins import registry, sources
-from ..core.plugins.deferred import nx
 from ..core.plugins.registry import Plugged, SettingsRegistry
 from ..core.plugins.settings import Settings, SettingsError, closest, tuples, unwritten
 from .builders import (

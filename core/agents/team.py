@@ -9,8 +9,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from ..adaptation.mirror import Mirror
-from ..adaptation.predictors import GivenPredictor
+from ..adaptation.predictors import GivenPredictor, Mirror
 from ..adaptation.self_model import Calibration, SelfModel
 from ..decision.exploration import Explorer
 from ..evaluators.evaluator import NOTHING_GIVEN, DecisionProblem, Deliberation, Evaluator

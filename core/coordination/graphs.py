@@ -24,8 +24,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ..numerics import FloatArray, IntArray
-from ..plugins.deferred import nx
+from ..numerics import FloatArray, IntArray, nx
 
 Scope = tuple[int, ...]
 

@@ -198,7 +198,7 @@ EVALUATORS = SettingsRegistry(
         "variable-elimination": f"{__package__}.coordination:VariableEliminationSettings",
         "max-plus": f"{__package__}.coordination:MaxPlusSettings",
         "best-response": f"{__package__}.best_response:BestResponseSettings",
-        "cross-entropy": f"{__package__}.cross_entropy:CrossEntropySettings",
+        "cross-entropy": f"{__package__}.coordination:CrossEntropySettings",
     },
     EvaluatorSettings,
 )

@@ -72,7 +72,7 @@ class Scenario(Protocol):
         = "scenario"`` joins.
     ``partners()``
         For every agent the one in whose place it stands in the mirror, or a ValueError of one line
-        if an agent has none: experience can be mirrored, see `core.adaptation.mirror`.
+        if an agent has none: experience can be mirrored, see `core.adaptation.predictors`.
     ``horizon``
         Decisions that its predictions look ahead, while nobody changes what it does after the
         first; 1 without. By that a check judges how far they are off. Then all are neutral; where

@@ -31,7 +31,6 @@ import numpy as np
 from pydantic import Field
 
 from ..decision.exploration import EXPLORATIONS, BurstExploration, ExplorationSettings
-from ..decision.settings import Decision
 from ..evaluators.evaluator import Counts, Deliberation
 from ..interface.spaces import ActionSet, StateSpace, choice
 from ..numerics import FloatArray, IntArray, njit
@@ -39,7 +38,7 @@ from ..plugins.registry import Plugged
 from ..plugins.settings import Fraction, Positive
 from ..rules.kernels.fuzzy import Partition
 from ..rules.rule_base import RuleBase
-from .learner import LearnerSettings
+from .learner import Decision, LearnerSettings
 
 TERMINAL, CUT_OFF = -1, -2
 """In place of the index of the next after-state: it is entered for ever; it is not known."""

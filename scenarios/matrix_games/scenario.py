@@ -54,8 +54,7 @@ from ...core.agents.team import Team
 from ...core.coordination.graphs import Elimination, Shape, shaped
 from ...core.interface.scenario import SUCCESS, Measure, Transition
 from ...core.interface.spaces import ActionSet, StateSpace, Variable, choice
-from ...core.numerics import FloatArray, IntArray
-from ...core.plugins.deferred import nx
+from ...core.numerics import FloatArray, IntArray, nx
 from ...core.plugins.settings import NonNegative, ScenarioSettings, closest
 
 OF_OPTIMA = (

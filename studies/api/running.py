@@ -27,8 +27,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...core.interface.scenario import Measure
-from ...core.numerics import FloatArray, IntArray
-from ...core.plugins.deferred import optimize
+from ...core.numerics import FloatArray, IntArray, optimize
 from ...core.plugins.sources import is_reference
 from ..catalogue.study import load_study, measured
 from ..errors import WIDTH, SpecError

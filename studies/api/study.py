@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...core.interface.scenario import SUCCESS, can_draw
-from ...core.plugins.deferred import pd
+from ...core.numerics import pd
 from ...core.plugins.settings import closest
 from ...core.plugins.sources import Sources
 from ..catalogue.study import analysed, drawn, load_study

@@ -9,7 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from ...core.plugins.deferred import pd
+from ...core.numerics import pd
 from ...core.plugins.sources import Sources
 from ..errors import SpecError, show
 from ..presentation.progress import Terminal

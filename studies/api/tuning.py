@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ...core.interface.scenario import roles_of
-from ...core.plugins.deferred import pd
+from ...core.numerics import pd
 from ..errors import SpecError, show
 from ..presentation.progress import Terminal, count
 from ..results.results import Results, read

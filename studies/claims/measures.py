@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...core.agents.cost import Problem
-from ...core.plugins.deferred import pd
+from ...core.numerics import pd
 from ..catalogue.chain_order import order_tests
 from ..catalogue.shapes import ratios_of
 from ..catalogue.wheel_failure import courses_of

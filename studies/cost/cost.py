@@ -34,14 +34,14 @@ from typing import Any, Literal
 from ...core.agents.cost import Problem, below_counts, is_chain
 from ...core.agents.loop import control_loop, join_agents, policy_seed
 from ...core.agents.team import Team
-from ...core.decision.settings import Decision
 from ...core.evaluators.best_response import CUTS
 from ...core.evaluators.coordination import MaxPlusSettings
 from ...core.evaluators.evaluator import Counts
 from ...core.interface.hierarchy import Hierarchy
 from ...core.interface.scenario import Scenario
+from ...core.learners.learner import Decision
 from ...core.learners.td import TDLambdaSettings
-from ...core.plugins.deferred import pd
+from ...core.numerics import pd
 from ...core.rules.rule_base import RuleBaseSettings
 from ...scenarios.line_up import LineUp, LineUpSettings
 from ...topologies import build, parse

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from ...core.agents.loop import body_of
-from ...core.plugins.deferred import pd
+from ...core.numerics import pd
 from ..errors import WIDTH
 from ..presentation import figures
 from ..presentation.figures import add_legend, look, marker

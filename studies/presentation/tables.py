@@ -22,7 +22,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from ...core.interface.scenario import Measure
-from ...core.plugins.deferred import pd
+from ...core.numerics import pd
 from ...core.plugins.settings import near
 from ..errors import SpecError
 from ..results.analysis import Summary

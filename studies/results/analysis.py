@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.interface.scenario import SUCCESS
-from ...core.plugins.deferred import pd
+from ...core.numerics import pd
 from ..errors import WIDTH
 from .power import SMALLEST, deviation_of, power_text
 from .results import Results

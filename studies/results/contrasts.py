@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...core.interface.scenario import Measure
-from ...core.plugins.deferred import pd, stats
+from ...core.numerics import pd, stats
 from ...core.plugins.settings import closest
 from ..errors import SpecError
 from ..spec.labels import aliases, label

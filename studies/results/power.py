@@ -16,7 +16,7 @@ from textwrap import wrap
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...core.plugins.deferred import special
+from ...core.numerics import special
 from ..errors import WIDTH
 from .statistics import EXACT, LEVEL, two_figures
 

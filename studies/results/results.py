@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.interface.scenario import SUCCESS, Measure
+from ...core.numerics import pd
 from ...core.plugins import sources
-from ...core.plugins.deferred import pd
 from ..errors import SpecError
 from ..spec.labels import label
 from ..spec.tables import flat

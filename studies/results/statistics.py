@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...core.plugins.deferred import special, stats
+from ...core.numerics import special, stats
 
 Array = NDArray[np.float64]
 

@@ -27,7 +27,7 @@ from ...core.decision.exploration import EXPLORATIONS
 from ...core.evaluators import EVALUATORS
 from ...core.interface.hierarchy import Hierarchy
 from ...core.learners import LEARNERS, LearnerSettings
-from ...core.plugins.deferred import nx
+from ...core.numerics import nx
 from ...core.plugins.registry import Registry
 from ...core.plugins.settings import Settings, closest, tuples
 from ...core.plugins.sources import Sources, is_reference, named

@@ -6,6 +6,7 @@ trial, its bits are the same: each trial has a process to itself, linear algebra
 
 import os
 import time
+import warnings
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Future
 from contextlib import contextmanager
@@ -74,6 +75,9 @@ def start_workers(
 QUIET = "ignore:resource_tracker:UserWarning"
 """The process that tidies up after a killed run would complain at length of what it tidies up."""
 
+REPLACED = "A worker stopped while some jobs were given to the executor"
+"""What loky says when it replaces a process that has grown by 300 MB, as PyTorch makes it grow."""
+
 THREADS = ("BLIS_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "NUMBA_NUM_THREADS", "NUMEXPR_NUM_THREADS")
 """What tells other libraries to use one thread, beside `ONE_THREAD`."""
 
@@ -102,6 +106,7 @@ class LokyWorkers(Workers):
     def __init__(self, jobs: int) -> None:
         self.processes = jobs
         self._executor: Any = None
+        warnings.filterwarnings("ignore", REPLACED)
         filters = os.environ.get("PYTHONWARNINGS", "")
         if QUIET not in filters:  # processes that are started from here on inherit it
             os.environ["PYTHONWARNINGS"] = f"{filters},{QUIET}".lstrip(",")

@@ -53,8 +53,7 @@ from shapely.geometry import Polygon
 from shapely.geometry.polygon import orient
 from shapely.validation import explain_validity
 
-from ....core.numerics import FloatArray, IntArray, njit
-from ....core.plugins.deferred import nx
+from ....core.numerics import FloatArray, IntArray, njit, nx
 from ....core.plugins.settings import closest, tuples
 from .geometry import Outline, ring_edges
 from .settings import GRAVITY, BoxSettings, RobotSettings

@@ -19,8 +19,7 @@ import numpy as np
 from ....core.agents.loop import StepRecord
 from ....core.agents.team import of_fuzzy_agents
 from ....core.interface.scenario import groups_of
-from ....core.numerics import FloatArray
-from ....core.plugins.deferred import pd
+from ....core.numerics import FloatArray, pd
 from ...results.analysis import EVALUATED, Analysis, Figures, Sizes, Summary, evaluated, shared
 from ...results.results import Results
 from ...results.statistics import NOT_NEGATIVE, Estimate, bootstrap, exactly, rate

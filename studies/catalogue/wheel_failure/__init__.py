@@ -22,7 +22,7 @@ import numpy as np
 from ....core.agents.team import Team, of_fuzzy_agents
 from ....core.learners.learner import LearnerSettings
 from ....core.learners.td import FrozenSettings
-from ....core.plugins.deferred import pd
+from ....core.numerics import pd
 from ...errors import SpecError
 from ...results.analysis import Analysis, Figures, Pair, Summary, differences, verdicts
 from ...results.results import Results

@@ -23,10 +23,10 @@ from nested_agents.core.agents.loop import (
 )
 from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.exploration import BurstExploration
-from nested_agents.core.decision.settings import Decision
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.interface.scenario import EmbodiedScenario, Scenario, roles_of
 from nested_agents.core.learners.batch import BatchTDSettings
+from nested_agents.core.learners.learner import Decision
 from nested_agents.core.learners.td import FrozenSettings, TDLambdaSettings
 from nested_agents.core.rules.rule_base import RuleBaseSettings
 from nested_agents.scenarios.box_pushing.config import BoxPushingSettings

@@ -13,7 +13,6 @@ from nested_agents.core.agents.loop import control_loop, join_agents
 from nested_agents.core.agents.messages import AbsentAgents, LostMessages
 from nested_agents.core.agents.team import Team
 from nested_agents.core.decision.exploration import BurstExploration
-from nested_agents.core.decision.settings import Decision
 from nested_agents.core.evaluators.evaluator import (
     Counts,
     EvaluatorSettings,
@@ -24,6 +23,7 @@ from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.interface.scenario import carried_rows
 from nested_agents.core.interface.spaces import ActionSet, StateSpace
 from nested_agents.core.learners import LEARNERS, LearnerSettings
+from nested_agents.core.learners.learner import Decision
 from tests.scenarios.test_examples import Tank
 
 PAPER = {"kind": "paper", "decay": 0.05, "clock": "episode"}

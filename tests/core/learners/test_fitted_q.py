@@ -5,11 +5,11 @@ import pytest
 
 from nested_agents.core.agents.messages import LostMessages
 from nested_agents.core.agents.team import Team
-from nested_agents.core.decision.settings import Decision
 from nested_agents.core.evaluators.evaluator import Deliberation
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.interface.spaces import ActionSet, StateSpace, Variable
 from nested_agents.core.learners.batch import REWARD_SCALE, FittedQ, FittedQSettings
+from nested_agents.core.learners.learner import Decision
 from nested_agents.core.rules.rule_base import RuleBase, RuleBaseSettings
 from nested_agents.scenarios.matrix_games.scenario import TeamGameSettings
 from nested_agents.studies.spec.spec import Spec

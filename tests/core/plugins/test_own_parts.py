@@ -184,7 +184,7 @@ def test_settings_are_read_without_numba_and_scipy() -> None:
     assert len(models) >= 12
     program = """
 import sys
-import nested_agents.core.decision.settings
+import nested_agents.core.learners.learner
 from nested_agents.core.evaluators import EVALUATORS
 from nested_agents.core.decision.exploration import EXPLORATIONS
 from nested_agents.core.learners import LEARNERS

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from nested_agents.core.adaptation.mirror import Mirror
+from nested_agents.core.adaptation.predictors import Mirror
 from nested_agents.core.agents.team import Team
 from nested_agents.core.interface.hierarchy import Hierarchy
 from nested_agents.core.learners.batch import BatchTDSettings
