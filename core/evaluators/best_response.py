@@ -257,7 +257,8 @@ class BestResponse(Aggregation):
             predicted = distinct[distinct != planned]
             parts.append((agents, alike, planned, predicted))
             changes.append((agents, self._actions[len(agents)][predicted]))
-        varied, worths, at = _with(plan, changes), {}, 0
+        worths: dict[tuple[int, ...], FloatArray] = {}
+        varied, at = _with(plan, changes), 0
         found = self.predicted_worth(deliberation, varied) if len(varied) else np.empty(0)
         for agents, alike, planned, predicted in parts:
             each = np.empty(len(alike))
